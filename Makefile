@@ -21,7 +21,7 @@ PAGES_VENV := $(CURDIR)/.venv-pages
 # Which tests of a part to run: arguments of cargo test for unit, fuzz-replay and miri; of pytest, in
 # the folder of the tests, for e2e, python, pages and firmware-test.
 T =
-# What `make check` leaves to `make test`: the tests of Rust that take seconds.
+# Tests in Rust that take seconds. `make check` leaves them out, `make test` runs them.
 QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header)
 # Tests that pytest runs at a time. Most of them wait.
 WORKERS ?= 4
@@ -106,7 +106,7 @@ pages: $(PAGES_VENV)/ready ## 3 min: every code block of README and docs runs
 	$(PAGES_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-# That the header is up to date is a test of unit.
+# Whether the header is up to date is tested in unit.
 ffi-test: ## 2 min: the C face: sanitizers, valgrind, C against the program
 	$(PROGRAM)
 	CARGO="$(CARGO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
@@ -150,11 +150,11 @@ fuzz: nightly ## every fuzz target for SECONDS=60 each
 	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz
 	NIGHTLY=$(NIGHTLY) fuzz/run $(SECONDS)
 
-# Memory and descriptors do not grow.
+# Checks that memory and descriptors do not grow.
 soak: ## a million exchanges with a thousand reconnects
 	$(CARGO) test --release --locked -p motorlink --all-features --test soak -- --ignored --nocapture
 
-# Fails with a seed and a trace where a promise is broken.
+# Fails with a seed and a trace if a guarantee is violated.
 reliability: ## 100 million exchanges on bad lines, docs/RELIABILITY.md
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
 
@@ -163,14 +163,15 @@ bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in 
 		echo "valgrind cannot be installed: instructions are not counted"
 	$(CARGO) run --release --locked -p motorlink-bench -- all
 
-# The package as users have it, and what it is compared with. The benchmark goes on without it.
+# Installs the Python package and its competitors. If this fails, the benchmark continues without
+# them.
 bench-python:
 	rm -f $(BENCH_VENV)/motorlink
 	{ test -x $(BENCH_VENV)/bin/python || $(PYTHON) -m venv $(BENCH_VENV); } && \
 		$(BENCH_VENV)/bin/python -m pip install --quiet . pyserial==3.5 && touch $(BENCH_VENV)/motorlink || \
 		echo "PYTHON IS NOT MEASURED: the package cannot be installed into $(BENCH_VENV)" >&2
 
-# The other simulators, for comparison. The benchmark goes on without them.
+# Installs the other simulators for comparison. If this fails, the benchmark continues without them.
 $(BENCH_VENV)/ready: benchmarks/requirements.txt
 	rm -f $@
 	{ $(PYTHON) -m venv $(BENCH_VENV) && $(BENCH_VENV)/bin/python -m pip install --quiet -r $< && touch $@; } || \
@@ -212,13 +213,13 @@ install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGE
 
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
 	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
-
+Checks the version in rust-version.
 # What rust-version promises.
 oldest: ## compiles the workspace with the oldest Rust that is meant to work
 	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \
 		rustup toolchain install --profile minimal $$rust && \
 		$(CARGO) +$$rust check --workspace --all-features --locked --target-dir target/oldest
-
+Finds incompatible changes that the version number does not allow.
 # Breaks that the version number does not allow.
 semver: ## the public interface against the last release
 	@release=$$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null) || \
@@ -235,14 +236,14 @@ clean: ## removes all that was built or installed into this folder
 	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) probe/target fuzz/target firmware/target
 
 # ---- What they need ----
-
+For systems where rustup does not install the toolchain of rust-toolchain.toml automatically.
 # Where rustup does not install by itself what rust-toolchain.toml names.
 toolchain:
 	@! command -v rustup >/dev/null || rustup which rustc >/dev/null 2>&1 || rustup toolchain install
 
 nightly:
 	@$(NIGHTLY_READY)
-
+Runs before the parts, because sudo may ask for a password. Each part reports missing packages.
 # Before the parts, because sudo may ask for a password. A part says what is still missing.
 packages:
 	$(WHOLE)

@@ -177,7 +177,7 @@ def midpoint(rhs, span, state, max_step):
 
 
 class OpenLoop:
-    """Stands in for motulator's control: voltages that turn with the rotor, and nothing kept."""
+    """Replaces motulator's control: voltages in the rotor's frame, without a history."""
 
     def __init__(self, machine):
         self.duty = complex(machine.vd, machine.vq) / machine.bus

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs parts of `make test`, two at a time, and says how long each took.
+"""Runs parts of `make test`, two at a time, and prints the duration of each.
 
 A part is a target of the Makefile. Its output goes to target/parts/PART.log and is printed when the
 part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
@@ -20,7 +20,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 LOGS = REPOSITORY / "target/parts"
-#: A part that takes longer hangs, s.
+#: A part that takes longer than this hangs, s.
 LIMIT = 3600
 
 
@@ -58,7 +58,7 @@ class Run:
         self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
 
     def end(self):
-        """Ends what still runs of it."""
+        """Ends its processes."""
         for sign in (signal.SIGTERM, signal.SIGKILL):
             try:
                 os.killpg(self.process.pid, sign)

@@ -14,7 +14,7 @@ use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
 use crate::result::Result;
 
-/// Instructions that an exchange has to stay below.
+/// Maximum number of instructions of an exchange.
 const MOST: f64 = 1_500.0;
 /// Time between two exchanges, for the simulated drive.
 const PERIOD: Micros = Micros(100);
@@ -66,7 +66,7 @@ pub fn kernels() -> [Kernel; 2] {
     [with_memory, with_simulation]
 }
 
-/// On a line that no other master has used.
+/// A master on a line without former masters.
 fn master() -> Master {
     let mut master = Master::new(MasterConfig::default());
     master.trust_line();
@@ -100,7 +100,7 @@ fn exchange(
     }
 }
 
-/// A drive that does nothing but keep registers.
+/// A drive that only stores registers.
 struct Memory {
     registers: [i32; 256],
 }

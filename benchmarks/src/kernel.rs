@@ -1,4 +1,4 @@
-//! Small pieces of work, timed here and counted by callgrind.
+//! Small kernels, timed here and counted by callgrind.
 
 use std::env::current_exe;
 use std::hint::black_box;
@@ -13,10 +13,10 @@ const BATCH: u32 = 1_000;
 /// Repetitions in the shorter of the two counted runs.
 const COUNTED: u32 = 1_000;
 
-/// What [`Cost::show`] has in place of a count when valgrind is missing.
+/// The text of [`Cost::show`] in place of a count without valgrind.
 pub const NOT_COUNTED: &str = "not measured: install valgrind";
 
-/// A piece of work that can be repeated.
+/// Work that can be repeated.
 pub struct Kernel {
     pub name: String,
     run: Box<dyn FnMut(u32)>,
@@ -32,7 +32,7 @@ impl Kernel {
         (self.run)(black_box(count));
     }
 
-    /// Times it, and counts it if there is a counter.
+    /// Measures the time, and the instructions if there is a counter.
     pub fn cost(mut self, counter: Option<&Counter>) -> Result<Cost> {
         self.repeat(BATCH);
         let mut batches: Vec<f64> = (0..BATCHES)
@@ -48,7 +48,7 @@ impl Kernel {
     }
 }
 
-/// What one repetition takes.
+/// The cost of one repetition.
 pub struct Cost {
     least_ns: f64,
     median_ns: f64,
@@ -71,7 +71,7 @@ impl Cost {
 pub struct Counter(());
 
 impl Counter {
-    /// `None`, loudly, when valgrind is not installed.
+    /// `None` with a warning if valgrind is not installed.
     pub fn find() -> Option<Self> {
         let valgrind = Command::new("valgrind").arg("--version").stdout(Stdio::null()).status();
         if valgrind.is_ok_and(|status| status.success()) {
@@ -81,8 +81,8 @@ impl Counter {
         None
     }
 
-    /// Instructions of one repetition: a run with twice the repetitions against one, so that start
-    /// and end cancel out.
+    /// Instructions of one repetition: the difference of a run with twice the repetitions and a run
+    /// with one, so that start and end cancel.
     fn count(&self, kernel: &str) -> Result<f64> {
         let once = Self::spawn(kernel, COUNTED)?;
         let twice = Self::spawn(kernel, 2 * COUNTED)?;
@@ -109,7 +109,7 @@ fn collected(run: Child) -> Result<u64> {
     total(&log).ok_or_else(|| format!("callgrind gave no count:\n{log}").into())
 }
 
-/// The count in what callgrind prints at its end: `==PID== Collected : 126651`.
+/// The count in callgrind's last output: `==PID== Collected : 126651`.
 fn total(log: &str) -> Option<u64> {
     let (_, count) = log.lines().find_map(|line| line.split_once("Collected : "))?;
     count.trim().parse().ok()

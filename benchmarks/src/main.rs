@@ -1,5 +1,5 @@
-//! The benchmark: what encoding, exchanges and cycles cost, and how near they come to what the
-//! machine and the wire allow. `make bench` runs it.
+//! The benchmark: the cost of encoding, exchanges and cycles, compared with the limits of the
+//! machine and the wire. `make bench` runs it.
 
 mod can;
 mod codec;
@@ -17,13 +17,13 @@ use clap::{Parser, Subcommand};
 use report::{Goal, Section, Style};
 use result::Result;
 
-/// Measures Motorlink on this machine. A goal that is missed is said so; the exit code stays 0.
+/// Measures Motorlink on this machine. Reports missed goals; the exit code is 0 nevertheless.
 #[derive(Parser)]
 #[command(name = "motorlink-bench")]
 struct Args {
     #[command(subcommand)]
     what: What,
-    /// Print Markdown, with the command and the machine, as docs/BENCHMARKS.md has it
+    /// Print Markdown, with the command and the machine, for docs/BENCHMARKS.md
     #[arg(long, global = true)]
     markdown: bool,
 }
@@ -40,9 +40,9 @@ enum What {
     Can,
     /// Instructions of an ST exchange, master and slave together
     Exchange,
-    /// Exchanges per second through Python, beside pyserial
+    /// Exchanges per second through Python, compared with pyserial
     Python,
-    /// Simulated drives against real time, and beside other simulators
+    /// Simulated drives compared with real time and with other simulators
     Simulation,
     /// Repeats one piece of work, to be counted from outside
     #[command(hide = true)]
@@ -50,12 +50,12 @@ enum What {
     /// Measures one line for a while, in a process of its own
     #[command(hide = true)]
     Sitting { line: String },
-    /// Answers on so many ptys until standard input ends
+    /// Replies on this number of ptys until the end of standard input
     #[command(hide = true)]
     Respond { count: u32 },
 }
 
-/// One part of the benchmark: its tables, and what became of its goals.
+/// One part of the benchmark: its tables, and the results of its goals.
 type Part = fn() -> Result<(Vec<Section>, Vec<Goal>)>;
 
 fn main() -> Result<()> {

@@ -1,4 +1,4 @@
-//! Exchanges per second through Python, measured by bench/python/exchange.py in a process of its own.
+//! Exchanges per second through Python, measured by bench/python/exchange.py in its own process.
 
 use std::env::current_exe;
 use std::path::Path;
@@ -14,15 +14,15 @@ use crate::result::Result;
 const ROUNDS: u32 = 400;
 /// Exchanges in a round.
 const EXCHANGES: u32 = 200;
-/// How many times as fast the package has to be as pyserial without a protocol, as an exchange in plain
-/// Python, and as that without its line.
+/// Required speed ratio of the package to pyserial without a protocol, to an exchange in plain
+/// Python, and to the latter without its line.
 const GOALS: [(&str, f64); 3] = [
     ("Python, pty: ratio to pyserial, bytes only", 1.0),
     ("Python, pty: ratio to framing and checks in Python", 5.0),
     ("Python, without a line: ratio to framing and checks", 5.0),
 ];
 
-/// Contestants as the script calls them, and what they are.
+/// Contestants by their names in the script, and their descriptions.
 const CONTESTANTS: [(&str, &str); 6] = [
     ("motorlink", "motorlink, m.get"),
     ("bytes only", "pyserial, bytes only"),

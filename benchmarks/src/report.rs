@@ -9,7 +9,7 @@ pub enum Style {
     Markdown,
 }
 
-/// A table with a title, and a paragraph that says how to read it.
+/// A table with a title and an explanation.
 pub struct Section {
     pub title: &'static str,
     pub note: String,
@@ -28,7 +28,7 @@ impl Section {
         let head = self.columns.iter().map(|name| (*name).to_owned()).collect();
         let rule = widths.iter().enumerate().map(|(column, &width)| match (style, column) {
             (Style::Plain, _) | (Style::Markdown, 0) => "-".repeat(width),
-            // Figures stand at the right.
+            // Numbers are right-aligned.
             (Style::Markdown, _) => format!("{}:", "-".repeat(width - 1)),
         });
         let mut text = match style {
@@ -63,15 +63,15 @@ fn line(cells: &[String], widths: &[usize], style: Style) -> String {
     }
 }
 
-/// A figure that is to be reached.
+/// A goal for a result.
 pub struct Goal {
     pub what: String,
     pub wanted: String,
-    /// The figure and whether it is good enough; `None` when it could not be measured.
+    /// The result and whether it reaches the goal; `None` if it could not be measured.
     pub reached: Option<(String, bool)>,
 }
 
-/// The goals and what became of them.
+/// The goals and their results.
 pub fn goals(goals: &[Goal]) -> Section {
     let row = |goal: &Goal| {
         let (figure, verdict) = match &goal.reached {

@@ -1,4 +1,4 @@
-//! What comes of a measurement.
+//! The result of a measurement.
 
 use std::error::Error;
 

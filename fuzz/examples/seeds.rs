@@ -1,4 +1,4 @@
-//! Writes the seeds of every target into the folder that is given, a folder a target.
+//! Writes the seeds of every target into the given folder, one folder per target.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
-//! The C face under any sequence of calls, for storage that holds what it should and for storage
-//! that does not, with callbacks that call back.
+//! The C library under any sequence of calls, on valid and invalid storage, with callbacks that
+//! call the library.
 #![allow(unsafe_code, reason = "the functions are C's")]
 
 use std::cell::Cell;
@@ -32,7 +32,7 @@ enum Kind {
 const KINDS: [Kind; 6] =
     [Kind::Master, Kind::Slave, Kind::Host, Kind::Drive, Kind::Codec, Kind::Adapter];
 
-/// What an object said last, to be handed to the other end.
+/// The last output of an object, to be passed to the other end.
 #[derive(Default)]
 struct Heard {
     bytes: Vec<u8>,
@@ -49,11 +49,11 @@ struct Objects {
 }
 
 thread_local! {
-    /// The storage that is in a call, for its callbacks.
+    /// The storage of the current call, for its callbacks.
     static IN_CALL: Cell<*mut u64> = const { Cell::new(null_mut()) };
 }
 
-/// What every callback does first: it calls for the object that calls it.
+/// The first step of every callback: a call on the object that calls it.
 fn call_back() {
     let storage = IN_CALL.get();
     let mut deadline = 0;
@@ -102,13 +102,13 @@ extern "C" fn sense(_: *mut c_void, sense: *mut motorlink_rmd_sense) {
     unsafe { (*sense).encoder_counts = i64::MIN };
 }
 
-/// C's structs are all zeros before anything is set.
+/// All members of C's structs are zero at first.
 fn zeroed<T>() -> T {
     // SAFETY: used for structs of integers, pointers and optional functions, and for enums with 0.
     unsafe { std::mem::MaybeUninit::zeroed().assume_init() }
 }
 
-/// Any calls for any storage.
+/// Any calls on any storage.
 pub fn ffi(data: &[u8]) {
     let mut st: motorlink_st_motor_control = zeroed();
     (st.version.name, st.version.pre_release) = (c"fuzz\xFF".as_ptr(), c"".as_ptr());
@@ -160,7 +160,7 @@ impl Objects {
             4 => self.now = self.now.wrapping_add(u64::from(input.word()) << (input.byte() % 48)),
             _ => {
                 let kind = KINDS[usize::from(input.byte()) % KINDS.len()];
-                // Mostly for what is there.
+                // Mostly calls that fit the object in the storage.
                 let there = self.kinds[at];
                 let kind =
                     if operation & 0x80 == 0 && there != Kind::Nothing { there } else { kind };
@@ -231,7 +231,7 @@ impl Objects {
         }
     }
 
-    /// Calls one of the functions of `kind` for a storage that may hold another.
+    /// Calls one of the functions of `kind` on a storage that may contain another kind.
     fn call(&mut self, kind: Kind, storage: *mut u64, input: &mut Input<'_>) -> Error {
         // SAFETY: the storage is a block, every other pointer is a reference, and sizes are theirs.
         unsafe {
@@ -435,7 +435,7 @@ impl Objects {
             for byte in &line.bytes[..line.size.into()] {
                 result = motorlink_slcan_host_receive(codec, *byte, &mut said, &mut frame);
             }
-            // Every line that goes out is one that comes in.
+            // Every sent line is a line that the host accepts.
             let frame_came = said == motorlink_slcan_answer::Frame;
             assert!(encoded != Error::Ok || frame_came == (result == Error::Ok));
             motorlink_slcan_host_receive(codec, input.byte(), &mut said, &mut frame)

@@ -1,4 +1,4 @@
-//! What the host library reads: slcan, port names, configurations and commands of simulated drives.
+//! Parsers of the host library: slcan, port names, configurations and commands of simulated drives.
 
 use motorlink::port::PortName;
 use motorlink::slcan::{self, Answer, Device, HostCodec};
@@ -53,7 +53,7 @@ fn answers(data: &[u8], cut: usize) -> (Vec<Answer>, u64) {
     (found, codec.garbage())
 }
 
-/// Any text as a port: what is taken is written so that it is read as the same.
+/// Any text as a port name. An accepted name is written so that it is parsed as the same name.
 pub fn port_name(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     match text.parse::<PortName>() {
@@ -66,8 +66,8 @@ pub fn port_name(data: &[u8]) {
     }
 }
 
-/// Any text as a register and as a value of any register: what is taken is a number of its type, and
-/// is taken again as it is shown.
+/// Any text as a register and as a value of any register. An accepted value is a number of its
+/// type, and is accepted again in its displayed form.
 pub fn st_value(data: &[u8]) {
     let mut input = Input::new(data);
     let (register, flags) = (RegisterId(input.byte()), input.byte());
@@ -92,7 +92,7 @@ pub fn st_value(data: &[u8]) {
     }
 }
 
-/// Any text as a configuration: what is taken gives drives that start and turn by numbers.
+/// Any text as a configuration. Drives of an accepted one start and turn with finite numbers.
 pub fn sim_config(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(config) = BenchConfig::parse(text) else { return };
@@ -119,8 +119,8 @@ pub fn sim_config(data: &[u8]) {
     }
 }
 
-/// Any lines as commands to simulated drives: each is answered, and what is then told of the drives
-/// is made of numbers.
+/// Any lines as commands to simulated drives. Each gets an answer, and the drives' states have
+/// finite numbers afterwards.
 pub fn sim_command(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let (mut st, mut rmd) = (SimServer::new(), SimServer::new());

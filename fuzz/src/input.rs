@@ -1,6 +1,7 @@
 //! Bytes as a source of operations.
 
-/// Values are taken from the front, so that a seed can be written by hand; past the end come zeros.
+/// Values are taken from the front, so that a seed can be written by hand. Zeros follow after the
+/// end.
 pub struct Input<'a>(&'a [u8]);
 
 impl<'a> Input<'a> {

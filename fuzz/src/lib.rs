@@ -1,6 +1,6 @@
-//! What every parser and state machine of Motorlink has to stand: functions that take any bytes and
-//! panic when something is not as it should be. The fuzzers in `fuzz_targets` feed them for hours
-//! (`make fuzz`), `tests/replay.rs` feeds them seeds and regressions in `make test`.
+//! Functions that test every parser and state machine of Motorlink with any bytes. They panic on a
+//! failure. The fuzzers in `fuzz_targets` run them for hours (`make fuzz`); `tests/replay.rs` runs
+//! them with seeds and earlier findings in `make test`.
 #![deny(unsafe_code)]
 
 mod ffi;
@@ -12,10 +12,10 @@ mod rmd;
 pub mod seeds;
 mod st;
 
-/// A target: its name, and what it does with bytes.
+/// A target: its name, and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// Every target, the cheapest executions first.
+/// Every target. The first ones have the fastest executions.
 pub const TARGETS: &[Target] = &[
     ("st_frame", st::frame),
     ("st_master", st::master),
@@ -32,10 +32,10 @@ pub const TARGETS: &[Target] = &[
     ("sim_command", host::sim_command),
 ];
 
-/// Feeds `data` to a target.
+/// Passes `data` to a target.
 ///
 /// # Panics
-/// When there is no such target, and when the target finds something.
+/// If there is no such target, or if the target finds a failure.
 pub fn run(name: &str, data: &[u8]) {
     let target = TARGETS.iter().find(|(known, _)| *known == name);
     let (_, target) = target.unwrap_or_else(|| panic!("there is no target {name}"));

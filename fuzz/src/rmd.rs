@@ -21,7 +21,7 @@ fn any_frame(input: &mut Input<'_>) -> CanFrame {
     }
 }
 
-/// Any bytes as the frame of every command, both ways, and in words.
+/// Any bytes as the frame of every command, in both directions, also shown as text.
 pub fn frame(data: &[u8]) {
     let mut input = Input::new(data);
     let frame = any_frame(&mut input);
@@ -53,7 +53,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(SetTorque4::decode(data).encode(), *data);
 }
 
-/// A host under any sequence of calls and frames, with time going on.
+/// A host under any sequence of calls and frames, while time passes.
 pub fn host(data: &[u8]) {
     let mut input = Input::new(data);
     let mut bench = HostFixture {
@@ -123,7 +123,7 @@ pub fn host(data: &[u8]) {
 struct HostFixture {
     host: Host,
     now: Instant,
-    /// What each motor was asked last.
+    /// The code of the last request to each motor.
     codes: [u8; MotorId::COUNT + 1],
     torque4: Option<[u8; 8]>,
 }
@@ -177,7 +177,7 @@ impl HostFixture {
         panic!("the host does not come to rest");
     }
 
-    /// In silence every exchange ends, each at its own deadline at the latest.
+    /// In silence every exchange ends, at its own deadline at the latest.
     fn finish(&mut self) {
         for _ in 0..=MotorId::COUNT {
             match self.drain() {
@@ -189,7 +189,7 @@ impl HostFixture {
     }
 }
 
-/// Four simulated drives on a bus, while the world around them changes.
+/// Four simulated drives on a bus, while their environment changes.
 pub fn drive(data: &[u8]) {
     let mut input = Input::new(data);
     let mut bus = RmdBus::demo(Instant(0));
@@ -200,7 +200,7 @@ pub fn drive(data: &[u8]) {
         match operation % 8 {
             0 | 1 => ask(&mut bus, now, CanFrame::new(id.can_id(), input.array())),
             2 => {
-                // A code that the document names, with any values.
+                // A code of the document, with any values.
                 let row = &COMMANDS[usize::from(input.byte()) % COMMANDS.len()];
                 let mut data: [u8; 8] = input.array();
                 data[0] = row.code.into();
@@ -231,7 +231,7 @@ pub fn drive(data: &[u8]) {
     finite(bus.nodes());
 }
 
-/// Whatever happened, the motors turn by numbers, and not with an error.
+/// The motors turn with finite numbers, and without an error of the simulation.
 pub fn finite(nodes: &[RmdNode]) {
     for node in nodes {
         let truth = node.motor().truth();
@@ -244,8 +244,8 @@ pub fn finite(nodes: &[RmdNode]) {
     }
 }
 
-/// Hands a frame to the drives: who is asked in a way that the document knows answers once, with the
-/// code that it was asked with; nobody else says anything.
+/// Passes a frame to the drives. A motor with a valid request answers once, with the code of the
+/// request. All others are silent.
 fn ask(bus: &mut RmdBus<[RmdNode; 4]>, now: Instant, frame: CanFrame) {
     let rom =
         |bus: &RmdBus<[RmdNode; 4]>| bus.nodes().each_ref().map(|node| node.motor().rom_writes());

@@ -1,5 +1,5 @@
-//! What the fuzzers begin with: the wire vectors as each target reads them, and what the
-//! documentation shows.
+//! The initial inputs of the fuzzers: the wire vectors in the form of each target, and the examples
+//! of the documentation.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ const PORTS: &[&str] = &[
     "unix-listen:./drive",
 ];
 
-/// Where the project is.
+/// The root folder of the project.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
@@ -44,7 +44,7 @@ fn text(path: &str) -> String {
 /// The seeds of a target.
 ///
 /// # Panics
-/// When the vectors or the documentation are not what they were, and when there is no such target.
+/// If the vectors or the documentation have an unexpected form, or if there is no such target.
 pub fn of(target: &str) -> Vec<Vec<u8>> {
     match target {
         "st_frame" => st().flat_map(|(_, request, reply)| [request, reply]).collect(),
@@ -127,12 +127,12 @@ fn any_frame(id: u16, data: [u8; 8]) -> Vec<u8> {
     seed
 }
 
-/// The index of a motor; the first for what all of them get.
+/// The index of a motor; the first one for identifiers of all motors.
 fn index(id: u16) -> u8 {
     id.checked_sub(0x141).filter(|index| *index < 32).unwrap_or(0) as u8
 }
 
-/// A trusted motor, a request and a reply of the same bytes, time, and once more.
+/// A trusted motor, a request and a reply with the same bytes, time, and the same again.
 fn host(id: u16, data: [u8; 8]) -> Vec<u8> {
     let mut seed = vec![13, index(id)];
     for operation in [0, 6, 0] {
@@ -202,7 +202,7 @@ fn values() -> Vec<Vec<u8>> {
     .collect()
 }
 
-/// What docs/SIMULATOR.md shows, and every member there is.
+/// The example of docs/SIMULATOR.md, and every member of a configuration.
 fn configurations() -> Vec<Vec<u8>> {
     let page = text("docs/SIMULATOR.md");
     let shown = page.split("```toml config\n").nth(1).and_then(|rest| rest.split("```").next());
@@ -218,7 +218,7 @@ fn members(section: &str, motor: &impl serde::Serialize) -> String {
     toml::Table::from_iter(section.map(|(name, table)| (name, table.into()))).to_string()
 }
 
-/// What docs/SIMULATOR.md shows, and one of each command.
+/// The examples of docs/SIMULATOR.md, and one of each command.
 fn commands() -> Vec<Vec<u8>> {
     let page = text("docs/SIMULATOR.md");
     let shown = page.lines().map(str::trim).filter(|line| line.starts_with("{\"command\""));

@@ -1,4 +1,4 @@
-//! ST's protocol: frames, both ends, and the simulated drive behind the slave.
+//! ST's protocol: frames, both ends, and the simulated drive of the slave.
 
 use motorlink::st::Transcript;
 use motorlink_proto::st::*;
@@ -38,18 +38,18 @@ pub fn frame(data: &[u8]) {
     }
 }
 
-/// What of some bytes fits a frame.
+/// The part of some bytes that fits into a frame.
 fn at_most(payload: &[u8]) -> &[u8] {
     &payload[..payload.len().min(MAX_PAYLOAD)]
 }
 
-/// The checksum as 3.3 has it, in more bits than it needs.
+/// The checksum of 3.3, with more bits than necessary.
 fn sum(bytes: &[u8]) -> u8 {
     let accumulator: u64 = bytes.iter().map(|&byte| u64::from(byte)).sum();
     ((accumulator >> 8) + (accumulator & 0xFF)) as u8
 }
 
-/// A request comes back from its own bytes; a reply is read without a panic.
+/// A request is decoded from its own bytes; decoding a reply does not panic.
 fn message(profile: Profile, frame: &Frame<'_>) {
     let payload = frame.payload;
     if let Some(info) = BoardInfo::decode(payload) {
@@ -69,10 +69,10 @@ fn message(profile: Profile, frame: &Frame<'_>) {
     assert!(frame.payload.starts_with(same.payload), "what follows a message is dropped");
 }
 
-/// What recovery asks first: GET_BOARD_INFO or GET_REVUP_DATA of phase 0.
+/// The first question of a recovery: GET_BOARD_INFO or GET_REVUP_DATA of phase 0.
 const QUESTIONS: [&[u8]; 2] = [&[0x06, 0x00, 0x06], &[0x08, 0x01, 0x00, 0x09]];
 
-/// A master under any sequence of calls, with time going on.
+/// A master under any sequence of calls, while time passes.
 pub fn master(data: &[u8]) {
     let mut input = Input::new(data);
     let recovery = [Recovery::None, Recovery::Drain, Recovery::Pad][usize::from(input.byte()) % 3];
@@ -82,7 +82,7 @@ pub fn master(data: &[u8]) {
         master: Master::new(MasterConfig { timeout, recovery, quiet, ..MasterConfig::default() }),
         now: Instant(0),
         recovery,
-        asked: None,
+        open: None,
         sent: false,
         lost: false,
         heard: false,
@@ -97,24 +97,24 @@ pub fn master(data: &[u8]) {
             7 => {
                 bench.master.abandon();
                 assert!(
-                    bench.asked.take().is_none() || bench.master.sync_state() == SyncState::Lost
+                    bench.open.take().is_none() || bench.master.sync_state() == SyncState::Lost
                 );
             }
             8 => {
                 bench.master.lost();
-                bench.asked = None;
+                bench.open = None;
                 assert_eq!(bench.master.sync_state(), SyncState::Lost);
             }
             9 => {
                 bench.master.reopened();
-                bench.asked = None;
+                bench.open = None;
                 let expected =
                     if recovery == Recovery::None { SyncState::InSync } else { SyncState::Lost };
                 assert_eq!(bench.master.sync_state(), expected);
             }
             _ => {
                 bench.master.trust_line();
-                bench.asked = None;
+                bench.open = None;
                 assert_eq!(bench.master.sync_state(), SyncState::InSync);
             }
         }
@@ -127,12 +127,12 @@ struct MasterFixture {
     master: Master,
     now: Instant,
     recovery: Recovery,
-    /// The frame of the exchange under way.
-    asked: Option<Vec<u8>>,
+    /// The frame of the open exchange.
+    open: Option<Vec<u8>>,
     sent: bool,
-    /// The line was lost when the exchange began.
+    /// Whether the line was lost when the exchange started.
     lost: bool,
-    /// Something came since then.
+    /// Whether bytes were received since then.
     heard: bool,
 }
 
@@ -145,30 +145,30 @@ impl MasterFixture {
         let mut out = [0; MAX_FRAME];
         let bytes = Frame::command(motor, &request, &mut out).map(<[u8]>::to_vec);
         let result = self.master.request(motor, &request);
-        self.begun(result, bytes);
+        self.check_request(result, bytes);
     }
 
     fn raw(&mut self, header: u8, payload: &[u8]) {
         let mut out = [0; MAX_FRAME];
         let bytes = Frame { header, payload }.encode(&mut out).map(<[u8]>::to_vec);
         let result = self.master.request_raw(header, payload);
-        self.begun(result, bytes);
+        self.check_request(result, bytes);
     }
 
-    fn begun(&mut self, result: Result<(), RequestError>, bytes: Option<Vec<u8>>) {
+    fn check_request(&mut self, result: Result<(), RequestError>, bytes: Option<Vec<u8>>) {
         match (result, bytes) {
-            (Err(RequestError::Busy), _) => assert!(self.asked.is_some(), "busy with nothing"),
+            (Err(RequestError::Busy), _) => assert!(self.open.is_some(), "busy with nothing"),
             (Err(RequestError::TooLong), bytes) => assert_eq!(bytes, None),
             (Ok(()), bytes) => {
-                assert!(self.asked.is_none(), "two exchanges at a time");
-                self.asked = Some(bytes.expect("it was taken, so it fits a frame"));
+                assert!(self.open.is_none(), "two exchanges at a time");
+                self.open = Some(bytes.expect("it was taken, so it fits a frame"));
                 self.lost = self.master.sync_state() == SyncState::Lost;
                 (self.sent, self.heard) = (false, false);
             }
         }
     }
 
-    /// Bytes from the line, whatever they are.
+    /// Passes any bytes from the line.
     fn receive(&mut self, bytes: &[u8]) {
         let before = self.master.counters();
         self.heard |= !bytes.is_empty();
@@ -177,7 +177,7 @@ impl MasterFixture {
         assert!(unasked as usize <= bytes.len() + MAX_FRAME);
     }
 
-    /// A whole frame from the line.
+    /// Passes a complete frame from the line.
     fn reply(&mut self, kind: u8, payload: &[u8]) {
         let header = [HEADER_ACK, HEADER_ACK, HEADER_NACK, HEADER_ATR][usize::from(kind) % 4];
         let payload = at_most(payload);
@@ -186,32 +186,32 @@ impl MasterFixture {
         self.receive(&bytes);
     }
 
-    /// Polls until there is something to wait for; gives it.
+    /// Polls until the master waits. Returns the deadline.
     fn drain(&mut self) -> Option<Instant> {
         for _ in 0..16 {
             match self.master.poll(self.now) {
                 Output::Transmit(bytes) => {
-                    let asked = self.asked.as_deref().expect("nothing is sent unasked");
+                    let frame = self.open.as_deref().expect("nothing is sent unasked");
                     assert!(!bytes.is_empty() && bytes.len() <= MAX_FRAME + 1);
-                    self.sent |= bytes == asked;
-                    // A line that does not answer is asked questions and told to stop, no more.
+                    self.sent |= bytes == frame;
+                    // On a line that does not answer, only questions and STOP_MOTORs are sent.
                     let stop = matches!(bytes, [header, 1, 2, _] if header & 0x1F == 3);
                     let harmless = stop || bytes[0] == 0xFF || QUESTIONS.contains(&bytes);
                     assert!(!self.lost || self.recovery != Recovery::None, "sent into a lost line");
                     assert!(!self.lost || self.heard || harmless, "{bytes:02x?} is sent unheard");
                 }
                 Output::Done(result) => {
-                    assert!(self.asked.take().is_some(), "done with nothing");
+                    assert!(self.open.take().is_some(), "done with nothing");
                     let answered = matches!(result, Ok(_) | Err(ExchangeError::Refused(_)));
                     assert!(self.sent || !answered, "answered before it was sent");
                     assert!(result.is_err() || result.is_ok_and(|payload| payload.len() <= 128));
                 }
                 Output::Wait(None) => {
-                    assert!(self.asked.is_none(), "an exchange is forgotten");
+                    assert!(self.open.is_none(), "an exchange is forgotten");
                     return None;
                 }
                 Output::Wait(Some(until)) => {
-                    assert!(self.asked.is_some(), "waits for nothing");
+                    assert!(self.open.is_some(), "waits for nothing");
                     if until > self.now {
                         return Some(until);
                     }
@@ -233,7 +233,7 @@ impl MasterFixture {
     }
 }
 
-/// The slave with simulated drives behind it, while the world around them changes.
+/// The slave with simulated drives, while their environment changes.
 pub fn slave(data: &[u8]) {
     let mut input = Input::new(data);
     let profile = PROFILES[usize::from(input.byte()) % 2];
@@ -264,7 +264,7 @@ pub fn slave(data: &[u8]) {
     finite(station.drive().motors());
 }
 
-/// Whatever happened, the motors turn by numbers.
+/// The motors turn with finite numbers.
 pub fn finite(motors: &[StMotor]) {
     for truth in motors.iter().map(StMotor::truth) {
         let plant = truth.plant;
@@ -275,7 +275,7 @@ pub fn finite(motors: &[StMotor]) {
     }
 }
 
-/// The slave and its model under any bytes, with time going on.
+/// The slave and its model under any bytes, while time passes.
 pub fn model(data: &[u8]) {
     let mut input = Input::new(data);
     let setup = input.byte();
@@ -300,7 +300,7 @@ fn reply(bytes: &[u8]) {
     }
 }
 
-/// Does what the simulator's commands can do, with values that it takes.
+/// Performs any of the simulator's commands, with valid values.
 fn world(station: &mut StStation<[StMotor; 2]>, input: &mut Input<'_>) {
     let (what, value) = (input.byte(), f32::from(input.word()) / 65.0);
     let number = MotorNumber::new(what % 2 + 1).expect("1 or 2");

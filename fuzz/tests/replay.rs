@@ -1,11 +1,11 @@
-//! Every target stands its seeds and what fuzzing once found.
+//! Runs every target with its seeds and with earlier findings.
 
 use std::fs;
 use std::path::Path;
 
 use motorlink_fuzz::{TARGETS, run, seeds};
 
-/// The program of a target and its line in Cargo.toml; without them it is never fuzzed.
+/// Each target needs its program and its line in Cargo.toml to be fuzzed.
 #[test]
 fn every_target_has_a_fuzzer() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -17,7 +17,7 @@ fn every_target_has_a_fuzzer() {
         assert!(program.contains(&format!("motorlink_fuzz::run(\"{target}\", data)")), "{target}");
         assert!(manifest.contains(&format!("path = \"fuzz_targets/{target}.rs\"")), "{target}");
     }
-    assert_eq!(programs.count(), TARGETS.len(), "a program in fuzz_targets is no target");
+    assert_eq!(programs.count(), TARGETS.len(), "a program in fuzz_targets is not a target");
 }
 
 #[test]
@@ -27,7 +27,7 @@ fn every_target_stands_its_seeds() {
         assert!(!seeds.is_empty(), "{target} has no seeds");
         for seed in &seeds {
             run(target, seed);
-            // Cut and with each byte damaged they are seeds as well.
+            // Shortened and damaged seeds are seeds as well.
             for at in 0..seed.len().min(200) {
                 run(target, &seed[..at]);
                 let mut damaged = seed.clone();
@@ -52,7 +52,7 @@ fn every_target_stands_what_was_found() {
     }
 }
 
-/// One number in one place is too rare for a fuzzer to come by.
+/// A single extreme number is too rare for a fuzzer to find.
 #[test]
 fn a_configuration_with_an_extreme_value_is_refused_or_runs() {
     let extremes =

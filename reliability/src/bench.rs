@@ -1,4 +1,4 @@
-//! Two ends on a line that misbehaves, on virtual time, and what is noted of them.
+//! Two ends on a line with faults, on virtual time, and the results.
 
 use std::collections::VecDeque;
 
@@ -9,49 +9,49 @@ use crate::life::Life;
 use crate::tally::{Tally, Violation};
 use crate::wire::Tagged;
 
-/// Messages that are remembered; more are never on their way.
+/// Number of stored messages. Fewer messages are in transit.
 const REMEMBERED: usize = 1 << 14;
-/// Lines that a trace keeps.
+/// Maximum number of lines in a trace.
 const TRACED: usize = 60;
 
-/// A program and drives, with a judge that knows where every unit came from.
+/// A program and drives, with a judge that knows the origin of every unit.
 pub trait Ends: Sized {
-    /// What the line carries.
+    /// The unit of the line.
     type Unit: Unit;
 
-    /// The most that the program rests, seldom and more often, µs: longer and shorter than any silence
-    /// that the protocol waits for.
+    /// Maximum pauses of the program, a rare and a frequent one, µs: longer and shorter than every
+    /// silence of the protocol.
     const RESTS: [u64; 2];
 
-    /// When something arrives or is due.
+    /// When a unit arrives or a deadline is due.
     fn due(bench: &Run<Self>) -> Option<Instant>;
 
-    /// Does what is due.
+    /// Handles arrivals and deadlines.
     fn step(bench: &mut Run<Self>);
 
     /// Reads the program's port.
     fn read(bench: &mut Run<Self>);
 
-    /// The program ends, and another opens the line.
+    /// Ends the program, and starts another one on the same line.
     fn next_program(&mut self);
 
-    /// Makes exchanges of the mix.
+    /// Performs exchanges of the mix.
     fn exchange(bench: &mut Run<Self>, rng: &mut Rng);
 
-    /// Makes an exchange in which the program is killed.
+    /// Performs an exchange in which the program is killed.
     fn killed_in(bench: &mut Run<Self>, rng: &mut Rng);
 }
 
 pub struct Run<E: Ends> {
     pub ends: E,
-    /// Whether the line does what nobody promises to survive.
+    /// Whether the line has faults that the protocol cannot handle.
     pub beyond: bool,
     pub out: Lane<Tagged<E::Unit>>,
     pub back: Lane<Tagged<E::Unit>>,
     pub now: Instant,
     /// When the last exchange ended.
     pub ended: Instant,
-    /// What has reached the program's port and was not read.
+    /// Units received by the program's port that were not read yet.
     pub inbox: VecDeque<Tagged<E::Unit>>,
     pub tally: Tally,
     pub violation: Option<String>,
@@ -59,7 +59,7 @@ pub struct Run<E: Ends> {
 }
 
 impl<E: Ends> Run<E> {
-    /// A line on which a unit takes so long.
+    /// A line with this transmission time of a unit.
     pub fn new(
         ends: E,
         faults: &Faults,
@@ -84,8 +84,8 @@ impl<E: Ends> Run<E> {
         }
     }
 
-    /// Runs at least `count` exchanges of the mix. Those from `traced` on are written down in a
-    /// violation.
+    /// Runs at least `count` exchanges of the mix. From exchange `traced` on, they are recorded for
+    /// a violation.
     pub fn run(
         mut self,
         life: Life,
@@ -111,7 +111,7 @@ impl<E: Ends> Run<E> {
                 let trace = self.trace.map(Vec::from).unwrap_or_default();
                 return Err(Violation { exchange, what, trace });
             }
-            // Most programs ask at once; some pause.
+            // Most programs start at once; some pause first.
             match rng.u8(..10) {
                 0 => self.rest(Micros(rng.u64(..E::RESTS[0]))),
                 1 | 2 => self.rest(Micros(rng.u64(..E::RESTS[1]))),
@@ -121,24 +121,24 @@ impl<E: Ends> Run<E> {
         Ok(self.tally)
     }
 
-    /// The program ends, and another opens the line.
+    /// Ends the program, and starts another one on the same line.
     pub fn next_program(&mut self) {
         self.note(|| "a new program".to_owned());
         self.ends.next_program();
     }
 
-    /// Nothing is asked for a while.
+    /// Sends no request for a while.
     pub fn rest(&mut self, pause: Micros) {
         self.advance(self.now + pause);
     }
 
-    /// Lets time pass until then.
+    /// Advances the time to `until`.
     pub fn advance(&mut self, until: Instant) {
         while self.step(until) {}
         self.now = self.now.max(until);
     }
 
-    /// Reads the port until then, or until something came.
+    /// Reads the port until `until`, or until a unit was received.
     pub fn wait(&mut self, until: Instant) {
         while self.inbox.is_empty() {
             if !self.step(until) {
@@ -149,7 +149,7 @@ impl<E: Ends> Run<E> {
         E::read(self);
     }
 
-    /// Does the next thing that is due until then; false if there is none.
+    /// Handles the next event before `until`; false if there is none.
     fn step(&mut self, until: Instant) -> bool {
         let Some(due) = E::due(self).filter(|due| *due <= until) else { return false };
         self.now = self.now.max(due);
@@ -157,13 +157,13 @@ impl<E: Ends> Run<E> {
         true
     }
 
-    /// A promise was not kept.
+    /// Records a violation of a guarantee.
     pub fn violates(&mut self, what: String) {
         self.note(|| format!("VIOLATION: {what}"));
         self.violation.get_or_insert(what);
     }
 
-    /// Writes down what happened, if somebody wants to know.
+    /// Records an event if a trace is requested.
     pub fn note(&mut self, what: impl FnOnce() -> String) {
         if let Some(trace) = &mut self.trace {
             if trace.len() == TRACED {

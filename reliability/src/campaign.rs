@@ -1,4 +1,4 @@
-//! Runs trials, on as many threads as the machine has processors.
+//! Runs trials, on one thread per processor.
 
 use std::panic::catch_unwind;
 use std::sync::Mutex;
@@ -10,19 +10,19 @@ use crate::plan::{Speaks, Trial, seeded};
 use crate::tally::{Tally, Violation};
 use crate::{rmd, st};
 
-/// Exchanges before a violation that its trace shows.
+/// Number of exchanges before a violation in its trace.
 const BEFORE: u64 = 3;
 
 /// Why a campaign has no result.
 #[derive(Debug)]
 pub enum Failed {
-    /// A trial that makes no sense.
+    /// An invalid trial.
     Plan(FaultError),
-    /// A promise that was not kept.
+    /// A violated guarantee.
     Violated { faults: String, seed: u64, violation: Violation },
 }
 
-/// Runs each trial in `seeds` parts with seeds of their own; gives a tally a trial.
+/// Runs each trial in `seeds` parts, each with its own seed. Returns one tally per trial.
 pub fn run(trials: &[Trial], seeds: u64) -> Result<Vec<Tally>, Failed> {
     let parts: Vec<(usize, u64)> =
         (0..trials.len()).flat_map(|n| (1..=seeds).map(move |seed| (n, seed))).collect();
@@ -34,7 +34,7 @@ pub fn run(trials: &[Trial], seeds: u64) -> Result<Vec<Tally>, Failed> {
     Ok(tallies)
 }
 
-/// The same for every part of some work: `work` of each, in their order.
+/// Runs `work` for every part in parallel. Returns the results in order.
 pub fn each<T: Sync, R: Send>(parts: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let results = Mutex::new(Vec::new());
@@ -68,7 +68,7 @@ fn part(trial: &Trial, seed: u64, exchanges: u64) -> Result<Tally, Failed> {
     };
     let result = catch_unwind(|| run(u64::MAX)).unwrap_or_else(panicked);
     result.map_err(|violation| {
-        // The same once more, this time written down.
+        // Runs the same part again, with a trace.
         let traced = violation.exchange.saturating_sub(BEFORE);
         let violation =
             catch_unwind(|| run(traced)).unwrap_or_else(panicked).err().unwrap_or(violation);

@@ -1,10 +1,11 @@
-//! Lives of programs.
+//! Lifetimes of programs.
 
-/// How long the programs live that speak.
+/// The lifetime of the programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Life {
     /// One for the whole trial.
     Long,
-    /// One after the other, each for a few exchanges; half of them are killed in the middle of one.
+    /// Several, one after the other, with a few exchanges each. Half of them are killed during an
+    /// exchange.
     Short,
 }

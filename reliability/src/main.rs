@@ -1,4 +1,4 @@
-//! Both protocols through lines that misbehave, on virtual time. See docs/RELIABILITY.md.
+//! Both protocols on lines with faults, on virtual time. See docs/RELIABILITY.md.
 
 mod bench;
 mod campaign;
@@ -23,22 +23,22 @@ use st::twice::{self, Batches};
 use st::verified::{self, Writes};
 use tally::Tally;
 
-/// Sends both protocols through lines that misbehave and checks what Motorlink promises; fails with
-/// the seed and a trace where a promise is not kept.
+/// Runs both protocols on lines with faults and checks Motorlink's guarantees. Fails with the seed
+/// and a trace if a guarantee is violated.
 #[derive(Parser)]
 #[command(name = "motorlink-reliability")]
 struct Args {
     /// Cut each trial to this many exchanges
     #[arg(long, default_value_t = u64::MAX)]
     most: u64,
-    /// Put the tables into this file, between its marks, instead of printing them
+    /// Write the tables into this file, between its marks, instead of printing them
     #[arg(long, value_name = "FILE")]
     update: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let result = measure(args.most).map_err(told).and_then(|tables| match args.update {
+    let result = measure(args.most).map_err(describe).and_then(|tables| match args.update {
         Some(path) => report::update(&path, &tables),
         None => {
             print!("{tables}");
@@ -75,7 +75,7 @@ fn measure(most: u64) -> Result<String, Failed> {
     let version = env!("CARGO_PKG_VERSION");
     let head = format!(
         "Motorlink {version}: {st} exchanges of ST's protocol and {rmd} of RMD, each trial in \
-         {SEEDS} parts with seeds 1 to {SEEDS}, and no promise was broken.\n\n"
+         {SEEDS} parts with seeds 1 to {SEEDS}, and no guarantee was violated.\n\n"
     );
     Ok(head + &tables)
 }
@@ -89,7 +89,7 @@ fn writes(most: u64) -> Result<Vec<(String, [Writes; 2])>, Failed> {
     WRITES.iter().map(row).collect()
 }
 
-/// Reads on lines where replies come twice, without and with confirmation.
+/// Reads on lines with duplicate replies, without and with confirmation.
 fn twice(most: u64) -> Result<Vec<(String, [Batches; 2])>, Failed> {
     let row = |&(share, faults, count): &(f64, &str, u64)| {
         let seeds: Vec<Faults> = (1..=SEEDS)
@@ -121,7 +121,7 @@ fn compare(setup: Setup, faults: &str, count: u64) -> Result<[Writes; 2], Failed
     Ok(kinds)
 }
 
-fn told(failed: Failed) -> String {
+fn describe(failed: Failed) -> String {
     match failed {
         Failed::Plan(error) => error.to_string(),
         Failed::Violated { faults, seed, violation } => format!(
@@ -137,12 +137,12 @@ fn told(failed: Failed) -> String {
 mod tests {
     use super::*;
 
-    /// Every trial of the long run, short.
+    /// Every trial of the full run, shortened.
     #[test]
     fn every_promise_is_kept_on_every_line() {
         for group in GROUPS {
             let trials: Vec<Trial> = group.trials(500).collect();
-            let tallies = campaign::run(&trials, 1).map_err(told).unwrap();
+            let tallies = campaign::run(&trials, 1).map_err(describe).unwrap();
             for (trial, tally) in trials.iter().zip(tallies) {
                 assert!(tally.exchanges >= 500, "{trial:?}");
                 assert!(tally.detected < tally.exchanges, "{trial:?}: nothing came through");
@@ -155,18 +155,20 @@ mod tests {
         for group in GROUPS {
             let clean =
                 Trial { faults: "drop=0", beyond: false, ..group.trials(1_000).next().unwrap() };
-            let [tally] = &campaign::run(&[clean], 1).map_err(told).unwrap()[..] else { panic!() };
+            let [tally] = &campaign::run(&[clean], 1).map_err(describe).unwrap()[..] else {
+                panic!()
+            };
             assert_eq!((tally.detected, tally.undetected, tally.misplaced), (0, 0, 0));
         }
     }
 
-    /// The judge sees what it is there to see: replies beyond what can be told apart are taken for
-    /// those of other exchanges, and a run that promises otherwise fails and says where.
+    /// The judge detects violations: very late replies are matched to other exchanges, and a run
+    /// that does not expect this fails and reports where.
     #[test]
     fn a_broken_promise_is_found_and_traced() {
         for group in GROUPS {
             let Some(beyond) = group.trials(2_000).find(|trial| trial.beyond) else { continue };
-            let tally = &campaign::run(&[beyond], 1).map_err(told).unwrap()[0];
+            let tally = &campaign::run(&[beyond], 1).map_err(describe).unwrap()[0];
             assert!(tally.misplaced > 0, "{}", group.title);
             let promised = Trial { beyond: false, ..beyond };
             let Err(Failed::Violated { violation, .. }) = campaign::run(&[promised], 1) else {
@@ -179,7 +181,7 @@ mod tests {
     #[test]
     fn verified_writes_are_right_where_plain_ones_are_not() {
         let (setup, faults, _) = WRITES[2];
-        let [plain, verified] = compare(setup, faults, 16_000).map_err(told).unwrap();
+        let [plain, verified] = compare(setup, faults, 16_000).map_err(describe).unwrap();
         assert!(plain.wrong > 0, "{plain:?}");
         assert_eq!(verified.wrong, 0, "{verified:?}");
         assert!(verified.done > 0);
@@ -187,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_reply_that_comes_twice_is_found_by_the_confirmation() {
-        for (line, [plain, confirmed]) in twice(16_000).map_err(told).unwrap() {
+        for (line, [plain, confirmed]) in twice(16_000).map_err(describe).unwrap() {
             assert!(plain.wrong > 0, "{line}: {plain:?}");
             assert!(confirmed.wrong * 4 <= plain.wrong, "{line}: {confirmed:?}");
             assert!(confirmed.detected < confirmed.count, "{line}: {confirmed:?}");

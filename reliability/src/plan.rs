@@ -1,4 +1,4 @@
-//! Which lines are tried, and for how long.
+//! The tested lines, and the lengths of the tests.
 
 use motorlink_link::fault::{FaultError, Faults};
 use motorlink_proto::st::{Profile, Recovery};
@@ -8,7 +8,7 @@ use crate::st::Setup;
 use crate::tally::Tally;
 use crate::{rmd, st};
 
-/// Who speaks.
+/// The protocol and its configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Speaks {
     St(Setup),
@@ -19,15 +19,15 @@ pub enum Speaks {
 #[derive(Debug, Clone, Copy)]
 pub struct Trial {
     pub speaks: Speaks,
-    /// As `--fault` takes them.
+    /// The faults, as text for `--fault`.
     pub faults: &'static str,
-    /// Whether the line does what nobody promises to survive: replies that are later than the
-    /// protocol can tell.
+    /// Whether the line has faults that the protocol cannot handle: replies later than the protocol
+    /// can distinguish.
     pub beyond: bool,
     pub exchanges: u64,
 }
 
-/// Trials with the same speakers.
+/// Trials with the same protocol and configuration.
 pub struct Group {
     pub title: &'static str,
     pub speaks: Speaks,
@@ -35,7 +35,7 @@ pub struct Group {
     beyond: &'static [(&'static str, u64)],
 }
 
-/// Each trial is cut into runs with seeds of their own, from 1 on.
+/// Number of parts of each trial. Their seeds start at 1.
 pub const SEEDS: u64 = 8;
 
 pub const SPEC: Setup =
@@ -43,7 +43,7 @@ pub const SPEC: Setup =
 const FIRMWARE: Setup =
     Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad, life: Life::Long };
 
-/// What is tried with both profiles.
+/// The lines of both profiles.
 const SERIAL: &[(&str, u64)] = &[
     ("flip=1e-6", 8_000_000),
     ("flip=1e-5", 4_000_000),
@@ -70,10 +70,10 @@ const SERIAL: &[(&str, u64)] = &[
     ("flip=1e-4,drop=1e-4,dup=1e-4,insert=1e-4,pause=30ms..1s@1e-4,cut=200ms@1e-5", 1_000_000),
 ];
 
-/// What nothing can survive for sure in a protocol without sequence numbers.
+/// Faults that a protocol without sequence numbers cannot handle reliably.
 const SERIAL_BEYOND: &[(&str, u64)] = &[("delay=0ms..3s", 200_000), ("pause=2s..9s@1e-3", 500_000)];
 
-/// Where recovery does nothing, or not what the drive needs.
+/// Lines for tests where the recovery is off, or does not fit the drive.
 const SHORT: &[(&str, u64)] = &[
     ("flip=1e-4", 500_000),
     ("flip=1e-3", 500_000),
@@ -108,10 +108,10 @@ const BUS: &[(&str, u64)] = &[
     ("flip=1e-5,drop=1e-4,dup=1e-4,insert=1e-3,pause=30ms..70ms@1e-4,cut=50ms@1e-5", 1_000_000),
 ];
 
-/// Replies of a motor with more than the quarantine time between them.
+/// Replies of a motor that differ in delay by more than the quarantine time.
 const BUS_BEYOND: &[(&str, u64)] = &[("delay=0ms..200ms", 500_000)];
 
-/// What programs in turn are tried with.
+/// The lines for several programs one after the other.
 const SERIAL_TURNS: &[(&str, u64)] = &[
     ("drop=0", 200_000),
     ("delay=0ms..60ms", 200_000),
@@ -135,8 +135,8 @@ const BUS_TURNS: &[(&str, u64)] = &[
     ("cut=300ms@1e-4", 200_000),
 ];
 
-/// Lines on which replies come twice: the share of them, further faults, and how many times registers are
-/// read.
+/// Lines with duplicate replies: the fraction of duplicates, further faults, and the number of
+/// reads.
 pub const TWICE: &[(f64, &str, u64)] = &[
     (1e-2, "drop=0", 200_000),
     (1e-1, "drop=0", 200_000),
@@ -145,7 +145,7 @@ pub const TWICE: &[(f64, &str, u64)] = &[
     (1e-1, "delay=5ms..5ms", 100_000),
 ];
 
-/// Everything that is tried.
+/// All trials.
 pub const GROUPS: &[Group] = &[
     Group {
         title: "ST, profile spec, recovery Drain",
@@ -192,7 +192,7 @@ pub const GROUPS: &[Group] = &[
     },
 ];
 
-/// Lines on which plain and verified writes are compared, and how many of each there are.
+/// Lines for the comparison of plain and verified writes, and the number of writes.
 pub const WRITES: &[(Setup, &str, u64)] = &[
     (SPEC, "flip=1e-4", 4_000_000),
     (SPEC, "flip=1e-3", 2_000_000),
@@ -220,7 +220,7 @@ impl Group {
 }
 
 impl Trial {
-    /// How many damaged messages should have passed for whole ones.
+    /// The expected number of damaged messages that pass the checksum.
     pub fn expected(&self, tally: &Tally) -> Result<f64, FaultError> {
         let faults = self.faults.parse()?;
         Ok(match self.speaks {
@@ -230,7 +230,7 @@ impl Trial {
     }
 }
 
-/// The faults of a trial in the run with this seed.
+/// The faults of a trial for this seed.
 pub fn seeded(faults: &str, seed: u64) -> Result<Faults, FaultError> {
     Ok(Faults { seed, ..faults.parse()? })
 }

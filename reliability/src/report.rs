@@ -12,7 +12,7 @@ use crate::st::twice::Batches;
 use crate::st::verified::Writes;
 use crate::tally::Tally;
 
-/// What stands before and behind the tables.
+/// The marks before and after the tables.
 const BEGIN: &str = "<!-- begin of what `make reliability` writes -->\n";
 const END: &str = "<!-- end of what `make reliability` writes -->\n";
 
@@ -85,7 +85,7 @@ pub fn trials(title: &str, rows: &mut [(Trial, Tally)]) -> Result<String, FaultE
     Ok(format!("### {title}\n\n{}\n", table.text))
 }
 
-/// Plain writes beside verified ones.
+/// Plain writes compared with verified ones.
 pub fn writes(rows: &[(String, [Writes; 2])]) -> String {
     let mut table = Table::new(&[
         "line",
@@ -105,7 +105,7 @@ pub fn writes(rows: &[(String, [Writes; 2])]) -> String {
     format!("### Plain and verified writes\n\n{}\n", table.text)
 }
 
-/// Reads of four registers on lines where replies come twice, without and with confirmation.
+/// Reads of four registers on lines with duplicate replies, without and with confirmation.
 pub fn twice(rows: &[(String, [Batches; 2])]) -> String {
     let mut table = Table::new(&[
         "line",
@@ -123,7 +123,7 @@ pub fn twice(rows: &[(String, [Batches; 2])]) -> String {
     format!("### Replies that come twice, 1 to 20 ms apart\n\n{}\n", table.text)
 }
 
-/// How many damaged frames the checksum lets through.
+/// The fraction of damaged frames that pass the checksum.
 pub fn checksum() -> String {
     const FRAMES: u32 = 300;
     const WRONG: [usize; 6] = [1, 2, 3, 4, 6, 20];
@@ -162,7 +162,7 @@ pub fn checksum() -> String {
     format!("### What the checksum lets through\n\n{}\n", table.text)
 }
 
-/// Puts `tables` between the marks of a file.
+/// Replaces the text between the marks of a file by `tables`.
 pub fn update(path: &Path, tables: &str) -> Result<(), String> {
     let whole = std::fs::read_to_string(path).map_err(|error| format!("{path:?}: {error}"))?;
     let text = replaced(&whole, tables)

@@ -1,28 +1,28 @@
-//! What became of the exchanges of a run.
+//! The results of a run.
 
 use motorlink::time::{Instant, Micros};
 
-/// What became of the exchanges of a run, or of several.
+/// The results of the exchanges of one run or of several.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// Exchanges that were asked for.
+    /// Started exchanges.
     pub exchanges: u64,
-    /// Exchanges that ended in an error which the faults caused.
+    /// Exchanges that ended with an error caused by the faults.
     pub detected: u64,
-    /// Damaged messages, or pieces of messages, whose receiver took them for whole ones.
+    /// Damaged messages, or pieces of messages, that the receiver accepted.
     pub undetected: u64,
-    /// Of those, how many the drive carried out.
+    /// Those of them that the drive executed.
     pub executed: u64,
-    /// Requests and replies to them that were sent.
+    /// Sent requests and replies to them.
     pub requests: u64,
     pub answers: u64,
-    /// Damaged messages whose receiver compared a checksum.
+    /// Damaged messages whose checksum the receiver checked.
     pub judged: u64,
-    /// Results that went to an exchange although they answered nothing of it.
+    /// Results matched to an exchange to which they do not belong.
     pub misplaced: u64,
-    /// Commands that arrived twice and were carried out twice.
+    /// Commands that arrived twice and were executed twice.
     pub repeated: u64,
-    /// From the end of an exchange that failed to the end of the next one that did not, us.
+    /// Time from the end of a failed exchange to the end of the next successful one, µs.
     recoveries: Vec<u32>,
     /// The longest exchange.
     pub longest: Micros,
@@ -43,7 +43,7 @@ impl Tally {
         self.longest = self.longest.max(other.longest);
     }
 
-    /// Median, 99th percentile and maximum of the time to recover, ms; `None` where nothing failed.
+    /// Median, 99th percentile and maximum of the recovery time, ms; `None` without a failure.
     pub fn recovery(&mut self) -> Option<[f64; 3]> {
         self.recoveries.sort_unstable();
         let last = self.recoveries.len().checked_sub(1)?;
@@ -52,7 +52,7 @@ impl Tally {
     }
 }
 
-/// Watches how long the line stays in trouble.
+/// Measures how long the line is in trouble.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Trouble(Option<Instant>);
 
@@ -69,13 +69,13 @@ impl Trouble {
     }
 }
 
-/// Something happened that must not.
+/// A violated guarantee.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Violation {
-    /// The exchange in which it showed.
+    /// The exchange in which it was detected.
     pub exchange: u64,
-    /// What.
+    /// A description.
     pub what: String,
-    /// What passed the line before; empty unless it was asked for.
+    /// The transfers before it; empty unless requested.
     pub trace: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! Bytes and frames that know where they come from.
+//! Bytes and frames with their origin.
 
 use motorlink_link::fault::{Rng, Struck, Unit, Way};
 
@@ -6,20 +6,20 @@ use motorlink_link::fault::{Rng, Struck, Unit, Way};
 #[derive(Debug, Clone, Copy)]
 pub struct Tagged<T> {
     pub unit: T,
-    /// The message that it is a part of; `None` is noise.
+    /// The message that contains it; `None` is noise.
     pub source: Option<Source>,
-    /// Whether its value changed on the way.
+    /// Whether its value changed in transit.
     pub changed: bool,
-    /// Whether it is the second copy of a unit that came twice.
+    /// Whether it is the second copy of a duplicated unit.
     pub copy: bool,
 }
 
-/// A place in a message.
+/// A position in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Source {
-    /// Messages of one direction are counted.
+    /// The number of the message in its direction.
     pub message: u32,
-    /// Which unit of it.
+    /// The index of the unit in it.
     pub place: u16,
 }
 
@@ -29,14 +29,14 @@ impl<T> Tagged<T> {
         Tagged { unit, source, changed: false, copy: false }
     }
 
-    /// The message of which this is, as it was sent, the unit at `place`.
+    /// The message whose unit at `place` this is, unchanged.
     pub fn intact(&self, place: usize) -> Option<u32> {
         let source = self.source.filter(|_| !self.changed && !self.copy)?;
         (usize::from(source.place) == place).then_some(source.message)
     }
 }
 
-/// The message that these units are, from its first on, each as it was sent.
+/// The message that consists of exactly these units, unchanged.
 pub fn message<T>(units: &[Tagged<T>]) -> Option<u32> {
     let message = units.first()?.intact(0)?;
     let whole = units.iter().enumerate().all(|(n, unit)| unit.intact(n) == Some(message));

@@ -1,5 +1,5 @@
-"""A line between programs and drives, as behind a device server: replies come late, twice or never, and go to
-whoever has it then."""
+"""A line between programs and drives, as on a device server. Replies come late, twice or never. The
+program that is connected at that time gets them."""
 
 import heapq
 import itertools
@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 @dataclass
 class Fate:
-    """What becomes of replies. Times in seconds."""
+    """The faults of replies. Times in seconds."""
 
     late: float = 0.0
-    #: Share of replies that come twice, and how much later at most.
+    #: Fraction of duplicate replies, and the maximum delay of the copy.
     twice: float = 0.0
     apart: float = 0.02
-    #: Share of replies that are lost.
+    #: Fraction of lost replies.
     lost: float = 0.0
-    #: Whether the line sends back what it is sent.
+    #: Whether the line echoes.
     echo: bool = False
 
 
@@ -112,7 +112,7 @@ class BadLine:
         self._asked += sent
         for message in self.messages(self._asked):
             self.requests.append(message)
-            # What is for the adapter itself is no frame.
+            # A command of the adapter itself is not a frame.
             if self.fate.echo and message[:1] not in (b"\r", b"C", b"S", b"O"):
                 self._tell(message)
             self.drives.sendall(message)

@@ -87,7 +87,7 @@ class Outcome:
 
 
 class Running:
-    """A program that runs while the test goes on; its output is read as it comes."""
+    """A program that runs during the test. Its output is read continuously."""
 
     def __init__(self, arguments, stdin=subprocess.DEVNULL, **variables):
         self.process = subprocess.Popen(

@@ -22,11 +22,11 @@ DEMO_ENDS_WITHIN = 30
 
 
 def test_the_demo_tells_its_story_in_lines_and_ends_by_itself(run, tmp_path):
-    told = run("demo", within=DEMO_ENDS_WITHIN, TMPDIR=str(tmp_path)).ended(0)
-    assert "\x1b" not in told.out
+    message = run("demo", within=DEMO_ENDS_WITHIN, TMPDIR=str(tmp_path)).ended(0)
+    assert "\x1b" not in message.out
     for said in (r"1500 rpm", r"-1000 rpm", r"RMD motor 1 .*°", r"BREAK_IN", r"FAULT_ACK"):
-        assert re.search(said, told.out), said
-    summary = told.out.partition("What you saw:")[2]
+        assert re.search(said, message.out), said
+    summary = message.out.partition("What you saw:")[2]
     assert len(re.findall(r"^  - ", summary, re.MULTILINE)) >= 5
     assert re.search(r"\d+ exchanges in \d+ s", summary)
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
@@ -142,8 +142,8 @@ def test_help_tells_the_exit_codes_and_every_command_has_help(run):
 
 
 def test_an_unknown_command_is_a_usage_error_with_the_nearest(run):
-    told = run("st", "statuss").ended(2).err
-    assert "'status'" in told
+    message = run("st", "statuss").ended(2).err
+    assert "'status'" in message
 
 
 @pytest.mark.parametrize(
@@ -159,8 +159,8 @@ def test_an_unknown_command_is_a_usage_error_with_the_nearest(run):
     ],
 )
 def test_a_time_without_a_unit_is_refused_with_both_spellings(run, words):
-    told = run(*words.split()).ended(2).err
-    assert "the unit is missing: write 100ms or 100s" in told
+    message = run(*words.split()).ended(2).err
+    assert "the unit is missing: write 100ms or 100s" in message
 
 
 @pytest.mark.parametrize(

@@ -197,8 +197,8 @@ def test_the_tolerance_of_a_full_turn_can_be_given(near):
     assert bus.motor(1)["mode"] == "off"
     rmd(*move, "--tolerance", 0.2).ended(0)
     assert bus.motor(1)["mode"] == "position"
-    for words, told in (("--tolerance=-1", "outside 0 to"), ("--tolerance=nan", "outside 0 to")):
-        assert told in rmd(*move, words).ended(2).err
+    for words, message in (("--tolerance=-1", "outside 0 to"), ("--tolerance=nan", "outside 0 to")):
+        assert message in rmd(*move, words).ended(2).err
     assert "--full-turn" in rmd("position", 90, "--full-turn").ended(2).err
     assert "counterclockwise (ccw)" in rmd("single-turn-position", 90, "left").ended(2).err
     assert "cannot be used" in rmd(*move, "--full-turn", "--tolerance", 1).ended(2).err
@@ -268,7 +268,7 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
 
 
 @pytest.mark.parametrize(
-    "command, told",
+    "command, message",
     [
         ("torque 33", "±32 A"),
         ("torque nan", "nothing was sent"),
@@ -282,14 +282,14 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
         ("raw zz", "not hexadecimal"),
     ],
 )
-def test_what_does_not_fit_is_not_sent(rmd, command, told):
+def test_what_does_not_fit_is_not_sent(rmd, command, message):
     refused = rmd("--trace", *command.split()).ended(2)
-    assert told in refused.err and "->" not in refused.err
+    assert message in refused.err and "->" not in refused.err
 
 
 def test_a_serial_line_is_not_a_can_bus(run, drives):
-    told = run("rmd", "-p", drives.can, "scan").ended(2).err
-    assert "cannot be used as a CAN bus" in told and "slcan:" in told
+    message = run("rmd", "-p", drives.can, "scan").ended(2).err
+    assert "cannot be used as a CAN bus" in message and "slcan:" in message
 
 
 def test_a_bare_interface_name_is_met_with_the_right_one(run):
@@ -300,8 +300,8 @@ def test_a_bare_interface_name_is_met_with_the_right_one(run):
 
 
 def test_a_motor_that_is_not_there_is_told(rmd):
-    told = rmd("-i", 9, "status").ended(3).err
-    assert "motor 9 does not answer" in told and "motorlink rmd scan" in told
+    message = rmd("-i", 9, "status").ended(3).err
+    assert "motor 9 does not answer" in message and "motorlink rmd scan" in message
     assert "no motor answered" in rmd("scan", 9, 10).ended(3).err
 
 
@@ -319,15 +319,15 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     ]
     assert partly.lines[1]["error"]["kind"] == "silent"
     assert "motor 2" in partly.err
-    told = on(run, port)("torque4", 0, 0, 0, 0).ended(3)
-    assert [line.split()[1] for line in told.out.splitlines()] == ["1", "3"]
-    two, four = told.err.splitlines()
+    message = on(run, port)("torque4", 0, 0, 0, 0).ended(3)
+    assert [line.split()[1] for line in message.out.splitlines()] == ["1", "3"]
+    two, four = message.err.splitlines()
     assert "motor 2 does not answer" in two and "motor 4 does not answer" in four
 
 
 def test_a_can_interface_that_is_absent_is_told(run):
-    told = run("rmd", "-p", "socketcan:nocan7", "scan").ended(3).err
-    assert "CAN" in told
+    message = run("rmd", "-p", "socketcan:nocan7", "scan").ended(3).err
+    assert "CAN" in message
 
 
 def test_a_device_that_does_not_exist_is_told(run, tmp_path):
@@ -337,27 +337,27 @@ def test_a_device_that_does_not_exist_is_told(run, tmp_path):
 @pytest.mark.parametrize("answer", [noise, lambda received: received])
 def test_an_adapter_that_is_not_slcan_is_told(run, tmp_path, answer):
     with device(tmp_path / "other", answer) as port:
-        told = run("rmd", "-p", f"slcan:{port}", "scan").ended(3).err
-    assert "does not answer like an slcan adapter" in told
+        message = run("rmd", "-p", f"slcan:{port}", "scan").ended(3).err
+    assert "does not answer like an slcan adapter" in message
 
 
 def test_an_st_drive_is_not_an_slcan_adapter(run, drives):
-    told = run("rmd", "-p", f"slcan:{drives.st}", "scan").ended(3).err
-    assert "does not answer like an slcan adapter" in told
+    message = run("rmd", "-p", f"slcan:{drives.st}", "scan").ended(3).err
+    assert "does not answer like an slcan adapter" in message
 
 
 def test_a_silent_device_is_given_up_in_time(run, tmp_path):
     with device(tmp_path / "silent") as port:
-        begun = time.monotonic()
+        started = time.monotonic()
         run("rmd", "-p", f"slcan:{port}", "--timeout", "20ms", "status").ended(3)
-        assert time.monotonic() - begun < 4
+        assert time.monotonic() - started < 4
 
 
 def test_an_adapter_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
     adapter = slcan_adapter(lambda frame: [])
     with device(tmp_path / "can", lambda r: None if b"t" in r else adapter(r)) as port:
-        told = run("rmd", "-p", f"slcan:{port}", "status").ended(3).err
-    assert "was closed" in told or "unplugged" in told
+        message = run("rmd", "-p", f"slcan:{port}", "status").ended(3).err
+    assert "was closed" in message or "unplugged" in message
 
 
 def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
@@ -369,8 +369,8 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
 
     with device(tmp_path / "can", slcan_adapter(v3_motor)) as link:
         port = f"slcan:{link}"
-        told = on(run, port)("status").ended(3).err
-        assert "V3" in told and "0x241" in told
+        message = on(run, port)("status").ended(3).err
+        assert "V3" in message and "0x241" in message
 
         found = on(run, port)("--json", "scan", 1).ended(0).json
         assert found["motor"] == 1 and "V3" in found["dialect"]
@@ -380,8 +380,8 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
 
 def test_an_adapter_that_echoes_its_own_frames_is_not_a_motor(run, tmp_path):
     with device(tmp_path / "can", slcan_adapter(lambda frame: [frame])) as link:
-        told = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", "50ms", "off").ended(3).err
-    assert "does not answer" in told
+        message = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", "50ms", "off").ended(3).err
+    assert "does not answer" in message
 
 
 @pytest.mark.parametrize("kind", ["slcan", "slcan:tcp"])

@@ -88,9 +88,9 @@ def test_registers_lists_the_table_without_a_port(run):
     registers = {r["name"]: r for r in run("st", "--json", "registers").ended(0).lines}
     assert registers["SPEED_MEAS"]["id"] == 0x1E
     assert registers["SPEED_MEAS"]["access"] == "R"
-    told = run("st", "registers").ended(0).out
-    assert told.startswith("id    name ") and "0x1e  SPEED_MEAS" in told
-    assert "  D   in data segments and on DAC channels only" in told
+    message = run("st", "registers").ended(0).out
+    assert message.startswith("id    name ") and "0x1e  SPEED_MEAS" in message
+    assert "  D   in data segments and on DAC channels only" in message
 
 
 @pytest.mark.parametrize(
@@ -229,27 +229,27 @@ def test_an_unknown_register_is_met_with_the_nearest(st):
 
 
 def test_a_value_out_of_range_is_not_sent(st):
-    told = st("--trace", "set", "SPEED_KP", 32768).ended(2)
-    assert "-32768 to 32767" in told.err and "->" not in told.err
+    message = st("--trace", "set", "SPEED_KP", 32768).ended(2)
+    assert "-32768 to 32767" in message.err and "->" not in message.err
     st("set", "SPEED_KP", "fast").ended(2)
     st("ramp", 1000, 65536).ended(2)
     st("current-reference", 40000, 0).ended(2)
 
 
 def test_the_drive_refuses_to_write_a_read_only_register(st):
-    told = st("set", "SPEED_MEAS", 3).ended(1).err
-    assert "motor 1 refused writing SPEED_MEAS: SET_READ_ONLY" in told
+    message = st("set", "SPEED_MEAS", 3).ended(1).err
+    assert "motor 1 refused writing SPEED_MEAS: SET_READ_ONLY" in message
 
 
 def test_the_drive_refuses_to_read_a_register_of_access_d(st):
-    told = st("get", "I_A").ended(1).err
-    assert "GET_WRITE_ONLY" in told and "use `st segment I_A`" in told
+    message = st("get", "I_A").ended(1).err
+    assert "GET_WRITE_ONLY" in message and "use `st segment I_A`" in message
 
 
 def test_a_refused_register_does_not_take_the_values_of_the_others(st):
-    told = st("get", "MIN_APP_SPEED", "I_A", "SC_RS", "STATUS").ended(1)
-    assert [line.split()[0] for line in told.out.splitlines()] == ["MIN_APP_SPEED", "STATUS"]
-    assert "I_A has access D" in told.err and "add --profile mcsdk-5.4" in told.err
+    message = st("get", "MIN_APP_SPEED", "I_A", "SC_RS", "STATUS").ended(1)
+    assert [line.split()[0] for line in message.out.splitlines()] == ["MIN_APP_SPEED", "STATUS"]
+    assert "I_A has access D" in message.err and "add --profile mcsdk-5.4" in message.err
     loop = st("get", "MIN_APP_SPEED", "I_A", "--every", "5ms", "--count", 3).ended(1)
     assert [line.split()[1:] for line in loop.out.splitlines()[2:]] == 3 * [["600", "-"]]
 
@@ -280,8 +280,8 @@ def test_an_unknown_code_of_a_refusal_has_no_empty_brackets(run, tmp_path):
         return frame(ACK, bytes(size)) if size else nack(0x63)
 
     with device(tmp_path / "drive", drive) as port:
-        told = run("st", "-p", port, "get", "SPEED_MEAS").ended(1).err
-    assert "0x63 (no document names this number)" in told and "()" not in told
+        message = run("st", "-p", port, "get", "SPEED_MEAS").ended(1).err
+    assert "0x63 (no document names this number)" in message and "()" not in message
 
 
 def test_a_motor_that_the_drive_lacks_is_refused_and_one_beyond_7_not_even_sent(st):
@@ -295,8 +295,8 @@ def test_hexadecimal_that_is_none_is_told(st):
 
 
 def test_without_a_port_the_ways_to_name_one_are_told(run):
-    told = run("st", "info").ended(2).err
-    assert "-p PORT" in told and "MOTORLINK_PORT" in told and "sim:" in told
+    message = run("st", "info").ended(2).err
+    assert "-p PORT" in message and "MOTORLINK_PORT" in message and "sim:" in message
 
 
 def test_the_port_may_come_from_the_environment(run, drives):
@@ -309,16 +309,16 @@ def test_a_port_that_is_none_is_a_usage_error(run, port):
 
 
 def test_a_can_port_is_not_a_serial_line(run, drives):
-    told = run("st", "-p", drives.port("slcan"), "info").ended(2).err
-    assert "cannot be used as a serial line" in told
+    message = run("st", "-p", drives.port("slcan"), "info").ended(2).err
+    assert "cannot be used as a serial line" in message
 
 
 # What goes wrong on the line.
 
 
 def test_a_device_that_does_not_exist_is_told(run, tmp_path):
-    told = run("st", "-p", tmp_path / "ttyACM7", "info").ended(3).err
-    assert "is it plugged in?" in told and "motorlink ports" in told
+    message = run("st", "-p", tmp_path / "ttyACM7", "info").ended(3).err
+    assert "is it plugged in?" in message and "motorlink ports" in message
 
 
 def test_a_file_is_not_a_serial_device(run, tmp_path):
@@ -334,9 +334,9 @@ def test_nobody_listening_is_told(run):
 def test_a_silent_device_is_given_up_in_time(run, tmp_path):
     with device(tmp_path / "silent") as port:
         begun = time.monotonic()
-        told = run("st", "-p", port, "--timeout", "100ms", "info").ended(3).err
+        message = run("st", "-p", port, "--timeout", "100ms", "info").ended(3).err
         assert time.monotonic() - begun < 4
-    assert "no reply in time" in told and "motorlink st scan" in told
+    assert "no reply in time" in message and "motorlink st scan" in message
 
 
 def test_scan_tells_silence_from_garbage(run, tmp_path):
@@ -352,23 +352,23 @@ def test_scan_tells_silence_from_garbage(run, tmp_path):
 def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
     with device(tmp_path / "noisy", answer) as port:
         begun = time.monotonic()
-        told = run("st", "-p", port, "--timeout", "200ms", "info").ended(3).err
+        message = run("st", "-p", port, "--timeout", "200ms", "info").ended(3).err
         assert time.monotonic() - begun < 5
     # Noise may begin as a reply does.
     said = ("motorlink st scan", "something else is sending", "the line lost bytes")
-    assert any(words in told for words in said), told
+    assert any(words in message for words in said), message
 
 
 def test_a_line_that_echoes_is_told(run, tmp_path):
     with device(tmp_path / "echo", lambda received: received) as port:
-        told = run("st", "-p", port, "--timeout", "200ms", "start").ended(3).err
-    assert "is received again" in told and "echoes" in told
+        message = run("st", "-p", port, "--timeout", "200ms", "start").ended(3).err
+    assert "is received again" in message and "echoes" in message
 
 
 def test_a_device_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
     with device(tmp_path / "unplugged", lambda received: None) as port:
-        told = run("st", "-p", port, "info").ended(3).err
-    assert "was closed" in told or "unplugged" in told
+        message = run("st", "-p", port, "info").ended(3).err
+    assert "was closed" in message or "unplugged" in message
 
 
 def test_a_loop_survives_a_drive_that_goes_and_comes_back(start, sim):

@@ -61,14 +61,14 @@ def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
     angle = "rmd --timeout 400ms angle --every 5ms --count 4"
     echo = f"{motorlink} {angle} -p $MOTORLINK_PORT?echo=1"
     off = f"{motorlink} rmd --timeout 400ms off"
-    told = ["--timeout", "400ms", "--field", 2, "--echo", echo, "--off", off]
-    code, cases = check("rmd", *told, "--", motorlink, *angle.split())
+    message = ["--timeout", "400ms", "--field", 2, "--echo", echo, "--off", off]
+    code, cases = check("rmd", *message, "--", motorlink, *angle.split())
     assert failed(cases) == {}
     assert code == 0
     assert sum(case["verdict"] == "passed" for case in cases.values()) == 20
 
 
-# Hosts as people write them. The naive ones give up sooner than the drive is told, so that on a busy
+# Typical hosts. The timeout of the naive ones is shorter than the drive's timeout, so that on a busy
 # machine, too, a late reply comes after that.
 
 
@@ -121,8 +121,8 @@ def test_a_naive_host_of_rmd_is_caught(check):
 def test_hosts_of_four_motors_are_told_apart(check):
     def cycle(name):
         host = f"{sys.executable} {HOSTS / name} {{path}} 0.4"
-        told = ["--only", "[a cycle]", "--timeout", "400ms", "--cycle", host]
-        return check("rmd", *told, "--", "true")
+        message = ["--only", "[a cycle]", "--timeout", "400ms", "--cycle", host]
+        return check("rmd", *message, "--", "true")
 
     code, cases = cycle("careful_cycle.py")
     assert (code, len(cases), failed(cases)) == (0, 5, {})
@@ -172,10 +172,10 @@ def test_a_host_that_only_complains_has_passed_nothing(check):
 
 def test_a_host_is_not_blamed_when_this_machine_is_too_busy(check, tmp_path):
     """The host freezes the kit and gives up meanwhile: once, or whenever it is tried."""
-    told = ["--timeout", "300ms", "--only", "every_reading", *python("freezing_st.py", 0.3)]
-    code, cases = check("st", *told, tmp_path / "was-frozen")
+    message = ["--timeout", "300ms", "--only", "every_reading", *python("freezing_st.py", 0.3)]
+    code, cases = check("st", *message, tmp_path / "was-frozen")
     assert (code, failed(cases)) == (0, {})
-    code, cases = check("st", *told)
+    code, cases = check("st", *message)
     assert code == 3
     (case,) = cases.values()
     assert case["verdict"] == "not-run" and "too busy" in case["why"]

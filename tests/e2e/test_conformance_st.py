@@ -157,5 +157,5 @@ def test_a_port_that_dies_ends_the_run(run, tmp_path):
 def test_a_fault_that_cannot_be_ended_is_told(sim, run):
     hooks = ("--fault-on", "true", "--fault-off", "exit 4")
     report = kit(run, sim(rmd=()).st, *hooks, "--only", "ST-4.6-21", "--json").ended(1).json
-    told = [case["expected"] for case in report["cases"] if case["verdict"] == "failed"]
-    assert told and all("end it by hand" in text and "exit 4" in text for text in told), told
+    message = [case["expected"] for case in report["cases"] if case["verdict"] == "failed"]
+    assert message and all("end it by hand" in text and "exit 4" in text for text in message), message

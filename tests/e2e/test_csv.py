@@ -45,8 +45,8 @@ def test_a_file_that_exists_is_overwritten_with_force_only(run, tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("precious")
     words = ("st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--count", 1, "--csv", path)
-    told = run(*words).ended(2).err
-    assert "exists already" in told and "--force" in told and path.read_text() == "precious"
+    message = run(*words).ended(2).err
+    assert "exists already" in message and "--force" in message and path.read_text() == "precious"
     run(*words, "--force").ended(0)
     assert len(read(path)) == 1
 

@@ -1,4 +1,4 @@
-"""`--fault`: a line that misbehaves as it is told, on real and on simulated ports."""
+"""`--fault`: a line with chosen faults, on real and on simulated ports."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""`motorlink guard`: motors stop when the program that started them is gone, however it ends."""
+"""`motorlink guard`: motors stop when the program that started them has ended for any reason."""
 
 import json
 import os
@@ -67,7 +67,7 @@ def test_every_byte_passes_both_ways(sim, guard):
     with Line(guard(drives.st).port) as line:
         assert line.get(SPEED_KP, motor=1) > 0
         assert line.ask(frame(header(GET_REG, 1), [0xFF]))[0] != ACK
-        # What is no frame passes too: the drive answers it as it does without a guard.
+        # Bytes outside a frame pass, too: the drive answers them as without a guard.
         line.send([0x06, 0x00, 0xFF])
         assert line.reply() == frame(0xFF, [0x0A])
         line.send([0x06])

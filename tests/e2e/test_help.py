@@ -111,10 +111,10 @@ def test_options_of_a_command_come_before_those_of_every_command(run, command):
 )
 @pytest.mark.parametrize("json", [(), ("--json",)])
 def test_no_suggestion_turns_a_motor(run, words, json):
-    told = run(*words.split(), *json).ended(2).err
+    message = run(*words.split(), *json).ended(2).err
     # Words that were typed are repeated.
-    suggested = set(re.findall(r"[a-z0-9-]+", told)) - set(words.split())
-    assert not suggested & MOVING, told
+    suggested = set(re.findall(r"[a-z0-9-]+", message)) - set(words.split())
+    assert not suggested & MOVING, message
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`motorlink sim --rom`: what was written to ROM outlives the process, however it ends."""
+"""`motorlink sim --rom`: ROM contents are kept after the process has ended for any reason."""
 
 import os
 import random

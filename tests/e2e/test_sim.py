@@ -263,8 +263,8 @@ def test_state_tells_what_is_really_going_on(sim):
 
 
 def test_time_passes_while_nobody_talks(rmd):
-    begun = rmd.do("state")["t"]
-    eventually(lambda: rmd.do("state")["t"] > begun + 0.1, "time passes")
+    started = rmd.do("state")["t"]
+    eventually(lambda: rmd.do("state")["t"] > started + 0.1, "time passes")
 
 
 def test_supply_sets_the_voltage(st, rmd):
@@ -384,7 +384,7 @@ def test_answers_that_nobody_reads_do_not_stop_the_drives(motorlink, tmp_path):
             for _ in range(20):
                 assert line.get(CONTROL_MODE) == 1
         simulator.terminate()
-        assert simulator.wait(10) == 0, "it ends although nobody reads"
+        assert simulator.wait(10) == 0, "it ends although its output is not read"
     finally:
         simulator.kill()
         simulator.wait()

@@ -131,10 +131,10 @@ def test_a_whole_byte_tells_ack_from_nack_and_as_commands_they_name_motor_7(spec
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_a_cut_off_frame_is_answered_with_timeout_after_25_ms(spec, size):
-    begun = time.monotonic()
+    started = time.monotonic()
     spec.send(frame(GET_REG, [SPEED_MEAS])[:size])
     assert spec.reply() == nack(TIMEOUT)
-    assert 0.024 < time.monotonic() - begun < 2
+    assert 0.024 < time.monotonic() - started < 2
     assert spec.ask(frame(GET_REG, [SPEED_MEAS]))[0] == ACK
 
 

@@ -1,4 +1,4 @@
-"""The clock port of a board: who is connected to it says how the board's time passes."""
+"""The clock port of a board: its client advances the board's time."""
 
 import contextlib
 import socket
@@ -8,7 +8,7 @@ TICK = 1e-4
 MOST_TICKS = 254
 COUNT = 0
 SYNC = 255
-# A machine under load may take so long for anything.
+# Timeout on a machine under load, s.
 PATIENCE = 30
 
 
@@ -23,9 +23,9 @@ class Clock:
 
     def __init__(self, port):
         self.line = connect(port)
-        # What passed in steps of this connection.
+        # Ticks in steps of this connection.
         self.ticks = 0
-        # How many bytes the board has sent, which the line's user takes off.
+        # Number of bytes that the board has sent and the line's user has not read.
         self.due = 0
         self.synchronise()
 
@@ -39,7 +39,7 @@ class Clock:
         self.line.close()
 
     def synchronise(self):
-        """Drops what the board still answers to a former host; asks again while it does not listen yet."""
+        """Drops pending answers to a former host; repeats the command until the board is ready."""
         deadline = time.monotonic() + PATIENCE
         self.line.settimeout(0.1)
         answer = None
@@ -52,7 +52,7 @@ class Clock:
         self.line.settimeout(PATIENCE)
 
     def ask(self, command):
-        """Sends a command; gives the answer."""
+        """Sends a command; returns the answer."""
         self.line.sendall(bytes([command]))
         return self.answer()
 
@@ -68,7 +68,7 @@ class Clock:
         return received[0]
 
     def delivered(self, count):
-        """Waits until the board has taken so many bytes. Its time does not advance."""
+        """Waits until the board has received this number of bytes. Its time does not advance."""
         deadline = time.monotonic() + PATIENCE
         while count > 0:
             taken = self.ask(COUNT)
@@ -78,7 +78,7 @@ class Clock:
             assert time.monotonic() < deadline, "the board takes no bytes"
 
     def step(self, ticks):
-        """Advances until then, or until bytes move; gives the ticks that passed."""
+        """Advances by at most `ticks`, or until bytes are transferred; returns the elapsed ticks."""
         done = self.ask(min(ticks, MOST_TICKS))
         self.ticks += done
         return done

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Builds the boards and the C library for microcontrollers, boots them in QEMU and runs tests/firmware against them. Ends with 77 where the
-# packages cannot be installed. MOTORLINK_BIN is the built program, PYTEST how to run pytest, SUDO what
-# makes a command root's.
+# Builds the boards and the C library for microcontrollers, boots them in QEMU and runs
+# tests/firmware. Exit code 77: the packages cannot be installed. MOTORLINK_BIN is the built
+# program, PYTEST the command of pytest, SUDO the command that gives root rights.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 repository=$tests/../..

@@ -1,4 +1,4 @@
-"""Both UARTs at once, and how fast: figures are printed, none is judged."""
+"""Both UARTs at once. Prints the exchange rates; there is no goal for them."""
 
 import threading
 import time
@@ -12,7 +12,7 @@ EXCHANGES = 1000
 
 
 def st_exchanges(board):
-    """Reads a register again and again; checks each reply."""
+    """Reads a register repeatedly; checks each reply."""
     ask, reply = frame(GET_REG, [0x03]), frame(ACK, [1])
     with connect(board.st) as line:
         for _ in range(EXCHANGES):
@@ -46,9 +46,9 @@ def rates(board, *hosts):
     rates = {}
 
     def measure(exchanges):
-        begun = time.monotonic()
+        started = time.monotonic()
         exchanges(board)
-        rates[exchanges] = EXCHANGES / (time.monotonic() - begun)
+        rates[exchanges] = EXCHANGES / (time.monotonic() - started)
 
     threads = [threading.Thread(target=measure, args=[host]) for host in hosts]
     with board.clock() as clock:
@@ -56,7 +56,7 @@ def rates(board, *hosts):
         clock.step(1)
         for thread in threads:
             thread.start()
-        # QEMU hands over bytes that wait with each step or two: a frame has time enough.
+        # QEMU passes waiting bytes at each or every other step, which is fast enough for a frame.
         while any(thread.is_alive() for thread in threads):
             clock.step(1)
     assert set(rates) == set(hosts), "each exchange got its own reply"
@@ -81,9 +81,9 @@ def test_motors_of_both_kinds_turn_at_once(board, st, rmd, eventually, capsys):
         rmd("-i", motor, "speed", 360).ended(0)
     eventually(lambda: abs(speed() - 1500) < 30, "1500 rpm")
     first = rmd("-i", 1, "--json", "angle").ended(0).values["multi_turn_angle"]
-    begun = time.monotonic()
+    started = time.monotonic()
     board.advance(2)
-    took = time.monotonic() - begun
+    took = time.monotonic() - started
     turned = rmd("-i", 1, "--json", "angle").ended(0).values["multi_turn_angle"] - first
     # Each program waits for the quarantine time, 0.1 s, before it trusts a motor.
     assert abs(turned - 360 * (2 + 0.1)) < 4

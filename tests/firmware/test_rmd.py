@@ -27,7 +27,7 @@ from test_rmd_can import (  # noqa: F401  # tests that run here with this file's
 )
 
 
-# The answer to the question for the adapter's version.
+# The answer to the version command of the adapter.
 VERSION = b"V1010\r"
 
 
@@ -72,7 +72,7 @@ def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
                 received += more
             except TimeoutError:
                 assert time.monotonic() < deadline, "the adapter does not answer"
-                # Overruns may have taken the last question.
+                # Overruns may have lost the last command.
                 line.sendall(b"\rV\r")
     assert rmd("-i", 1, "--json", "status").ended(0).values["voltage"] == 24.0
 

@@ -11,7 +11,7 @@ list)
     ;;
 esac
 
-# What one check left is not taken for another's.
+# Results of an earlier check must not be used.
 rm -rf "/tmp/$1"
 mkdir "/tmp/$1"
 cd "/tmp/$1" || exit
@@ -34,7 +34,7 @@ await() {
     done
 }
 
-# $2 is the text or the pattern that $1 should be.
+# Fails unless $1 matches the text or the pattern $2.
 same() {
     # shellcheck disable=SC2254
     case $1 in
@@ -58,7 +58,7 @@ more_receivers_than() {
     [ "$(receivers)" -gt "$1" ]
 }
 
-# Lets candump write what passes on an interface to bus: direction, identifier, bytes.
+# Records the traffic of an interface with candump: direction, identifier, bytes.
 record() {
     before=$(receivers)
     candump -x "$1" >bus &
@@ -67,7 +67,7 @@ record() {
     await more_receivers_than "$before"
 }
 
-# What was recorded in direction $1, received or sent, from the interface's point of view.
+# The recorded frames in direction $1, received or sent, from the interface's point of view.
 recorded() {
     awk -v way="$1" '$2 == way { $1 = $2 = $3 = $4 = $6 = ""; $0 = $0; $1 = $1; print }' bus
 }
@@ -76,7 +76,7 @@ recorded_lines() {
     [ "$(recorded "$1" | grep -c .)" = "$2" ]
 }
 
-# Whether a file has more lines than the $2 that it had.
+# Whether a file has more than $2 lines.
 has_grown() {
     [ "$(grep -c . "$1")" -gt "$2" ]
 }
@@ -85,7 +85,8 @@ rmd() {
     motorlink rmd -p "$port" --timeout 5s "$@"
 }
 
-# Without 0x9A and 0x9C, which bring a motor in step and confirm what was read; what stops a motor goes out first and again.
+# Without 0x9A and 0x9C, which check a motor and confirm reads. Off and Stop are sent before them
+# and repeated.
 without_questions() {
     grep -v -E '^14. 9[AC] 00 00 00 00 00 00 00$' | uniq
 }
@@ -123,7 +124,7 @@ check_candump_sees_the_bytes_of_the_document() {
         rmd torque4 16 -16 0 8
         rmd --id 4 raw 9C
         rmd scan 3
-        # Nobody has the last ID.
+        # No motor has the last ID.
         motorlink rmd -p $port scan 32 2>/dev/null
     } >/dev/null
     cat >document <<'BYTES'
@@ -165,7 +166,7 @@ check_cansend_makes_the_simulated_motors_answer() {
     await recorded_lines RX 1
     # 25 degrees, 24.0 V, no error.
     same "$(recorded RX)" '142 9A 19 00 F0 00 00 00 00'
-    # Nobody answers an unknown command, a motor that is not there, or a frame of another kind.
+    # There is no reply to an unknown command, to a missing motor, or to a frame of another kind.
     cansend can0 142#FF00000000000000
     cansend can0 145#9A00000000000000
     cansend can0 142#9A000000000000
@@ -179,7 +180,8 @@ check_cansend_makes_the_simulated_motors_answer() {
     same "$(recorded RX | tail -n 4 | cut -c 1-6 | tr '\n' ' ')" '141 A1 142 A1 143 A1 144 A1 '
 }
 
-# A motor made of candump and cansend: answers requests to ID 5 with $1, and the questions of a host that has just come.
+# A motor made of candump and cansend: answers requests to ID 5 with $1, and the questions of a new
+# host.
 scripted_motor() {
     echo "$1" >answer
     [ ! -e scripted ] || return 0
@@ -205,7 +207,7 @@ check_cansend_answers_our_host() {
     scripted_motor 33000000E8030000
     same "$(rmd --id 5 acceleration --json)" '*"values":{"acceleration":{"value":1000,*'
     same "$(cat asked)" '* vcan0 145#3300000000000000*'
-    # The document prints this command's reply with the code of another.
+    # The document prints this command's reply with the code of another command.
     scripted_motor 9A1E0000F1000009
     said=$(rmd --id 5 clear-errors --json)
     same "$? $said" '1 {"ok":false,"motor":5,*"values":{"temperature":{"value":30,*'
@@ -278,7 +280,8 @@ check_sim_says_why_it_cannot_serve_an_interface() {
 
 check_the_kernels_slcan_driver_works_with_the_simulated_adapter() {
     serve slcan-pty:adapter
-    # The driver is there as long as somebody holds the adapter open: slcan_attach, until a key comes.
+    # The driver exists while a program keeps the adapter open: slcan_attach, until a key is
+    # pressed.
     sleep 60 | slcan_attach -w -o -s8 -n slcan0 "$(readlink adapter)" &
     running="$running $!"
     await [ -e /sys/class/net/slcan0 ]

@@ -33,7 +33,7 @@ unpack_debian() {
 
 "$tests/../install" test-socketcan ||
     unavailable "packages are missing; as root: tests/install test-socketcan"
-# The lists of packages must not change meanwhile.
+# The lists of packages must not change during this.
 exec 9>"${TMPDIR:-/tmp}/motorlink-apt-$(id -u).lock"
 flock 9
 unpack_debian >&2 || unavailable "Debian's kernel cannot be downloaded"

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Boots Debian's kernel in QEMU and runs inside it what needs CAN; see docs/SOCKETCAN.md. Prints a
-# line `passed NAME` or `failed NAME: why` for each check. Ends with 0 when all that there is has
-# passed, with 77 where the packages for it cannot be had, and with 1 otherwise.
+# Boots Debian's kernel in QEMU and runs the checks that need CAN in it; see docs/SOCKETCAN.md.
+# Prints `passed NAME` or `failed NAME: why` for each check. Exit code 0: all checks passed; 77: the
+# packages cannot be installed; 1: otherwise.
 set -eu
 here=$(dirname "$0")
 # Seconds; a whole run takes about 40 on a machine with nothing else to do. The machine's own time is that

@@ -1,4 +1,4 @@
-//! Modules that depend on each other, and the names that make them.
+//! Modules that depend on each other, and the names that cause it.
 
 use crate::modules::{Id, Modules};
 use crate::names::Name;
@@ -7,7 +7,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The largest sets of nodes in which every node leads to every other one.
+/// The largest sets of nodes in which every node reaches every other one.
 pub fn cycles(edges: impl Iterator<Item = (usize, usize)>) -> Vec<BTreeSet<usize>> {
     let edges = edges.map(|(from, to)| (from as u32, to as u32));
     let sets = tarjan_scc(&DiGraph::<(), ()>::from_edges(edges));
@@ -19,7 +19,7 @@ pub fn cycles(edges: impl Iterator<Item = (usize, usize)>) -> Vec<BTreeSet<usize
 pub struct Cycle<'a> {
     modules: &'a Modules,
     pub members: BTreeSet<Id>,
-    /// Few names without which there is no cycle, each with the shortest way back.
+    /// A few names whose removal ends the cycle, each with the shortest way back.
     names: Vec<(&'a Name, Vec<&'a Name>)>,
 }
 
@@ -39,7 +39,8 @@ fn ends(name: &Name) -> (Id, Id) {
     (name.from, name.to)
 }
 
-/// Names without which there is no cycle: those of few items, since to move an item changes them all.
+/// Names whose removal ends the cycle. Names of few items are preferred, because moving an item
+/// changes all names of it.
 fn closing<'a>(names: &[&'a Name]) -> Vec<&'a Name> {
     let item = |name: &Name| (name.to, name.item.clone());
     let without = |names: &[&'a Name], items: &[(Id, String)]| {
@@ -55,7 +56,7 @@ fn closing<'a>(names: &[&'a Name]) -> Vec<&'a Name> {
         let candidates: BTreeSet<_> = rest.iter().map(|name| item(name)).collect();
         let best = candidates.into_iter().min_by_key(|candidate| {
             let uses = rest.iter().filter(|name| item(name) == *candidate);
-            // How many names would have to go until no such dependency is left.
+            // The number of names to remove until no such dependency remains.
             let beside = uses.map(|name| rest.iter().filter(|o| ends(o) == ends(name)).count());
             (cyclic(&without(&rest, std::slice::from_ref(candidate))), beside.sum::<usize>())
         });
@@ -73,7 +74,7 @@ fn closing<'a>(names: &[&'a Name]) -> Vec<&'a Name> {
 
 /// A name for every step from the module that defines an item to the one that names it.
 fn way_back<'a>(names: &[&'a Name], name: &Name) -> Vec<&'a Name> {
-    // The graph finds the last of several edges.
+    // Of several edges, the graph finds the last one.
     let edges = names.iter().rev().map(|&name| (name.from as u32, name.to as u32, name));
     let graph = DiGraph::<(), &Name>::from_edges(edges);
     let (start, goal) = (NodeIndex::new(name.to), NodeIndex::new(name.from));
@@ -83,7 +84,7 @@ fn way_back<'a>(names: &[&'a Name], name: &Name) -> Vec<&'a Name> {
 }
 
 impl Cycle<'_> {
-    /// What to know to break it, with the files' paths from `folder` on.
+    /// The facts needed to break the cycle. Paths start at `folder`.
     pub fn report(&self, folder: &Path) -> String {
         let sentence = |name: &Name| {
             let file = &self.modules.0[name.from].file;
@@ -95,7 +96,7 @@ impl Cycle<'_> {
         for &member in &self.members {
             report += &format!("  {}\n", self.modules.0[member].name);
         }
-        report += "There is no cycle without these names:\n";
+        report += "The cycle ends without these names:\n";
         for (name, way_back) in &self.names {
             report += &format!("  {}", sentence(name));
             for name in way_back {

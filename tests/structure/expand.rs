@@ -1,4 +1,4 @@
-//! Expands macros by example, so that what they declare and name is seen.
+//! Expands macros by example, so that their declarations and names are found.
 
 use proc_macro2::{Delimiter, Group, Ident, TokenStream, TokenTree};
 use quote::ToTokens;
@@ -26,7 +26,7 @@ enum Value {
 }
 
 impl Macro {
-    /// From its rules; `$crate` becomes `crate`.
+    /// Parses the rules. `$crate` becomes `crate`.
     pub fn new(rules: TokenStream) -> Result<Self> {
         let parse = |input: ParseStream| {
             let mut rules = Vec::new();
@@ -43,7 +43,7 @@ impl Macro {
         parse.parse2(rules)
     }
 
-    /// What the first rule that fits makes of the tokens of an invocation.
+    /// Expands an invocation with the first matching rule.
     pub fn expand(&self, input: &TokenStream) -> Option<TokenStream> {
         self.0.iter().find_map(|(matcher, transcriber)| {
             let mut values = HashMap::new();
@@ -91,7 +91,7 @@ fn text(token: Option<TokenTree>) -> String {
     token.map_or(String::new(), |token| token.to_string())
 }
 
-/// Takes from `input` what fits `patterns`, and keeps the values of their variables.
+/// Matches `input` with `patterns`, and stores the values of their variables.
 fn take(
     patterns: &[Pattern],
     input: ParseStream,

@@ -1,4 +1,4 @@
-//! Reads the modules of a crate, and expands the macros that declare something.
+//! Reads the modules of a crate, and expands the macros that contain declarations.
 
 use crate::modules::{Id, Kind, Module, Modules, ROOT, is_test};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub fn load(file: &Path, read: Read) -> Modules {
         ..Module::default()
     });
     loader.read_file(ROOT);
-    // A macro may be imported, so that all modules have to be there.
+    // A macro may be imported, so all modules must be loaded first.
     while let Some((id, invocation, line)) = loader.invocations.pop() {
         loader.expand(id, invocation, line);
     }

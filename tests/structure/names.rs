@@ -1,7 +1,8 @@
 //! The items of other modules that the code of a module names.
 //!
-//! Not seen: methods and other associated items; the braces of format strings; the strings in attributes;
-//! in attributes and other tokens that are no code a lower-case name without `::` that is not called.
+//! Not detected: methods and other associated items; the braces of format strings; the strings in
+//! attributes; and, in attributes and other tokens that are not code, a lower-case name without
+//! `::` that is not called.
 
 use crate::modules::{Id, Modules, has_test, is_test};
 use crate::resolve::{Target, segments};
@@ -224,7 +225,7 @@ impl Visit<'_> for Names<'_> {
         visit::visit_path(self, path);
     }
 
-    /// A constant or a variant without fields looks like a name that the pattern declares.
+    /// A constant or a variant without fields looks like a variable in the pattern.
     fn visit_pat_ident(&mut self, pattern: &PatIdent) {
         let name = pattern.ident.to_string();
         if capital(&name) {

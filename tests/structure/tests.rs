@@ -285,7 +285,7 @@ fn the_report_shows_what_to_move() {
     let reports: Vec<_> =
         of_modules(&modules, &names).iter().map(|cycle| cycle.report(Path::new(""))).collect();
     let expected = "2 modules depend on each other:\n  crate::a\n  crate::b\n\
-        There is no cycle without these names:\n\
+        The cycle ends without these names:\n\
         \x20 b.rs names crate::a::Shared (line 1)\n\
         \x20   while a.rs names crate::b::One (line 3)\n";
     assert_eq!(reports, [expected]);

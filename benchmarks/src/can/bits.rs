@@ -1,10 +1,10 @@
 //! The bits of a standard CAN data frame, stuff bits included.
 
-/// Bits behind the stuffed part: CRC delimiter, ACK slot and delimiter, end of frame.
+/// Bits after the stuffed part: CRC delimiter, ACK slot and delimiter, end of frame.
 const TAIL: u32 = 1 + 1 + 1 + 7;
-/// Recessive bits that keep two frames apart.
+/// Recessive bits between two frames.
 pub(super) const INTERMISSION: u32 = 3;
-/// Equal bits after which one of the other value is stuffed.
+/// Number of equal bits after which an opposite bit is stuffed.
 const RUN: u32 = 5;
 
 /// Bits of a data frame from start to end of frame. `id` has 11 bits, `data` at most 8 bytes.
@@ -20,11 +20,11 @@ pub(super) fn frame_bits(id: u16, data: &[u8]) -> u32 {
     bits.sent + TAIL
 }
 
-/// What is sent so far.
+/// The bits sent so far.
 #[derive(Default)]
 struct Bits {
     crc: u16,
-    /// The last bit sent, and how many of its value stand at the end.
+    /// The last sent bit, and the number of equal bits at the end.
     last: bool,
     run: u32,
     /// Stuff bits included.
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn a_frame_of_zeros_has_a_stuff_bit_after_every_fifth() {
-        // 34 zero bits from start of frame to checksum, and the ten behind it.
+        // 34 zero bits from start of frame to checksum, and the ten bits after it.
         assert_eq!(frame_bits(0x000, &[]), 34 + 6 + 10);
     }
 
@@ -95,7 +95,7 @@ mod tests {
         let mut word = 1u64;
         let (mut least, mut most) = (u32::MAX, 0);
         for id in 0x000..=0x7FF {
-            // Knuth's generator, with runs in between.
+            // Knuth's generator, with runs of equal bits added.
             word = word.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(0x1405_7B7E_F767_814F);
             for data in [word, word & (word >> 9), 0, u64::MAX] {
                 let length = length(id, data.to_le_bytes());
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn frames_of_the_protocol_have_their_length() {
-        // By long division and text search, in another language.
+        // Computed by long division and text search in another language.
         assert_eq!(length(0x141, [0x9C, 0, 0, 0, 0, 0, 0, 0]), 124);
         assert_eq!(length(0x141, [0xA4, 0, 0x68, 0x01, 0x28, 0x23, 0, 0]), 120);
         assert_eq!(length(0x144, [0xA1, 25, 0xF3, 0xFF, 0x38, 0xFF, 0x10, 0x27]), 117);

@@ -1,4 +1,4 @@
-//! One cycle after the other: the sans-IO host, the wire, simulated motors.
+//! Cycles one after the other: the sans-IO host, the wire, simulated motors.
 
 use motorlink_proto::rmd::{
     Command, Host, MotorId, MotorSet, Output, RequestError, SetSpeed, SetTorque4,
@@ -10,7 +10,7 @@ use motorlink_sim::rmd::{RmdBus, RmdNode};
 use super::wire::{Sender, Transfer, Wire};
 use crate::result::Result;
 
-/// What a cycle asks of the motors 1 to 4.
+/// The requests of a cycle to motors 1 to 4.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Cycle {
     /// A torque for each in one frame.
@@ -32,16 +32,16 @@ impl Cycle {
         }
     }
 
-    /// Whether a share is asked for.
+    /// Whether there is a goal for the share.
     pub(super) const fn is_required(self) -> bool {
         matches!(self, Cycle::SetTorque4 | Cycle::Pipelined)
     }
 
-    /// Runs `cycles` of it with motors that answer `turnaround` after the request.
+    /// Runs `cycles` cycles. Motors answer `turnaround` after the request.
     pub(super) fn run(self, cycles: u32, turnaround: Micros) -> Result<Outcome> {
         let mut rig = Rig::new(turnaround);
         for number in 0..cycles {
-            // A swing of references, so that motors turn and frames differ.
+            // Varies the references, so that motors turn and frames differ.
             let swing = (number % 200) as i16 - 100;
             let speed = SetSpeed { speed: CentiDps(i32::from(swing) * 400) };
             match self {
@@ -68,11 +68,11 @@ impl Cycle {
     }
 }
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Debug)]
 pub(super) struct Outcome {
     cycles: u32,
-    /// Bits, of which the wire carries one a microsecond.
+    /// Bits. The wire transmits one per microsecond.
     carried: u64,
     took: Micros,
 }
@@ -82,7 +82,7 @@ impl Outcome {
         self.carried as f64 / f64::from(self.cycles)
     }
 
-    /// Cycles per second of a wire that is never idle.
+    /// Cycles per second on a wire that is never idle.
     pub(super) fn ceiling(&self) -> f64 {
         1e6 / self.bits_per_cycle()
     }
@@ -92,7 +92,7 @@ impl Outcome {
         1e6 * f64::from(self.cycles) / self.took.as_micros() as f64
     }
 
-    /// Of the ceiling.
+    /// The rate as a share of the ceiling.
     pub(super) fn share(&self) -> f64 {
         self.rate() / self.ceiling()
     }
@@ -119,7 +119,7 @@ impl Rig {
         self.host.request(self.now, id, command.encode())
     }
 
-    /// Lets time pass until every exchange is over; `wanted` of them have to end in a reply.
+    /// Advances the time until every exchange is over. `wanted` of them must end with a reply.
     fn settle(&mut self, wanted: usize) -> Result<()> {
         let mut replies = 0;
         loop {
@@ -138,7 +138,7 @@ impl Rig {
         }
     }
 
-    /// Lets the wire carry a frame, or time pass until `deadline` when there is none.
+    /// Transmits a frame; without one, advances the time to `deadline`.
     fn pass(&mut self, deadline: Instant) {
         let Some(Transfer { sender, frame, at }) = self.wire.carry() else {
             self.now = deadline;

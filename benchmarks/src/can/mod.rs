@@ -11,9 +11,9 @@ use crate::result::Result;
 use cycle::{Cycle, Outcome};
 
 const CYCLES: u32 = 2_000;
-/// What real motors may take to answer.
+/// Typical turnaround of real motors.
 const TURNAROUND: Micros = Micros(250);
-/// The share of the wire's ceiling that a cycle has to reach when motors answer at once.
+/// Required share of the wire's ceiling, with motors that answer at once.
 const LEAST: f64 = 0.98;
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {

@@ -1,23 +1,23 @@
-//! A bus at 1 Mbit/s: a bit is a microsecond, and the lowest identifier goes first.
+//! A bus at 1 Mbit/s: a bit takes a microsecond, and the lowest identifier is transmitted first.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::bits::{INTERMISSION, frame_bits};
 
-/// Who sends a frame.
+/// The sender of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sender {
     Host,
     Motor,
 }
 
-/// A frame on its way.
+/// A frame in transit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Transfer {
     pub(super) sender: Sender,
     pub(super) frame: CanFrame,
-    /// When its sender has it ready, then when the others have received it.
+    /// When the sender has it ready; then, when the others have received it.
     pub(super) at: Instant,
 }
 
@@ -30,12 +30,12 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    /// Queues a frame to be sent from its time on.
+    /// Queues a frame, to be sent from its time on.
     pub(super) fn queue(&mut self, transfer: Transfer) {
         self.queued.push(transfer);
     }
 
-    /// Carries the frame that wins the bus when it is idle; `None` when nobody has one.
+    /// Transmits the frame that wins the arbitration on the idle bus; `None` if there is no frame.
     pub(super) fn carry(&mut self) -> Option<Transfer> {
         let ready = self.queued.iter().map(|transfer| transfer.at).min()?;
         let start = ready.max(self.idle_from);

@@ -1,4 +1,4 @@
-//! A kind of message, as work that can be counted.
+//! A kind of message, as a kernel that can be counted.
 
 use crate::kernel::Kernel;
 

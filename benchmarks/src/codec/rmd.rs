@@ -9,7 +9,7 @@ use super::kind::Kind;
 
 /// The identifier of motor 1.
 const FIRST: u16 = MOTOR_BASE + 1;
-/// The values of every message; each takes those that it has bytes for.
+/// The values of every message. Each uses as many bytes as it has.
 const VALUES: [u8; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 /// Every command of the table with its reply, and the torque frame.
@@ -47,7 +47,7 @@ where
     there_and_back(FIRST, |reply: &C::Reply| reply.encode_as(C::CODE))
 }
 
-/// From values to a frame of the identifier `id`, and from the frame to values.
+/// Encodes values into a frame with the identifier `id`, and decodes the frame.
 fn there_and_back<P: Payload + 'static>(id: u16, encode: impl Fn(&P) -> [u8; 8]) -> impl FnMut() {
     let values = P::decode(&VALUES);
     move || {

@@ -21,38 +21,38 @@ pub(super) fn kinds() -> Vec<Kind> {
     let torque_ramp = TorqueRamp { torque_s16a: 4000, duration_ms: 250 };
     let currents = CurrentReference { iq_s16a: 4000, id_s16a: -100 };
     vec![
-        told(Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x27] }),
+        acknowledged(Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x27] }),
         asked(Request::GetRegister(register), &[0xDC, 0x05, 0, 0], move |payload| {
             black_box(register.decode(Profile::Spec, payload));
         }),
-        told(Request::ExecuteCommand(Command::StartMotor)),
+        acknowledged(Request::ExecuteCommand(Command::StartMotor)),
         asked(Request::GetBoardInfo, NAME, |payload| {
             black_box(BoardInfo::decode(payload));
         }),
-        told(Request::SetRamp(Ramp { speed_rpm: 1500, duration_ms: 250 })),
+        acknowledged(Request::SetRamp(Ramp { speed_rpm: 1500, duration_ms: 250 })),
         asked(Request::GetRevupData(0), &PHASE.to_bytes(), |payload| {
             black_box(RevupPhase::decode(payload));
         }),
-        told(Request::SetRevupData(0, PHASE)),
-        told(Request::SetCurrentReference(currents)),
+        acknowledged(Request::SetRevupData(0, PHASE)),
+        acknowledged(Request::SetCurrentReference(currents)),
         asked(Request::GetProfilerInfo(&[1]), &[2, 0x66, 0x67], plain),
         asked(Request::GetFirmwareVersion, NAME, |payload| {
             black_box(FirmwareVersion::decode(payload));
         }),
         asked(Request::GetSegment(0), &[0; 8], plain),
-        told(Request::SetTorqueRamp(torque_ramp)),
-        told(Request::ConfigureSegment { segment: 0, registers: REGISTERS }),
-        told(Request::SetPosition(position)),
+        acknowledged(Request::SetTorqueRamp(torque_ramp)),
+        acknowledged(Request::ConfigureSegment { segment: 0, registers: REGISTERS }),
+        acknowledged(Request::SetPosition(position)),
     ]
 }
 
-/// A payload that the protocol hands over as it is.
+/// A payload without decoding.
 fn plain(payload: &[u8]) {
     black_box(payload);
 }
 
 /// A request that is acknowledged without a payload.
-fn told(request: Request<'static>) -> Kind {
+fn acknowledged(request: Request<'static>) -> Kind {
     asked(request, &[], plain)
 }
 
@@ -77,7 +77,7 @@ fn asked(request: Request<'static>, payload: &[u8], decode: impl Fn(&[u8]) + 'st
     )
 }
 
-/// What the far end makes of the bytes.
+/// Decodes the bytes as the peer does.
 fn read(bytes: Option<&[u8]>) -> Option<Frame<'_>> {
     match Frame::parse(black_box(bytes?)) {
         Parse::Frame(frame, _) => Some(frame),

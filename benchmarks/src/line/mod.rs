@@ -17,13 +17,13 @@ use raw::{Far, Functions};
 use sitting::{Rates, sit, yielding};
 use transport::Transport;
 
-/// Processes that measure: where code and stacks come to lie in memory makes a tenth.
+/// Number of measuring processes. The addresses of code and stacks change the result by a tenth.
 const SITTINGS: usize = 20;
-/// Pairs of rounds in a sitting.
+/// Pairs of rounds per process.
 const ROUNDS: usize = 80;
 /// Exchanges in a round.
 const EXCHANGES: u32 = 50;
-/// The share of the raw loop's rate that the client has to reach.
+/// Required fraction of the raw loop's rate.
 const LEAST: f64 = 0.90;
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
@@ -71,7 +71,7 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     Ok((vec![section], goals))
 }
 
-/// The rounds of all sittings.
+/// The rounds of all processes.
 fn rounds(transport: Transport) -> Result<Vec<Rates>> {
     let mut rounds = Vec::with_capacity(SITTINGS * ROUNDS);
     for _ in 0..SITTINGS {
@@ -91,7 +91,7 @@ fn rounds(transport: Transport) -> Result<Vec<Rates>> {
     Ok(rounds)
 }
 
-/// A sitting in this process: prints a line for each pair of rounds.
+/// The rounds of this process: prints a line for each pair of rounds.
 pub fn sitting(name: &str) -> Result<()> {
     let transport = Transport::ALL.into_iter().find(|transport| transport.name() == name);
     let transport = transport.ok_or_else(|| format!("no line is called {name}"))?;
@@ -101,14 +101,14 @@ pub fn sitting(name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Answers at the far ends of `count` ptys, whose paths it prints, until standard input ends.
+/// Replies at the far ends of `count` ptys until the end of standard input. Prints their paths.
 pub fn respond(count: u32) -> Result<()> {
     let mut near = Vec::new();
     for _ in 0..count {
         let line = Transport::Pty.open()?;
         println!("{}", ttyname(&line.near, Vec::new())?.to_str()?);
         let far = Far::new(line.far)?;
-        // Who opens the device may close it again.
+        // The program that opens the device may close it again.
         near.push(line.near);
         thread::spawn(|| yielding(|| far.serve::<Functions>()));
     }
@@ -116,7 +116,7 @@ pub fn respond(count: u32) -> Result<()> {
     Ok(())
 }
 
-/// The middle and the ends of what was measured.
+/// Median, minimum and maximum of the results.
 #[derive(Debug, PartialEq)]
 pub struct Spread {
     least: f64,

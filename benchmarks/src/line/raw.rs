@@ -1,4 +1,4 @@
-//! The same bytes by the same system calls, and nothing else: write, ppoll, read at the near end;
+//! The same bytes with the same system calls, and nothing else: write, ppoll, read at the near end;
 //! ppoll, read, write at the far end.
 
 use std::os::fd::OwnedFd;
@@ -12,17 +12,17 @@ use crate::result::Result;
 /// GET_REG SPEED_MEAS to motor 1, and a speed of 0.
 const REQUEST: &[u8] = &[0x22, 0x01, 0x1E, 0x41];
 const REPLY: &[u8] = &[0xF0, 0x04, 0x00, 0x00, 0x00, 0x00, 0xF4];
-/// The client waits for a reply with this timeout, so the kernel has a timer to set here too.
+/// The client waits for a reply with this timeout. So the kernel sets a timer here, too.
 const TIMEOUT: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
 
-/// How the loop calls the system.
+/// How the loop calls the kernel.
 pub(super) trait Calls {
     fn send(fd: &OwnedFd, bytes: &[u8]) -> io::Result<usize>;
     fn wait(fd: &OwnedFd, timeout: Option<&Timespec>) -> io::Result<usize>;
     fn take(fd: &OwnedFd, buffer: &mut [u8]) -> io::Result<usize>;
 }
 
-/// Each call is a function that returns, as in libc.
+/// Each system call is a function that returns, as in libc.
 pub(super) struct Functions;
 
 impl Calls for Functions {
@@ -42,8 +42,8 @@ impl Calls for Functions {
     }
 }
 
-/// All is one function, which no program has: nothing returns behind a switch to another thread,
-/// where the processor mispredicts it.
+/// Everything is inlined into one function. No real program is like this: no function returns after
+/// a thread switch, where the processor mispredicts it.
 pub(super) struct Inlined;
 
 impl Calls for Inlined {
@@ -63,7 +63,7 @@ impl Calls for Inlined {
     }
 }
 
-/// The end that asks.
+/// The end that sends requests.
 pub(super) struct Near(OwnedFd);
 
 impl Near {
@@ -78,7 +78,7 @@ impl Near {
     }
 }
 
-/// The end that answers.
+/// The end that replies.
 pub(super) struct Far(OwnedFd);
 
 impl Far {
@@ -96,7 +96,7 @@ impl Far {
     }
 }
 
-/// Takes `size` bytes, which nearly always come at once.
+/// Receives `size` bytes, which nearly always arrive at once.
 #[inline(always)]
 fn receive<C: Calls>(fd: &OwnedFd, size: usize, timeout: Option<&Timespec>) -> io::Result<()> {
     let mut buffer = [0; 256];
@@ -113,7 +113,7 @@ fn receive<C: Calls>(fd: &OwnedFd, size: usize, timeout: Option<&Timespec>) -> i
     Ok(())
 }
 
-/// As the client's line is.
+/// Non-blocking, like the client's line.
 fn nonblocking(fd: OwnedFd) -> Result<OwnedFd> {
     fcntl_setfl(&fd, fcntl_getfl(&fd)? | OFlags::NONBLOCK)?;
     Ok(fd)

@@ -1,7 +1,8 @@
-//! A sitting: client and raw loop in turn, on lines and threads of its own.
+//! One measuring process: client and raw loop alternate, on their own lines and threads.
 //!
-//! All threads share one core, where a wake-up costs the same every time. The far ends have a lower
-//! priority: they never preempt the near end, so each exchange waits in ppoll, as for a real drive.
+//! All threads share one core, so that a wake-up always costs the same. The far ends have a lower
+//! priority: they never preempt the near end, so each exchange waits in ppoll, as with a real
+//! drive.
 
 use std::error::Error;
 use std::fmt;
@@ -47,7 +48,7 @@ impl FromStr for Rates {
     }
 }
 
-/// Measures `rounds` times a round of `exchanges` of each kind. This thread stays on one core
+/// Measures `rounds` rounds of `exchanges` exchanges of each kind. This thread remains on one core
 /// afterwards.
 pub(super) fn sit(transport: Transport, rounds: usize, exchanges: u32) -> Result<Vec<Rates>> {
     pin()?;
@@ -58,7 +59,7 @@ pub(super) fn sit(transport: Transport, rounds: usize, exchanges: u32) -> Result
         scope.spawn(|| yielding(|| serve(station)));
         scope.spawn(|| yielding(|| far_raw.serve::<Functions>()));
         scope.spawn(|| yielding(|| far_inlined.serve::<Inlined>()));
-        // The far ends leave when these are dropped.
+        // The far ends exit when these are dropped.
         let link = FdLink::new(line.near, transport.name())?;
         let client = Client::over(transport.name(), Box::new(link), Options::default());
         let (motor, raw, inlined) =
@@ -94,9 +95,10 @@ fn pin() -> Result<()> {
     Ok(sched_setaffinity(None, &one)?)
 }
 
-/// Does `work` at a lower priority.
+/// Runs `work` at a lower priority.
 pub(super) fn yielding(work: impl FnOnce()) {
-    // Never refused: on Linux this is for the calling thread alone, and only raising takes a right.
+    // Never refused: on Linux this affects only the calling thread, and only raising the priority
+    // needs permission.
     let _ = setpriority_process(None, 10);
     work();
 }
@@ -108,7 +110,7 @@ fn serve(mut line: FdLink) {
     let mut buffer = [0; 256];
     while let Ok(size) = line.read(&mut buffer, None) {
         let now = Moment(began.elapsed().as_micros() as u64);
-        // A line that fails here fails in the next read as well.
+        // If the write fails, the next read fails as well.
         station.receive(now, &buffer[..size], |reply| drop(line.write(reply)));
     }
 }

@@ -1,4 +1,4 @@
-//! The lines: two ends of each, connected.
+//! The lines: both ends of each, connected.
 
 use std::net::{TcpListener, TcpStream};
 use std::os::fd::OwnedFd;
@@ -35,7 +35,7 @@ impl Transport {
         }
     }
 
-    /// Whether a ratio is asked for.
+    /// Whether there is a goal for the ratio.
     pub(super) const fn is_required(self) -> bool {
         matches!(self, Transport::SocketPair | Transport::Pty)
     }

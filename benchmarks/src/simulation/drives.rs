@@ -1,4 +1,4 @@
-//! Our drives, each at its work, as kernels that let one period pass.
+//! Our drives in operation, as kernels that simulate one period.
 
 use std::hint::black_box;
 
@@ -20,23 +20,23 @@ use crate::kernel::Kernel;
 const PERIOD: Micros = Micros(50);
 pub(super) const PERIOD_S: f64 = 50e-6;
 
-/// Time to get to the speed.
+/// Time to reach the speed.
 const SETTLED: Instant = Instant(6_000_000);
 /// Speed of the ST motors, rpm.
 const RPM: i32 = 1_500;
 /// Speed of the RMD motor, °/s.
 const DPS: i32 = 720;
 
-/// A drive and what it does.
+/// A drive and its operation.
 pub(super) struct Rig {
     pub(super) name: &'static str,
-    /// Whether a speed is asked of it.
+    /// Whether there is a goal for its speed.
     pub(super) is_required: bool,
     build: fn(&'static str) -> Kernel,
 }
 
 impl Rig {
-    /// The drive when it has got to its speed.
+    /// The drive after it reached its speed.
     pub(super) fn kernel(&self) -> Kernel {
         (self.build)(self.name)
     }
@@ -66,7 +66,7 @@ pub(super) const RIGS: [Rig; 6] = [ENCODER, SENSORLESS, RMD, OBSERVED, IDLE, PLA
 pub(super) const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
 const IQ: f32 = 2.0;
 
-/// The motor that all but the RMD motor are, with a load that takes its torque.
+/// The motor of all drives except the RMD motor, with a load that takes its torque.
 fn motor() -> PlantConfig {
     let motor = preset::shinano();
     let machine = motor.machine;
@@ -77,7 +77,7 @@ fn motor() -> PlantConfig {
     PlantConfig { load, ..motor }
 }
 
-/// What bench/peers.py is told of it.
+/// The motor as an argument of bench/peers.py.
 pub(super) fn machine() -> Value {
     let PlantConfig { machine, supply, .. } = motor();
     json!({
@@ -102,7 +102,8 @@ fn plant(name: &'static str) -> Kernel {
     let across = machine.resistance * IQ + electrical * machine.flux_linkage;
     let share = Vector::new(-electrical * machine.inductance_q * IQ, across)
         * (1.0 / config.supply.voltage);
-    // The voltage acts in the next period: the rotor is one and a half ahead in its middle.
+    // The voltage acts in the next period, so the rotor is one and a half periods further in its
+    // middle.
     let ahead = angle::position(1.5 * PERIOD_S as f32 * electrical) as u32;
     let mut period = move || {
         let frame = Vector::unit(plant.machine().electrical_angle().wrapping_add(ahead));
@@ -117,14 +118,14 @@ fn plant(name: &'static str) -> Kernel {
     })
 }
 
-/// A drive that has an encoder and no observer beside it.
+/// A drive with an encoder and without an observer.
 fn encoder() -> MotorConfig {
     let mut config = MotorConfig::servo();
     config.build.observer_cordic = false;
     config
 }
 
-/// An ST drive that turns at a speed; 0: it was never started.
+/// An ST drive that turns at a speed; with 0 it was never started.
 fn st(name: &'static str, mut config: MotorConfig, rpm: i32) -> Kernel {
     config.plant.load = motor().load;
     let drive = StDrive::new(Instant(0), [StMotor::new(config)]).expect("one motor is allowed");

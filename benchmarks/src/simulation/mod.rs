@@ -1,4 +1,4 @@
-//! Simulated drives: how much faster than real ones they are, and than other simulators.
+//! Simulated drives: speed relative to real time and to other simulators.
 
 mod drives;
 mod peers;
@@ -12,16 +12,16 @@ use crate::result::Result;
 use drives::Rig;
 use peers::{Peer, Peers};
 
-/// How often the drives and the other simulators take turns.
+/// Number of turns of the drives and the other simulators.
 const ROUNDS: usize = 7;
-/// Periods of ours in a turn.
+/// Periods of our drives per turn.
 const PERIODS: u32 = 100_000;
-/// Drives that one core has to run in real time.
+/// Required number of drives that one core can simulate in real time.
 const REAL_TIME: f64 = 500.0;
-/// How much faster than the others a whole drive has to be.
+/// Required speed ratio of a whole drive to the others.
 const FASTER: f64 = 100.0;
 
-/// How the others are set up.
+/// The configuration of the other simulators.
 const OTHERS: &str = "\
 The other simulators run as fast as they can (benchmarks/peers.py). They plot nothing, compute no
 reward that is not required, and have one voltage in each period.
@@ -43,7 +43,7 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     Ok((vec![own, others], goals))
 }
 
-/// Each built when it is asked for, because it has to get to its speed first.
+/// Each is built on demand, because it must reach its speed first.
 pub fn kernels() -> impl Iterator<Item = Kernel> {
     drives::RIGS.iter().map(Rig::kernel)
 }
@@ -124,7 +124,7 @@ fn beside_others() -> Result<(Section, Vec<Goal>)> {
     Ok((section, goals.into()))
 }
 
-/// Medians of their steps a second, ours, and the ratio.
+/// Medians of their steps per second and of ours, and the ratio.
 fn take_turns(peer: &Peer, peers: &mut Peers) -> Result<(f64, f64, f64)> {
     let mut kernel = peer.ours.kernel();
     let mut turns = Vec::new();
@@ -138,7 +138,7 @@ fn take_turns(peer: &Peer, peers: &mut Peers) -> Result<(f64, f64, f64)> {
     ))
 }
 
-/// Repetitions a second of this thread's time on the processor.
+/// Repetitions per second of this thread's processor time.
 fn rate(kernel: &mut Kernel) -> f64 {
     let began = processor_seconds();
     kernel.repeat(PERIODS);

@@ -1,4 +1,4 @@
-//! The other simulators: Python packages, measured by bench/peers.py in a process of its own.
+//! The other simulators: Python packages, measured by bench/peers.py in its own process.
 
 use std::io::{BufRead, BufReader, Lines, Write};
 use std::path::Path;
@@ -16,13 +16,13 @@ pub(super) const PACKAGES: [&str; 2] = [GEM, MOTULATOR];
 /// A model of another simulator.
 pub(super) struct Peer {
     pub(super) package: &'static str,
-    /// What it is, for the reader.
+    /// Its description.
     pub(super) what: &'static str,
-    /// What bench/peers.py calls it.
+    /// Its name in bench/peers.py.
     model: &'static str,
     /// Steps in a turn, a good quarter of a second.
     steps: u32,
-    /// What of ours it is nearest to.
+    /// Our drive that is most similar.
     pub(super) ours: Rig,
 }
 
@@ -55,7 +55,7 @@ pub(super) const PEERS: [Peer; 8] = [
     ),
 ];
 
-/// The packages at work.
+/// The process that runs the packages.
 pub(super) struct Peers {
     child: Child,
     orders: ChildStdin,
@@ -64,7 +64,7 @@ pub(super) struct Peers {
 }
 
 impl Peers {
-    /// `None`, loudly, where `make bench` could not install the packages.
+    /// `None` with a warning if `make bench` could not install the packages.
     pub(super) fn start() -> Result<Option<Self>> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let python = folder.join("../.venv-bench/bin/python");
@@ -91,7 +91,7 @@ impl Peers {
         Ok(Some(peers))
     }
 
-    /// What is measured, with versions.
+    /// The names and versions of the packages.
     pub(super) fn versions(&self) -> String {
         let versions = self.versions.as_object().into_iter().flatten();
         let named =
@@ -99,7 +99,7 @@ impl Peers {
         named.collect::<Vec<_>>().join(", ")
     }
 
-    /// Steps a second of this peer.
+    /// Steps per second of this peer.
     pub(super) fn rate(&mut self, peer: &Peer) -> Result<f64> {
         writeln!(self.orders, "{} {}", peer.model, peer.steps)?;
         let answer = self.answer()?;
@@ -119,7 +119,7 @@ impl Peers {
 
 impl Drop for Peers {
     fn drop(&mut self) {
-        // It may have ended by itself already.
+        // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,7 +1,16 @@
-//! Motor drives from a program: the clients of both protocols, and what keeps a motor safe.
+//! Clients for motor drives: ST's Motor Control Protocol on a serial line, and RMD over CAN.
 //!
-//! [`st`] speaks ST's Motor Control Protocol, [`rmd`] the RMD protocol over CAN; both over ports
-//! of [`port`], which [`list`] finds. [`relay`] stands between another program and its motors.
+//! | to | use |
+//! |---|---|
+//! | command ST motors | [`st::Client`], [`st::Motor`] |
+//! | command RMD motors | [`rmd::Client`], [`rmd::Motor`] |
+//! | command drives from an event loop | [`st::EventClient`], [`rmd::EventClient`] |
+//! | open a port by name | [`port::PortName`] |
+//! | list the ports of this machine | [`list::ports`] |
+//! | stop motors at the end of a scope, on errors and panics | [`st::StopOnDrop`], [`rmd::StopOnDrop`] |
+//! | limit speeds and currents | [`st::Limits`], [`rmd::Limits`] |
+//! | find the baud rate of an ST drive | [`st::scan_baud`] |
+//! | stop the motors of another program when it ends | [`relay::Relay`] |
 #![forbid(unsafe_code)]
 
 pub mod relay;

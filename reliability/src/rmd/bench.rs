@@ -1,4 +1,4 @@
-//! Host and drives on a bus that misbehaves, and a judge that knows where every frame came from.
+//! Host and drives on a bus with faults, and a judge that knows the origin of every frame.
 
 use motorlink::time::{Instant, Micros};
 use motorlink_link::fault::{Faults, Rng, Unit};
@@ -14,40 +14,40 @@ use crate::bench::{self, Ends, Log};
 use crate::tally::Trouble;
 use crate::wire::Tagged;
 
-/// A frame at 1 Mbit/s.
+/// Transmission time of a frame at 1 Mbit/s.
 const FRAME: Micros = Micros(120);
-/// How long a motor thinks.
+/// Processing time of a motor.
 const TURNAROUND: Micros = Micros(300);
-/// How long an exchange takes at most: the motor is left alone for the quarantine time, asked for its
-/// status, silent for the quarantine time, and asked.
+/// Worst-case duration of an exchange: quarantine time, status question, quarantine time again,
+/// request.
 const LONGEST: Micros = Micros(2 * (DEFAULT_QUARANTINE.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
-/// What a program that asks a motor for the first time may wait longer: for the answers to what ends
-/// motion, and to another question.
+/// Additional time of the first exchange with a motor: the answers to Off and Stop, and to a second
+/// question.
 const FIRST: Micros = Micros(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
-/// As the blocking client, the host takes what came meanwhile after a pause of this length.
+/// The host reads received frames after a pause of this length, like the blocking client.
 const IDLE: Micros = Micros(1_000);
 
-/// A frame of the host to a motor.
+/// A frame from the host to a motor.
 #[derive(Clone, Copy, Default)]
 struct SentFrame {
-    /// Counts what each motor was sent, from 1 on.
+    /// Number of the frame to this motor, from 1.
     number: u64,
     at: Instant,
-    /// Off and Stop do not wait until the motor's replies can be trusted.
+    /// Whether this is Off or Stop, which do not wait for trusted replies.
     halts: bool,
-    /// The number of what told the motor last to move.
+    /// The number of the last motion command.
     moved: u64,
 }
 
-/// A frame of the host to each motor that it reaches.
+/// A frame from the host, for each motor that it reaches.
 type Sent = [SentFrame; MOTORS];
 
-/// A frame of a drive.
+/// A frame from a drive.
 #[derive(Clone, Copy)]
 struct Reply {
-    /// What it answers.
-    asked: SentFrame,
-    /// Whether its request came twice, and this answers the second copy.
+    /// The request that it answers.
+    request: SentFrame,
+    /// Whether its request was duplicated, and this answers the second copy.
     again: bool,
 }
 
@@ -57,14 +57,14 @@ pub type RmdRun = bench::Run<Rmd>;
 pub struct Rmd {
     host: Host,
     nodes: Vec<Node>,
-    /// What each motor was sent last.
+    /// The last frame to each motor.
     last: Sent,
     trouble: [Trouble; MOTORS],
-    /// Motors whose last reply was not that to the exchange which took it.
+    /// Motors whose last reply belonged to another exchange.
     behind: [bool; MOTORS],
     sent: Log<Sent>,
     replies: Log<Reply>,
-    /// The frame that the host was given last.
+    /// The last frame passed to the host.
     heard: Option<Tagged<CanFrame>>,
 }
 
@@ -103,7 +103,7 @@ impl Ends for Rmd {
         }
     }
 
-    /// Gives the host the next frame.
+    /// Passes the next frame to the host.
     fn read(bench: &mut RmdRun) {
         let Some(frame) = bench.inbox.pop_front() else { return };
         bench.note(|| format!("<- {:03x} {:02x?}", frame.unit.id(), frame.unit.data()));
@@ -156,22 +156,22 @@ impl RmdRun {
         }
     }
 
-    /// One exchange with one motor, as the blocking client does it: a quarantine is waited for.
+    /// One exchange with one motor, like the blocking client: waits for the end of a quarantine.
     pub fn ask(&mut self, id: MotorId, data: [u8; 8]) {
-        let begun = self.now;
+        let started = self.now;
         let longest = if self.ends.host.is_unknown(id) { LONGEST + FIRST } else { LONGEST };
         self.tally.exchanges += 1;
         self.ready();
         let answered = self.insist(id, data);
         self.over(id, answered);
-        let took = self.now.since(begun);
+        let took = self.now.since(started);
         if took > longest && !self.beyond {
             self.violates(format!("an exchange took {} ms", took.0 / 1_000));
         }
         self.tally.longest = self.tally.longest.max(took);
     }
 
-    /// Asks until the request was carried out, or failed; whether it was.
+    /// Repeats the request until it was carried out or failed. Returns whether it was carried out.
     fn insist(&mut self, id: MotorId, data: [u8; 8]) -> bool {
         loop {
             match self.ends.host.request(self.now, id, data) {
@@ -188,7 +188,7 @@ impl RmdRun {
         }
     }
 
-    /// As the blocking client, before many motors are asked at once.
+    /// Prepares many motors for simultaneous requests, like the blocking client.
     fn introduce(&mut self) {
         self.ready();
         for id in MotorSet::TORQUE4 {
@@ -198,7 +198,7 @@ impl RmdRun {
         }
     }
 
-    /// A request to each motor at once. One in quarantine is told so.
+    /// Sends a request to each motor at once. A motor in quarantine gets none.
     pub fn cycle(&mut self, requests: [[u8; 8]; MOTORS]) {
         self.introduce();
         for (id, data) in MotorSet::TORQUE4.zip(requests) {
@@ -228,21 +228,21 @@ impl RmdRun {
         }
     }
 
-    /// Moves frames until every exchange is over, which waits for no motor in quarantine.
+    /// Transfers frames until every exchange is over. Does not wait for motors in quarantine.
     fn run_all(&mut self) {
-        let begun = self.now;
+        let started = self.now;
         let is_first = MotorSet::TORQUE4.into_iter().any(|id| self.ends.host.is_unknown(id));
         let longest = if is_first { DEFAULT_TIMEOUT + FIRST } else { DEFAULT_TIMEOUT };
         while let Some((id, result)) = self.outcome() {
             self.over(id, result.is_ok());
         }
-        let took = self.now.since(begun);
+        let took = self.now.since(started);
         if took > longest {
             self.violates(format!("a cycle took {} ms", took.0 / 1_000));
         }
     }
 
-    /// Moves frames until an exchange is over.
+    /// Transfers frames until an exchange is over.
     fn outcome(&mut self) -> Option<(MotorId, Result<[u8; 8], Failure>)> {
         loop {
             self.ended = self.now;
@@ -291,7 +291,7 @@ impl RmdRun {
             return;
         };
         let Some(source) = frame.source else {
-            return self.violates(format!("motor {id} answered {frame:?}, which nobody sent"));
+            return self.violates(format!("motor {id} answered {frame:?}, which was never sent"));
         };
         if frame.changed {
             self.tally.undetected += 1;
@@ -299,8 +299,8 @@ impl RmdRun {
         }
         self.tally.repeated += u64::from(frame.copy && acted);
         self.tally.answers += 1;
-        let asked = self.ends.sent.get(source.message).expect("it is on its way")[id.index()];
-        let message = self.ends.replies.push(Reply { asked, again: frame.copy });
+        let request = self.ends.sent.get(source.message).expect("it is on its way")[id.index()];
+        let message = self.ends.replies.push(Reply { request, again: frame.copy });
         self.back.push(self.now + TURNAROUND, [Tagged::new(reply, message, 0)]);
     }
 
@@ -311,41 +311,41 @@ impl RmdRun {
         }
     }
 
-    /// Finds out where the reply came from that the host took.
+    /// Finds the origin of the reply that the host accepted.
     fn trace_back(&mut self, id: MotorId) {
         let Some(frame) =
             self.ends.heard.filter(|frame| frame.unit.order() == u32::from(id.can_id()))
         else {
-            return self.violates("the host took a reply that did not come".into());
+            return self.violates("the host accepted a reply that was not received".into());
         };
         if frame.changed || frame.source.is_none() {
             self.tally.undetected += 1;
-            // The reply is still to come, and nobody waits for it.
+            // The reply is still in transit, without an exchange that expects it.
             self.ends.behind[id.index()] |= frame.source.is_none();
             return;
         }
         let reply = frame.source.and_then(|source| self.ends.replies.get(source.message));
-        let Some(&Reply { asked, again }) = reply else { return };
+        let Some(&Reply { request, again }) = reply else { return };
         let last = self.ends.last[id.index()];
         let behind = &mut self.ends.behind[id.index()];
-        if asked.number == last.number {
+        if request.number == last.number {
             *behind = false;
             return;
         }
-        // Off and Stop are sent again after the quarantine time and may be acknowledged by the reply to an
-        // earlier one, behind which nothing moved the motor.
-        let late = self.now.since(asked.at) > DEFAULT_TIMEOUT + DEFAULT_QUARANTINE;
-        let halted = late && last.halts && asked.number > last.moved;
-        // Nothing tells the second copy of a reply from the reply to the next request, whose own
-        // reply then passes for that of the one behind it.
+        // Off and Stop are repeated after the quarantine time. The reply to an earlier one may
+        // acknowledge them, if no motion command was sent after it.
+        let late = self.now.since(request.at) > DEFAULT_TIMEOUT + DEFAULT_QUARANTINE;
+        let halted = late && last.halts && request.number > last.moved;
+        // The second copy of a reply cannot be distinguished from the reply to the next request.
+        // The reply to that request is then matched to the one after it.
         if !(again || frame.copy || *behind || halted || self.beyond) {
-            let (number, other) = (last.number, asked.number);
+            let (number, other) = (last.number, request.number);
             return self
                 .violates(format!("request {number} of motor {id} got the reply to {other}"));
         }
         *behind |= !halted;
         self.tally.misplaced += 1;
-        self.note(|| format!("   that answered request {}", asked.number));
+        self.note(|| format!("   that answered request {}", request.number));
     }
 
     fn over(&mut self, id: MotorId, answered: bool) {

@@ -1,4 +1,4 @@
-//! A motor that counts what it is told.
+//! A motor that counts its commands.
 
 use motorlink_proto::rmd::{
     Drive, DriveConfig, Mode, MotorControl, MotorId, Pid, Sense, SetTorque4, Settings, TORQUE4_ID,
@@ -8,7 +8,7 @@ use motorlink_proto::units::{DeciVolts, DpsPerSecond};
 
 pub const MOTORS: usize = 4;
 
-/// Counts the calls that change something; every look at its sensors shows something else.
+/// Counts the calls that change something. Every sensor reading is different.
 #[derive(Debug, Clone, Default)]
 pub struct Counting {
     pub acts: u64,

@@ -1,4 +1,4 @@
-//! What a program asks of motors.
+//! The requests of a program to motors.
 
 use motorlink_link::fault::Rng;
 use motorlink_proto::rmd::*;
@@ -49,7 +49,7 @@ pub fn torques(rng: &mut Rng) -> SetTorque4 {
     SetTorque4(std::array::from_fn(|_| IqCommand(rng.i16(-2_000..=2_000))))
 }
 
-/// One of the four.
+/// One of the four motors.
 pub fn motor(rng: &mut Rng) -> MotorId {
     MotorId::new(rng.u8(1..=MOTORS as u8)).expect("1 to 4")
 }

@@ -1,4 +1,4 @@
-//! Master and slave on a line that misbehaves, and a judge that knows where every byte came from.
+//! Master and slave on a line with faults, and a judge that knows the origin of every byte.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -17,15 +17,15 @@ use crate::life::Life;
 use crate::tally::Trouble;
 use crate::wire::{Tagged, message};
 
-/// A byte at 115200 baud.
+/// Transmission time of a byte at 115200 baud.
 const BYTE: Micros = Micros(87);
-/// How long the slave thinks.
+/// Processing time of the slave.
 const TURNAROUND: Micros = Micros(100);
-/// As the blocking client, the master looks for what came unasked after a pause of this length.
+/// The master checks for received bytes after a pause of this length, like the blocking client.
 const IDLE: Micros = Micros::from_millis(20);
-/// Where a lost line does not recover by itself, the program opens it again this much later.
+/// Without recovery, the program reopens a lost line after this time.
 const REOPENING: Micros = Micros::from_millis(3_000);
-/// Who speaks, and how.
+/// The profile and the configuration of the master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setup {
     pub profile: Profile,
@@ -36,7 +36,7 @@ pub struct Setup {
 /// A transmission of the master.
 struct Sent {
     exchange: u64,
-    /// Whether it is the exchange's own request, not a part of recovery.
+    /// Whether it is the exchange's own request, not part of the recovery.
     request: bool,
     size: usize,
 }
@@ -47,13 +47,13 @@ struct Reply {
     answers: Answer,
 }
 
-/// What a reply answers.
+/// The command that a reply answers.
 enum Answer {
-    /// The request of an exchange, as it was sent.
+    /// The unchanged request of an exchange.
     Exchange(u64),
-    /// A frame of recovery, as it was sent.
+    /// An unchanged frame of the recovery.
     Recovery,
-    /// What was taken for a frame, with bytes from the requests of these exchanges.
+    /// A frame made of other bytes, with bytes from the requests of these exchanges.
     Other(Option<RangeInclusive<u64>>),
 }
 
@@ -65,20 +65,20 @@ pub struct St {
     config: MasterConfig,
     master: Master,
     slave: Slave,
-    /// How many replies come twice, and by which chance.
+    /// Probability of duplicate replies.
     twice: Option<(f64, Rng)>,
-    /// Second copies, and when they come.
+    /// Second copies, and their times.
     copies: VecDeque<(Instant, Vec<Tagged<u8>>)>,
     pub drive: Memory,
-    /// The number of the exchange under way.
+    /// The number of the open exchange.
     exchange: u64,
     /// The last exchange whose request was sent.
-    asked: u64,
+    sent_exchange: u64,
     sent: Log<Sent>,
     replies: Log<Reply>,
-    /// What the slave takes for a command at the moment.
+    /// The bytes of the slave's current command.
     frame: Vec<Tagged<u8>>,
-    /// What the master read since it sent its request.
+    /// The bytes read by the master since its request.
     heard: Vec<Tagged<u8>>,
     payload: Vec<u8>,
     trouble: Trouble,
@@ -98,7 +98,7 @@ pub fn bench(setup: Setup, faults: &Faults, beyond: bool) -> StRun {
         copies: VecDeque::new(),
         drive: Memory::new(),
         exchange: 0,
-        asked: 0,
+        sent_exchange: 0,
         sent: Log::new(),
         replies: Log::new(),
         frame: Vec::new(),
@@ -115,7 +115,7 @@ impl Ends for St {
     const RESTS: [u64; 2] = [60_000, 5_000];
 
     fn due(bench: &StRun) -> Option<Instant> {
-        let heard = bench.out.due().map(|due| due.max(bench.deaf_until()));
+        let heard = bench.out.due().map(|due| due.max(bench.busy_until()));
         let copy = bench.ends.copies.front().map(|(at, _)| *at);
         [heard, bench.back.due(), bench.ends.slave.deadline(), copy].into_iter().flatten().min()
     }
@@ -132,7 +132,7 @@ impl Ends for St {
         {
             bench.back.push(bench.now, copy);
         }
-        while bench.now >= bench.deaf_until()
+        while bench.now >= bench.busy_until()
             && let Some(byte) = bench.out.pop(bench.now)
         {
             if bench.ends.setup.profile == Profile::Spec || bench.now >= bench.back.free() {
@@ -171,14 +171,14 @@ impl Ends for St {
 }
 
 impl St {
-    /// Whether `frame` is made of nothing but what recovery sends.
+    /// Whether `frame` contains only bytes of the recovery.
     fn is_padding(&self) -> bool {
         let sent = |byte: &Tagged<u8>| self.sent.get(byte.source?.message);
         let padding = |byte| sent(byte).is_some_and(|sent| !sent.request);
         self.frame.iter().all(|byte| !byte.changed && padding(byte))
     }
 
-    /// Exchanges of whose requests there are bytes in `frame`.
+    /// Exchanges whose requests have bytes in `frame`.
     fn involved(&self) -> Option<RangeInclusive<u64>> {
         let messages = self.frame.iter().filter_map(|byte| self.sent.get(byte.source?.message));
         let mut exchanges = messages.filter(|sent| sent.request).map(|sent| sent.exchange);
@@ -188,12 +188,12 @@ impl St {
 }
 
 impl StRun {
-    /// Lets this share of the replies come twice from now on.
+    /// Duplicates this fraction of the replies from now on.
     pub fn repeat(&mut self, share: f64, seed: u64) {
         self.ends.twice = Some((share, Rng::with_seed(seed)));
     }
 
-    /// One exchange as the blocking client does it; gives the acknowledge's payload.
+    /// One exchange, like the blocking client. Returns the acknowledge's payload.
     pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], ExchangeError> {
         let result = self.attempt(ask, Instant(u64::MAX)).expect("it ends");
         self.tally.exchanges += 1;
@@ -201,10 +201,10 @@ impl StRun {
         result.map(|()| &self.ends.payload[..])
     }
 
-    /// An exchange, unless it lasts until `end`.
+    /// An exchange that is aborted at `end`.
     fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), ExchangeError>> {
         self.ends.exchange += 1;
-        let begun = self.now;
+        let attempt_start = self.now;
         if self.now.since(self.ended) > IDLE {
             St::read(self);
         }
@@ -254,7 +254,7 @@ impl StRun {
         if took > self.ends.config.longest_exchange() + sending {
             self.violates(format!("an exchange took {} ms", took.0 / 1_000));
         }
-        self.tally.longest = self.tally.longest.max(self.now.since(begun));
+        self.tally.longest = self.tally.longest.max(self.now.since(attempt_start));
         Some(result)
     }
 
@@ -262,7 +262,7 @@ impl StRun {
         let message =
             self.ends.sent.push(Sent { exchange: self.ends.exchange, request, size: bytes.len() });
         if request {
-            self.ends.asked = self.ends.exchange;
+            self.ends.sent_exchange = self.ends.exchange;
             self.tally.requests += 1;
             self.ends.heard.clear();
         }
@@ -271,8 +271,8 @@ impl StRun {
         self.advance(self.out.free());
     }
 
-    /// While the slave answers, bytes wait for it; shipped firmware throws them away.
-    fn deaf_until(&self) -> Instant {
+    /// While the slave replies, bytes wait; shipped firmware drops them.
+    fn busy_until(&self) -> Instant {
         if self.ends.setup.profile == Profile::Spec { self.back.free() } else { Instant(0) }
     }
 
@@ -290,7 +290,7 @@ impl StRun {
         }
     }
 
-    /// The slave has taken `frame` for a command.
+    /// Records that the slave accepted `frame` as a command.
     fn take(&mut self, reply: &[u8], acted: bool) {
         let refused = reply[0] == HEADER_NACK && reply[2] == u8::from(ErrorCode::BadCrc);
         let whole = message(&self.ends.frame)
@@ -302,15 +302,15 @@ impl StRun {
                 if refused {
                     self.violates("a command that arrived as it was sent counts as damaged".into());
                 }
-                if request && exchange != self.ends.asked && !self.beyond {
+                if request && exchange != self.ends.sent_exchange && !self.beyond {
                     self.violates(format!("the command of exchange {exchange} came after others"));
                 }
                 if request { Answer::Exchange(exchange) } else { Answer::Recovery }
             }
-            // What padding is for: its own end is a frame of a motor that is not there.
+            // This is the purpose of padding: its end is a frame for a motor that does not exist.
             None if self.ends.is_padding() => Answer::Recovery,
-            // A frame with code 0, which nobody knows: what a line that is stuck at 0 says all the
-            // time. Its checksum fits always.
+            // A frame with code 0, which is unknown: a line that is stuck at 0 sends it all the
+            // time. Its checksum is always correct.
             None if self.ends.frame.iter().all(|byte| byte.unit == 0) => {
                 Answer::Other(self.ends.involved())
             }
@@ -354,7 +354,7 @@ impl StRun {
         }
     }
 
-    /// Finds out where the reply came from that the master took.
+    /// Finds the origin of the reply that the master accepted.
     fn trace_back(&mut self) {
         let heard: Vec<u8> = self.ends.heard.iter().map(|byte| byte.unit).collect();
         let mut start = 0;
@@ -362,7 +362,10 @@ impl StRun {
             match Frame::parse(&heard[start..]) {
                 Parse::Frame(frame, size) if frame.header == HEADER_ATR => start += size,
                 Parse::Frame(_, size) => break size,
-                _ => return self.violates("the master took a reply that did not come".into()),
+                _ => {
+                    return self
+                        .violates("the master accepted a reply that was not received".into());
+                }
             }
         };
         let taken = &self.ends.heard[start..start + size];
@@ -374,7 +377,7 @@ impl StRun {
             Some(Answer::Exchange(exchange)) if *exchange == current => {}
             Some(Answer::Other(Some(involved))) if involved.contains(&current) => {}
             Some(Answer::Other(_)) => {
-                self.note(|| "   that answered nothing of this exchange".to_owned());
+                self.note(|| "   that reply does not belong to this exchange".to_owned());
                 self.tally.misplaced += 1;
             }
             Some(Answer::Exchange(_) | Answer::Recovery) if self.beyond => {
@@ -389,13 +392,14 @@ impl StRun {
             }
             None => {
                 self.tally.judged += 1;
-                self.note(|| "   that is no reply that the drive gave".to_owned());
+                self.note(|| "   that is not a reply of the drive".to_owned());
                 self.slip(&heard[start..start + size]);
             }
         }
     }
 
-    /// A frame that nobody sent was taken for one: only if its checksum fits.
+    /// Records that bytes that were never sent as a frame were accepted as one. Its checksum must
+    /// be correct.
     fn slip(&mut self, frame: &[u8]) {
         self.tally.undetected += 1;
         let (check, body) = frame.split_last().expect("a frame has a checksum");

@@ -1,4 +1,4 @@
-//! A drive whose registers are memory, and which counts what it does.
+//! A drive whose registers are memory. It counts its actions.
 
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Feature, Features, MotorControl, MotorNumber,
@@ -9,7 +9,7 @@ pub const MOTORS: u8 = 2;
 
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// Of each motor its registers, by their ids.
+    /// The registers of each motor, by their ids.
     pub banks: [[i32; 256]; MOTORS as usize],
     revup: [RevupPhase; REVUP_PHASES as usize],
     /// Calls that changed something.

@@ -13,7 +13,7 @@ pub use bench::Setup;
 
 use crate::tally::{Tally, Violation};
 
-/// Runs `count` exchanges of the mix. Those from `traced` on are written down in a violation.
+/// Runs `count` exchanges of the mix. From exchange `traced` on, they are recorded for a violation.
 pub fn run(
     setup: Setup,
     faults: &Faults,
@@ -24,7 +24,7 @@ pub fn run(
     bench::bench(setup, faults, beyond).run(setup.life, faults.seed, count, traced)
 }
 
-/// How many damaged messages the checksum should have let through.
+/// The expected number of damaged messages that pass the checksum.
 pub fn expected(setup: Setup, faults: &Faults, tally: &Tally) -> f64 {
     if (Faults { flip: 0.0, ..*faults }) != Faults::NONE {
         return tally.judged as f64 / 256.0;

@@ -1,4 +1,4 @@
-//! How often a damaged frame should pass for a whole one.
+//! The expected fraction of damaged frames that pass the checksum.
 
 use motorlink_link::fault::Rng;
 use motorlink_proto::st::{
@@ -9,15 +9,15 @@ use motorlink_proto::time::Instant;
 use super::drive::{MOTORS, Memory};
 use super::traffic;
 
-/// Frames of the mix that are looked at.
+/// Number of sampled frames of the mix.
 const FRAMES: usize = 400;
-/// Patterns a frame that are tried where not all of them are.
+/// Number of sampled patterns per frame, if not all are tested.
 const TRIED: usize = 200;
-/// More wrong bits than that are as good as random.
+/// More wrong bits than this are treated as random.
 const MANY: usize = 8;
 
-/// Chance of a request and of a reply of the mix to pass for a whole one on a line with this bit
-/// error rate: the chance of k wrong bits, times the share of k-bit patterns that pass.
+/// Probability that a request and a reply of the mix pass damaged, at this bit error rate: the
+/// probability of k wrong bits times the fraction of k-bit patterns that pass.
 pub fn undetected(profile: Profile, rate: f64) -> (f64, f64) {
     let mut rng = Rng::with_seed(1);
     let mut slave = Slave::new(profile, MotorNumber::new(MOTORS).expect("1 to 7"));
@@ -29,7 +29,7 @@ pub fn undetected(profile: Profile, rate: f64) -> (f64, f64) {
         let mut take = |byte: &u8| slave.receive(Instant(0), *byte, &mut drive).map(<[u8]>::to_vec);
         let reply = request.iter().filter_map(&mut take).last().expect("each frame is answered");
         requests += passes(&request, rate, |_| true, &mut rng);
-        // A master takes nothing else for a reply.
+        // A master accepts only these headers as a reply.
         let reply_header = |header| matches!(header, HEADER_ACK | HEADER_NACK);
         replies += passes(&reply, rate, reply_header, &mut rng);
     }
@@ -38,7 +38,7 @@ pub fn undetected(profile: Profile, rate: f64) -> (f64, f64) {
 
 fn passes(frame: &[u8], rate: f64, header: impl Fn(u8) -> bool, rng: &mut Rng) -> f64 {
     let bits = frame.len() * 8;
-    // The chance of no wrong bit, then of one more each time.
+    // The probability of no wrong bit, then of one more in each step.
     let mut chance = (1.0 - rate).powi(bits as i32);
     let mut left = 1.0 - chance;
     let mut sum = 0.0;
@@ -52,8 +52,9 @@ fn passes(frame: &[u8], rate: f64, header: impl Fn(u8) -> bool, rng: &mut Rng) -
     sum + left.max(0.0) / 256.0
 }
 
-/// The share of the patterns of `wrong` bits that pass: of all of them up to two bits where there
-/// are not too many, else of some drawn by lot. Frames pass with the headers that `header` takes.
+/// The fraction of the patterns with `wrong` wrong bits that pass. All patterns up to two bits are
+/// tested if there are not too many; otherwise a random sample. Frames pass with the headers that
+/// `header` accepts.
 pub fn share(frame: &[u8], wrong: usize, header: impl Fn(u8) -> bool, rng: &mut Rng) -> f64 {
     let bits = frame.len() * 8;
     let mut damaged = frame.to_vec();
@@ -111,7 +112,7 @@ mod tests {
         }
     }
 
-    /// Two wrong bits cancel where they have the same weight and opposite signs; a frame with a wrong
+    /// Two wrong bits cancel if they have the same weight and opposite signs. A frame with a wrong
     /// length never passes. That leaves (m - 1) (m - 2) / (2 m (8 m - 1)) of the pairs in m bytes.
     #[test]
     fn two_wrong_bits_pass_about_one_time_in_sixteen_and_many_one_in_256() {

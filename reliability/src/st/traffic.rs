@@ -1,4 +1,4 @@
-//! What a program asks of a drive: reads, writes, commands, ramps, and frames of any kind.
+//! The requests of a program to a drive: reads, writes, commands, ramps, and frames of any kind.
 
 use motorlink_link::fault::Rng;
 use motorlink_proto::st::{
@@ -40,7 +40,7 @@ impl Ask {
     }
 }
 
-/// Registers that programs watch, and settings that they write.
+/// Registers that programs read periodically, and settings that they write.
 pub const WATCHED: [RegisterId; 8] = [
     RegisterId::SPEED_MEAS,
     RegisterId::SPEED_REF,
@@ -69,7 +69,7 @@ const COMMANDS: [Command; 5] = [
     Command::StartStop,
 ];
 
-/// The next request of the mix: half of them read, a fifth writes registers, a tenth commands.
+/// The next request of the mix: half are reads, a fifth are register writes, a tenth are commands.
 pub fn next(profile: Profile, rng: &mut Rng) -> Ask {
     let motor = rng.u8(1..=MOTORS);
     let request = match rng.u8(..100) {
@@ -91,10 +91,10 @@ pub fn next(profile: Profile, rng: &mut Rng) -> Ask {
             let data = RevupPhase { speed_rpm, torque_s16a: rng.i16(..), duration_ms: rng.u16(..) };
             Request::SetRevupData(rng.u8(..5), data)
         }
-        // Data segments in one profile, a torque ramp and nothing in the other.
+        // Data segments in one profile; a torque ramp or unknown in the other.
         96..97 => return Ask::raw(Frame::header(0x0E, motor), &[0, 0x1E, 0x02, 0x19, 0x23]),
         97..98 => return Ask::raw(Frame::header(0x0D, motor), &[0, 1, 0, 0, 100, 0]),
-        // A motor that is not there, and codes that nobody knows with a payload of any size.
+        // A motor that does not exist, and unknown codes with a payload of any size.
         98..99 => return Ask::of(MOTORS + 1, &Request::GetRegister(RegisterId::STATUS)),
         _ => {
             let mut payload = [0; 127];

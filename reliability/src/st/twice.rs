@@ -1,4 +1,5 @@
-//! Programs that read four registers where replies come twice, as `motorlink st get A B C D` does.
+//! Programs that read four registers on lines with duplicate replies, like `motorlink st get A B C
+//! D`.
 
 use std::iter::Sum;
 
@@ -21,13 +22,13 @@ const READ: [RegisterId; 6] = [
     RegisterId::FLAGS,
 ];
 
-/// What became of the reads.
+/// The results of the reads.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Batches {
     pub count: u64,
-    /// A read or a confirmation failed.
+    /// Number of failed reads or confirmations.
     pub detected: u64,
-    /// A value was another register's, and nothing failed.
+    /// Number of values that belong to another register, without a failure.
     pub wrong: u64,
 }
 
@@ -41,8 +42,8 @@ impl Sum for Batches {
     }
 }
 
-/// Reads four registers `count` times, each time by a new program, on a line with `faults` where this share
-/// of the replies comes twice; `confirms` each value, or not.
+/// Reads four registers `count` times, each time with a new program, on a line with `faults`.
+/// `share` is the fraction of duplicate replies. `confirms` is whether each value is confirmed.
 pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
     let setup = Setup { life: Life::Short, ..SPEC };
     let mut bench = bench::bench(setup, faults, true);
@@ -68,7 +69,7 @@ pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
     batches
 }
 
-/// As `Client::confirm`.
+/// Like `Client::confirm`.
 fn confirm(bench: &mut StRun, last: Option<usize>, turn: bool) -> bool {
     let (question, size) = question_behind(last, turn);
     let answer = bench.exchange(&Ask::of(0, &question));

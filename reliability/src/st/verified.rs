@@ -1,4 +1,4 @@
-//! Plain writes beside verified ones: what was reported as done, and what the register has.
+//! Plain writes compared with verified ones: the reported result, and the register's value.
 
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{
@@ -10,15 +10,15 @@ use super::drive::MOTORS;
 use super::traffic::{self, Ask, SETTINGS};
 use crate::tally::Violation;
 
-/// What became of writes.
+/// The results of writes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Writes {
     pub writes: u64,
-    /// Reported as done.
+    /// Number of writes reported as done.
     pub done: u64,
-    /// Reported as done, and the register has another value.
+    /// Number of writes reported as done while the register has another value.
     pub wrong: u64,
-    /// Another register has changed, whatever was reported.
+    /// Number of writes that changed another register, with any result.
     pub beside: u64,
 }
 
@@ -31,7 +31,8 @@ impl Writes {
     }
 }
 
-/// Writes `count` random values to settings, each register read back and repeated if `verified`.
+/// Writes `count` random values to settings. If `verified`, each register is read back and the
+/// write is repeated.
 pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<Writes, Violation> {
     let mut bench = bench::bench(setup, faults, false);
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);

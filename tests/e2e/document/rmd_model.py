@@ -210,7 +210,7 @@ class RmdMotor:
             self.speed = old + (self.iq - old / DPS_PER_AMPERE) / inertia * dt
 
     def _settle(self):
-        """Stand still exactly on the target when nearly there."""
+        """Stop exactly on the target when near it."""
         if self.mode != POSITION or self.stopped or self.limit == 0:
             return
         if abs(self.target - self.multi_angle()) < 0.01 and abs(self.speed) < 2.0:

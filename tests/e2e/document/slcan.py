@@ -19,7 +19,7 @@ LONGEST_COMMAND = 64
 
 
 class Adapter:
-    """One adapter; `bus(can_id, data)` returns the frames that come back."""
+    """One adapter; `bus(can_id, data)` returns the reply frames."""
 
     def __init__(self, bus, sent_reply="z"):
         self.bus = bus

@@ -126,7 +126,7 @@ class Motor:
         self.set_mode(TORQUE_MODE)
 
     def set_mode(self, mode):
-        """CONTROL_MODE; in RUN speed mode goes on from the speed there is."""
+        """CONTROL_MODE; in RUN, speed mode continues from the present speed."""
         if mode == self.mode:
             return
         self.mode = mode

@@ -1,4 +1,4 @@
-"""A serial line served over TCP: one client at a time, a steady clock beside it.
+"""A serial line served over TCP: one client at a time, and a steady clock.
 
 Both programs use this loop.  A *session* is the thing at the end of the line:
 

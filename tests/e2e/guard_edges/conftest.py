@@ -54,7 +54,7 @@ def client():
 
 @pytest.fixture
 def mute(motorlink, tmp_path):
-    """`mute("st", drives, "full")`: a guard whose output nobody reads."""
+    """`mute("st", drives, "full")`: a guard whose output is not read."""
     started = []
 
     def mute(protocol, drives, output, serve=None):

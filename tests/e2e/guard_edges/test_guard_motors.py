@@ -38,7 +38,7 @@ def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(si
         with RawLine(tmp_path / "held") as line:
             line.say(b"\rC\rS8\rO\r", b"\r")
             os.write(line.end, b"t14188100000000000000\rt1418A2000000A08C0000\r")
-            eventually(lambda: bus.passed(b"t1418A2"), "the motor is told to turn")
+            eventually(lambda: bus.passed(b"t1418A2"), "the motor gets a motion command")
             bus.lose(b"t141881")
         eventually(lambda: bus.is_lost(b"t141881"), "the guard's first 0x81 is lost")
         process.says("motor 1 is stopped (0x81 acknowledged)")

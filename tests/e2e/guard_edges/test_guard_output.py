@@ -1,4 +1,4 @@
-"""Output that nobody reads, and a supervisor that does not listen."""
+"""Output that is not read, and a supervisor that does not listen."""
 
 import json
 import os
@@ -30,7 +30,7 @@ def test_a_guard_whose_output_nobody_reads_guards_on_and_ends(bench, mute, clien
 
 
 def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client, tmp_path):
-    """Each is a line on stderr, and nobody reads them."""
+    """Each event is a line on stderr, which is not read."""
     drives = bench("st")
     words = ["guard", "-p", drives.st, "--serve", "tcp-listen:127.0.0.1:0"]
     process = start(*words)
@@ -38,7 +38,7 @@ def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client, tmp_p
     host, _, number = announced["path"].rpartition(":")
     program = client("st", announced["path"])
     turns(drives, "st")
-    # The reader of this test stands still, as a shell does that nobody looks at.
+    # The reader of this test blocks, like a stopped shell.
     with process._news:
         for _ in range(1500):
             socket.create_connection((host, int(number)), timeout=5).close()

@@ -54,8 +54,8 @@ def test_a_link_whose_pty_is_anothers_by_now_is_an_error(sim, run, tmp_path):
     try:
         while not os.path.exists(f"/dev/pts/{number}"):
             others.append(os.openpty())
-        told = run("st", "-p", link, "start").ended(3)
-        assert "stale" in told.err and "another program" in told.err
+        message = run("st", "-p", link, "start").ended(3)
+        assert "stale" in message.err and "another program" in message.err
         # So it is through a link to the link.
         (tmp_path / "alias").symlink_to(link)
         assert "stale" in run("st", "-p", tmp_path / "alias", "info").ended(3).err

@@ -1,4 +1,4 @@
-"""Output that nobody reads."""
+"""Output that is not read."""
 
 import os
 import subprocess

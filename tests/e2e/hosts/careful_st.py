@@ -16,7 +16,7 @@ def checksum(data):
 def exchange(port, request, timeout):
     """The payload of the ACK to a request."""
     if port.in_waiting:
-        sys.exit("something came that nobody asked for")
+        sys.exit("received bytes without a request")
     port.write(request + bytes([checksum(request)]))
     reply, deadline = b"", time.monotonic() + timeout
     while len(reply) < 2 or len(reply) < reply[1] + 3:
