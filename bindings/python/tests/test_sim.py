@@ -167,7 +167,7 @@ def test_faults_temperatures_supplies_and_power_cycles() -> None:
         (lambda bench: bench.inject("st1", "FIRE"), "BREAK_IN"),
         (lambda bench: bench.power_cycle("st1"), "one supply"),
         (lambda bench: bench.execute({"command": "explode"}), "not a command"),
-        (lambda bench: bench.execute({"command": "pause"}), "stands still"),
+        (lambda bench: bench.execute({"command": "pause"}), "does not run by itself"),
         (lambda bench: bench.record(["st1.speed"], seconds=1), "st1.speed_rpm"),
         (lambda bench: bench.record(["st1.speed_rpm"], seconds=1, every=1e-6), "50 µs"),
         (lambda bench: bench.record(["st1.iq_amps"] * 2, seconds=1), "named twice"),

@@ -149,7 +149,7 @@ impl Bench {
     ) -> Result<Serving, PortError> {
         if !self.clock.is_virtual() {
             let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
-            let why = "this bench is already served: end that first".to_owned();
+            let why = "this bench is served already: end that first".to_owned();
             return Err(PortError::Configuration { port, why });
         }
         let (stop, stopped) = UnixStream::pair().map_err(failed)?;
