@@ -101,3 +101,32 @@ def test_cmake_finds_the_library_of_the_target(installed, tmp_path):
     subprocess.run(["cmake", "-S", tmp_path, "-B", tmp_path / "build", *defines], check=True)
     subprocess.run(["cmake", "--build", tmp_path / "build"], check=True)
     assert (tmp_path / "build/loopback").exists()
+
+
+def refused(*words, **environment):
+    """The message with which the installation fails."""
+    run = subprocess.run([INSTALL, *words], env=os.environ | environment, capture_output=True, text=True)
+    assert run.returncode == 1
+    return run.stderr
+
+
+def test_an_unknown_target_is_refused_with_the_list(tmp_path):
+    message = refused(tmp_path, "", "thumbv8m.base-none-eabi")
+    assert "unknown target thumbv8m.base-none-eabi" in message and "thumbv6m-none-eabi" in message
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_compiler_is_named(tmp_path):
+    message = refused(tmp_path, "", "thumbv7em-none-eabihf", CROSS_COMPILE="no-such-")
+    assert "no-such-ar is not installed" in message
+
+
+def test_a_library_with_a_panic_is_not_installed(tmp_path):
+    tools, prefix = tmp_path / "tools", tmp_path / "prefix"
+    tools.mkdir()
+    (tools / "arm-ar").symlink_to(shutil.which("arm-none-eabi-ar"))
+    (tools / "arm-nm").write_text("#!/bin/sh\necho '         U __aeabi_uldivmod\n         U rust_begin_unwind'\n")
+    (tools / "arm-nm").chmod(0o755)
+    message = refused(prefix, "", "thumbv7em-none-eabihf", CROSS_COMPILE=f"{tools}/arm-")
+    assert message.rstrip().endswith("U rust_begin_unwind") and "__aeabi_uldivmod" not in message
+    assert not list(prefix.rglob("libmotorlink.a"))

@@ -140,9 +140,10 @@ pub struct motorlink_st_motor_control {
 plain!(motorlink_st_motor_control);
 
 /// What the storage of a slave holds.
+#[repr(C)]
 pub(crate) struct State {
-    slave: Slave,
     drive: Kept<motorlink_st_motor_control>,
+    slave: Slave,
 }
 
 storage!(motorlink_st_slave: State, tag::ST_SLAVE);

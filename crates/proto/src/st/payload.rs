@@ -23,9 +23,11 @@ impl<'o> Payload<'o> {
 
     #[inline(never)]
     pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        for &byte in bytes {
-            self.byte(byte);
+        let room = self.room.get_mut(self.len..).unwrap_or(&mut []);
+        for (slot, byte) in room.iter_mut().zip(bytes) {
+            *slot = *byte;
         }
+        self.len = self.len.saturating_add(bytes.len());
         self
     }
 
