@@ -252,7 +252,7 @@ def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
     bus.do("supply", motor=1, volts=5.0)
     eventually(lambda: bus.motor(1)["errors"] == ["LOW_VOLTAGE"], "low voltage")
     refused = rmd("--json", "clear-errors").ended(1)
-    assert refused.values["errors"] == ["LOW_VOLTAGE"] and "keeps its errors" in refused.err
+    assert refused.values["errors"] == ["LOW_VOLTAGE"] and "still has errors" in refused.err
     assert refused.json["ok"] is False
     bus.do("supply", motor=1, volts=24.0)
     eventually(lambda: rmd("clear-errors").code == 0, "the error is cleared")

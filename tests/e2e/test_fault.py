@@ -69,7 +69,7 @@ def test_a_bus_with_foreign_frames_and_copies_works(run):
         ((*ST, "--fault", "seed=7", "info"), "no fault is named"),
         ((*ST, "--fault", "corrupt=1e-3", "info"), "use flip"),
         ((*RMD, "--fault", "stuck0=1s@1", "status"), "use cut"),
-        (("st", "-p", "/dev/ttyNONE", "--fault", "drop=1", "scan"), "takes no --fault"),
+        (("st", "-p", "/dev/ttyNONE", "--fault", "drop=1", "scan"), "cannot be used with --fault"),
     ],
 )
 def test_what_makes_no_sense_is_refused_before_anything_is_sent(run, arguments, why):

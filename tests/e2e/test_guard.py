@@ -160,7 +160,7 @@ def test_a_second_program_is_turned_away(sim, guard, run, start):
     watching.more_lines(1)
     assert "in use by another program" in run("st", "-p", process.port, "info").ended(3).err
     assert "hung up" in run("st", "-p", f"tcp:{tcp}", "info").ended(3).err
-    process.says("does not get the line")
+    process.says("was refused")
     watching.more_lines()
     # The drive's own port is locked as well.
     assert "in use by another program" in run("st", "-p", drives.st, "info").ended(3).err
@@ -214,11 +214,11 @@ def test_a_drive_that_is_unplugged_is_stopped_when_it_is_back(sim, guard, client
     process = guard(drives.st)
     program = client(process.port, "1:1")
     drives.kill()
-    process.says("the drive's port is lost")
+    process.says("the port of the drive failed")
     program.kill()
     process.says("motor 1 MAY STILL TURN")
     drives = sim(rmd=())
-    process.says("the drive's port is back")
+    process.says("the port of the drive works again")
     process.says("motor 1 is stopped")
     with Line(process.port) as line:
         assert line.get(STATUS, motor=1) == 0

@@ -164,7 +164,7 @@ impl<'a> Sink<'a> {
                 let event = self.event(elapsed, "back");
                 return self.print(|_| print_line(&Value::from(event)));
             }
-            (false, Kind::Silent) => note("it answers again"),
+            (false, Kind::Silent) => note("the motor answers again"),
             (false, _) => note("the line is back"),
         }
         Ok(())

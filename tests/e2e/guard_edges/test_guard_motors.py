@@ -82,11 +82,11 @@ def test_an_rmd_guard_over_a_lost_port_goes_on_when_it_is_back(sim, guard, clien
     program = client("rmd", process.port)
     turns(drives, "rmd")
     drives.kill()
-    process.says("the drive's port is lost")
+    process.says("the port of the drive failed")
     program.kill()
     process.says("motor 1 MAY STILL TURN")
     drives = sim(st=())
-    process.says("the drive's port is back")
+    process.says("the port of the drive works again")
     process.says("motor 1 is stopped (0x81 acknowledged)")
 
 

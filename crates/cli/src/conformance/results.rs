@@ -61,7 +61,7 @@ pub fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
 
 pub fn refused(report: &Report, who: &str) -> Failure {
     Failure::refused(format!(
-        "{} of {} cases failed: {who} does not do what its document says",
+        "{} of {} cases failed: {who} differs from its document",
         report.failed().count(),
         report.outcomes.len()
     ))

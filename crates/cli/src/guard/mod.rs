@@ -207,7 +207,7 @@ fn serve(
     let last = relay.end();
     let told = last.iter().try_for_each(|event| tell(event, json, &supervisor));
     if last.iter().any(words::leaves_something_turning) {
-        return Err(Failure::link("motors may still turn: not all said that they stop"));
+        return Err(Failure::link("motors may still turn: not all confirmed that they stop"));
     }
     outcome.and(told)
 }

@@ -73,7 +73,7 @@ impl Spin {
             }
             if !is_told && Instant::now() > give_up {
                 return Err(Failure::refused(format!(
-                    "the motor turns at {speed} {unit} and was told {told} {unit}: does it have \
+                    "the motor turns at {speed} {unit} instead of {told} {unit}: does it have \
                      power, and is it free to turn?",
                     unit = self.protocol.unit(),
                     told = self.speed,
@@ -147,7 +147,7 @@ impl Proof {
 
     pub fn show(&self, program: &[OsString], mut relay: Relay, json: bool) -> Result<(), Failure> {
         if self.speed == 0 {
-            return Err(Failure::usage("--spin 0 turns nothing: give a speed"));
+            return Err(Failure::usage("--spin 0 does not turn the motor: give a speed"));
         }
         let folder = Folder::new()?;
         let path = folder.0.join("line");
@@ -251,7 +251,7 @@ impl Program {
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => {
                     return Err(Failure::link(
-                        "the motor could not be turned: see above; nothing was proved",
+                        "the motor could not be turned (see above), so the guard was not tested",
                     ));
                 }
             }

@@ -1,4 +1,4 @@
-//! What a guard says of what happens.
+//! Events of a guard in words and as JSON.
 
 use motorlink::relay::{Event, Halt, Outcome, Part, Reason};
 use serde_json::{Value, json};
@@ -9,47 +9,51 @@ use crate::failure::Failure;
 pub fn of(event: &Event) -> (String, Value) {
     match event {
         Event::Came { port } => {
-            (format!("{port}: a program has the line"), json!({ "event": "came", "port": port }))
+            (format!("{port}: a program opened the port"), json!({ "event": "came", "port": port }))
         }
         Event::Left { dropped: 0 } => {
-            ("the program has left the line".into(), json!({ "event": "left", "dropped": 0 }))
+            ("the program closed the port".into(), json!({ "event": "left", "dropped": 0 }))
         }
         Event::Left { dropped } => (
-            format!("the program has left the line; {dropped} of what it sent were not passed on"),
+            format!(
+                "the program closed the port; {dropped} bytes or frames that it sent were not passed on"
+            ),
             json!({ "event": "left", "dropped": dropped }),
         ),
         // A program cannot be disconnected from a pty.
         Event::TurnedAway { port } if port.contains("pty:") => (
             format!(
-                "{port}: another program opened it as well; unless it looks for the lock, it shares \
+                "{port}: a second program opened the port; if it does not check the lock, both use \
                  the line"
             ),
             json!({ "event": "shared", "port": port }),
         ),
         Event::TurnedAway { port } => (
-            format!("{port}: another program came and does not get the line"),
+            format!("{port}: a second program tried to open the port and was refused"),
             json!({ "event": "turned-away", "port": port }),
         ),
         Event::Browser { port } => (
             format!(
-                "{port}: closed a program that speaks HTTP, TLS or STUN, as a browser does; nothing \
-                 of it was passed on. Did a web page look for drives?"
+                "{port}: closed a client that sent HTTP, TLS or STUN, as a browser does; its data was \
+                 not passed on. A web page may search for drives"
             ),
             json!({ "event": "browser", "port": port }),
         ),
         Event::Unguarded { motor, code } => (
             format!(
-                "motor {motor} is commanded by another node of the bus ({code:#04x}): what that sets \
-                 turning is not guarded here"
+                "motor {motor} is commanded by another node of the bus ({code:#04x}): the guard does \
+                 not stop what that node starts"
             ),
             json!({ "event": "unguarded", "motor": motor, "code": code }),
         ),
         Event::PortLost(error) => {
             let failure = Failure::from(error);
-            let text = format!("the drive's port is lost: {}", failure.text());
+            let text = format!("the port of the drive failed: {}", failure.text());
             (text, json!({ "event": "port-lost", "error": failure.object() }))
         }
-        Event::PortBack => ("the drive's port is back".into(), json!({ "event": "port-back" })),
+        Event::PortBack => {
+            ("the port of the drive works again".into(), json!({ "event": "port-back" }))
+        }
         Event::Stopped { reason, halts } => stopped(*reason, halts),
         other => (format!("{other:?}"), json!({ "event": "other" })),
     }
@@ -62,15 +66,15 @@ pub fn leaves_something_turning(event: &Event) -> bool {
 
 fn stopped(reason: Reason, halts: &[Halt]) -> (String, Value) {
     let (why, word) = match reason {
-        Reason::ClientGone => ("the program is gone", "client-gone"),
+        Reason::ClientGone => ("the program ended or closed the port", "client-gone"),
         Reason::ClientSilent => ("the program is silent", "client-silent"),
         Reason::Ending => ("the guard ends", "ending"),
     };
     let again = if reason == Reason::Ending { "" } else { "; trying again" };
     let texts: Vec<String> = halts.iter().map(|halt| in_words(halt, again)).collect();
-    let told = if texts.is_empty() { "there is no such motor".into() } else { texts.join("; ") };
+    let results = if texts.is_empty() { "there is no such motor".into() } else { texts.join("; ") };
     let objects: Vec<Value> = halts.iter().map(as_json).collect();
-    (format!("{why}: {told}"), json!({ "event": "stopped", "reason": word, "motors": objects }))
+    (format!("{why}: {results}"), json!({ "event": "stopped", "reason": word, "motors": objects }))
 }
 
 fn in_words(halt: &Halt, again: &str) -> String {
@@ -78,7 +82,7 @@ fn in_words(halt: &Halt, again: &str) -> String {
     match &halt.outcome {
         Outcome::Stopped(state) => format!("{part} is stopped ({state})"),
         Outcome::Unproven(state) => {
-            format!("{part} acknowledged its stop and is still {state}{again}")
+            format!("{part} acknowledged its stop, but its state is {state}{again}")
         }
         Outcome::Failed(error) => match part {
             Part::Motor(_) => format!("{part} MAY STILL TURN: {error}{again}"),

@@ -58,7 +58,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 return session.replied(&status);
             }
             let failure = Failure::refused(format!(
-                "motor {id} keeps its errors, their cause is still there: {}",
+                "motor {id} still has errors, because their cause is present: {}",
                 status.errors
             ))
             .about(&session.port, session.id);
@@ -92,10 +92,10 @@ fn turn(
     let moved = session.motor()?.set_single_turn_position(angle, direction, max_speed, full_turn);
     moved.map_err(|error| match error {
         Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
-            Failure::from(error).trying("`--full-turn` sends it all the same")
+            Failure::from(error).trying("add `--full-turn` to allow the move")
         }
         Error::FullTurn { .. } => Failure::from(error).trying(format!(
-            "try `{}`, or `--full-turn` if it may be a full turn",
+            "try `{}`, or add `--full-turn` to allow nearly a full turn",
             direction.opposite()
         )),
         error => error.into(),
@@ -138,7 +138,10 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     let mut request = [0; 8];
     let Some(room) = request.get_mut(..bytes.len()) else {
-        return Err(Failure::usage(format!("a frame has 8 bytes, not {}", bytes.len())));
+        return Err(Failure::usage(format!(
+            "a frame has at most 8 bytes, and {} were given",
+            bytes.len()
+        )));
     };
     room.copy_from_slice(bytes);
     if Code::from(request[0]).info().is_some_and(|row| row.rom) {

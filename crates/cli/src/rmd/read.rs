@@ -59,7 +59,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     }
     if found.is_empty() {
         return Err(Failure::link(
-            "no motor answered; is the supply on, the bus terminated, the bitrate 1 Mbit/s?",
+            "no motor answered; is the supply on, is the bus terminated, and is the bitrate 1 Mbit/s?",
         ));
     }
     Ok(())

@@ -80,7 +80,9 @@ impl Session {
         if self.write_rom {
             return Ok(());
         }
-        Err(Failure::usage(format!("{what} writes to the motor's ROM, which wears"))
-            .trying("add --write-rom to allow it"))
+        Err(Failure::usage(format!(
+            "{what} writes to the ROM of the motor, and each write wears the ROM"
+        ))
+        .trying("add --write-rom to allow it"))
     }
 }

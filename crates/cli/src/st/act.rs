@@ -84,7 +84,7 @@ fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
     session.done(format!("{}: {command} acknowledged", motor.number()))
 }
 
-/// A drive acknowledges a START that has no effect, so its state is read back.
+/// A drive also acknowledges a START that has no effect, so its state is read.
 fn start(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.start()?;
@@ -93,8 +93,8 @@ fn start(session: &Session) -> Result<(), Failure> {
         Status::FaultNow | Status::FaultOver => {
             let faults = explain(motor.flags()?);
             Err(Failure::refused(format!(
-                "{} did not start, it is in {status}: {faults}\nclear it with \
-                 `motorlink st fault-ack` when the cause is gone",
+                "{} did not start, its state is {status}: {faults}\nremove the cause, then run \
+                 `motorlink st fault-ack`",
                 motor.number()
             )))
         }
@@ -129,7 +129,7 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);
-            return Err(Failure::refused(format!("{} keeps its faults: {why}", motor.number())));
+            return Err(Failure::refused(format!("{} still has faults: {why}", motor.number())));
         }
     }
 }
@@ -167,7 +167,7 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
         [code @ 0..=0x1F, payload @ ..] => (*code, payload),
         _ => {
             return Err(Failure::usage(
-                "the first byte is the frame code, 00 to 1f; --motor adds the motor",
+                "the first byte must be a frame code, 00 to 1f; --motor selects the motor",
             ));
         }
     };

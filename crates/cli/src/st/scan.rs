@@ -21,7 +21,7 @@ pub fn run(
         return Err(Failure::usage(format!("`{port}` has no baud rate to scan")));
     }
     if connection.fault.is_some() {
-        return Err(Failure::usage("a scan of baud rates takes no --fault"));
+        return Err(Failure::usage("a scan of baud rates cannot be used with --fault"));
     }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
     let rates = if port.at_baud(rates[0]).is_some() { rates } else { &rates[..1] };
