@@ -167,7 +167,7 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused(near):
     bus, rmd = near
     refused = rmd("--trace", "single-turn-position", 90, "cw").ended(2).err
     assert "motor 1 is at 90.02°, 0.02° past 90.00° clockwise" in refused
-    assert "try `counterclockwise`, or `--full-turn`" in refused
+    assert "try `counterclockwise`, or add `--full-turn`" in refused
     assert "-> 141#94" in refused and "-> 141#a" not in refused
     assert bus.motor(1)["mode"] == "off"
 

@@ -192,7 +192,7 @@ def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, g
         rests(drives, 1)
         began = drives.do("state")["t"]
         eventually(lambda: drives.do("state")["t"] > began + 1.5, "silence")
-    process.says("has left")
+    process.says("closed the port")
     assert not any("silent" in text for text in process.err), process.err
 
 

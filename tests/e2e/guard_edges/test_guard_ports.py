@@ -41,7 +41,7 @@ def test_what_a_program_left_of_a_pty_does_not_harm_the_next(bench, guard, run):
     termios.tcsetattr(line, termios.TCSANOW, modes)
     termios.tcflow(line, termios.TCOOFF)
     os.close(line)
-    process.says("has left")
+    process.says("closed the port")
     run("st", "-p", process.port, "get", "SPEED_KP").ended(0)
 
 

@@ -38,7 +38,7 @@ def test_no_web_page_starts_a_motor_wherever_its_request_is_cut(sim, guard, prot
             except ConnectionError:
                 pass
         process.until(
-            lambda: sum("nothing of it was passed on" in text for text in process.err) == cut + 1,
+            lambda: sum("its data was not passed on" in text for text in process.err) == cut + 1,
             f"browser {cut + 1} is reported",
         )
     assert not is_turning(drives, protocol)
