@@ -432,13 +432,21 @@ def test_a_segment_is_not_sent_to_firmware_that_has_none(run):
     assert "--profile spec" in refused.err and "->" not in refused.err
 
 
-def test_a_start_while_the_motor_stops_is_told_to_have_no_effect(run, sim):
-    drives = sim(rmd=())
+def test_a_start_while_the_motor_stops_has_no_effect_and_is_an_error(run, sim, tmp_path):
+    # A flywheel: it takes half a minute to stop.
+    config = tmp_path / "flywheel.toml"
+    config.write_text("[[st.motor]]\npreset = 'servo'\nplant.load.inertia = 1e-3\n")
+    drives = sim(config, rmd=())
 
     def st(*arguments):
         return run("st", "-p", drives.port("pty"), *arguments)
 
+    st("ramp", 2000, 2000).ended(0)
     st("start").ended(0)
-    eventually(lambda: "RUN" in st("get", "STATUS").ended(0).out, "motor 1 runs")
+
+    def is_fast():
+        return st("get", "SPEED_MEAS", "--json").ended(0).values["SPEED_MEAS"] > 1000
+
+    eventually(is_fast, "motor 1 turns fast")
     st("stop").ended(0)
     assert "still stopping" in st("start").ended(1).err
