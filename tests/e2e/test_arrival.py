@@ -43,7 +43,7 @@ def test_a_move_within_the_turn_returns_when_the_motor_is_there(rmd):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_the_motor(start, bench, rmd, number):
-    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting = start("rmd", "-p", bench.port("slcan"), "--timeout", "500ms", "--trace", *FAR)
     waiting.says("0x92")
     for _ in range(2):
         waiting.process.send_signal(number)
@@ -67,7 +67,7 @@ def test_a_motor_that_is_held_is_stopped(bench, rmd):
 
 
 def test_an_error_of_the_motor_ends_the_wait(start, bench):
-    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting = start("rmd", "-p", bench.port("slcan"), "--timeout", "500ms", "--trace", *FAR)
     waiting.says("0x92")
     bench.do("fault", motor=1, fault="LOW_VOLTAGE")
     assert waiting.wait() == 1
@@ -75,7 +75,7 @@ def test_an_error_of_the_motor_ends_the_wait(start, bench):
 
 
 def test_drives_that_are_killed_end_the_wait(start, bench):
-    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting = start("rmd", "-p", bench.port("slcan"), "--timeout", "500ms", "--trace", *FAR)
     waiting.says("0x92")
     bench.kill()
     assert waiting.wait() == 3
@@ -83,7 +83,7 @@ def test_drives_that_are_killed_end_the_wait(start, bench):
 
 
 def test_frozen_drives_end_the_wait(start, bench):
-    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting = start("rmd", "-p", bench.port("slcan"), "--timeout", "500ms", "--trace", *FAR)
     waiting.says("0x92")
     bench.process.send_signal(signal.SIGSTOP)
     assert waiting.wait() == 3

@@ -19,6 +19,7 @@ enum Kind {
     Port,
     InvalidValue,
     FullTurn,
+    NotArrived,
     UnknownRegister,
     Closed,
 }
@@ -33,7 +34,7 @@ struct Facts<'a> {
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 8] = [const { PyOnceLock::new() }; 8];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 9] = [const { PyOnceLock::new() }; 9];
         let name = match self {
             Kind::Refused => "RefusedError",
             Kind::Link => "LinkError",
@@ -41,6 +42,7 @@ impl Kind {
             Kind::Port => "PortError",
             Kind::InvalidValue => "InvalidValueError",
             Kind::FullTurn => "FullTurnError",
+            Kind::NotArrived => "NotArrivedError",
             Kind::UnknownRegister => "UnknownRegisterError",
             Kind::Closed => "ClosedError",
         };
@@ -111,6 +113,9 @@ pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
         Error::Limit { motor, .. } => {
             (Kind::InvalidValue, Facts { motor: named(motor.0), ..Facts::default() })
         }
+        Error::NotArrived { motor, .. } => {
+            (Kind::NotArrived, Facts { motor: Some(motor.number()), ..Facts::default() })
+        }
         Error::Differs { motor, .. } => {
             (Kind::Refused, Facts { motor: Some(motor.number()), ..Facts::default() })
         }
@@ -145,6 +150,7 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
             let hint = "full_turn=True sends it anyway";
             return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);
         }
+        Error::NotArrived { .. } => (Kind::NotArrived, facts(None)),
         Error::Port(error) => return port_error(py, error),
         _ => (Kind::InvalidValue, facts(None)),
     };

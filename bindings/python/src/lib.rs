@@ -35,15 +35,15 @@ mod _core {
     use super::event::{RmdEventClient, StEventClient};
     #[pymodule_export]
     use super::rmd::{
-        RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_encode, rmd_errors_text,
-        rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
+        RmdArrival, RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_encode,
+        rmd_errors_text, rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
     };
     #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
-        StClient, StOptions, StRequest, StSampling, StVerifiedWrite, st_flags_text, st_motor,
-        st_register, st_register_name, st_registers, st_scan_baud, st_scan_rates,
+        StArrival, StClient, StOptions, StRequest, StSampling, StVerifiedWrite, st_flags_text,
+        st_motor, st_register, st_register_name, st_registers, st_scan_baud, st_scan_rates,
     };
 
     #[pymodule_init]
@@ -58,6 +58,9 @@ mod _core {
         module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;
         let tolerance = motorlink::rmd::FullTurn::TOLERANCE;
         module.add("RMD_FULL_TURN_TOLERANCE", TurnCentiDegrees::UNIT.value(tolerance.digits()))?;
+        let tolerance = motorlink::rmd::ARRIVAL_TOLERANCE;
+        module.add("RMD_ARRIVAL_TOLERANCE", tolerance.degrees())?;
+        module.add("ST_ARRIVAL_TOLERANCE", motorlink::st::ARRIVAL_TOLERANCE_RAD)?;
         module.add("RMD_SCAN_WIDTH", motorlink::rmd::SCAN_WIDTH)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

@@ -130,6 +130,23 @@ impl Rows {
     }
 }
 
+/// Waits by a port's clock; a signal's handler may raise an exception.
+pub(crate) fn pause(py: Python<'_>, clock: &Clock, seconds: f64) -> PyResult<()> {
+    let wait = span(py, "a time", seconds)?;
+    py.detach(|| pass(clock, wait));
+    py.check_signals()
+}
+
+/// A time of a clock that counts s.
+pub(crate) fn instant(now: f64) -> time::Instant {
+    time::Instant((now * 1e6).ceil() as u64)
+}
+
+/// A span in s.
+pub(crate) fn seconds(span: time::Micros) -> f64 {
+    Duration::from(span).as_secs_f64()
+}
+
 /// Lets time pass.
 fn pass(clock: &Clock, span: Duration) {
     // A part of a microsecond is one: virtual time would never pass it.

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command, Error};
-use motorlink::rmd::{Payload, Pid, SpinDirection};
+use motorlink::rmd::{MotorId, MotorSet, Payload, Pid, SpinDirection};
 use motorlink::st::{Profile, RegisterId};
 
 /// A parser with words for completions. The argument needs `hide_possible_values`, so that its help does
@@ -55,6 +55,12 @@ pub fn id() -> Hinted<impl TypedValueParser<Value = u8>> {
     Hinted { parser: clap::value_parser!(u8).range(1..=32), words }
 }
 
+/// IDs of RMD motors: `3`, `1,3`, `1-4`.
+pub fn ids() -> Hinted<impl TypedValueParser<Value = MotorSet>> {
+    let words = || (1..=32).map(|id: u8| id.to_string()).collect();
+    Hinted { parser: parse_ids, words }
+}
+
 /// A number of an ST motor.
 pub fn motor() -> Hinted<impl TypedValueParser<Value = u8>> {
     let words = || (1..=7).map(|number: u8| number.to_string()).collect();
@@ -74,4 +80,41 @@ pub fn direction() -> Hinted<impl TypedValueParser<Value = SpinDirection>> {
     };
     let words = || SpinDirection::NAMES.iter().map(|(_, name)| (*name).to_owned()).collect();
     Hinted { parser, words }
+}
+
+/// Reads the motors that `--id` means: `3`, `1,3`, `1-4`.
+fn parse_ids(text: &str) -> Result<MotorSet, String> {
+    let wrong =
+        || format!("`{text}` is not an ID from 1 to 32, nor a list or a range such as 1,3 or 1-4");
+    let id = |word: &str| word.trim().parse().ok().and_then(MotorId::new).ok_or_else(wrong);
+    let mut ids = MotorSet::EMPTY;
+    for word in text.split(',') {
+        let (first, last) = match word.split_once('-') {
+            Some((first, last)) => (id(first)?, id(last)?),
+            None => (id(word)?, id(word)?),
+        };
+        if first > last {
+            return Err(wrong());
+        }
+        ids = (first.number()..=last.number()).filter_map(MotorId::new).chain(ids).collect();
+    }
+    Ok(ids)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_numbers_lists_and_ranges() {
+        let numbers =
+            |text| parse_ids(text).map(|ids| ids.map(MotorId::number).collect::<Vec<_>>());
+        assert_eq!(numbers("3"), Ok(vec![3]));
+        assert_eq!(numbers("1,3"), Ok(vec![1, 3]));
+        assert_eq!(numbers("7,1-4"), Ok(vec![1, 2, 3, 4, 7]));
+        assert_eq!(numbers("32"), Ok(vec![32]));
+        for wrong in ["", "0", "33", "4-1", "1-", "a", "1,,2", "-1", "1-40"] {
+            assert!(parse_ids(wrong).is_err(), "{wrong}");
+        }
+    }
 }

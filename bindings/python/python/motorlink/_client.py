@@ -201,6 +201,13 @@ class BlockingClient(Closing, Blocking, AnyClient):
     def _is_closed(self) -> bool:
         return bool(self._core.is_closed)
 
+    def _now(self) -> float:
+        now: float = self._core.now
+        return now
+
+    def _pause(self, seconds: float) -> None:
+        self._core.pause(seconds)
+
 
 def opens(
     opening: Callable[Arguments, Callable[[], Exchanges[Opened]]],

@@ -13,10 +13,12 @@ from motorlink.errors import MotorlinkError
 
 __all__ = [
     "CanPort",
+    "RMD_ARRIVAL_TOLERANCE",
     "RMD_FULL_TURN_TOLERANCE",
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
     "RMD_TIMEOUT",
+    "RmdArrival",
     "RmdClient",
     "RmdEventClient",
     "RmdOptions",
@@ -26,11 +28,13 @@ __all__ = [
     "SimPort",
     "SimRecording",
     "SimServing",
+    "ST_ARRIVAL_TOLERANCE",
     "ST_ATTEMPTS",
     "ST_BAUD_RATES",
     "ST_SCAN_TIMEOUT",
     "ST_SEGMENTS",
     "ST_TIMEOUT",
+    "StArrival",
     "StClient",
     "StEventClient",
     "StOptions",
@@ -58,6 +62,8 @@ __all__ = [
 ]
 
 __version__: str
+#: Maximum distance from the target of a motor that has arrived, °.
+RMD_ARRIVAL_TOLERANCE: float
 #: How far past its target a motor is taken to be at it, °.
 RMD_FULL_TURN_TOLERANCE: float
 #: How long a late reply is awaited, s.
@@ -66,6 +72,8 @@ RMD_QUARANTINE: float
 RMD_SCAN_WIDTH: int
 #: How long a reply is awaited, s.
 RMD_TIMEOUT: float
+#: Maximum distance from the target of a motor that has arrived, rad.
+ST_ARRIVAL_TOLERANCE: float
 #: How often a verified write is tried.
 ST_ATTEMPTS: int
 #: The rates that drives are built with, the most frequent first.
@@ -191,6 +199,24 @@ class StOptions:
     ) -> StOptions: ...
 
 @final
+class StArrival:
+    """Says which registers to read until a motor has arrived."""
+
+    def __new__(
+        cls,
+        motor: int,
+        angle_rad: float,
+        duration_s: float,
+        tolerance_rad: float,
+        timeout: float | None,
+    ) -> StArrival: ...
+    def check(self, data: bytes) -> None: ...
+    def next(self, now: float) -> tuple[str, Any]: ...
+    def replied(self, now: float, data: bytes) -> None: ...
+    def confirmed(self, now: float) -> None: ...
+    def lost(self, now: float) -> None: ...
+
+@final
 class StClient:
     """A master on a serial line."""
 
@@ -199,6 +225,9 @@ class StClient:
     def exchange(self, motor: int, request: StRequest) -> Any: ...
     def set_verified(self, motor: int, request: StRequest, attempts: int) -> int: ...
     def confirm(self) -> None: ...
+    @property
+    def now(self) -> float: ...
+    def pause(self, seconds: float) -> None: ...
     def raw(self, motor: int, code: int, payload: bytes) -> bytes: ...
     def sample(
         self, sampling: StSampling, skip: bool, most: int | None
@@ -247,6 +276,18 @@ class RmdOptions:
     ) -> RmdOptions: ...
 
 @final
+class RmdArrival:
+    """Says what to ask a motor until it has arrived."""
+
+    def __new__(
+        cls, motor: int, request: RmdRequest, tolerance_degrees: float, timeout: float | None
+    ) -> RmdArrival: ...
+    def next(self, now: float) -> tuple[str, Any]: ...
+    def replied(self, now: float, data: bytes) -> None: ...
+    def confirmed(self, now: float) -> None: ...
+    def lost(self, now: float) -> None: ...
+
+@final
 class RmdClient:
     """A CAN bus with RMD motors."""
 
@@ -254,6 +295,9 @@ class RmdClient:
     def open(port: str | SimPort | CanPort, options: RmdOptions) -> RmdClient: ...
     def exchange(self, id: int, request: RmdRequest) -> Any: ...
     def confirm(self, id: int) -> None: ...
+    @property
+    def now(self) -> float: ...
+    def pause(self, seconds: float) -> None: ...
     def cycle(self, requests: Sequence[tuple[int, RmdRequest]]) -> dict[int, Any]: ...
     def set_torque4(
         self, iq_amps: Sequence[float], expect: Sequence[int]

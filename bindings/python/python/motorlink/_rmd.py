@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, check_request, one
+from motorlink._arrival import arrived
 from motorlink._client import AnyClient
 from motorlink._core import CanPort
 from motorlink._rmd_table import MotionStatus, MotorCommands, Request, Status
@@ -300,6 +301,11 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         given: Exchanges[Any] = self._client._exchange(self._id, request)
         return given
 
+    def _arrived(self, watch: _core.RmdArrival) -> Exchanges[MotionStatus]:
+        return arrived(
+            self._client, watch, self._exchange, lambda: self._client._confirm(self._id)
+        )
+
     def set_limits(
         self,
         *,
@@ -317,21 +323,41 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
 
     @both_apis
     def set_position(
-        self, angle_degrees: float, max_speed_dps: float | None = None
+        self,
+        angle_degrees: float,
+        max_speed_dps: float | None = None,
+        *,
+        wait: bool = False,
+        arrival_tolerance_degrees: float = _core.RMD_ARRIVAL_TOLERANCE,
+        timeout: float | None = None,
     ) -> Exchanges[MotionStatus]:
         """Turns to an angle over all turns, ° (0xA3; with ``max_speed_dps`` 0xA4). Returns the motion before it.
 
         ``max_speed_dps`` is at least 1 and is rounded down to whole °/s.
 
+        ``wait=True`` returns when the motor has arrived: it is at most ``arrival_tolerance_degrees`` from
+        the target and its angle does not change for 0.25 s. The result is the motion then. Otherwise
+        ``NotArrivedError`` is raised, and the motor still has its command. ``timeout``, s, is by default
+        twice the time of the distance at ``max_speed_dps`` and 10 s; 60 s without ``max_speed_dps``.
+
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
-        ...     status = client.motor(1).set_position(90, max_speed_dps=500)
+        ...     status = client.motor(1).set_position(90, max_speed_dps=500, wait=True)
         """
         if max_speed_dps is None:
-            return self._exchange(Request.set_position(angle_degrees))
-        return self._exchange(
-            Request.set_position_limited(angle_degrees=angle_degrees, max_speed_dps=max_speed_dps)
-        )
+            request = Request.set_position(angle_degrees)
+        else:
+            request = Request.set_position_limited(
+                angle_degrees=angle_degrees, max_speed_dps=max_speed_dps
+            )
+        status: MotionStatus
+        if not wait:
+            status = yield self._exchange(request)
+            return status
+        watch = _core.RmdArrival(self._id, request, arrival_tolerance_degrees, timeout)
+        yield self._exchange(request)
+        status = yield from self._arrived(watch)
+        return status
 
     @both_apis
     def set_single_turn_position(
@@ -342,6 +368,9 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         direction: str = "clockwise",
         full_turn: bool = False,
         tolerance_degrees: float = _core.RMD_FULL_TURN_TOLERANCE,
+        wait: bool = False,
+        arrival_tolerance_degrees: float = _core.RMD_ARRIVAL_TOLERANCE,
+        timeout: float | None = None,
     ) -> Exchanges[MotionStatus]:
         """Turns to an angle within the turn (0xA5; with ``max_speed_dps`` 0xA6). Returns the motion before it.
 
@@ -367,10 +396,13 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
                 angle_degrees=angle_degrees, direction=direction, max_speed_dps=max_speed_dps
             )
         _core.rmd_full_turn_tolerance(tolerance_degrees)
+        watch = _core.RmdArrival(self._id, request, arrival_tolerance_degrees, timeout)
         if not full_turn:
             angle = yield self._exchange(Request.read_single_turn_angle())
             request.check_full_turn(self._id, angle, tolerance_degrees)
         status: MotionStatus = yield self._exchange(request)
+        if wait:
+            status = yield from self._arrived(watch)
         return status
 
     @both_apis

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, check_request, one
+from motorlink._arrival import arrived
 from motorlink._client import AnyClient
 from motorlink._core import StRequest as Request
 from motorlink._sampling import AnySampling, Samples, by_motor, skips
@@ -490,13 +491,36 @@ class StMotor(Generic[ClientT]):
         )
 
     @both_apis
-    def set_position(self, angle_rad: float, duration_s: float) -> Exchanges[None]:
+    def set_position(
+        self,
+        angle_rad: float,
+        duration_s: float,
+        *,
+        wait: bool = False,
+        arrival_tolerance_rad: float = _core.ST_ARRIVAL_TOLERANCE,
+        timeout: float | None = None,
+    ) -> Exchanges[None]:
         """Turns to ``angle_rad`` in ``duration_s`` (0x12 of profile ``mcsdk-5.4``, with position control).
 
         Raises ``InvalidValueError`` if there is a ``speed_limit_rpm``: the command has no speed.
+
+        ``wait=True`` returns when the motor has arrived: ``duration_s`` is over, it is at most
+        ``arrival_tolerance_rad`` from the target and its position does not change for 0.25 s. Otherwise
+        ``NotArrivedError`` is raised, and the motor still has its command. A motor that is not in RUN, nor
+        on its way there, gets no command. ``timeout``, s, is by default ``duration_s`` and 10 s.
         """
         self._only("mcsdk-5.4", "moves")
-        return self._exchange(Request.set_position(angle_rad, duration_s))
+        request = Request.set_position(angle_rad, duration_s)
+        if not wait:
+            yield self._exchange(request)
+            return
+        watch = _core.StArrival(self._number, angle_rad, duration_s, arrival_tolerance_rad, timeout)
+        watch.check((yield self._read(_core.st_register("STATUS").id)))
+        yield self._exchange(request)
+        yield from arrived(self._client, watch, self._read, self._client._confirm)
+
+    def _read(self, register: int) -> Any:
+        return self._client._exchange_raw(self._number, 0x02, bytes([register]))
 
     @both_apis
     def revup_data(self, phase: int) -> Exchanges[RevupPhase]:

@@ -14,6 +14,7 @@ __all__ = [
     "InvalidValueError",
     "LinkError",
     "MotorlinkError",
+    "NotArrivedError",
     "PortError",
     "RefusedError",
     "ReplyTimeoutError",
@@ -66,6 +67,13 @@ class RefusedError(MotorlinkError):
         super().__init__(message, port=port, motor=motor)
         self.code = code
         self.name = name
+
+
+class NotArrivedError(MotorlinkError):
+    """A motor did not arrive at its target in time, or stopped before it. The message says why.
+
+    The motor still has its command. ``motor.stop()`` stops it; so does the end of ``with``.
+    """
 
 
 class LinkError(MotorlinkError, ConnectionError):

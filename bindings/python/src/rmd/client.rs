@@ -6,6 +6,7 @@ use motorlink::rmd::{
     Client, Error, IqCommand, MotorId, MotorSet, SCAN_WIDTH, ScanResult, SetTorque4, StopAction,
     Stopped,
 };
+use motorlink::time;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
@@ -16,6 +17,7 @@ use super::sample::RmdSampling;
 use crate::can::{AnyPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
+use crate::sampling::{self, seconds};
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -68,6 +70,17 @@ impl RmdClient {
         let (id, data) = (motor_id(py, id)?, request.data());
         let reply = self.bus.exchange(py, |bus| bus.raw(id, data))?;
         request.value(py, &reply.map_err(|error| rmd_error(py, &error))?)
+    }
+
+    /// The time of the port's clock, s.
+    #[getter]
+    fn now(&self) -> f64 {
+        seconds(self.clock.now().since(time::Instant(0)))
+    }
+
+    /// Waits by the port's clock.
+    fn pause(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        sampling::pause(py, &self.clock, seconds)
     }
 
     /// Checks that a motor's replies matched their requests.

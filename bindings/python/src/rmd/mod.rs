@@ -1,11 +1,13 @@
 //! The RMD protocol over CAN, V1.62.
 
+mod arrival;
 mod client;
 mod options;
 mod quantity;
 mod request;
 mod sample;
 
+pub(crate) use arrival::RmdArrival;
 pub(crate) use client::{RmdClient, four_currents, motor_ids, not_stopped, scan_result};
 pub(crate) use options::{RmdOptions, limits};
 pub(crate) use quantity::rmd_quantities;

@@ -3,6 +3,7 @@
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::st::{Client, MotorNumber, Stopped};
+use motorlink::time;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 
@@ -10,6 +11,7 @@ use super::options::StOptions;
 use super::request::{StRequest, motor_number};
 use super::sample::StSampling;
 use crate::error::{invalid_value, st_error};
+use crate::sampling::{self, seconds};
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -69,6 +71,17 @@ impl StClient {
             client.motor(motor)?.set_raw_verified(register, bits, attempts)
         })?;
         written.map_err(|error| st_error(py, &error))
+    }
+
+    /// The time of the port's clock, s.
+    #[getter]
+    fn now(&self) -> f64 {
+        seconds(self.clock.now().since(time::Instant(0)))
+    }
+
+    /// Waits by the port's clock.
+    fn pause(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        sampling::pause(py, &self.clock, seconds)
     }
 
     /// Checks that the replies so far matched their requests.

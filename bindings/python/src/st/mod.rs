@@ -1,5 +1,6 @@
 //! ST's Motor Control Protocol.
 
+mod arrival;
 mod client;
 mod frame;
 mod options;
@@ -11,6 +12,7 @@ mod scale;
 mod scan;
 mod verified;
 
+pub(crate) use arrival::StArrival;
 pub(crate) use client::{StClient, frame_code, not_stopped};
 pub(crate) use options::StOptions;
 pub(crate) use reply::Answer;

@@ -8,9 +8,9 @@ use motorlink::rmd::{
 use super::args::{self, Act, MaxSpeed};
 use super::arrival;
 use super::session::Session;
-use super::settings;
+use super::{settings, several};
 use crate::failure::Failure;
-use crate::output::{hex, parse_hex, report};
+use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
@@ -28,11 +28,11 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 session.line(session.id).ok(true).values(&session.rows(&EncoderOffset { offset })),
             )
         }
-        Act::Off => {
+        Act::Off { .. } => {
             motor.off()?;
             session.done(format!("motor {id} is off"))
         }
-        Act::Stop => {
+        Act::Stop { .. } => {
             motor.stop()?;
             session.done(format!("motor {id} is stopped; `run` resumes"))
         }
@@ -119,20 +119,13 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
                 session.output.result(text, object.ok(true).values(&rows))?;
             }
             Some(Err(error)) => {
-                let failure = Failure::from(error).about(&session.port, id);
-                if session.output.json {
-                    session.output.result("", object.failed(&failure))?;
-                }
-                failures.push(failure);
+                let id = error.motor().unwrap_or(session.motor()?.id());
+                several::failed(session, id, error.into(), &mut failures)?;
             }
             None => {}
         }
     }
-    // A program has each in its results.
-    while !session.output.json && failures.len() > 1 {
-        report(&failures.remove(0));
-    }
-    failures.into_iter().next().map_or(Ok(()), Err)
+    several::all_of(session, failures)
 }
 
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {

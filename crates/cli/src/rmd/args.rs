@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::rmd::SpinDirection;
+use motorlink::rmd::{MotorSet, SpinDirection};
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
@@ -24,10 +24,10 @@ pub struct Args {
 #[derive(clap::Args)]
 #[command(next_help_heading = help::GLOBAL)]
 pub struct MotorArgs {
-    /// The motor's ID, 1 to 32
-    #[arg(short, long, default_value_t = 1, global = true, value_parser = hint::id(),
-          hide_possible_values = true)]
-    pub id: u8,
+    /// The motor's ID, 1 to 32; several as 1,3 or 1-4, or with several --id
+    #[arg(short, long, default_value = "1", global = true, value_name = "ID",
+          value_parser = hint::ids(), hide_possible_values = true)]
+    pub id: Vec<MotorSet>,
     /// How long to wait for a reply, 1ms to 10s
     #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
           value_parser = span_up_to(Duration::from_secs(10)))]
@@ -67,7 +67,7 @@ pub enum Read {
 }
 
 /// Commands that change something, and any frame.
-#[derive(Subcommand)]
+#[derive(Subcommand, Clone)]
 pub enum Act {
     /// Show the gains, or set them until power-off (permanently with --write-rom)
     ///
@@ -96,9 +96,17 @@ pub enum Act {
     /// Set the zero to the current position, effective after the next power cycle (needs --write-rom)
     Zero,
     /// Switch the motor off: it turns freely, and a load may fall
-    Off,
+    Off {
+        /// Switch off all motors on the bus: IDs 1 to 32
+        #[arg(long)]
+        all: bool,
+    },
     /// Stop the motor and hold it; `run` resumes the last command
-    Stop,
+    Stop {
+        /// Stop all motors on the bus: IDs 1 to 32
+        #[arg(long)]
+        all: bool,
+    },
     /// Resume the command that `stop` stopped
     Run,
     /// Turn with a constant torque current
@@ -159,7 +167,7 @@ pub enum Act {
 }
 
 /// How fast a move may be.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct MaxSpeed {
     /// Maximum speed, °/s; at least 1, rounded down to a whole number
     #[arg(long, value_name = "DPS")]
@@ -167,7 +175,7 @@ pub struct MaxSpeed {
 }
 
 /// What becomes of a move that could be nearly a full turn.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct FullTurn {
     /// Allow the move even if it may be nearly a full turn
     #[arg(long)]
@@ -178,7 +186,7 @@ pub struct FullTurn {
 }
 
 /// Whether to wait for the end of a move.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct Wait {
     /// Return when the motor has arrived and is still; stop it after Ctrl-C or if it does not arrive
     ///
@@ -196,4 +204,18 @@ pub struct Wait {
     /// How long to wait (default: twice the time at --max-speed and 10s; 60s without --max-speed)
     #[arg(long, value_name = "TIME", requires = "wait", value_parser = parse_span)]
     pub wait_timeout: Option<Duration>,
+}
+
+impl MotorArgs {
+    /// The motors that are meant.
+    pub fn ids(&self) -> MotorSet {
+        self.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more))
+    }
+}
+
+impl Act {
+    /// Whether the command is never given to several motors at once.
+    pub fn is_for_one(&self) -> bool {
+        matches!(self, Act::Zero | Act::EncoderOffset { .. } | Act::Torque4 { .. })
+    }
 }

@@ -6,22 +6,35 @@ mod arrival;
 mod read;
 mod session;
 mod settings;
+mod several;
 
 pub use args::Args;
 use args::{Command, Read};
 use session::connect;
+
+use motorlink::rmd::MotorId;
 
 use crate::failure::Failure;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, motor, command } = args;
     let port = connection.port()?;
-    let session = connect(&connection, &motor, &port);
-    let done = session.and_then(|session| match command {
-        Command::Act(act) => act::run(&session, act),
+    let (session, ids) = (connect(&connection, &motor, &port), motor.ids());
+    let done = session.and_then(|mut session| match command {
+        Command::Act(act) => several::run(&mut session, ids, &act),
         Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
-        Command::Read(Read::Status { repeat }) => read::status(&session, &repeat),
-        Command::Read(Read::Angle { repeat }) => read::angle(&session, &repeat),
+        Command::Read(Read::Status { repeat } | Read::Angle { repeat })
+            if ids.len() > 1 && repeat.every.is_some() =>
+        {
+            Err(Failure::usage("--every is for one motor: give one --id"))
+        }
+        Command::Read(Read::Status { repeat }) => {
+            several::each(&mut session, ids, |session| read::status(session, &repeat))
+        }
+        Command::Read(Read::Angle { repeat }) => {
+            several::each(&mut session, ids, |session| read::angle(session, &repeat))
+        }
     });
-    done.map_err(|failure| failure.about(&port.to_string(), motor.id))
+    let first = ids.map(MotorId::number).min().unwrap_or(1);
+    done.map_err(|failure| failure.about(&port.to_string(), first))
 }

@@ -1,7 +1,7 @@
 //! An open bus, for all commands.
 
 use motorlink::port::PortName;
-use motorlink::rmd::{Client, Motor, Options, Payload, Quantity};
+use motorlink::rmd::{Client, Motor, MotorId, Options, Payload, Quantity};
 
 use super::args::MotorArgs;
 use crate::connection::Connection;
@@ -27,7 +27,8 @@ pub fn connect(
     let options = Options { timeout: motor.timeout, ..Options::default() };
     let bus = Client::open_wrapped(port, connection.around_bus()?, options)?;
     let (output, raw) = (connection.output(), connection.raw);
-    let (id, write_rom, port) = (motor.id, motor.write_rom, port.to_string());
+    let id = motor.ids().map(MotorId::number).next().unwrap_or(1);
+    let (write_rom, port) = (motor.write_rom, port.to_string());
     Ok(Session { bus, id, output, raw, write_rom, port })
 }
 

@@ -186,6 +186,12 @@ class AwaitedClient(Awaited, AnyClient):
             opening.add_done_callback(came)
             raise
 
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    async def _pause(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
     async def _end(self, *, in_flight: bool) -> None:
         self._fail(self._steps.closed())
         failed, cancelled = await self._steps.close(self._close)

@@ -1,0 +1,91 @@
+"""``set_position(..., wait=True)``: it returns when the motor has arrived."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+import motorlink
+from motorlink.errors import InvalidValueError, NotArrivedError, ReplyTimeoutError
+from motorlink.sim import Bench
+
+SERVO = 'profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n'
+
+
+@pytest.mark.parametrize("degrees", [90, -33.3, 0.3])
+def test_a_move_returns_when_the_motor_is_there(degrees: float) -> None:
+    bench = Bench()
+    with motorlink.rmd.open(bench) as client:
+        motor = client.motor(1)
+        motion = motor.set_position(degrees, max_speed_dps=360, wait=True)
+        assert motion.speed_dps == 0
+        assert motor.multi_turn_angle() == pytest.approx(degrees, abs=0.15)
+        bench.run(1.0)
+        assert motor.multi_turn_angle() == pytest.approx(degrees, abs=0.15)
+
+
+def test_a_move_within_the_turn_returns_when_the_motor_is_there() -> None:
+    with motorlink.rmd.open(Bench()) as client:
+        motor = client.motor(1)
+        motor.set_single_turn_position(350, 360, direction="counterclockwise", wait=True)
+        assert motor.multi_turn_angle() == pytest.approx(-10, abs=0.15)
+
+
+def test_a_motor_that_needs_longer_raises() -> None:
+    with motorlink.rmd.open(Bench()) as client:
+        with pytest.raises(NotArrivedError, match="the time is over and the motor is moving") as caught:
+            client.motor(1).set_position(36000, max_speed_dps=360, wait=True, timeout=0.5)
+        assert caught.value.motor == 1
+        assert client.moving == [1]
+
+
+def test_a_motor_that_is_held_raises() -> None:
+    bench = Bench()
+    bench.lock_rotor("rmd1")
+    with motorlink.rmd.open(bench) as client, pytest.raises(NotArrivedError, match="stopped before"):
+        client.motor(1).set_position(90, wait=True)
+
+
+def test_a_motor_that_is_not_there_raises() -> None:
+    client = motorlink.rmd.open(Bench(), on_close="nothing")
+    with client, pytest.raises(ReplyTimeoutError):
+        client.motor(9).set_position(90, wait=True)
+
+
+@pytest.mark.parametrize("wrong", [-0.1, float("nan"), 1e12])
+def test_a_tolerance_that_cannot_be_is_refused(wrong: float) -> None:
+    with motorlink.rmd.open(Bench()) as client:
+        with pytest.raises(InvalidValueError):
+            client.motor(1).set_position(90, wait=True, arrival_tolerance_degrees=wrong)
+        assert client.moving == []
+
+
+def test_an_st_move_returns_when_the_motor_is_there() -> None:
+    with motorlink.st.open(Bench(SERVO), profile="mcsdk-5.4") as client:
+        motor = client.motor(1)
+        motor.start()
+        motor.set_position(3.0, 0.5, wait=True)
+        assert motor.get("CURRENT_POSITION") == pytest.approx(3.0, abs=0.011)
+
+
+def test_an_st_motor_that_is_not_running_gets_no_move() -> None:
+    with motorlink.st.open(Bench(SERVO), profile="mcsdk-5.4") as client:
+        motor = client.motor(1)
+        with pytest.raises(NotArrivedError, match="IDLE, not in RUN"):
+            motor.set_position(3.0, 0.5, wait=True)
+        assert motor.get("MOVE_DURATION") == 0
+
+
+def test_tasks_wait_for_their_motors() -> None:
+    async def main() -> None:
+        async with motorlink.aio.rmd.open("sim:") as client:
+            one, two = client.motor(1), client.motor(2)
+            await asyncio.gather(
+                one.set_position(45, max_speed_dps=360, wait=True),
+                two.set_position(-90, max_speed_dps=360, wait=True),
+            )
+            assert await one.multi_turn_angle() == pytest.approx(45, abs=0.15)
+            assert await two.multi_turn_angle() == pytest.approx(-90, abs=0.15)
+
+    asyncio.run(main())

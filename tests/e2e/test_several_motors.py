@@ -1,0 +1,78 @@
+"""One command for several motors: `--id 1,3`, `--id 1-4`, `off --all`, `stop --all`."""
+
+import pytest
+
+
+@pytest.fixture(name="bench")
+def on_a_bus(sim):
+    return sim(st=())
+
+
+@pytest.fixture(name="rmd")
+def on_its_port(run, bench):
+    port = bench.port("slcan")
+    return lambda *words: run("rmd", "-p", port, "--timeout", "500ms", *words)
+
+
+def modes(bench):
+    return [bench.motor(number)["mode"] for number in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize(("command", "mode"), [("off", "off"), ("stop", "stopped")])
+def test_all_motors_come_to_rest(bench, rmd, command, mode):
+    rmd("--id", "1-4", "speed", 100).ended(0)
+    assert modes(bench) == ["speed"] * 4
+    done = rmd("--json", command, "--all").ended(0)
+    assert [(line["motor"], line["ok"]) for line in done.lines] == [(n, True) for n in (1, 2, 3, 4)]
+    assert "28 IDs do not answer" in done.err
+    assert modes(bench) == [mode] * 4
+
+
+@pytest.mark.parametrize("ids", [["--id", "1,3"], ["--id", "1", "--id", "3"], ["-i", "1,3-3"]])
+def test_a_command_reaches_the_motors_that_are_meant(bench, rmd, ids):
+    done = rmd("--json", *ids, "speed", 100).ended(0)
+    assert [line["motor"] for line in done.lines] == [1, 3]
+    assert modes(bench) == ["speed", "off", "speed", "off"]
+
+
+def test_a_motor_that_is_not_there_keeps_no_other_from_stopping(bench, rmd):
+    rmd("--id", "1-4", "speed", 100).ended(0)
+    done = rmd("--json", "--id", "9,1-4", "stop").ended(3)
+    assert [(line["motor"], line["ok"]) for line in done.lines] == [
+        *((number, True) for number in (1, 2, 3, 4)),
+        (9, False),
+    ]
+    assert modes(bench) == ["stopped"] * 4
+
+
+def test_a_motor_that_is_not_there_keeps_no_other_from_the_command(bench, rmd):
+    done = rmd("--id", "9,2", "torque", 0.5).ended(3)
+    assert "motor 2" in done.out
+    assert "motor 9 does not answer" in done.err
+    assert modes(bench)[1] == "torque"
+
+
+def test_without_any_motor_all_is_a_failure(bench, run):
+    port = bench.port("slcan")
+    lost = ("rmd", "-p", port, "--timeout", "20ms", "--fault", "drop=1")
+    assert "may still be turning" in run(*lost, "off", "--all").ended(3).err
+
+
+def test_motors_stop_on_a_bad_line(bench, rmd):
+    for seed in range(4):
+        rmd("--id", "1-4", "speed", 100).ended(0)
+        done = rmd("--fault", f"drop=0.01,seed={seed}", "stop", "--all")
+        if done.code == 0:
+            assert modes(bench) == ["stopped"] * 4
+
+
+def test_what_is_for_one_motor_refuses_several(rmd):
+    for words in (["zero"], ["encoder-offset", 3], ["status", "--every", "1s"]):
+        assert "one --id" in rmd("--id", "1,2", *words).ended(2).err
+    for wrong in ("0", "33", "4-1", "1,,2"):
+        assert "1 to 32" in rmd("--id", wrong, "angle").ended(2).err
+
+
+def test_a_value_that_is_out_of_range_is_told_once(rmd):
+    done = rmd("--id", "1-4", "torque", 99).ended(2)
+    assert done.err.count("99") == 1
