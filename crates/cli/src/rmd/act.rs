@@ -8,7 +8,7 @@ use motorlink::rmd::{
 use super::args::{self, Act, MaxSpeed};
 use super::arrival;
 use super::session::Session;
-use super::{settings, several};
+use super::settings;
 use crate::failure::Failure;
 use crate::output::{hex, parse_hex};
 
@@ -120,12 +120,12 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
             }
             Some(Err(error)) => {
                 let id = error.motor().unwrap_or(session.motor()?.id());
-                several::failed(session, id, error.into(), &mut failures)?;
+                session.failed(id, error.into(), &mut failures)?;
             }
             None => {}
         }
     }
-    several::all_of(session, failures)
+    session.report_all(failures)
 }
 
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {

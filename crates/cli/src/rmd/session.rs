@@ -7,7 +7,7 @@ use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::{self, Line, Row};
-use crate::output::Printer;
+use crate::output::{Printer, report};
 
 /// An open bus, the selected motor, and how its values are shown.
 pub struct Session {
@@ -70,6 +70,30 @@ impl Session {
     pub fn wanted<Q: Quantity>(&self, value: f64) -> Result<Q, Failure> {
         let wanted = if self.raw { Q::wanted_digits(value) } else { Q::wanted(value) };
         wanted.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
+    }
+
+    /// Keeps the failure of one of several motors; a program has it in its results.
+    pub fn failed(
+        &self,
+        id: MotorId,
+        failure: Failure,
+        failures: &mut Vec<Failure>,
+    ) -> Result<(), Failure> {
+        let failure = failure.about(&self.port, id.number());
+        if self.output.json {
+            self.output.result("", self.line(id.number()).failed(&failure))?;
+        }
+        failures.push(failure);
+        Ok(())
+    }
+
+    /// Reports the failures of several motors; the exit code is that of the last.
+    pub fn report_all(&self, mut failures: Vec<Failure>) -> Result<(), Failure> {
+        // A program has each in its results.
+        while !self.output.json && failures.len() > 1 {
+            report(&failures.remove(0));
+        }
+        failures.pop().map_or(Ok(()), Err)
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {

@@ -6,7 +6,7 @@ use super::act;
 use super::args::Act;
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{note, report};
+use crate::output::note;
 
 /// How often motors that do not answer are told to stop or to switch off.
 const ATTEMPTS: u32 = 3;
@@ -56,10 +56,10 @@ pub fn each(
             // Nothing was sent, and the same would happen for the others.
             Err(failure @ (Failure::Interrupted | Failure::OutputClosed)) => return Err(failure),
             Err(failure) if failure.exit_code() == 2 => return Err(failure),
-            Err(failure) => failed(session, id, failure, &mut failures)?,
+            Err(failure) => session.failed(id, failure, &mut failures)?,
         }
     }
-    all_of(session, failures)
+    session.report_all(failures)
 }
 
 /// Stops motors at once, and again those that do not answer. Motors in `expected` have to answer.
@@ -109,7 +109,7 @@ fn halt_all(
             }
             Some(error) if there.contains(id) || !matches!(error, Error::Timeout { .. }) => {
                 let what = "it did not confirm, and may still be turning";
-                failed(session, id, Failure::from(error.clone()).then(what), &mut failures)?;
+                session.failed(id, Failure::from(error.clone()).then(what), &mut failures)?;
             }
             _ => {}
         }
@@ -122,7 +122,7 @@ fn halt_all(
     if !silent.is_empty() && failures.is_empty() {
         note(format!("{} IDs do not answer: no motor, or no supply", silent.len()));
     }
-    all_of(session, failures)
+    session.report_all(failures)
 }
 
 fn id_of(found: &ScanResult) -> MotorId {
@@ -132,28 +132,4 @@ fn id_of(found: &ScanResult) -> MotorId {
         | ScanResult::Echo(id)
         | ScanResult::Shared(id) => *id,
     }
-}
-
-/// Keeps a failure; a program has it in its results.
-pub fn failed(
-    session: &Session,
-    id: MotorId,
-    failure: Failure,
-    failures: &mut Vec<Failure>,
-) -> Result<(), Failure> {
-    let failure = failure.about(&session.port, id.number());
-    if session.output.json {
-        session.output.result("", session.line(id.number()).failed(&failure))?;
-    }
-    failures.push(failure);
-    Ok(())
-}
-
-/// Reports all failures; the exit code is that of the last.
-pub fn all_of(session: &Session, mut failures: Vec<Failure>) -> Result<(), Failure> {
-    // A program has each in its results.
-    while !session.output.json && failures.len() > 1 {
-        report(&failures.remove(0));
-    }
-    failures.pop().map_or(Ok(()), Err)
 }
