@@ -87,13 +87,13 @@ impl Session {
         Ok(())
     }
 
-    /// Reports the failures of several motors; the exit code is that of the last.
+    /// Reports the failures of several motors.
     pub fn report_all(&self, mut failures: Vec<Failure>) -> Result<(), Failure> {
         // A program has each in its results.
         while !self.output.json && failures.len() > 1 {
             report(&failures.remove(0));
         }
-        failures.pop().map_or(Ok(()), Err)
+        failures.into_iter().next().map_or(Ok(()), Err)
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {
