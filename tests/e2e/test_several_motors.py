@@ -28,6 +28,14 @@ def test_all_motors_come_to_rest(bench, rmd, command, mode):
     assert modes(bench) == [mode] * 4
 
 
+@pytest.mark.parametrize("command", ["off", "stop"])
+def test_ids_without_a_motor_are_no_failure_at_the_default_timeout(run, command):
+    done = run("rmd", "-p", "sim:", "--json", command, "--all").ended(0)
+    assert [line["motor"] for line in done.lines] == [1, 2, 3, 4]
+    done = run("rmd", "-p", "sim:", "--id", "1,9", command).ended(3)
+    assert "motor 9 does not answer" in done.err
+
+
 @pytest.mark.parametrize("ids", [["--id", "1,3"], ["--id", "1", "--id", "3"], ["-i", "1,3-3"]])
 def test_a_command_reaches_the_motors_that_are_meant(bench, rmd, ids):
     done = rmd("--json", *ids, "speed", 100).ended(0)

@@ -93,7 +93,7 @@ impl RmdArrival {
         self.watch.iter_mut().for_each(|watch| watch.confirmed(instant(now)));
     }
 
-    /// There is no reply to trust.
+    /// The last reply cannot be trusted.
     fn lost(&mut self, now: f64) {
         self.watch.iter_mut().for_each(|watch| watch.lost(instant(now)));
     }

@@ -101,7 +101,7 @@ impl StArrival {
         self.watch.iter_mut().for_each(ArrivalWatch::confirmed);
     }
 
-    /// There is no reply to trust.
+    /// The last reply cannot be trusted.
     fn lost(&mut self, now: f64) {
         self.watch.iter_mut().for_each(|watch| watch.lost(instant(now)));
     }

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::note;
 
-/// Gives a command to move, and waits for its end if `wait` says so.
+/// Sends a command to move. With `--wait` it returns when the move is over.
 pub fn command(
     session: &Session,
     command: impl FnOnce() -> Result<MotionStatus, Failure>,
@@ -68,7 +68,7 @@ fn arrive(
     Err(Failure::Interrupted)
 }
 
-/// Stops what was set moving; the failure says what came of it.
+/// Stops the motor. The failure contains the result of the stop.
 fn stopped(session: &Session, stop: StopOnDrop<'_>, failure: Failure) -> Failure {
     let outcomes = stop.stop_now();
     let Some(Stopped { id, result }) = outcomes.last() else { return failure };

@@ -1,6 +1,8 @@
 //! One command for several motors: `--id 1,3`, `--id 1-4`, `--all`.
 
-use motorlink::rmd::{Command as Request, Error, MotorId, MotorSet, Off, ScanResult, Stop};
+use motorlink::rmd::{
+    Command as Request, Error, MotorId, MotorSet, Off, Options, ScanResult, Stop,
+};
 
 use super::act;
 use super::args::Act;
@@ -74,7 +76,12 @@ fn halt_all(
         Halt::Stop => Stop.encode(),
     };
     let (mut left, mut errors, mut confirmed) = (ids, Vec::new(), MotorSet::EMPTY);
-    for _ in 0..ATTEMPTS {
+    let clock = session.bus.clock();
+    for attempt in 0..ATTEMPTS {
+        if attempt > 0 {
+            // Until then a motor that was silent may still answer the attempt before.
+            clock.wait(clock.now() + Options::default().quarantine.into());
+        }
         errors.clear();
         let requests: Vec<_> = left.map(|id| (id, request)).collect();
         let cycle = session.bus.cycle(&requests, |id, result| match result {
@@ -107,7 +114,7 @@ fn halt_all(
                 // A reader that is gone does not keep the others from being reported.
                 let _ = session.output.result(done, line);
             }
-            Some(error) if there.contains(id) || !matches!(error, Error::Timeout { .. }) => {
+            Some(error) if there.contains(id) || !is_silence(error) => {
                 let what = "it did not confirm, and may still be turning";
                 session.failed(id, Failure::from(error.clone()).then(what), &mut failures)?;
             }
@@ -123,6 +130,11 @@ fn halt_all(
         note(format!("{} IDs do not answer: no motor, or no supply", silent.len()));
     }
     session.report_all(failures)
+}
+
+/// Whether an ID may have no motor.
+fn is_silence(error: &Error) -> bool {
+    matches!(error, Error::Timeout { .. } | Error::Quarantined { .. })
 }
 
 fn id_of(found: &ScanResult) -> MotorId {

@@ -66,7 +66,7 @@ fn arrive(
     Err(Failure::Interrupted)
 }
 
-/// Stops the motor; the failure says what came of it.
+/// Stops the motor. The failure contains the result of the stop.
 fn stopped(session: &Session, failure: Failure) -> Failure {
     let stop = || session.motor().and_then(|motor| Ok(motor.stop()?));
     let result = (1..STOPS).fold(stop(), |result, _| result.or_else(|_| stop()));

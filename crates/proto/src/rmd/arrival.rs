@@ -188,7 +188,7 @@ impl ArrivalWatch {
         };
     }
 
-    /// Takes note that there is no reply to trust: the sample does not count.
+    /// Records a lost or untrusted reply: the sample does not count.
     pub fn lost(&mut self, now: Instant) {
         let verdict = self.arrival.lost(now);
         self.stage = self.after(now, verdict);

@@ -185,7 +185,7 @@ impl ArrivalWatch {
         }
     }
 
-    /// Takes note that there is no reply to trust. If it was to confirm the replies before, none of them
+    /// Records a lost or untrusted reply. If it was to confirm the replies before, none of them
     /// counts.
     pub fn lost(&mut self, now: Instant) {
         let arrival = self.arrival.as_mut().unwrap_or(&mut self.waiting);
