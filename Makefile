@@ -213,14 +213,12 @@ install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGE
 
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
 	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
-Checks the version in rust-version.
-# What rust-version promises.
+# Checks the version in rust-version.
 oldest: ## compiles the workspace with the oldest Rust that is meant to work
 	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \
 		rustup toolchain install --profile minimal $$rust && \
 		$(CARGO) +$$rust check --workspace --all-features --locked --target-dir target/oldest
-Finds incompatible changes that the version number does not allow.
-# Breaks that the version number does not allow.
+# Finds incompatible changes that the version number does not allow.
 semver: ## the public interface against the last release
 	@release=$$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null) || \
 		{ echo "there is no release yet (no tag v*) to compare with"; exit 0; }; \
@@ -236,15 +234,13 @@ clean: ## removes all that was built or installed into this folder
 	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) probe/target fuzz/target firmware/target
 
 # ---- What they need ----
-For systems where rustup does not install the toolchain of rust-toolchain.toml automatically.
-# Where rustup does not install by itself what rust-toolchain.toml names.
+# For systems where rustup does not install the toolchain of rust-toolchain.toml automatically.
 toolchain:
 	@! command -v rustup >/dev/null || rustup which rustc >/dev/null 2>&1 || rustup toolchain install
 
 nightly:
 	@$(NIGHTLY_READY)
-Runs before the parts, because sudo may ask for a password. Each part reports missing packages.
-# Before the parts, because sudo may ask for a password. A part says what is still missing.
+# Runs before the parts, because sudo may ask for a password. Each part reports missing packages.
 packages:
 	$(WHOLE)
 	-@$(if $(filter e2e python pages firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
