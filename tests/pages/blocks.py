@@ -9,7 +9,6 @@ A block is fenced and names its language. A word after the language says how it 
 | `python` | all blocks of a page run in order in one process |
 | `python pytest` | runs as a test file |
 | `c`, `rust` | a program: it compiles without a warning and runs |
-| `c compile`, `rust compile` | it compiles |
 | `toml scenario`, `toml config` | `motorlink sim run` plays it, `motorlink sim` serves it |
 | `json` | each line is valid by docs/json.schema.json |
 | `json any` | each line is JSON |
@@ -23,19 +22,18 @@ from pathlib import Path
 REPOSITORY = Path(__file__).parents[2]
 PAGES = sorted([*REPOSITORY.glob("*.md"), *REPOSITORY.glob("docs/*.md")])
 
-#: Why lines of a shell are not run: they need root, hardware or a network, compile for minutes, run
-#: for minutes, or have names that the reader replaces.
-SKIPS = {"root", "hardware", "network", "build", "long", "placeholder"}
+#: Why lines of a shell are not run: they need root, compile or run for minutes, or have names that
+#: the reader replaces.
+SKIPS = {"root", "build", "long", "placeholder"}
 #: The words that a fence may have after its language.
 WORDS = {
     "sh": {"", *(f"skip={reason}" for reason in SKIPS)},
     "python": {"", "pytest", "fragment"},
-    "c": {"", "compile", "fragment"},
-    "rust": {"", "compile", "fragment"},
+    "c": {"", "fragment"},
+    "rust": {"", "fragment"},
     "toml": {"scenario", "config", "fragment"},
     "json": {"", "any"},
     "cmake": {"fragment"},
-    "make": {"fragment"},
     "text": {""},
 }
 

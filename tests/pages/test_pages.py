@@ -113,11 +113,6 @@ def test_programs_in_c(block, compiled_c, folder, drives, environment):
     runs(compiled_c(block), folder, environment)
 
 
-@each(blocks.of("c", "compile"))
-def test_programs_in_c_compile(block, compiled_c):
-    compiled_c(block)
-
-
 def runs(program, folder, environment):
     done = subprocess.run(
         [program], cwd=folder, env=environment, capture_output=True, text=True, timeout=LIMIT
@@ -125,7 +120,7 @@ def runs(program, folder, environment):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-RUST = blocks.of("rust", "", "compile")
+RUST = blocks.of("rust", "")
 CRATES = {
     "motorlink": "motorlink",
     "motorlink-testbench": "testbench",
@@ -169,14 +164,9 @@ def compiled_rust():
     return target / "debug"
 
 
-@each([block for block in RUST if block.word == ""])
+@each(RUST)
 def test_programs_in_rust(block, compiled_rust, folder, drives, environment):
     runs(compiled_rust / rust_name(block), folder, environment)
-
-
-@each([block for block in RUST if block.word == "compile"])
-def test_programs_in_rust_compile(block, compiled_rust):
-    assert (compiled_rust / rust_name(block)).exists()
 
 
 @each(blocks.of("toml", "fragment"))
