@@ -1,19 +1,25 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* What the examples need of a POSIX system: a raw serial line, a clock, waiting. Include it first. */
+/*
+ * What the examples need of a POSIX system: a raw serial line, a clock, waiting, signals. Include it
+ * first.
+ */
 #ifndef MOTORLINK_EXAMPLE_POSIX_H
 #define MOTORLINK_EXAMPLE_POSIX_H
 
-#if !defined(_POSIX_C_SOURCE) && !defined(_XOPEN_SOURCE)
-#define _POSIX_C_SOURCE 200809L
+#ifndef _XOPEN_SOURCE
+#define _XOPEN_SOURCE 700
 #endif
 
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -49,13 +55,77 @@ static inline void make_raw(int fd) {
   }
 }
 
-static inline int open_line(const char *path) {
-  int fd = open(path, O_RDWR | O_NOCTTY);
+/* Locks the line, so that no second program sends on it. */
+static inline void lock_line(int fd, const char *path) {
+  const char *device = ttyname(fd);
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    if (errno == EWOULDBLOCK) {
+      fprintf(stderr, "%s: in use by another program\n", path);
+      exit(3);
+    }
+    fail(path);
+  }
+  /* Also excludes programs that do not lock. A pty would keep this mode after the program. */
+  if (device != NULL && strncmp(device, "/dev/pts/", 9) != 0 && ioctl(fd, TIOCEXCL) != 0) {
+    fail(path);
+  }
+}
+
+static inline int open_device(const char *path) {
+  int fd = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
   if (fd < 0) {
     fail(path);
   }
+  return fd;
+}
+
+/* Opens a serial line and locks it. */
+static inline int open_line(const char *path) {
+  int fd = open_device(path);
+  lock_line(fd, path);
   make_raw(fd);
   return fd;
+}
+
+/* Opens a pty for a simulated drive. Its other end stays open, so that programs may come and go. */
+static inline int serve_pty(int *kept) {
+  int fd = posix_openpt(O_RDWR | O_NOCTTY);
+  if (fd < 0 || grantpt(fd) != 0 || unlockpt(fd) != 0) {
+    fail("pty");
+  }
+  *kept = open_device(ptsname(fd));
+  make_raw(*kept);
+  return fd;
+}
+
+/* The signal that asks the program to end; 0: none. */
+static volatile sig_atomic_t caught_signal;
+
+static inline void note_signal(int number) {
+  caught_signal = number;
+}
+
+/*
+ * From now on these signals do not end the program: it has to stop its motor first. A signal ends
+ * the wait in `receive_until`. What is ignored stays ignored.
+ */
+static inline void catch_signals(void) {
+  static const int numbers[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE};
+  size_t i;
+  for (i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    struct sigaction action;
+    if (sigaction(numbers[i], NULL, &action) != 0) {
+      fail("sigaction");
+    }
+    if (action.sa_handler == SIG_IGN) {
+      continue;
+    }
+    memset(&action, 0, sizeof action);
+    action.sa_handler = note_signal;
+    if (sigaction(numbers[i], &action, NULL) != 0) {
+      fail("sigaction");
+    }
+  }
 }
 
 static inline void send_all(int fd, const uint8_t *bytes, size_t size) {

@@ -5,7 +5,6 @@
  * Prints the path that a host opens, and serves it until stdin ends. The motor is the one of motor.h,
  * with ID 1. Exits with 0.
  */
-#define _XOPEN_SOURCE 700
 #include "posix.h"
 
 #include <motorlink.h>
@@ -41,14 +40,9 @@ static void serve(int fd, uint8_t byte) {
 }
 
 int main(void) {
-  int fd = posix_openpt(O_RDWR | O_NOCTTY);
   int kept;
+  int fd = serve_pty(&kept);
   motorlink_rmd_drive_config config;
-  if (fd < 0 || grantpt(fd) != 0 || unlockpt(fd) != 0) {
-    fail("pty");
-  }
-  /* The other end stays open, so that hosts may come and go. */
-  kept = open_line(ptsname(fd));
 
   callbacks = motor_control(&motor);
   memset(&config, 0, sizeof config);

@@ -4,7 +4,9 @@
  *
  * Turns motor 1 to 90 degrees, no faster than 360 degrees per second; has motors 1 to 4 hold a
  * torque current of 0 in one frame; shows that a limit holds. Switches motor 1 off, also after a
- * failure. Ends with 0, with 3 where the line failed.
+ * failure, Ctrl-C or SIGTERM. Prints nothing while the motor turns: output that is not read blocks. Ends
+ * with 0, with 3 if the line failed or the motor did not acknowledge Off, and with 128 and its number
+ * after a signal.
  *
  * What an earlier program asked a motor may still be answered: the first exchange with each motor
  * ends in QUARANTINED, and it is asked again when it was silent for the quarantine time.
@@ -15,14 +17,24 @@
 
 static motorlink_rmd_host host;
 static motorlink_slcan_host adapter;
-static int turning;
+enum { MOTOR = 1, OFF_ATTEMPTS = 3 };
 
-static void leave(int fd);
+/* From before the first motion command until Off is acknowledged. */
+static int turning;
+/* Whether Off is being sent: the program ends behind it. */
+static int leaving;
+
+static void leave(int fd, const char *why, int code);
+
+static void warn(void) {
+  if (turning) {
+    fprintf(stderr, "Off was not acknowledged: motor %d may still turn\n", MOTOR);
+  }
+}
 
 static void check(int fd, motorlink_error error) {
   if (error != MOTORLINK_OK) {
-    fprintf(stderr, "%s\n", motorlink_error_text(error));
-    leave(fd);
+    leave(fd, motorlink_error_text(error), 3);
   }
 }
 
@@ -50,6 +62,9 @@ static motorlink_rmd_output next_outcome(int fd) {
   for (;;) {
     motorlink_rmd_output output;
     motorlink_slcan_line line;
+    if (caught_signal && !leaving) {
+      leave(fd, "ended by a signal", 128 + caught_signal);
+    }
     check(fd, motorlink_rmd_host_poll(&host, now_us(), &output));
     if (output.kind == MOTORLINK_OUTPUT_DONE) {
       return output;
@@ -69,15 +84,39 @@ static motorlink_rmd_output next_done(int fd) {
   return output;
 }
 
-/* Ends the program, and the motor before it. */
-static void leave(int fd) {
-  if (turning) {
-    turning = 0;
-    if (motorlink_rmd_host_request(&host, now_us(), 1, motorlink_rmd_off()) == MOTORLINK_OK) {
-      next_done(fd);
+/* Asks for Off, in place of the exchange under way, and waits for the reply. */
+static void switch_off(int fd) {
+  uint64_t retry_us;
+  motorlink_error result;
+  check(fd, motorlink_rmd_host_cancel(&host, now_us(), MOTOR));
+  result = motorlink_rmd_host_request(&host, now_us(), MOTOR, motorlink_rmd_off());
+  if (result == MOTORLINK_ERROR_QUARANTINED) {
+    check(fd, motorlink_rmd_host_retry(&host, &retry_us));
+    while (now_us() < retry_us) {
+      hear(fd, retry_us);
+    }
+    return;
+  }
+  check(fd, result);
+  for (;;) {
+    motorlink_rmd_output output = next_outcome(fd);
+    if (output.motor == MOTOR) {
+      turning = output.result != MOTORLINK_OK;
+      return;
     }
   }
-  exit(3);
+}
+
+/* Ends the program, and the motor before it. */
+static void leave(int fd, const char *why, int code) {
+  int attempt;
+  for (attempt = 0; turning && !leaving && attempt < OFF_ATTEMPTS; attempt++) {
+    leaving = 1;
+    switch_off(fd);
+    leaving = 0;
+  }
+  fprintf(stderr, "%s\n", why);
+  exit(code);
 }
 
 /* Asks until the motor can be trusted, for 2 s at the most. */
@@ -103,6 +142,7 @@ static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data req
 
 int main(int argc, char **argv) {
   const int16_t torques[4] = {0, 0, 0, 0};
+  int16_t speeds_dps[4];
   motorlink_slcan_line line;
   motorlink_rmd_status status;
   motorlink_rmd_limits limits;
@@ -116,6 +156,8 @@ int main(int argc, char **argv) {
     fprintf(stderr, "usage: %s PORT\n", argv[0]);
     return 2;
   }
+  catch_signals();
+  atexit(warn);
   fd = open_line(argv[1]);
   check(fd, motorlink_slcan_host_init(&adapter, sizeof adapter));
   check(fd, motorlink_rmd_host_init(&host, sizeof host));
@@ -137,7 +179,6 @@ int main(int argc, char **argv) {
     motorlink_rmd_data reply = exchange(fd, 1, motorlink_rmd_read_multi_turn_angle());
     angle = motorlink_rmd_decode_multi_turn_angle(reply);
   } while ((angle < 8900 || angle > 9100) && now_us() < give_up);
-  printf("motor 1: %ld hundredths of a degree\n", (long)angle);
 
   for (motor = 2; motor <= 4; motor++) {
     exchange(fd, motor, motorlink_rmd_read_status());
@@ -146,7 +187,7 @@ int main(int argc, char **argv) {
   for (left = 4; left > 0; left--) {
     motorlink_rmd_output output = next_done(fd);
     motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(output.reply);
-    printf("motor %u: %d degrees per second\n", (unsigned)output.motor, (int)motion.speed_dps);
+    speeds_dps[output.motor - 1] = motion.speed_dps;
   }
 
   limits.current_16ma = 100;
@@ -155,11 +196,14 @@ int main(int argc, char **argv) {
   check(fd, motorlink_rmd_host_set_limits(&host, 2, &limits));
   if (motorlink_rmd_host_request(&host, now_us(), 2, motorlink_rmd_set_torque(101)) !=
       MOTORLINK_ERROR_LIMIT) {
-    fprintf(stderr, "the limit did not hold\n");
-    leave(fd);
+    leave(fd, "the limit did not hold", 3);
   }
   exchange(fd, 1, motorlink_rmd_off());
   turning = 0;
+  printf("motor 1: %ld hundredths of a degree\n", (long)angle);
+  for (motor = 1; motor <= 4; motor++) {
+    printf("motor %u: %d degrees per second\n", (unsigned)motor, (int)speeds_dps[motor - 1]);
+  }
   check(fd, motorlink_rmd_host_busy(&host, &busy));
   close(fd);
   return busy == 0 && angle >= 8900 && angle <= 9100 ? 0 : 3;

@@ -5,7 +5,6 @@
  * Prints the path that a master opens, and serves it until stdin ends. The motor is the one of fan.h.
  * Exits with 0.
  */
-#define _XOPEN_SOURCE 700
 #include "posix.h"
 
 #include <motorlink.h>
@@ -24,13 +23,8 @@ static void check(motorlink_error error) {
 }
 
 int main(void) {
-  int fd = posix_openpt(O_RDWR | O_NOCTTY);
   int kept;
-  if (fd < 0 || grantpt(fd) != 0 || unlockpt(fd) != 0) {
-    fail("pty");
-  }
-  /* The other end stays open, so that masters may come and go. */
-  kept = open_line(ptsname(fd));
+  int fd = serve_pty(&kept);
 
   drive = fan_control(&fan);
   check(motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, &drive));

@@ -15,18 +15,22 @@
  *     static motorlink_st_master master;
  *     motorlink_st_output output;
  *
- *     motorlink_st_master_init(&master, sizeof master, NULL);
- *     motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_SPEED_MEAS);
+ *     check(motorlink_st_master_init(&master, sizeof master, NULL));
+ *     check(motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_SPEED_MEAS));
  *     do {
- *       motorlink_st_master_poll(&master, now_us(), &output);
+ *       check(motorlink_st_master_poll(&master, now_us(), &output));
  *       if (output.kind == MOTORLINK_OUTPUT_TRANSMIT) {
  *         send(output.bytes.data, output.bytes.size);
  *       } else if (output.kind == MOTORLINK_OUTPUT_WAIT) {
  *         size_t size = receive_until(output.until_us, buffer, sizeof buffer);
- *         motorlink_st_master_receive(&master, now_us(), buffer, size);
+ *         check(motorlink_st_master_receive(&master, now_us(), buffer, size));
  *       }
  *     } while (output.kind != MOTORLINK_OUTPUT_DONE);
- *     if (output.result == MOTORLINK_OK) { speed_rpm = output.value; }
+ *     check(output.result);
+ *     speed_rpm = output.value;
+ *
+ * `check` is yours: it leaves the loop if its argument is not MOTORLINK_OK. A call with a wrong argument
+ * begins no exchange, and a loop that waits for its end then waits forever.
  *
  * For every function:
  *
@@ -45,7 +49,8 @@
  * request is BUSY. `motor` is 1 to 7, or 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor`
  * is over 7. BUSY: an exchange is under way. The host of RMD motors has an exchange with each motor,
  * all at the same time. LIMIT, of both: the request exceeds a limit that the caller set, for a master
- * with `motorlink_st_master_set_limits`.
+ * with `motorlink_st_master_set_limits`; a start without an acknowledged ramp under a limit of speed; for
+ * RMD also a value outside of the document's range.
  *
  * Numbers with names. Registers, commands, error codes, states and the like have an enum each. Its name
  * is the type in calls. The type has one byte, with -fshort-enums and without. In C it is `uint8_t`; from
@@ -1631,6 +1636,10 @@ motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *mas
 
 /**
  * Begins to execute a command. Any number is allowed.
+ *
+ * What stops a motor (STOP_MOTOR, SC_STOP) is sent at once if the line is lost or was just opened, then
+ * the line is recovered, then it is sent again. The result is that of the second. If it is not
+ * `MOTORLINK_OK`, begin again: the motor may still turn.
  */
 motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
                                             uint8_t motor,

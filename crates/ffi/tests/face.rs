@@ -274,6 +274,32 @@ fn three_questions_bring_a_just_opened_line_in_sync() {
 }
 
 #[test]
+fn a_stop_is_sent_at_once_to_a_drive_that_does_not_answer() {
+    let mut master: motorlink_st_master = zeroed();
+    let raw_stop = 2;
+    for is_raw in [false, true] {
+        let mut output: motorlink_st_output = zeroed();
+        gives!(Ok, motorlink_st_master_init(&mut master, size_of_val(&master), null()));
+        gives!(Ok, motorlink_st_master_trust_line(&mut master));
+        gives!(Ok, motorlink_st_master_execute(&mut master, 1, 1));
+        while output.kind != motorlink_output::Done {
+            let now = output.until_us;
+            gives!(Ok, motorlink_st_master_poll(&mut master, now, &mut output));
+        }
+        assert_eq!(output.result, Error::Timeout);
+        if is_raw {
+            gives!(Ok, motorlink_st_master_raw(&mut master, 1, 3, &raw_stop, 1));
+        } else {
+            gives!(Ok, motorlink_st_master_execute(&mut master, 1, 2));
+        }
+        gives!(Ok, motorlink_st_master_poll(&mut master, 2_000_000, &mut output));
+        assert_eq!(bytes(&output.bytes), [0x23, 0x01, 0x02, 0x26]);
+        gives!(Ok, motorlink_st_master_poll(&mut master, 2_000_000, &mut output));
+        assert_eq!(output.kind, motorlink_output::Wait);
+    }
+}
+
+#[test]
 fn a_line_that_echoes_is_no_drive() {
     let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);

@@ -45,6 +45,40 @@ fn a_refusal_keeps_its_code_and_the_line_unless_the_frame_was_damaged() {
 }
 
 #[test]
+fn a_request_that_is_sent_ahead_is_sent_again_after_the_recovery() {
+    let stop = Request::ExecuteCommand(Command::StopMotor);
+    let frame = [0x23, 0x01, 0x02, 0x26];
+    for recovery in Recovery::ALL {
+        let mut master = master(recovery);
+        master.lost();
+        master.request(1, &stop).unwrap();
+        master.send_ahead();
+        assert_eq!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
+        assert_ne!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
+    }
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.master.lost();
+    pair.exchange(1, stop).unwrap();
+    assert_eq!(pair.sent.last().unwrap(), &frame);
+}
+
+#[test]
+fn a_request_on_a_line_in_sync_is_not_sent_ahead() {
+    let mut master = master(Recovery::Drain);
+    master.request(1, &STATUS).unwrap();
+    master.send_ahead();
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    assert!(matches!(master.poll(Instant(0)), Output::Wait(_)));
+    for end in [Master::lost, Master::reopened, Master::trust_line] {
+        master.lost();
+        master.request(1, &STATUS).unwrap();
+        master.send_ahead();
+        end(&mut master);
+        assert_eq!(master.poll(Instant(0)), Output::Wait(None));
+    }
+}
+
+#[test]
 fn only_one_exchange_is_under_way() {
     let mut master = master(Recovery::None);
     master.request(0, &STATUS).unwrap();

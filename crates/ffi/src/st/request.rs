@@ -1,8 +1,8 @@
 //! Requests of a master: every function begins an exchange.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Frame, LimitError, MotorNumber, PositionMove, REVUP_PHASES, Ramp,
-    RegisterId, Request, RequestError, TorqueRamp,
+    Command, CurrentReference, Effect, Frame, LimitError, MotorNumber, PositionMove, REVUP_PHASES,
+    Ramp, RegisterId, Request, RequestError, TorqueRamp,
 };
 
 use super::master::State;
@@ -27,12 +27,22 @@ fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), moto
     check_motor(motor)?;
     let effect = state.account.check(state.master.counters(), motor, request).map_err(limited)?;
     state.master.request(motor, request).map_err(refused)?;
+    state.send_stop_ahead(effect);
     state.account.sent(motor, effect);
     state.asked = match request {
         Request::GetRegister(register) => Some(*register),
         _ => None,
     };
     Ok(())
+}
+
+impl State {
+    /// What stops a motor does not wait for the recovery of a lost line.
+    fn send_stop_ahead(&mut self, effect: Effect) {
+        if effect == Effect::Stops {
+            self.master.send_ahead();
+        }
+    }
 }
 
 fn check_motor(motor: u8) -> Result<(), motorlink_error> {
@@ -82,6 +92,10 @@ pub unsafe extern "C" fn motorlink_st_master_set_register(
 }
 
 /// Begins to execute a command. Any number is allowed.
+///
+/// What stops a motor (STOP_MOTOR, SC_STOP) is sent at once if the line is lost or was just opened, then
+/// the line is recovered, then it is sent again. The result is that of the second. If it is not
+/// `MOTORLINK_OK`, begin again: the motor may still turn.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_execute(
     master: *mut motorlink_st_master,
@@ -276,6 +290,7 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
         let counters = state.master.counters();
         let effect = state.account.check_frame(counters, &frame).map_err(limited)?;
         state.master.request_raw(frame.header, payload).map_err(refused)?;
+        state.send_stop_ahead(effect);
         state.account.sent_frame(&frame, effect);
         state.asked = None;
         Ok(())

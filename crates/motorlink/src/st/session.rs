@@ -39,9 +39,6 @@ pub(super) struct Session {
     losses: u32,
     /// Changes with each confirmation.
     turn: bool,
-    /// What is sent before a lost line is recovered, and its size.
-    ahead: [u8; MAX_FRAME],
-    ahead_size: usize,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
 }
@@ -99,8 +96,6 @@ impl Session {
             last_size: None,
             losses: 0,
             turn: false,
-            ahead: [0; MAX_FRAME],
-            ahead_size: 0,
             is_retired: false,
         }
     }
@@ -130,9 +125,8 @@ impl Session {
         self.check_retired(Effect::of(request))?;
         let checked = self.account.check(self.master.counters(), motor, request);
         let effect = checked.map_err(|why| limited(motor, why))?;
-        self.prepare(effect, |ahead| Frame::command(motor, request, ahead).map(<[u8]>::len));
         let begun = self.master.request(motor, request);
-        self.begun(begun, motor, What::of(request))?;
+        self.begun(begun, effect, motor, What::of(request))?;
         self.account.sent(motor, effect);
         Ok(())
     }
@@ -146,9 +140,8 @@ impl Session {
         let frame = Frame { header: Frame::header(code, motor), payload };
         let checked = self.account.check_frame(self.master.counters(), &frame);
         let effect = checked.map_err(|why| limited(motor, why))?;
-        self.prepare(effect, |ahead| frame.encode(ahead).map(<[u8]>::len));
         let begun = self.master.request_raw(frame.header, payload);
-        self.begun(begun, motor, What::Raw(code))?;
+        self.begun(begun, effect, motor, What::Raw(code))?;
         self.account.sent_frame(&frame, effect);
         Ok(())
     }
@@ -165,29 +158,18 @@ impl Session {
         }
     }
 
-    /// On a lost line `encode` writes what stops a motor, which is sent before the line has recovered and
-    /// again afterwards. The reply to the first sending comes before the recovery's own reply, so it
-    /// never counts.
-    fn prepare(
-        &mut self,
-        effect: Effect,
-        encode: impl FnOnce(&mut [u8; MAX_FRAME]) -> Option<usize>,
-    ) {
-        self.ahead_size =
-            match effect == Effect::Stops && self.master.sync_state() == SyncState::Lost {
-                true => encode(&mut self.ahead).unwrap_or(0),
-                false => 0,
-            };
-    }
-
     fn begun(
         &mut self,
         begun: Result<(), RequestError>,
+        effect: Effect,
         motor: u8,
         what: What,
     ) -> Result<(), Error> {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
+        }
+        if effect == Effect::Stops {
+            self.master.send_ahead();
         }
         self.losses = self.master.counters().losses;
         self.pending = PendingRequest { motor, what };
@@ -199,10 +181,7 @@ impl Session {
     }
 
     pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
-        match std::mem::take(&mut self.ahead_size) {
-            0 => self.master.poll(now),
-            size => Output::Transmit(&self.ahead[..size]),
-        }
+        self.master.poll(now)
     }
 
     /// The exchange is over: with what the reader of replies made of the acknowledge's payload, and
@@ -265,7 +244,6 @@ impl Session {
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.
     pub(super) fn abandon(&mut self) {
-        self.ahead_size = 0;
         self.master.abandon();
     }
 

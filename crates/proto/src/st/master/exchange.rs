@@ -45,6 +45,11 @@ impl Exchange {
         Some(())
     }
 
+    /// The frame that [`send`](Self::send) will return.
+    pub(super) fn unsent(&self) -> &[u8] {
+        self.buffer.get(..usize::from(self.filled)).unwrap_or(&[])
+    }
+
     /// Returns the frame to send. Bytes received from now on belong to the reply.
     pub(super) fn send(&mut self) -> &[u8] {
         let size = usize::from(core::mem::take(&mut self.filled));

@@ -59,6 +59,8 @@ pub enum RequestError {
 pub struct Master {
     config: MasterConfig,
     state: State,
+    /// Whether the request is sent before the line is recovered.
+    is_ahead: bool,
     exchange: Exchange,
     /// The request of the exchange.
     request: Summary,
@@ -89,6 +91,7 @@ impl Master {
         Master {
             config,
             state: State::Idle,
+            is_ahead: false,
             exchange: Exchange::NONE,
             request: Summary::NONE,
             resync: Resync::new(matches!(config.recovery, Recovery::None)),
@@ -150,6 +153,15 @@ impl Master {
         };
     }
 
+    /// Sends the request that was just started at once, also on a lost line. After the recovery it
+    /// is sent again, and only the reply to that counts. For requests that stop a motor.
+    pub fn send_ahead(&mut self) {
+        self.is_ahead = matches!(
+            self.state,
+            State::Recovering(_) | State::Done(Err(ExchangeError::Failed(Failure::Lost)))
+        );
+    }
+
     /// Cancels the open exchange. Its reply may still come, so the line is lost.
     pub fn abandon(&mut self) {
         if self.state != State::Idle {
@@ -163,7 +175,7 @@ impl Master {
             self.resync.abandon(stage);
         }
         self.lose();
-        self.state = State::Idle;
+        self.end();
     }
 
     /// Declares that the port was opened again. Pending replies are unknown. Without recovery the
@@ -176,17 +188,25 @@ impl Master {
                 self.resync.forget();
             }
         }
-        self.state = State::Idle;
+        self.end();
     }
 
     /// Declares that there are no pending replies: no request was sent on this line before.
     pub fn trust_line(&mut self) {
         self.resync.in_step();
+        self.end();
+    }
+
+    fn end(&mut self) {
         self.state = State::Idle;
+        self.is_ahead = false;
     }
 
     /// The next action. Poll again after each [`Output::Transmit`], and at the end of a wait.
     pub fn poll(&mut self, now: Instant) -> Output<'_> {
+        if core::mem::take(&mut self.is_ahead) {
+            return Output::Transmit(self.exchange.unsent());
+        }
         match &mut self.state {
             State::Idle => Output::Wait(None),
             State::Recovering(stage) => match self.resync.poll(stage, now, &self.config) {
