@@ -18,7 +18,7 @@ VALIDATOR = Draft202012Validator(SCHEMA)
 #: What reads or acts on a drive, as a person gives it.
 ST = [
     *("info", "status", "registers", "get SPEED_MEAS FLAGS STATUS DAC_OUT1 0x3F", "segment SPEED_MEAS I_A"),
-    *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
+    *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start --ramp 900 100 --speed-limit 1000", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
     *("revup-data", "revup-data 1 500 200 250", "current-reference 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
     *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS", "--raw revup-data"),
 ]

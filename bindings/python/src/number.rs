@@ -19,6 +19,18 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     fitting(py, what, value, nearest, unit)
 }
 
+/// As [`digits`], rounded towards 0 as a [`limit`] is: a value equal to its limit is within the limit.
+pub(crate) fn inward_digits<T: TryFrom<i64>>(
+    py: Python<'_>,
+    what: &str,
+    value: f64,
+    scale: f64,
+    unit: &str,
+) -> PyResult<T> {
+    let rounded = value.is_finite().then(|| inward(value, scale));
+    fitting(py, what, value, rounded, unit)
+}
+
 /// The digits, if the value has some and they fit the field.
 fn fitting<T: TryFrom<i64>>(
     py: Python<'_>,

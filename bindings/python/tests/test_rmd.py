@@ -87,7 +87,7 @@ def test_gains_and_acceleration_are_kept(rmd_bus: rmd.Client) -> None:
     assert motor.pid() == gains
     motor.write_acceleration_ram(1234)
     assert motor.acceleration() == 1234
-    with pytest.raises(motorlink.InvalidValueError, match="outside 0 to 2147483647 °/s²; nothing was sent"):
+    with pytest.raises(motorlink.InvalidValueError, match="-1 °/s² is negative.*nothing was sent"):
         motor.write_acceleration_ram(-1)
     assert motor.acceleration() == 1234
     for nonsense in (gains._replace(speed_kp=256), gains._replace(speed_kp=-1)):
@@ -166,11 +166,14 @@ def test_limits_hold() -> None:
     with rmd.open("sim:", timeout=PATIENT, **limits) as bus:
         motor = bus.motor(1)
         motor.set_position(-90, max_speed_dps=360)
-        # A digit is 0.016 A: 62 digits are within 1 A.
-        motor.set_torque(0.992)
+        # A digit is 0.016 A: both the limit and the current become 62 digits, 0.992 A.
+        motor.set_torque(1.0)
+        motor.set_torque(-1.0)
+        bus.set_torque4([1.0, -1.0, 0, 0])
         for beyond in (
-            lambda: motor.set_torque(1.0),
-            lambda: motor.set_torque(-1.02),
+            lambda: motor.set_torque(1.01),
+            lambda: motor.set_torque(-1.01),
+            lambda: motor.raw(bytes([0xA1, 0, 0, 0, 63, 0, 0, 0])),
             lambda: motor.set_speed(360.01),
             lambda: motor.set_position(90.01, 1),
             lambda: motor.set_position(10),

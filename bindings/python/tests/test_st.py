@@ -250,7 +250,11 @@ def test_a_limit_of_current_rounds_towards_0() -> None:
         with st.open("sim:", current_limit=limit, full_scale_amps=full_scale) as bus:
             motor = bus.motor(1)
             motor.set_current_reference(most, -most)
+            # A current equal to the limit is rounded as the limit is.
+            motor.set_current_reference(limit, -limit)
+            motor.set("TORQUE_REF", limit)
             digit = full_scale / 32767
+            assert abs(motor.get("TORQUE_REF") - most) < digit / 2
             with pytest.raises(motorlink.InvalidValueError, match="limit"):
                 motor.set_current_reference(most + digit, 0)
     with st.open("sim:", speed_limit_rpm=999.9) as bus:

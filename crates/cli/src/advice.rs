@@ -76,6 +76,9 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
             }
             _ => None,
         },
+        st::Error::Limit { exceeded: st::LimitError::NoRamp { .. }, .. } => {
+            Some("give the ramp with the start: `motorlink st start --ramp RPM MS`")
+        }
         st::Error::NotVerifiable { why: Unverifiable::NotReadable, .. } => {
             Some("`motorlink st registers` says what can")
         }

@@ -30,6 +30,14 @@ pub enum Unfit {
         /// Symbol of the unit; `digits` if digits were given.
         unit: &'static str,
     },
+    /// Negative, where 0 means no limit. A drive may take a negative value for no limit, too
+    /// (docs/SPEC-NOTES.md R24).
+    Negative {
+        /// The given value.
+        value: f64,
+        /// Symbol of the unit; `digits` if digits were given.
+        unit: &'static str,
+    },
     /// It would be sent as 0, which has a special meaning.
     BecomesZero {
         /// The given value.
@@ -53,6 +61,11 @@ impl core::fmt::Display for Unfit {
             Unfit::OutOfRange { value, least, most, unit } => {
                 write!(f, "{value} {unit} is outside {least} to {most} {unit}")
             }
+            Unfit::Negative { value, unit } => write!(
+                f,
+                "{value} {unit} is negative, and a motor may treat it as no limit: give a positive value, \
+                 or 0 for no limit"
+            ),
             Unfit::BecomesZero { value, digit, unit } => write!(
                 f,
                 "{value} {unit} would be sent as 0, which means no limit: give 0, or {digit} {unit} at \
@@ -113,6 +126,9 @@ impl Scale {
         let unit = self.symbol;
         if self.rounding == Rounding::NoLimitOfZero && digits == 0 && value > 0.0 {
             return Err(Unfit::BecomesZero { value, digit: self.digit, unit });
+        }
+        if self.rounding == Rounding::NoLimitOfZero && value < 0.0 {
+            return Err(Unfit::Negative { value, unit });
         }
         let is_below = self.least == 0 && value < 0.0;
         if value.is_finite() && !is_below && (self.least..=self.most).contains(&digits) {
@@ -276,9 +292,10 @@ unit!(
     0, 0 => i32::MAX, NoLimitOfZero
 );
 unit!(
-    /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A.
+    /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A. A wanted current is rounded
+    /// towards 0, as a limit is: a current equal to its limit is within the limit.
     IqCommand(i16, 2), amps, from_amps, 32.0 / 2000.0, "A",
-    3, -2000 => 2000, Nearest
+    3, -2000 => 2000, Inward
 );
 unit!(
     /// RMD torque current feedback: 2048 digits are 33 A.
@@ -311,8 +328,8 @@ mod tests {
     fn a_wanted_value_is_the_nearest_digit_and_never_cut() {
         assert_eq!(IqCommand::wanted(-32.0), Ok(IqCommand(-2000)));
         assert_eq!(IqCommand::wanted(32.007), Ok(IqCommand(2000)));
-        let beyond = IqCommand::wanted(32.01).unwrap_err().to_string();
-        assert_eq!(beyond, "32.01 A is beyond ±32 A");
+        let beyond = IqCommand::wanted(32.016).unwrap_err().to_string();
+        assert_eq!(beyond, "32.016 A is beyond ±32 A");
         assert_eq!(TurnCentiDegrees::wanted(359.99), Ok(TurnCentiDegrees(35_999)));
         let full = TurnCentiDegrees::wanted(360.0).unwrap_err().to_string();
         assert_eq!(full, "360 ° is outside 0 to 359.99 °");
@@ -322,6 +339,16 @@ mod tests {
         }
         assert!(TurnCentiDegrees::wanted(-0.001).is_err());
         assert_eq!(CentiDps::wanted(-0.001), Ok(CentiDps(0)));
+    }
+
+    #[test]
+    fn a_torque_current_is_rounded_towards_0_as_its_limit_is() {
+        for thousandths in -32_000..=32_000 {
+            let amps = f64::from(thousandths) / 1000.0;
+            let iq = IqCommand::wanted(amps).unwrap();
+            assert_eq!(i64::from(iq.0), inward(amps, IqCommand::SCALE));
+            assert!(iq.amps().abs() <= amps.abs() + 1e-6, "{amps}");
+        }
     }
 
     #[test]
@@ -343,6 +370,8 @@ mod tests {
         assert_eq!(DpsPerSecond::wanted(0.5), Ok(DpsPerSecond(1)));
         let little = DpsPerSecond::wanted(0.4).unwrap_err().to_string();
         assert!(little.ends_with("which means no limit: give 0, or 1 °/s² at least"), "{little}");
+        let negative = DpsPerSecond::wanted(-5.0).unwrap_err().to_string();
+        assert!(negative.starts_with("-5 °/s² is negative, and a motor may treat it as no limit"));
         for odd in [1e-300, 0.499, -0.4, -1e-300, -1.0, f64::NAN] {
             assert!(DpsPerSecond::wanted(odd).is_err(), "{odd}");
             assert!(DpsPerSecond::wanted_digits(odd).is_err(), "{odd}");

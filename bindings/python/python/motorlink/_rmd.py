@@ -87,7 +87,8 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         ``current_limit_amps``, ``speed_limit_dps``, ``angle_limit_degrees``
             The most that a request to any motor may ask for, in both directions. They also hold for raw
             frames. The angle limit counts from zero. They are rounded towards 0 to a value that a frame can
-            carry: 1.0 A becomes 0.992 A, as a digit is 0.016 A.
+            carry: 1.0 A becomes 0.992 A, as a digit is 0.016 A. Torque currents are rounded in the same way, so
+            a current equal to the limit is allowed.
             With a speed limit, a move needs ``max_speed_dps``. The limit does not hold under a torque command,
             where the load decides the speed. The angle limit holds for ``set_position``. It does not hold for
             ``set_single_turn_position``, whose angle is within the turn.

@@ -82,7 +82,8 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         ``speed_limit_rpm``, ``current_limit``
             The most that a request may ask for, in both directions. They also hold for register writes and
             raw frames. The current is in A with ``full_scale_amps``, otherwise in digits. They are rounded
-            towards 0 to a value that a frame can carry.
+            towards 0 to a value that a frame can carry. Currents in A are rounded in the same way, so a current
+            equal to the limit is allowed.
             With a speed limit, a motor starts only after a ``set_ramp`` within the limit, and
             ``set_position`` is refused. After a torque command, a write of CONTROL_MODE, a reset of the
             drive, or a lost line or port, call ``set_ramp`` again. The limit does not hold under a torque

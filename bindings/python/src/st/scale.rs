@@ -8,7 +8,7 @@ use pyo3::types::PyString;
 
 use super::profile;
 use crate::error::{invalid_value, unknown_register};
-use crate::number::digits;
+use crate::number::inward_digits;
 
 /// Digits of a drive's full scale of current.
 const FULL_SCALE: f64 = 32767.0;
@@ -56,10 +56,10 @@ impl Scale {
         self.ampere.map_or((1.0, Unit::S16A.symbol()), |ampere| (ampere, Unit::Ampere.symbol()))
     }
 
-    /// A current as digits.
+    /// A current as digits, rounded towards 0.
     pub(crate) fn digits<T: TryFrom<i64>>(&self, py: Python<'_>, current: f64) -> PyResult<T> {
         let (scale, unit) = self.current();
-        digits(py, "a current", current, scale, unit)
+        inward_digits(py, "a current", current, scale, unit)
     }
 
     /// Digits as a current: a float in A, an integer in s16A.

@@ -43,6 +43,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("st set", "st -p ./st0 set SPEED_KP 800 --verify"),
     ("st set", "st -p ./st0 set DAC_OUT1 I_ALPHA"),
     ("st start", "st -p ./st0 start"),
+    ("st start", "st -p ./st0 start --ramp 900 500 --speed-limit 1000"),
     ("st stop", "st -p ./st0 stop"),
     ("st start-stop", "st -p ./st0 start-stop"),
     ("st stop-ramp", "st -p ./st0 stop-ramp"),

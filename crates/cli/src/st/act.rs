@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use motorlink::st::{
     Command as Execute, CurrentReference, Flags, PositionMove, Profile, REVUP_PHASES, Ramp,
-    RegisterId, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, register::Unit,
+    RegisterId, Request, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, register::Unit,
 };
 use motorlink::time;
 
@@ -25,7 +25,12 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             let attempts = verify.map(|attempts| attempts.unwrap_or(VERIFY_ATTEMPTS));
             set::run(session, &register, &value, attempts)
         }
-        Act::Start => start(session),
+        Act::Start { ramp } => {
+            if let [rpm, ms] = ramp[..] {
+                set_ramp(session, rpm, ms)?;
+            }
+            start(session)
+        }
         Act::Stop => execute(session, Execute::StopMotor),
         Act::StartStop => execute(session, Execute::StartStop),
         Act::StopRamp => execute(session, Execute::StopRamp),
@@ -53,6 +58,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             if !position.is_possible() {
                 return Err(Failure::usage(format!("{rad} rad in {seconds} s is not possible")));
             }
+            session.client.check(session.motor, &Request::SetPosition(position))?;
             if wait.wait {
                 return arrival::move_and_wait(session, position, &wait);
             }
@@ -82,6 +88,17 @@ fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.execute(command)?;
     session.done(format!("{}: {command} acknowledged", motor.number()))
+}
+
+/// The ramp that a start executes.
+fn set_ramp(session: &Session, speed_rpm: i32, ms: i32) -> Result<(), Failure> {
+    let duration_ms = u16::try_from(ms).map_err(|_| {
+        Failure::usage(format!(
+            "the duration of a ramp is 0 to {} ms, not {ms}; nothing was sent",
+            u16::MAX
+        ))
+    })?;
+    Ok(session.motor()?.set_ramp(Ramp { speed_rpm, duration_ms })?)
 }
 
 /// A drive also acknowledges a START that has no effect, so its state is read.

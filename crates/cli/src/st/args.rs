@@ -36,6 +36,19 @@ pub struct DriveArgs {
     #[arg(long, global = true, value_name = "TIME",
           value_parser = span_up_to(Duration::from_secs(60)))]
     pub timeout: Option<Duration>,
+    /// Refuse commands for more speed than this, rpm, rounded down; `start` needs --ramp
+    ///
+    /// The limit applies to ramps, rev-up phases, RAMP_FINAL_SPEED and `raw`. `position` has no speed
+    /// and is refused. The limit does not apply to torque commands, to the drive's own rev-up and
+    /// alignment, and to a motor that already turns. Nothing is sent if a command exceeds the limit.
+    #[arg(long, global = true, value_name = "RPM", value_parser = parse_distance)]
+    pub speed_limit: Option<f64>,
+    /// Refuse commands for more current than this, s16A digits, rounded down
+    ///
+    /// The limit applies to Iq and Id in `current-reference`, `torque-ramp`, `revup-data`, `set` and
+    /// `raw`. Nothing is sent if a command exceeds it.
+    #[arg(long, global = true, value_name = "S16A", value_parser = parse_distance)]
+    pub current_limit: Option<f64>,
     /// After an error, send padding bytes to a 5.x drive that waits for the rest of a frame
     #[arg(long, global = true)]
     pub pad: bool,
@@ -107,7 +120,11 @@ pub enum Act {
         verify: Option<Option<u8>>,
     },
     /// Start the motor
-    Start,
+    Start {
+        /// Set this ramp first: speed at the end, rpm, and duration, ms. Needed with --speed-limit
+        #[arg(long, num_args = 2, value_names = ["RPM", "MS"], allow_negative_numbers = true)]
+        ramp: Vec<i32>,
+    },
     /// Stop the motor
     Stop,
     /// Start an idle motor, or stop a running motor

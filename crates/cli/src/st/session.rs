@@ -1,7 +1,7 @@
 //! An open drive, for all commands.
 
 use motorlink::port::PortName;
-use motorlink::st::{Client, Motor, Options, Profile, Reading, Recovery, RegisterId};
+use motorlink::st::{Client, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId};
 
 use super::args::DriveArgs;
 use crate::connection::Connection;
@@ -27,10 +27,19 @@ pub fn connect(
     let timeout = drive.timeout.unwrap_or(defaults.timeout);
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
-    let options = Options { profile, timeout, recovery, ..defaults };
+    let limits = limits(drive);
+    let options = Options { profile, timeout, recovery, limits, ..defaults };
     let client = Client::open_wrapped(port, connection.around_line(profile)?, options)?;
     let (motor, output, raw) = (drive.motor, connection.output(), connection.raw);
     Ok(Session { client, motor, output, raw, port: port.to_string() })
+}
+
+/// Limits are rounded towards 0, and saturate: a limit never allows more than was given.
+fn limits(drive: &DriveArgs) -> Limits {
+    Limits {
+        speed_rpm: drive.speed_limit.map(|rpm| rpm as u32),
+        current_s16a: drive.current_limit.map(|digits| digits as u16),
+    }
 }
 
 impl Session {

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use motorlink::st::{
-    Error, Reading, RegisterId, Unverified, VerifiedWrite, find_register, parse_value,
+    Error, Reading, RegisterId, Request, Unverified, VerifiedWrite, find_register, parse_value,
 };
 
 use super::refusal;
@@ -23,6 +23,9 @@ pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> R
     let profile = session.client.profile();
     let bits = parse_value(register, text, profile, session.raw)?;
     let motor = session.motor()?;
+    let (bytes, size) = (bits.to_le_bytes(), usize::from(register.write_size(profile)));
+    let write = Request::SetRegister { register, value: &bytes[..size.min(bytes.len())] };
+    session.client.check(session.motor, &write)?;
     let comparable = VerifiedWrite::new::<Infallible>(profile, register, bits);
     if let (Some(attempts), Err(_)) = (attempts, comparable) {
         // Refused by the library: nothing is sent.

@@ -162,6 +162,11 @@ impl Client {
         self.turns.take().session.set_limits(id, limits);
     }
 
+    /// Checks a request against the motor's limits. Nothing is sent.
+    pub(super) fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
+        self.turns.take().session.check_limits(id, request)
+    }
+
     /// One exchange with one motor. A motor in quarantine is waited for.
     pub fn ask<C: Command>(&self, id: MotorId, command: &C) -> Result<C::Reply, Error> {
         self.raw(id, command.encode()).map(|reply| C::Reply::decode(&reply))

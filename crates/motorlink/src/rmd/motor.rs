@@ -167,8 +167,7 @@ impl Motor<'_> {
             }
         };
         if full_turn != FullTurn::Allowed {
-            let in_range = Limits::default().check(&request);
-            in_range.map_err(|exceeded| Error::Limit { motor: self.id, exceeded })?;
+            self.bus.check_limits(self.id, &request)?;
             let at = self.single_turn_angle()?;
             self.bus.confirm(self.id)?;
             full_turn.check(self.id, at, angle, direction)?;

@@ -116,6 +116,11 @@ impl Session {
         self.host.set_limits(id, limits);
     }
 
+    pub(super) fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
+        let checked = self.host.limits(id).check(request);
+        checked.map_err(|exceeded| Error::Limit { motor: id, exceeded })
+    }
+
     /// The motors with an exchange under way.
     pub(super) fn busy(&self) -> MotorSet {
         let held = if self.held.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };

@@ -183,6 +183,15 @@ impl Client {
         })
     }
 
+    /// Checks a request against the limits. Nothing is sent. That a start has a ramp is checked when it
+    /// is sent.
+    ///
+    /// # Errors
+    /// [`Error::Limit`], [`Error::NoSuchMotor`].
+    pub fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.rules.check(motor, request)
+    }
+
     /// One exchange with motor number `motor`, where 0 is the drive's current motor. `reply` reads
     /// the acknowledge's payload; `None` from it is [`Error::Reply`]. It must not call this client,
     /// which is locked meanwhile.

@@ -345,7 +345,7 @@ mod tests {
         let slow = "send = \"position\"\nangle_degrees = 1\nmax_speed_dps = 0.9";
         assert!(rmd(slow).unwrap_err().contains("outside 1 to"));
         let back = "send = \"acceleration\"\nacceleration_dps2 = -1";
-        assert!(rmd(back).unwrap_err().contains("outside 0 to"));
+        assert!(rmd(back).unwrap_err().contains("negative"));
         assert!(rmd("send = \"pid\"\nspeed_kp = 3").unwrap_err().contains("position_kp"));
     }
 }
