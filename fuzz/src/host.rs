@@ -3,6 +3,7 @@
 use motorlink::port::PortName;
 use motorlink::slcan::{self, Answer, Device, HostCodec};
 use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink_link::printable;
 use motorlink_link::serve::ServeName;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{self, Command as _, MotorId};
@@ -58,11 +59,11 @@ pub fn port_name(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     match text.parse::<PortName>() {
         Ok(name) => assert_eq!(name.to_string().parse(), Ok(name)),
-        Err(error) => assert!(error.to_string().contains(text)),
+        Err(error) => assert!(error.to_string().contains(&printable(text))),
     }
     match text.parse::<ServeName>() {
         Ok(name) => assert_eq!(name.to_string().parse(), Ok(name)),
-        Err(error) => assert!(error.to_string().contains(text)),
+        Err(error) => assert!(error.to_string().contains(&printable(text))),
     }
 }
 

@@ -1,10 +1,12 @@
 """Moves with `--wait`: they end when the motor has arrived, and stop it otherwise."""
 
+import fcntl
 import signal
+import subprocess
 
 import pytest
 
-from program import eventually
+from program import environment, eventually
 
 FAST = ["--max-speed", 720]
 FAR = ["position", 72000, *FAST, "--wait"]
@@ -50,6 +52,17 @@ def test_a_signal_stops_the_motor(start, bench, rmd, number):
     assert waiting.wait() == 130
     waiting.says("motor 1 was stopped")
     assert angle(rmd) < 70_000
+    assert is_still(rmd)
+
+
+def test_messages_that_are_not_read_keep_no_motor_from_its_stop(motorlink, bench, rmd):
+    words = ["rmd", "-p", bench.port("slcan"), "--trace", *map(str, FAR)]
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with subprocess.Popen([motorlink, *words], **pipes, env=environment()) as waiting:
+        fcntl.fcntl(waiting.stderr, fcntl.F_SETPIPE_SZ, 4096)
+        eventually(lambda: abs(bench.motor(1)["angle_degrees"]) > 720, "two turns")
+        waiting.send_signal(signal.SIGINT)
+        assert waiting.wait(15) == 130
     assert is_still(rmd)
 
 

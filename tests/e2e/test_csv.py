@@ -1,6 +1,7 @@
 """`--every` with `--csv`: docs/CSV.md."""
 
 import csv
+import fcntl
 import os
 import subprocess
 
@@ -81,6 +82,15 @@ def test_a_recording_goes_on_when_the_reader_of_stdout_is_gone(motorlink, tmp_pa
     )
     assert (piped.returncode, piped.stderr) == (0, "")
     assert len(read(path)) == 300
+
+
+def test_a_recording_goes_on_when_stdout_is_not_read(motorlink, tmp_path):
+    path = tmp_path / "run.csv"
+    words = ["st", "-p", "sim:", "get", "STATUS", "--every", "2ms", "--count", "1000", "--csv", path]
+    with subprocess.Popen([motorlink, *words], stdout=subprocess.PIPE, env=environment()) as recording:
+        fcntl.fcntl(recording.stdout, fcntl.F_SETPIPE_SZ, 4096)
+        assert recording.wait(30) == 0
+    assert len(read(path)) == 1000
 
 
 def test_ctrl_c_leaves_whole_rows_and_tells_a_count_that_was_not_reached(start, tmp_path):

@@ -116,7 +116,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         }
         Command::Man { folder } => help::write_manual(command(), &folder),
     };
-    let code = match result {
+    let code = match result.and_then(|()| output::kept_error()) {
         Ok(()) => 0,
         Err(failure) => output::report(&failure),
     };

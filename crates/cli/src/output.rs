@@ -1,8 +1,8 @@
 //! Output: aligned rows for people, or one JSON object per line for programs.
 
 use std::io::{Write, stderr, stdout};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::Hex;
@@ -13,8 +13,17 @@ use crate::json::{Cell, Line, Row};
 use crate::terminal::safe;
 use crate::voice::Voice;
 
-/// stdout and stderr, if the program must not wait for their readers.
-static VOICES: OnceLock<(Voice, Voice)> = OnceLock::new();
+/// stdout, if the program must not wait for its reader.
+static RESULTS: OnceLock<Voice> = OnceLock::new();
+
+/// stderr, if the program must not wait for its reader.
+static MESSAGES: OnceLock<Voice> = OnceLock::new();
+
+/// Whether an error of stdout is kept until the end.
+static KEEPS_ERROR: AtomicBool = AtomicBool::new(false);
+
+/// The first error of stdout that was kept.
+static KEPT_ERROR: Mutex<Option<Failure>> = Mutex::new(None);
 
 /// Whether stderr has JSON, too.
 static JSON: AtomicBool = AtomicBool::new(false);
@@ -94,14 +103,27 @@ pub fn has_json_messages() -> bool {
     JSON.load(Ordering::Relaxed)
 }
 
-/// From now on printing does not block, because motors or drives depend on this program. Returns stdout.
-pub fn never_wait() -> &'static Voice {
-    let (results, _) = VOICES.get_or_init(|| {
-        let messages =
-            |lines| format!("{lines} lines were dropped here, because they were not read in time");
-        (Voice::new(stdout(), missed), Voice::new(stderr(), messages))
-    });
-    results
+/// From now on printing does not block, because motors or drives depend on this program. On stdout
+/// `missed` is the line in place of dropped lines. Returns stdout.
+pub fn never_wait(missed: fn(u64) -> String) -> &'static Voice {
+    never_wait_for_messages();
+    RESULTS.get_or_init(|| Voice::new(stdout(), missed))
+}
+
+/// As [`never_wait`], for stderr only.
+pub fn never_wait_for_messages() {
+    MESSAGES.get_or_init(|| Voice::new(stderr(), missed_text));
+}
+
+/// From now on an error of stdout does not end a command: it may have motors left to stop.
+pub fn keep_error() {
+    KEEPS_ERROR.store(true, Ordering::Relaxed);
+}
+
+/// The error of stdout that was kept, after a command that was carried out.
+pub fn kept_error() -> Result<(), Failure> {
+    let kept = KEPT_ERROR.lock().unwrap_or_else(PoisonError::into_inner).take();
+    kept.map_or(Ok(()), |failure| Err(failure.then("the command was carried out")))
 }
 
 /// The JSON line in place of `lines` dropped lines.
@@ -109,11 +131,15 @@ pub fn missed(lines: u64) -> String {
     json!({ "event": "dropped", "lines": lines }).to_string()
 }
 
+/// The same as text.
+pub fn missed_text(lines: u64) -> String {
+    format!("{lines} lines were dropped here, because they were not read in time")
+}
+
 /// Waits a moment until all output is written, after [`never_wait`].
 pub fn finish() {
-    if let Some((results, messages)) = VOICES.get() {
-        messages.finish();
-        results.finish();
+    for voice in [&MESSAGES, &RESULTS].into_iter().filter_map(OnceLock::get) {
+        voice.finish();
     }
 }
 
@@ -127,8 +153,8 @@ pub fn note(text: impl std::fmt::Display) {
 
 /// Prints a line on stderr as it is.
 pub fn print_message(text: &dyn std::fmt::Display) {
-    match VOICES.get() {
-        Some((_, messages)) => messages.say(text),
+    match MESSAGES.get() {
+        Some(messages) => messages.say(text),
         None => drop(writeln!(stderr(), "{}", safe(&text.to_string()))),
     }
 }
@@ -149,17 +175,24 @@ pub fn report(failure: &Failure) -> u8 {
     code
 }
 
-/// Prints a line at once; a reader that is gone ends the program quietly.
+/// Prints a line at once. If the reader has closed stdout, the program ends without a message.
 pub fn print_line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
-    if let Some((results, _)) = VOICES.get() {
+    if let Some(results) = RESULTS.get() {
         results.say(text);
         return Ok(());
     }
     let mut out = stdout().lock();
     let text = text.to_string();
-    writeln!(out, "{}", safe(&text))
-        .and_then(|()| out.flush())
-        .map_err(|error| Failure::output(&error))
+    let printed = writeln!(out, "{}", safe(&text)).and_then(|()| out.flush());
+    let failure = match printed {
+        Ok(()) => return Ok(()),
+        Err(error) => Failure::output(&error),
+    };
+    if !KEEPS_ERROR.load(Ordering::Relaxed) {
+        return Err(failure);
+    }
+    KEPT_ERROR.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
+    Ok(())
 }
 
 /// A progress bar on stderr for a scan of `steps` steps, if stderr is a terminal.

@@ -10,7 +10,7 @@ use crate::columns::Columns;
 use crate::failure::{Failure, Kind, Problem};
 use crate::interrupt;
 use crate::json::{Cell, Line};
-use crate::output::{Printer, note, print_line};
+use crate::output::{Printer, missed, missed_text, never_wait, note, print_line};
 use crate::recording::Recording;
 use crate::span::parse_span;
 
@@ -111,6 +111,10 @@ impl<'a> Sink<'a> {
                 .trying("leave one out, or give --csv a file"));
         }
         let (columns, prints) = (Columns::on_stdout(), !is_stdout);
+        if prints && recording.is_some() {
+            // A reader that waits does not stop the recording.
+            never_wait(if output.json { missed } else { missed_text });
+        }
         Ok(Sink { output, object, columns, recording, prints, refusal: None, noted: Vec::new() })
     }
 
@@ -174,20 +178,11 @@ impl<'a> Sink<'a> {
         self.object.clone().at(Some(elapsed.as_secs_f64())).with("event", name)
     }
 
-    /// Prints on stdout. If stdout is closed, a recording continues.
+    /// Prints on stdout.
     fn print(
         &mut self,
         print: impl FnOnce(&mut Self) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        if !self.prints {
-            return Ok(());
-        }
-        match print(self) {
-            Err(Failure::OutputClosed) if self.recording.is_some() => {
-                self.prints = false;
-                Ok(())
-            }
-            done => done,
-        }
+        if self.prints { print(self) } else { Ok(()) }
     }
 }

@@ -167,7 +167,7 @@ fn guard_rmd(args: &RmdArgs, program: &[OsString]) -> Result<(), Failure> {
 
 /// Motors depend on this process from now on.
 fn hold() {
-    output::never_wait();
+    output::never_wait(output::missed);
     interrupt::hold();
 }
 

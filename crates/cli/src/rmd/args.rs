@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::rmd::{MotorSet, SpinDirection};
+use motorlink::rmd::{MotorId, MotorSet, SpinDirection};
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
@@ -24,8 +24,8 @@ pub struct Args {
 #[derive(clap::Args)]
 #[command(next_help_heading = help::GLOBAL)]
 pub struct MotorArgs {
-    /// The motor's ID, 1 to 32; several as 1,3 or 1-4, or with several --id
-    #[arg(short, long, default_value = "1", global = true, value_name = "ID",
+    /// The motor's ID, 1 to 32 (default 1); several as 1,3 or 1-4, or with several --id
+    #[arg(short, long, global = true, value_name = "ID",
           value_parser = hint::ids(), hide_possible_values = true)]
     pub id: Vec<MotorSet>,
     /// How long to wait for a reply, 1ms to 10s
@@ -209,13 +209,35 @@ pub struct Wait {
 impl MotorArgs {
     /// The motors that are meant.
     pub fn ids(&self) -> MotorSet {
+        if self.id.is_empty() {
+            return MotorId::new(1).into_iter().collect();
+        }
         self.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more))
+    }
+}
+
+impl Command {
+    /// Why --id has no meaning with this command, if it has none.
+    pub fn without_id(&self) -> Option<&'static str> {
+        match self {
+            Command::Act(Act::Off { all: true } | Act::Stop { all: true }) => {
+                Some("--all is for all motors")
+            }
+            Command::Act(Act::Torque4 { .. }) => Some("torque4 is for motors 1 to 4"),
+            Command::Read(Read::Scan { .. }) => Some("scan takes the IDs as arguments"),
+            _ => None,
+        }
     }
 }
 
 impl Act {
     /// Whether the command is never given to several motors at once.
     pub fn is_for_one(&self) -> bool {
-        matches!(self, Act::Zero | Act::EncoderOffset { .. } | Act::Torque4 { .. })
+        matches!(self, Act::Zero | Act::EncoderOffset { .. })
+    }
+
+    /// Whether the command waits for the end of a move.
+    pub fn waits(&self) -> bool {
+        matches!(self, Act::Position { wait, .. } | Act::SingleTurnPosition { wait, .. } if wait.wait)
     }
 }

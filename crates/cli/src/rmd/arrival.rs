@@ -8,7 +8,7 @@ use super::args::Wait;
 use super::session::Session;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::note;
+use crate::output::{never_wait_for_messages, note};
 
 /// Sends a command to move. With `--wait` it returns when the move is over.
 pub fn command(
@@ -26,6 +26,7 @@ pub fn command(
         options.tolerance = session.wanted(tolerance)?;
     }
     // From here on a signal stops the motor.
+    never_wait_for_messages();
     interrupt::hold();
     if interrupt::interrupted() {
         return Err(Failure::Interrupted);
@@ -71,13 +72,20 @@ fn arrive(
 /// Stops the motor. The failure contains the result of the stop.
 fn stopped(session: &Session, stop: StopOnDrop<'_>, failure: Failure) -> Failure {
     let outcomes = stop.stop_now();
-    let Some(Stopped { id, result }) = outcomes.last() else { return failure };
-    let fact = match result {
-        Ok(()) => format!("motor {id} was stopped"),
-        Err(error) => format!("motor {id} could not be stopped and may still be turning: {error}"),
-    };
+    if outcomes.is_empty() {
+        return failure;
+    }
+    let facts: Vec<String> = outcomes.iter().map(what_came_of).collect();
+    let fact = facts.join("; ");
     if matches!(failure, Failure::Interrupted) {
         note(format!("interrupted before the motor arrived; {fact}"));
     }
     failure.then(fact).about(&session.port, session.id)
+}
+
+fn what_came_of(Stopped { id, result }: &Stopped) -> String {
+    match result {
+        Ok(()) => format!("motor {id} was stopped"),
+        Err(error) => format!("motor {id} could not be stopped and may still be turning: {error}"),
+    }
 }

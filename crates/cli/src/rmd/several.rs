@@ -35,13 +35,15 @@ pub fn run(session: &mut Session, ids: MotorSet, act: &Act) -> Result<(), Failur
     if ids.len() > 1 && act.is_for_one() {
         return Err(Failure::usage("this command is for one motor: give one --id"));
     }
-    each(session, ids, |session| act::run(session, act.clone()))
+    each(session, ids, act.waits(), |session| act::run(session, act.clone()))
 }
 
-/// Does something for one motor after the other. The failures come at the end.
+/// Does something for one motor after the other. The failures come at the end. With `until_failure`
+/// the motors behind the first failure are left as they are.
 pub fn each(
     session: &mut Session,
     ids: MotorSet,
+    until_failure: bool,
     mut act: impl FnMut(&Session) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     if ids.len() == 1 {
@@ -57,7 +59,7 @@ pub fn each(
             Ok(()) => {}
             // Nothing was sent, and the same would happen for the others.
             Err(failure @ (Failure::Interrupted | Failure::OutputClosed)) => return Err(failure),
-            Err(failure) if failure.exit_code() == 2 => return Err(failure),
+            Err(failure) if failure.exit_code() == 2 || until_failure => return Err(failure),
             Err(failure) => session.failed(id, failure, &mut failures)?,
         }
     }

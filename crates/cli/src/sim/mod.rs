@@ -87,7 +87,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     if let Some(folder) = &args.rom {
         bench.keep_rom(RomFolder::open(folder)?);
     }
-    let out = output::never_wait();
+    let out = output::never_wait(output::missed);
     serve(&mut bench, &config, &st, &rmd, out)?;
     obey(&mut bench, std::io::stdin(), out, |end| interrupted() || end && args.stdin)
 }

@@ -6,7 +6,7 @@ use super::args::Wait;
 use super::session::Session;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::note;
+use crate::output::{never_wait_for_messages, note};
 
 /// How often a STOP_MOTOR is sent until it is acknowledged.
 const STOPS: u32 = 4;
@@ -21,6 +21,7 @@ pub fn move_and_wait(session: &Session, target: PositionMove, wait: &Wait) -> Re
     motor.check_can_move()?;
     session.client.confirm()?;
     // From here on a signal stops the motor.
+    never_wait_for_messages();
     interrupt::hold();
     if interrupt::interrupted() {
         return Err(Failure::Interrupted);

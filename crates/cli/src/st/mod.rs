@@ -18,6 +18,7 @@ use session::connect;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
+use crate::output::keep_error;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
@@ -37,7 +38,10 @@ fn run_at(
 ) -> Result<(), Failure> {
     let connect = || connect(connection, drive, port);
     match command {
-        Command::Act(act) => act::run(&connect()?, act),
+        Command::Act(act) => {
+            keep_error();
+            act::run(&connect()?, act)
+        }
         Command::Read(read) => match read {
             Read::Registers { filter } => registers::list(connection.output(), &filter),
             Read::Scan { rates } => {
