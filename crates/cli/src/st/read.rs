@@ -113,22 +113,24 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
     names.iter().map(|name| find_register(name).map_err(Failure::from)).collect()
 }
 
-/// Reads registers. If the drive refuses one, the others are read all the same.
+/// Reads registers, and confirms each reply. If the drive refuses one, the others are read all the same.
 fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Failure> {
     let motor = session.motor()?;
-    let cells = registers
+    registers
         .iter()
-        .map(|&register| match motor.get_raw(register) {
-            Ok(bits) => Ok(Cell::Read(row(session, &session.reading(register, bits)))),
-            Err(error) if refusal::is_about_register(&error) => {
-                let failure = refusal::of_read(error, register, session.client.profile());
-                Ok(Cell::Refused(register.to_string(), session.about(failure)))
-            }
-            Err(error) => Err(error.into()),
+        .map(|&register| {
+            let cell = match motor.get_raw(register) {
+                Ok(bits) => Cell::Read(row(session, &session.reading(register, bits))),
+                Err(error) if refusal::is_about_register(&error) => {
+                    let failure = refusal::of_read(error, register, session.client.profile());
+                    Cell::Refused(register.to_string(), session.about(failure))
+                }
+                Err(error) => return Err(error.into()),
+            };
+            session.client.confirm()?;
+            Ok(cell)
         })
-        .collect::<Result<_, Failure>>()?;
-    session.client.confirm()?;
-    Ok(cells)
+        .collect()
 }
 
 /// A register with its value as people read it.
