@@ -44,6 +44,14 @@ impl Cell {
             Cell::Refused(_, failure) => Some(failure),
         }
     }
+
+    /// As [`refusal`](Self::refusal), without the cell.
+    pub fn into_refusal(self) -> Option<Failure> {
+        match self {
+            Cell::Read(_) => None,
+            Cell::Refused(_, failure) => Some(failure),
+        }
+    }
 }
 
 impl Row {

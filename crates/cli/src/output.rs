@@ -62,18 +62,16 @@ impl Printer {
             let rows = cells.iter().filter_map(Cell::row);
             self.texts(rows.map(|row| (&*row.name, &*row.text)))?;
         }
-        let mut refusals: Vec<Failure> = cells
-            .into_iter()
-            .filter_map(|cell| match cell {
-                Cell::Refused(_, failure) => Some(failure),
-                Cell::Read(_) => None,
-            })
-            .collect();
-        // In JSON each refusal is in the result.
-        while !self.json && refusals.len() > 1 {
-            report(&refusals.remove(0));
+        self.report_all(cells.into_iter().filter_map(Cell::into_refusal).collect())
+    }
+
+    /// Reports the failures of several values or motors. One of them is left to be returned. In JSON
+    /// each is in the results.
+    pub fn report_all(self, mut failures: Vec<Failure>) -> Result<(), Failure> {
+        while !self.json && failures.len() > 1 {
+            report(&failures.remove(0));
         }
-        refusals.into_iter().next().map_or(Ok(()), Err)
+        failures.into_iter().next().map_or(Ok(()), Err)
     }
 
     fn texts<'a>(

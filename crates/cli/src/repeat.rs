@@ -93,7 +93,7 @@ struct Sink<'a> {
     object: &'a Line,
     columns: Columns,
     recording: Option<Recording>,
-    /// Whether stdout has samples.
+    /// Whether stdout has the table.
     prints: bool,
     /// The first value that the drive refused.
     refusal: Option<Failure>,
@@ -130,15 +130,13 @@ impl<'a> Sink<'a> {
         if let Some(recording) = &mut self.recording {
             recording.sample(seconds, &cells)?;
         }
-        self.print(|sink| match sink.output.json {
-            true => print_line(&Value::from(sink.object.clone().at(Some(seconds)).cells(&cells))),
-            false => sink.columns.print(seconds, &cells),
-        })?;
-        let refusals = cells.into_iter().filter_map(|cell| match cell {
-            Cell::Refused(_, failure) => Some(failure),
-            Cell::Read(_) => None,
-        });
-        self.refusal = self.refusal.take().or(refusals.into_iter().next());
+        if self.output.json {
+            print_line(&Value::from(self.object.clone().at(Some(seconds)).cells(&cells)))?;
+        } else if self.prints {
+            self.columns.print(seconds, &cells)?;
+        }
+        let refusal = self.refusal.take();
+        self.refusal = refusal.or_else(|| cells.into_iter().find_map(Cell::into_refusal));
         Ok(())
     }
 
@@ -150,7 +148,7 @@ impl<'a> Sink<'a> {
         match (self.output.json, problem.kind) {
             (true, _) => {
                 let event = self.event(elapsed, "outage").with("error", problem.object());
-                return self.print(|_| print_line(&Value::from(event)));
+                return print_line(&Value::from(event));
             }
             (false, Kind::Silent) => note(format!("{text}; {retry}")),
             (false, _) => note(format!("the line is lost: {text}; {retry}")),
@@ -164,10 +162,7 @@ impl<'a> Sink<'a> {
         }
         self.columns.repeat_header();
         match (self.output.json, kind) {
-            (true, _) => {
-                let event = self.event(elapsed, "back");
-                return self.print(|_| print_line(&Value::from(event)));
-            }
+            (true, _) => return print_line(&Value::from(self.event(elapsed, "back"))),
             (false, Kind::Silent) => note("the motor answers again"),
             (false, _) => note("the line is back"),
         }
@@ -176,13 +171,5 @@ impl<'a> Sink<'a> {
 
     fn event(&self, elapsed: Duration, name: &str) -> Line {
         self.object.clone().at(Some(elapsed.as_secs_f64())).with("event", name)
-    }
-
-    /// Prints on stdout.
-    fn print(
-        &mut self,
-        print: impl FnOnce(&mut Self) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        if self.prints { print(self) } else { Ok(()) }
     }
 }

@@ -125,7 +125,7 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
             None => {}
         }
     }
-    session.report_all(failures)
+    session.output.report_all(failures)
 }
 
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {

@@ -7,7 +7,7 @@ use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::{self, Line, Row};
-use crate::output::{Printer, report};
+use crate::output::Printer;
 
 /// An open bus, the selected motor, and how its values are shown.
 pub struct Session {
@@ -85,15 +85,6 @@ impl Session {
         }
         failures.push(failure);
         Ok(())
-    }
-
-    /// Reports the failures of several motors.
-    pub fn report_all(&self, mut failures: Vec<Failure>) -> Result<(), Failure> {
-        // A program has each in its results.
-        while !self.output.json && failures.len() > 1 {
-            report(&failures.remove(0));
-        }
-        failures.into_iter().next().map_or(Ok(()), Err)
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {

@@ -63,7 +63,7 @@ pub fn each(
             Err(failure) => session.failed(id, failure, &mut failures)?,
         }
     }
-    session.report_all(failures)
+    session.output.report_all(failures)
 }
 
 /// Stops motors at once, and again those that do not answer. Motors in `expected` have to answer.
@@ -112,9 +112,7 @@ fn halt_all(
         let error = errors.iter().find(|(of, _)| *of == id).map(|(_, error)| error);
         match error.filter(|_| left.contains(id)) {
             None if confirmed.contains(id) => {
-                let line = session.line(id.number()).ok(true);
-                // A reader that is gone does not keep the others from being reported.
-                let _ = session.output.result(done, line);
+                session.output.result(done, session.line(id.number()).ok(true))?;
             }
             Some(error) if there.contains(id) || !is_silence(error) => {
                 let what = "it did not confirm, and may still be turning";
@@ -131,7 +129,7 @@ fn halt_all(
     if !silent.is_empty() && failures.is_empty() {
         note(format!("{} IDs do not answer: no motor, or no supply", silent.len()));
     }
-    session.report_all(failures)
+    session.output.report_all(failures)
 }
 
 /// Whether an ID may have no motor.

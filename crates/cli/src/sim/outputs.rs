@@ -76,7 +76,7 @@ pub fn resolve(
     Ok(found)
 }
 
-/// What tells whether two names are one file.
+/// Two names with the same identity are one file.
 #[derive(Debug, PartialEq, Eq)]
 enum Identity {
     /// Device and number of a file that exists.
