@@ -44,6 +44,23 @@ def run(motorlink):
     return run
 
 
+@pytest.fixture(scope="session")
+def piped(motorlink):
+    """Runs the program with its stdout redirected by a shell: `piped("st registers", "| head -n 2")`."""
+
+    def piped(words, out, within=30):
+        done = subprocess.run(
+            ["bash", "-c", f"{motorlink} {words} {out}; exit ${{PIPESTATUS[0]}}"],
+            capture_output=True,
+            text=True,
+            timeout=within,
+            env=environment(),
+        )
+        return Outcome(done.returncode, done.stdout, done.stderr)
+
+    return piped
+
+
 @pytest.fixture
 def start(motorlink):
     """Starts the program and lets it run: `start("demo")`. It is ended after the test."""

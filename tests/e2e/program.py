@@ -89,9 +89,10 @@ class Outcome:
 class Running:
     """A program that runs during the test. Its output is read continuously."""
 
-    def __init__(self, arguments, stdin=subprocess.DEVNULL, **variables):
+    def __init__(self, arguments, stdin=subprocess.DEVNULL, folder=None, **variables):
         self.process = subprocess.Popen(
             arguments,
+            cwd=folder,
             stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

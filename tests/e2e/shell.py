@@ -1,15 +1,14 @@
-"""Runs the shell lines of a page beside simulated drives."""
+"""Runs shell lines of help and pages beside simulated drives."""
 
 import re
 import shlex
-import signal
 import subprocess
-import threading
 from pathlib import Path
 
-from blocks import REPOSITORY
+from program import Running
 
-#: Ports of real devices, and the simulated ones that stand in for them.
+REPOSITORY = Path(__file__).parents[2]
+#: Ports of real devices, and the simulated ones that replace them.
 DEVICES = [
     (re.compile(r"\b(?:slcan:/dev/\w+|socketcan:can\d)"), "slcan:./can0"),
     (re.compile(r"(?:serial:)?/dev/(?:serial/by-id/[\w.-]+|tty\w+\d)"), "./st0"),
@@ -48,10 +47,11 @@ def runs_on(words):
 
 
 class Shell:
-    """A shell in a folder. What it started in the background ends with it."""
+    """A shell in a folder, with variables for its commands. What it started in the background ends with
+    it."""
 
-    def __init__(self, folder, environment):
-        self.folder, self.environment = folder, environment
+    def __init__(self, folder, **variables):
+        self.folder, self.variables = folder, variables
         self.background = []
 
     def __enter__(self):
@@ -60,6 +60,7 @@ class Shell:
     def __exit__(self, *error):
         for command in reversed(self.background):
             command.interrupt()
+            command.end()
 
     def run(self, line, words, expected):
         """Runs a line; an AssertionError says how it failed."""
@@ -69,73 +70,33 @@ class Shell:
             assert done.returncode == 0, f"{line}\n{done.stderr}"
             return
         if words[0] == "export":
-            self.environment = {**self.environment, **dict(simulated(w).split("=", 1) for w in words[1:])}
+            self.variables.update(simulated(word).split("=", 1) for word in words[1:])
             return
         if words[-1] == "&":
-            command = Command(line.split("#")[0].rstrip().removesuffix("&"), self)
+            command = self._start(line.split("#")[0].rstrip().removesuffix("&"))
             self.background.append(command)
-            command.output(announcements(words))
+            command.line(announcements(words) - 1, LIMIT)
             return
-        command = Command(line, self)
-        if runs_on(words):
-            command.output(announcements(words) if serves(words) else 2)
-            command.interrupt()
-        code = command.wait()
-        allowed = {0, 130} if runs_on(words) else {expected}
-        assert code in allowed, f"exit code {code}, not {expected}: {line}\n{command.said()}"
+        command = self._start(line)
+        try:
+            if runs_on(words):
+                command.line(announcements(words) - 1 if serves(words) else 0, LIMIT)
+                command.interrupt()
+            code = command.wait(LIMIT)
+        finally:
+            command.end()
+        said = "\n".join([*command.out[-40:], *command.err[-40:]])
+        assert code == expected, f"exit code {code}, not {expected}: {line}\n{said}"
+
+    def _start(self, line):
+        return Running(
+            ["bash", "-c", f"set -o pipefail; {line}" if "|" in line else f"exec {line}"],
+            stdin=subprocess.PIPE,
+            folder=self.folder,
+            **self.variables,
+        )
 
 
 def announcements(words):
     """How many lines a command that serves prints when its ports are ready."""
     return max(1, sum(word in ("--st", "--rmd", "--serve") for word in words))
-
-
-class Command:
-    """A command line that runs."""
-
-    def __init__(self, line, shell):
-        self.line = line
-        self.process = subprocess.Popen(
-            ["bash", "-c", f"set -o pipefail; exec {line}" if "|" not in line else line],
-            cwd=shell.folder,
-            env=shell.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-        self.lines = []
-        self.news = threading.Condition()
-        self.reader = threading.Thread(target=self._read, daemon=True)
-        self.reader.start()
-
-    def _read(self):
-        for line in self.process.stdout:
-            with self.news:
-                self.lines.append(line)
-                self.news.notify_all()
-
-    def output(self, count):
-        """Waits for `count` lines of output."""
-        with self.news:
-            arrived = self.news.wait_for(lambda: len(self.lines) >= count, LIMIT)
-        assert arrived, f"{count} lines were expected: {self.line}\n{self.said()}"
-
-    def interrupt(self):
-        """Ctrl-C, and waits for the end."""
-        self.process.send_signal(signal.SIGINT)
-        self.wait()
-
-    def wait(self):
-        """The exit code."""
-        try:
-            return self.process.wait(LIMIT)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise AssertionError(f"it does not end: {self.line}\n{self.said()}") from None
-        finally:
-            self.reader.join(5)
-
-    def said(self):
-        return "".join(self.lines[-40:])

@@ -172,12 +172,6 @@ def test_a_time_without_a_unit_is_refused_with_both_spellings(run, words):
         "completions bash",
     ],
 )
-def test_a_reader_that_has_enough_ends_the_program_quietly(motorlink, command):
-    piped = subprocess.run(
-        ["bash", "-c", f"{motorlink} {command} | head -n 2 >/dev/null; exit ${{PIPESTATUS[0]}}"],
-        capture_output=True,
-        text=True,
-        timeout=20,
-        env=environment(),
-    )
-    assert (piped.returncode, piped.stderr) == (0, "")
+def test_a_reader_that_has_enough_ends_the_program_quietly(piped, command):
+    done = piped(command, "| head -n 2 >/dev/null", within=20)
+    assert (done.code, done.err) == (0, "")

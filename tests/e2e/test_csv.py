@@ -73,14 +73,11 @@ def test_a_full_disk_ends_a_recording_with_3(motorlink, csv_to):
     assert done.returncode == 3 and "No space left" in done.stderr, done.stderr
 
 
-def test_a_recording_goes_on_when_the_reader_of_stdout_is_gone(motorlink, tmp_path):
+def test_a_recording_goes_on_when_the_reader_of_stdout_is_gone(piped, tmp_path):
     path = tmp_path / "run.csv"
-    command = f"{motorlink} st -p sim: get STATUS --every 2ms --count 300 --csv {path} | head -n 3 >/dev/null"
-    piped = subprocess.run(
-        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"],
-        capture_output=True, text=True, timeout=30, env=environment(),
-    )
-    assert (piped.returncode, piped.stderr) == (0, "")
+    words = f"st -p sim: get STATUS --every 2ms --count 300 --csv {path}"
+    done = piped(words, "| head -n 3 >/dev/null")
+    assert (done.code, done.err) == (0, "")
     assert len(read(path)) == 300
 
 

@@ -2,13 +2,12 @@
 
 import os
 import re
-import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from program import environment
+from shell import Shell, lines as commands
 
 ROOT = Path(__file__).parents[2]
 #: What a bare `motorlink` needs: position control and the other features of a servo.
@@ -39,12 +38,6 @@ def examples(text):
     return [line.strip() for line in block[1].replace("\\\n", "").splitlines()] if block else []
 
 
-def runs_until_ctrl_c(example):
-    """Whether an example has no end of its own."""
-    serves = " guard " in example and "--prove" not in example or "motorlink sim --" in example
-    return serves or "--every" in example and "--count" not in example
-
-
 @pytest.mark.parametrize("command", ["st", "rmd", "guard", "sim", "conformance", ""])
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     # The program itself, and commands without subcommands.
@@ -57,39 +50,13 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
     (tmp_path / "servo.toml").write_text(SERVO)
     path = f"{Path(motorlink).resolve().parent}:{os.environ['PATH']}"
     for line in lines:
-        config = ["servo.toml"] if "mcsdk-5.4" in line else []
-        served = subprocess.Popen(
-            [Path(motorlink).resolve(), "sim", *config, "--stdin", "--st", "pty:./st0", "--rmd", "slcan-pty:./can0"],
-            cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(),
-        ) if "motorlink sim" not in line else None
-        try:
-            if served:
-                assert all(served.stdout.readline() for _ in range(2))
-            ended = ended_example(line, tmp_path, path)
-            assert ended.returncode == 0, f"{line}\n{ended.stdout}\n{ended.stderr}"
-        finally:
-            if served:
-                served.communicate("")
+        config = "servo.toml" if "mcsdk-5.4" in line else ""
+        with Shell(tmp_path, PATH=path) as shell:
+            if "motorlink sim" not in line:
+                shell.run(*next(commands(f"motorlink sim {config} --st pty:./st0 --rmd slcan-pty:./can0 &")))
+            shell.run(*next(commands(line)))
         for made in ("run.csv", "run.svg", "motorlink.bash"):
             (tmp_path / made).unlink(missing_ok=True)
-
-
-def ended_example(line, folder, path):
-    """Runs a command line; one without an end gets Ctrl-C after its first line of output."""
-    process = subprocess.Popen(
-        ["bash", "-c", f"exec {line}"], cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, env=environment({"PATH": path}),
-    )
-    try:
-        out = ""
-        if runs_until_ctrl_c(line):
-            out = process.stdout.readline()
-            process.send_signal(signal.SIGINT)
-        rest, err = process.communicate(timeout=60)
-        return subprocess.CompletedProcess(line, process.returncode, out + rest, err)
-    finally:
-        process.kill()
-        process.communicate()
 
 
 @pytest.mark.parametrize("command", ["st get", "st set", "rmd off", "rmd speed", "rmd status"])

@@ -22,7 +22,7 @@ def rmd(run, sim):
 
 
 def drive(read, written):
-    """A drive's replies. `read()` gives that to GET_REG SPEED_KP, `written(value)` is told each SET_REG."""
+    """A drive's replies. `read()` gives that to GET_REG SPEED_KP, `written(value)` gets each SET_REG."""
     pending = bytearray()
 
     def reply(request):

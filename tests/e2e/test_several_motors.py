@@ -1,10 +1,6 @@
 """One command for several motors: `--id 1,3`, `--id 1-4`, `off --all`, `stop --all`."""
 
-import subprocess
-
 import pytest
-
-from program import environment
 
 
 @pytest.fixture(name="bench")
@@ -90,44 +86,34 @@ def test_a_value_that_is_out_of_range_is_told_once(rmd):
     assert done.err.count("99") == 1
 
 
-@pytest.fixture(name="piped")
-def into(motorlink, bench):
-    def piped(words, out):
-        command = f"{motorlink} rmd -p {bench.port('slcan')} --timeout 500ms {words} {out}"
-        return subprocess.run(
-            ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"],
-            capture_output=True, text=True, timeout=30, env=environment(),
-        )
-
-    return piped
+@pytest.fixture(name="rmd_into")
+def on_its_port_into(piped, bench):
+    return lambda words, out: piped(f"rmd -p {bench.port('slcan')} --timeout 500ms {words}", out)
 
 
 @pytest.mark.parametrize(("out", "code"), [("| true", 0), ("| head -n 1", 0), ("> /dev/full", 3)])
 @pytest.mark.parametrize("json", ["", "--json"])
-def test_output_that_cannot_be_written_keeps_no_motor_from_its_command(bench, rmd, piped, out, code, json):
+def test_output_that_cannot_be_written_keeps_no_motor_from_its_command(bench, rmd, rmd_into, out, code, json):
     rmd("--id", "1-4", "speed", 100).ended(0)
-    done = piped(f"--id 1-4 {json} torque 0", out)
-    assert done.returncode == code, done.stderr
-    assert ("the command was carried out" in done.stderr) == (code == 3)
+    done = rmd_into(f"--id 1-4 {json} torque 0", out)
+    assert done.code == code, done.err
+    assert ("the command was carried out" in done.err) == (code == 3)
     assert modes(bench) == ["torque"] * 4
 
 
 @pytest.mark.parametrize("words", ["--id 9,1 off", "--id 9,1 --json off", "--id 1,9 torque 0"])
-def test_a_closed_output_hides_no_failure(piped, words):
-    done = piped(words, "| true")
-    assert done.returncode == 3
-    assert "motor 9" in done.stderr
+def test_a_closed_output_hides_no_failure(rmd_into, words):
+    done = rmd_into(words, "| true")
+    assert done.code == 3
+    assert "motor 9" in done.err
 
 
-def test_a_closed_output_hides_no_motor_that_four_torques_do_not_reach(motorlink, sim, tmp_path):
+def test_a_closed_output_hides_no_motor_that_four_torques_do_not_reach(piped, sim, tmp_path):
     config = tmp_path / "one.toml"
     config.write_text("[[rmd.motor]]\nid = 1\n")
     port = sim(config, st=()).port("slcan")
-    command = f"{motorlink} rmd -p {port} torque4 0 0 0 0 | true; exit ${{PIPESTATUS[0]}}"
-    done = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=30, env=environment()
-    )
-    assert done.returncode == 3 and "motor 4" in done.stderr
+    done = piped(f"rmd -p {port} torque4 0 0 0 0", "| true")
+    assert done.code == 3 and "motor 4" in done.err
 
 
 def test_a_move_that_fails_is_the_last_and_the_motors_before_it_are_stopped(run, sim, tmp_path):

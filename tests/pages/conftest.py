@@ -8,19 +8,25 @@ from pathlib import Path
 import pytest
 
 from blocks import REPOSITORY
-from shell import Shell
+
+sys.path.insert(0, str(REPOSITORY / "tests/e2e"))
+
+from program import environment as without_settings  # noqa: E402
+from shell import Shell  # noqa: E402
 
 #: What a page's lines find in the current folder, as in a clone.
 FOLDERS = ["bindings", "contrib", "crates", "docs", "scenarios", "tests", "vectors"]
 SERVE = "motorlink sim --st pty:./st0 --rmd slcan-pty:./can0"
 
 
+#: What a reader's commands have: `motorlink` and `python3` are those of the package.
+VARIABLES = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "MPLBACKEND": "Agg"}
+
+
 @pytest.fixture(scope="session")
 def environment():
-    """The environment of a reader: `motorlink` and `python3` are those of the package."""
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith("MOTORLINK_")}
-    path = f"{Path(sys.executable).parent}:{inherited['PATH']}"
-    return {**inherited, "PATH": path, "NO_COLOR": "1", "MPLBACKEND": "Agg"}
+    """The environment of a reader."""
+    return without_settings(VARIABLES)
 
 
 @pytest.fixture
@@ -33,9 +39,9 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def shell(folder, environment):
+def shell(folder):
     """A shell in that folder."""
-    with Shell(folder, environment) as shell:
+    with Shell(folder, **VARIABLES) as shell:
         yield shell
 
 
