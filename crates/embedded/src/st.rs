@@ -122,7 +122,8 @@ impl<U: Read + Write + ReadReady> MasterPort<U> {
         }
     }
 
-    /// The master, to start exchanges.
+    /// The master, to start exchanges. A STOP_MOTOR is sent by the next [`poll`](Self::poll), also on
+    /// a lost line.
     pub const fn master_mut(&mut self) -> &mut Master {
         &mut self.master
     }

@@ -24,8 +24,10 @@ impl Pair {
         let config = RmdConfig::default();
         let id = MotorId::new(config.id).expect("ID 1");
         let drive = Drive::new(DriveConfig::new(id), config.factory_rom());
-        let motors = [RmdMotor::new(config).expect("a preset")];
-        Pair { host, port: DrivePort::new(Adapter::new(board), [drive]), motors }
+        let mut motors = [RmdMotor::new(config).expect("a preset")];
+        let mut port = DrivePort::new(Adapter::new(board), [drive]);
+        port.power_on(Instant(0), &mut motors);
+        Pair { host, port, motors }
     }
 
     fn say(&mut self, text: &str) {

@@ -5,8 +5,8 @@ mod uart;
 use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::st::{Event, MasterPort, SlavePort};
 use motorlink_proto::st::{
-    ErrorCode, ExchangeError, Failure, Master, MasterConfig, Profile, Ramp, RegisterId, Request,
-    Slave,
+    Command, ErrorCode, ExchangeError, Failure, Master, MasterConfig, Profile, Ramp, RegisterId,
+    Request, Slave,
 };
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{StDrive, StMotor};
@@ -93,6 +93,17 @@ fn a_just_opened_line_needs_two_silences() {
     assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
     let quiet = MasterConfig::default().quiet;
     assert_eq!(bench.now, Instant(0) + quiet + quiet);
+}
+
+#[test]
+fn a_stop_is_sent_at_once_on_a_lost_line() {
+    let mut bench = Pair::opened();
+    let stop = Request::ExecuteCommand(Command::StopMotor);
+    bench.master.master_mut().request(1, &stop).unwrap();
+    bench.master.poll(bench.now).expect("sent");
+    let frame = [0x23, 0x01, 0x02, 0x26].map(Ok);
+    assert_eq!(*bench.slave.uart_mut().received.borrow(), frame);
+    assert_eq!(bench.exchange(), Ok(vec![]), "acknowledged after the recovery");
 }
 
 #[test]

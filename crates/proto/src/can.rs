@@ -69,6 +69,11 @@ impl CanFrame {
         self.data.get(..len).unwrap_or(&self.data)
     }
 
+    /// All eight bytes; those beyond the length are 0.
+    pub const fn padded_data(&self) -> [u8; 8] {
+        self.data
+    }
+
     /// Identifier and bytes of a standard data frame of eight bytes; nothing for any other frame.
     pub const fn eight_bytes(&self) -> Option<(u16, &[u8; 8])> {
         if self.extended || self.remote || self.len != 8 {

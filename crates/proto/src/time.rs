@@ -15,6 +15,22 @@ impl Instant {
     pub const fn since(self, earlier: Instant) -> Micros {
         Micros(self.0.saturating_sub(earlier.0))
     }
+
+    /// The span between both, whichever is the earlier.
+    pub const fn distance(self, other: Instant) -> Micros {
+        Micros(self.0.abs_diff(other.0))
+    }
+
+    /// Whether a wait of at most `span` until this moment is over at `now`.
+    ///
+    /// A clock that was set back, or a counter that wrapped around, also ends the wait: else it
+    /// would last until the clock reaches this moment again. That is the case if the moment is more
+    /// than twice `span` away.
+    pub const fn is_over(self, span: Micros, now: Instant) -> bool {
+        // Of 0 and of a moment in the past this is a large number.
+        let left = self.0.wrapping_sub(now.0).wrapping_sub(1);
+        left >= span.0.saturating_mul(2)
+    }
 }
 
 impl Micros {

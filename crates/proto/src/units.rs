@@ -6,6 +6,9 @@
 /// rounding errors of binary fractions in 32 bits, and far less than a digit.
 const TOLERANCE: f64 = 1e-6;
 
+/// The most decimal places of a text.
+const MOST_DECIMALS: u8 = 9;
+
 /// The number of whole digits of `scale` in `value`, rounded towards 0: the digits that a limit of
 /// `value` allows. 0.3 has 30 digits of 0.01, although binary fractions give 29.999…: a value
 /// within a millionth of a digit counts as that digit. Saturates; NaN gives 0.
@@ -13,6 +16,17 @@ pub fn inward(value: f64, scale: f64) -> i64 {
     let digits = value / scale;
     let tolerance = if digits < 0.0 { -TOLERANCE } else { TOLERANCE };
     (digits + tolerance) as i64
+}
+
+/// The number of decimal places of a text that has the nearest digit of `scale`: the last place is
+/// not more than a digit.
+pub fn decimal_places(scale: f64) -> u8 {
+    let (mut places, mut step) = (0u8, 1.0);
+    while step > scale * (1.0 + TOLERANCE) && places < MOST_DECIMALS {
+        places = places.saturating_add(1);
+        step /= 10.0;
+    }
+    places
 }
 
 /// A value that a message cannot carry, or that the protocol does not allow.
@@ -125,7 +139,8 @@ impl Scale {
         };
         let unit = self.symbol;
         if self.rounding == Rounding::NoLimitOfZero && digits == 0 && value > 0.0 {
-            return Err(Unfit::BecomesZero { value, digit: self.digit, unit });
+            let digit = self.rounded(self.digit, 1.0);
+            return Err(Unfit::BecomesZero { value, digit, unit });
         }
         if self.rounding == Rounding::NoLimitOfZero && value < 0.0 {
             return Err(Unfit::Negative { value, unit });
@@ -134,8 +149,23 @@ impl Scale {
         if value.is_finite() && !is_below && (self.least..=self.most).contains(&digits) {
             return Ok(digits);
         }
-        let (least, most) = (self.value(self.least), self.value(self.most));
+        let least = self.rounded(self.value(self.least), 1.0);
+        let most = self.rounded(self.value(self.most), -1.0);
         Err(Unfit::OutOfRange { value, least, most, unit })
+    }
+
+    /// An end of the range with the decimals of the scale. If it has more, it is rounded to the next
+    /// value `up` (1.0) or down (-1.0).
+    fn rounded(&self, end: f64, up: f64) -> f64 {
+        let parts = (0..self.decimals).fold(1.0, |parts, _| parts * 10.0);
+        let near = nearest(end * parts) as f64;
+        let is_beyond = (near - end * parts) * up < -TOLERANCE;
+        (if is_beyond { near + up } else { near }) / parts
+    }
+
+    /// Whether the unit is that of an angle, a speed or an acceleration.
+    pub fn is_motion(&self) -> bool {
+        matches!(self.suffix, "degrees" | "dps" | "dps2")
     }
 
     /// The same scale for values in digits.

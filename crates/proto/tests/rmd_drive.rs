@@ -96,6 +96,25 @@ fn an_offset_beyond_the_encoder_is_cut_in_the_reply_too() {
 }
 
 #[test]
+fn a_drive_does_not_answer_or_command_its_motor_before_power_on() {
+    let mut node = Node::new(1);
+    let before = node.motor.clone();
+    node.drive = Drive::new(node.drive.config, *node.drive.rom());
+    node.motor.sense.faults = Errors(0xFF);
+    assert_eq!(node.raw(SetSpeed { speed: CentiDps(36000) }.encode()), None);
+    assert_eq!(node.raw(Off.encode()), None);
+    let torques = SetTorque4([IqCommand(100); 4]).encode();
+    assert_eq!(node.receive(Instant(1), &CanFrame::new(TORQUE4_ID, torques)), None);
+    node.drive.poll(Instant(1), &mut node.motor);
+    assert_eq!(node.motor.modes_set, before.modes_set);
+    node.motor.sense.faults = Errors::NONE;
+    node.power_cycle();
+    assert!(node.drive.errors().is_empty());
+    assert!(node.raw(SetSpeed { speed: CentiDps(36000) }.encode()).is_some());
+    assert_eq!(node.motor.mode, Mode::Speed(CentiDps(36000)));
+}
+
+#[test]
 fn a_new_zero_is_in_the_reply_and_holds_from_the_next_power_on() {
     let mut node = Node::new(1);
     node.motor.sense.encoder = 0x1234;

@@ -45,14 +45,13 @@ fn a_refusal_keeps_its_code_and_the_line_unless_the_frame_was_damaged() {
 }
 
 #[test]
-fn a_request_that_is_sent_ahead_is_sent_again_after_the_recovery() {
+fn a_stop_is_sent_at_once_and_again_after_the_recovery() {
     let stop = Request::ExecuteCommand(Command::StopMotor);
     let frame = [0x23, 0x01, 0x02, 0x26];
     for recovery in Recovery::ALL {
         let mut master = master(recovery);
         master.lost();
         master.request(1, &stop).unwrap();
-        master.send_ahead();
         assert_eq!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
         assert_ne!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
     }
@@ -63,19 +62,41 @@ fn a_request_that_is_sent_ahead_is_sent_again_after_the_recovery() {
 }
 
 #[test]
-fn a_request_on_a_line_in_sync_is_not_sent_ahead() {
+fn a_raw_stop_is_sent_at_once_and_other_requests_are_not() {
+    let start = Request::ExecuteCommand(Command::StartMotor);
+    for recovery in [Recovery::Drain, Recovery::Pad] {
+        let mut master = master(recovery);
+        master.lost();
+        master.request_raw(0x23, &[0x02]).unwrap();
+        let frame = [0x23, 0x01, 0x02, 0x26];
+        assert_eq!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
+        for request in [&start, &STATUS] {
+            master.lost();
+            master.request(1, request).unwrap();
+            let frame = request_frame(request);
+            assert_ne!(master.poll(Instant(0)), Output::Transmit(&frame), "{recovery:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_on_a_line_in_sync_is_sent_once() {
+    let stop = Request::ExecuteCommand(Command::StopMotor);
     let mut master = master(Recovery::Drain);
-    master.request(1, &STATUS).unwrap();
-    master.send_ahead();
+    master.request(1, &stop).unwrap();
     assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
     assert!(matches!(master.poll(Instant(0)), Output::Wait(_)));
     for end in [Master::lost, Master::reopened, Master::trust_line] {
         master.lost();
-        master.request(1, &STATUS).unwrap();
-        master.send_ahead();
+        master.request(1, &stop).unwrap();
         end(&mut master);
         assert_eq!(master.poll(Instant(0)), Output::Wait(None));
     }
+}
+
+fn request_frame(request: &Request<'_>) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    Frame::command(1, request, &mut frame).unwrap().to_vec()
 }
 
 #[test]

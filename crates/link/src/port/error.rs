@@ -339,7 +339,7 @@ mod tests {
             "no permission to open `/dev/ttyACM0`: join the group: \
              sudo usermod -aG dialout $USER, then log in again"
         );
-        // For the group root the hint names a udev rule: nobody should join this group.
+        // For the group root the hint names a udev rule. A user must not join this group.
         assert!(permission_hint(Some("root")).contains("udev"));
         assert_eq!(owning_group(Path::new("/dev/null"), Path::new("/")).as_deref(), Some("root"));
     }

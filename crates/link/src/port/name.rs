@@ -68,6 +68,12 @@ pub enum NameError {
         /// The valid forms.
         forms: String,
     },
+    /// A serial port or a CAN adapter as Windows names it: `COM3`, `PCAN_USBBUS1`.
+    #[error("`{name}` is a port of Windows, and this system is not Windows")]
+    Windows {
+        /// The given name.
+        name: String,
+    },
     /// It has characters that a terminal does not show as they are.
     #[error("`{name}` is not a port name: it has control characters")]
     Unprintable {

@@ -40,6 +40,7 @@ impl FromStr for PortName {
                 given.refuse_others(scheme.options())?;
                 Ok(port)
             }
+            None if is_windows(name) => Err(NameError::Windows { name: name.to_owned() }),
             None => {
                 let mut forms = format!("ports are {}", listed(&schemes, |_| true, "and"));
                 if name.contains(':') && schemes.len() == BUILT_IN.len() {
@@ -98,6 +99,13 @@ fn listed(
         forms.filter(|form| is_wanted(form.carries)).map(|form| form.text).collect();
     let end = texts.pop().unwrap_or_default();
     if texts.is_empty() { end.to_owned() } else { format!("{} {last} {end}", texts.join(", ")) }
+}
+
+/// Whether Windows names a serial port or a CAN adapter so.
+fn is_windows(name: &str) -> bool {
+    let name = name.to_ascii_uppercase();
+    let number = name.strip_prefix("COM").map(|rest| rest.trim_end_matches(':'));
+    number.is_some_and(|number| number.parse::<u8>().is_ok()) || name.starts_with("PCAN_")
 }
 
 /// The port whose name is most similar to `name`.

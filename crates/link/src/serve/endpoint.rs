@@ -25,7 +25,8 @@ const PAUSE: Micros = Micros::from_millis(100);
 
 /// The source of clients.
 enum Listener {
-    /// The one client is the program that has the pty open. Otherwise its line is stored here.
+    /// The one client is the program that has the pty open. Otherwise its line is stored here. There
+    /// is neither while no new pty could be made.
     Pty(Pty, Option<Client>),
     /// Each connection is a client.
     Tcp(TcpListener),
@@ -114,6 +115,10 @@ impl Endpoint {
 
     /// Handles events and deadlines. `ready` has the events of the watched descriptors.
     pub(super) fn serve(&mut self, now: Instant, ready: &[PollFlags], scratch: &mut Scratch) {
+        if self.station.disconnects() {
+            // Other events are handled in the next turn.
+            return self.disconnect_all(now);
+        }
         let listener_is_ready = ready.last().is_some_and(|events| !events.is_empty());
         if listener_is_ready && let Listener::Pty(pty, _) = &self.listener {
             pty.clear_openings();
@@ -131,7 +136,11 @@ impl Endpoint {
         self.remove_disconnected(now);
         let reopens = self.paused_until.take_if(|until| *until <= now).is_some();
         let known = self.clients.len();
-        if listener_is_ready || reopens || self.was_opened_unseen() {
+        let is_pty = matches!(self.listener, Listener::Pty(..));
+        if reopens && is_pty {
+            self.renew_pty(now);
+        }
+        if listener_is_ready || (reopens && !is_pty) || self.was_opened_unseen() {
             self.admit(now);
         }
         for newcomer in known..self.clients.len() {
@@ -142,6 +151,24 @@ impl Endpoint {
         }
         for client in &mut self.clients {
             scratch.dropped += client.flush();
+        }
+    }
+
+    /// Closes the connections of all clients, with the bytes that were not read yet.
+    fn disconnect_all(&mut self, now: Instant) {
+        for _closed in self.clients.drain(..) {
+            self.station.client_disconnected(now);
+        }
+        self.renew_pty(now);
+    }
+
+    /// Replaces a pty whose server's side was closed. Without free descriptors or ptys it tries again
+    /// later.
+    fn renew_pty(&mut self, now: Instant) {
+        let Listener::Pty(pty, waiting @ None) = &mut self.listener else { return };
+        match pty.renew() {
+            Ok(line) => *waiting = Some(Client::new(line, Gate::open())),
+            Err(_) => self.paused_until = Some(now + PAUSE),
         }
     }
 
@@ -267,6 +294,10 @@ impl AnyStation {
 
     fn client_disconnected(&mut self, now: Instant) {
         either!(self, station => station.client_disconnected(now));
+    }
+
+    fn disconnects(&self) -> bool {
+        either!(self, station => station.disconnects())
     }
 
     fn accepts_input(&self) -> bool {

@@ -36,9 +36,20 @@ impl Pty {
         clear_link(link)?;
         let (path, master) = open_pair().map_err(|errno| failed(errno.into()))?;
         let openings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
-        symlink(&path, link).map_err(failed)?;
-        mark(&master, link).map_err(failed)?;
+        place_link(&path, link, &master).map_err(failed)?;
         Ok((Pty { path, link: link.to_owned(), openings }, master))
+    }
+
+    /// Makes a new pty, and moves the link to it. Returns the server's side.
+    pub(super) fn renew(&mut self) -> io::Result<OwnedFd> {
+        let (path, master) = open_pair()?;
+        let openings = watch_comings(&path)?;
+        match std::fs::remove_file(&self.link) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => place_link(&path, &self.link, &master)?,
+        }
+        (self.path, self.openings) = (path, openings);
+        Ok(master)
     }
 
     /// The device that a client opens.
@@ -85,6 +96,11 @@ impl Drop for Pty {
             let _ = std::fs::remove_file(&self.link);
         }
     }
+}
+
+fn place_link(path: &Path, link: &Path, master: &OwnedFd) -> io::Result<()> {
+    symlink(path, link)?;
+    mark(master, link)
 }
 
 /// A pty in raw mode: its path and the server's side, non-blocking.

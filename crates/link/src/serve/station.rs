@@ -39,7 +39,13 @@ pub trait Station<T: Traffic> {
         others < T::MOST_CLIENTS
     }
 
-    /// A client closed the port or disconnected.
+    /// Whether to disconnect the clients now. What they sent and was not read yet is dropped. A pty
+    /// is replaced by a new one at the same link.
+    fn disconnects(&self) -> bool {
+        false
+    }
+
+    /// A client closed the port, or was disconnected.
     fn client_disconnected(&mut self, _now: Instant) {}
 
     /// Whether clients may send more now. Otherwise their bytes wait in the kernel, and those of a

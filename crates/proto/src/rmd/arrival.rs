@@ -5,12 +5,12 @@ use core::fmt;
 use super::command::{
     Command, ReadMotionStatus, ReadMultiTurnAngle, ReadSingleTurnAngle, ReadStatus,
 };
-use super::encoder::FULL_TURN;
 use super::payload::Payload;
 use super::reply::{Errors, MotionStatus, MultiTurnAngle, SingleTurnAngle, Status};
-use crate::arrival::{Arrival, Criteria, SAMPLE_TIME, Verdict};
+use super::way::{Angles, Jump, Target, Way};
+use crate::arrival::{self, Arrival, Criteria, Reason, STALL_TIME, Sampler, Verdict, Watch};
 use crate::time::{Instant, Micros};
-use crate::units::{CentiDegrees, SpeedLimit, TurnCentiDegrees};
+use crate::units::{CentiDegrees, SpeedLimit, TurnCentiDegrees, WideCentiDegrees};
 
 /// Maximum distance from the target of a motor that has arrived, if no other is given: 0.1°, which
 /// is more than a count of the coarsest encoder (12 bits, 0.088°).
@@ -25,254 +25,365 @@ const STILL: f64 = 0.1;
 /// Maximum reported speed of a motor that is still, °/s.
 const SLOW: i16 = 5;
 
-/// Where a motor turns to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
-    /// An angle over all turns (0xA3, 0xA4). The motor is asked for its multi-turn angle (0x92).
-    MultiTurn(CentiDegrees),
-    /// An angle within the turn (0xA5, 0xA6). The motor is asked for its single-turn angle (0x94).
-    SingleTurn(TurnCentiDegrees),
-}
+/// Reads a motor until it has arrived: it has gone the whole way to its target, is within the tolerance
+/// and still. A motor that was at a target within the turn when it was commanded may still begin a full
+/// turn. It has not arrived before [`STALL_TIME`].
+pub type ArrivalWatch = Watch<ArrivalSampler>;
+/// Why a motor did not arrive. Distances are in °.
+pub type NotArrived = arrival::NotArrived<AbortReason>;
 
-/// What to do next.
+/// A motor that has arrived.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ArrivalStep {
-    /// Send this request to the motor. Then call [`replied`](ArrivalWatch::replied) or
-    /// [`lost`](ArrivalWatch::lost).
-    Ask([u8; 8]),
-    /// Confirm that the replies went to their own requests. Then call
-    /// [`confirmed`](ArrivalWatch::confirmed) or [`lost`](ArrivalWatch::lost).
-    Confirm,
-    /// Wait until this time.
-    Wait(Instant),
-    /// The move is over.
-    Done(Result<MotionStatus, NotArrived>),
+pub struct Arrived {
+    /// The angle over all turns (0x92).
+    pub angle: MultiTurnAngle,
+    /// The motion (0x9C).
+    pub motion: MotionStatus,
 }
 
-/// Why a motor did not arrive.
+/// Why a motor does not carry out a move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub enum NotArrived {
-    /// The time is over.
-    TimedOut {
-        /// Distance to the target, °.
-        remaining: f64,
-        /// Whether the motor does not move.
-        is_still: bool,
-    },
-    /// The motor stopped before its target.
-    Stalled {
-        /// Distance to the target, °.
-        remaining: f64,
-    },
+pub enum AbortReason {
     /// The motor reports errors; while it has one it is off (docs/SPEC-NOTES.md R18).
-    Protection {
-        /// The errors.
-        errors: Errors,
-        /// Distance to the target, °.
-        remaining: f64,
-    },
-    /// The motor does not answer. `remaining` is not a number if it never did.
-    Silent {
-        /// Distance to the target when the motor answered last, °.
-        remaining: f64,
+    Protection(Errors),
+    /// The angle over all turns (0x92) changed by more than the reported speed explains. The motor loses
+    /// its turns when its supply is interrupted.
+    LostTurns {
+        /// The angle before the change, °.
+        from: f64,
+        /// The angle after it, °.
+        to: f64,
     },
 }
 
-/// Asks a motor that was commanded to turn to a position, until it has arrived.
-///
-/// Begin after the reply to the command. A motor has arrived if it is within the tolerance of its target
-/// and still for [`SETTLE_TIME`](crate::arrival::SETTLE_TIME).
+/// The requests and criteria of a move.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ArrivalWatch {
+pub struct ArrivalSampler {
     target: Target,
+    tolerance: CentiDegrees,
+    timeout: Option<Micros>,
     max_speed: Option<SpeedLimit>,
-    arrival: Arrival,
-    begin: Instant,
-    /// Whether the timeout is to be derived from the first angle.
-    is_timeout_due: bool,
-    stage: Stage,
-    remaining: f64,
+    /// When the motor was commanded.
+    begin: Option<Instant>,
+    reading: Reading,
+    /// `None` before the first angles.
+    way: Option<Way>,
+    is_sampled: bool,
+    angles: Angles,
     motion: MotionStatus,
     errors: Errors,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Stage {
+enum Reading {
     Angle,
+    WithinTurn,
     Motion,
     Errors,
-    Confirm,
-    Wait(Instant),
-    Done(Result<(), NotArrived>),
 }
 
 impl ArrivalWatch {
-    /// Begins at `now`. Without `timeout` it is twice the time that the distance takes at `max_speed`
-    /// and 10 s; without both, [`ARRIVAL_TIMEOUT`].
+    /// For a command that is not sent yet. Without `timeout` it is twice the time that the way takes at
+    /// `max_speed` and 10 s; without both, [`ARRIVAL_TIMEOUT`]. It begins with the command.
     pub fn new(
-        now: Instant,
         target: Target,
         tolerance: CentiDegrees,
         timeout: Option<Micros>,
         max_speed: Option<SpeedLimit>,
     ) -> Self {
-        let criteria = Criteria {
-            tolerance: tolerance.degrees(),
-            still: STILL,
-            not_before: now,
-            until: now + timeout.unwrap_or(ARRIVAL_TIMEOUT),
+        let angles = Angles {
+            over_all: WideCentiDegrees(0),
+            within: TurnCentiDegrees(0),
+            asked: Instant(0),
+            replied: Instant(0),
         };
-        ArrivalWatch {
+        Watch::over(ArrivalSampler {
             target,
+            tolerance,
+            timeout,
             max_speed,
-            arrival: Arrival::new(now, criteria),
-            begin: now,
-            is_timeout_due: timeout.is_none(),
-            stage: Stage::Angle,
-            remaining: f64::NAN,
+            begin: None,
+            reading: Reading::Angle,
+            way: None,
+            is_sampled: false,
+            angles,
             motion: MotionStatus::default(),
             errors: Errors::NONE,
+        })
+    }
+}
+
+impl Sampler for ArrivalSampler {
+    type Request = [u8; 8];
+    type Reply = [u8; 8];
+    type Arrived = Arrived;
+    type Reason = AbortReason;
+    const CONFIRMS_SAMPLES: bool = true;
+
+    fn begin(&mut self, now: Instant) {
+        (self.angles.asked, self.reading) = (now, Reading::Angle);
+    }
+
+    fn request(&self) -> [u8; 8] {
+        match self.reading {
+            Reading::Angle => ReadMultiTurnAngle.encode(),
+            Reading::WithinTurn => ReadSingleTurnAngle.encode(),
+            Reading::Motion => ReadMotionStatus.encode(),
+            Reading::Errors => ReadStatus.encode(),
         }
     }
 
-    /// What to do next.
-    pub fn next(&mut self, now: Instant) -> ArrivalStep {
-        match self.stage {
-            Stage::Wait(until) if now < until => ArrivalStep::Wait(until),
-            Stage::Angle | Stage::Wait(_) => {
-                self.stage = Stage::Angle;
-                ArrivalStep::Ask(match self.target {
-                    Target::MultiTurn(_) => ReadMultiTurnAngle.encode(),
-                    Target::SingleTurn(_) => ReadSingleTurnAngle.encode(),
-                })
-            }
-            Stage::Motion => ArrivalStep::Ask(ReadMotionStatus.encode()),
-            Stage::Errors => ArrivalStep::Ask(ReadStatus.encode()),
-            Stage::Confirm => ArrivalStep::Confirm,
-            Stage::Done(result) => ArrivalStep::Done(result.map(|()| self.motion)),
-        }
-    }
-
-    /// Takes the reply to the last request.
-    pub fn replied(&mut self, reply: &[u8; 8]) {
-        match self.stage {
-            Stage::Angle => {
-                self.remaining = self.target.remaining(reply);
-                if core::mem::take(&mut self.is_timeout_due) {
-                    self.arrival.set_until(self.begin + self.default_timeout());
+    fn replied(&mut self, now: Instant, reply: &[u8; 8]) -> bool {
+        self.reading = match self.reading {
+            Reading::Angle => {
+                self.angles.over_all = MultiTurnAngle::decode(reply).angle;
+                self.angles.replied = now;
+                match self.target {
+                    Target::SingleTurn { .. } => Reading::WithinTurn,
+                    Target::MultiTurn(_) if self.begin.is_some() => Reading::Motion,
+                    Target::MultiTurn(_) => return true,
                 }
-                self.stage = Stage::Motion;
             }
-            Stage::Motion => {
+            Reading::WithinTurn => {
+                self.angles.within = SingleTurnAngle::decode(reply).angle;
+                if self.begin.is_none() {
+                    return true;
+                }
+                Reading::Motion
+            }
+            Reading::Motion => {
                 self.motion = MotionStatus::decode(reply);
-                self.stage = Stage::Errors;
+                Reading::Errors
             }
-            Stage::Errors => {
+            Reading::Errors => {
                 self.errors = Status::decode(reply).errors;
-                self.stage = Stage::Confirm;
+                return true;
             }
-            Stage::Confirm | Stage::Wait(_) | Stage::Done(_) => {}
+        };
+        false
+    }
+
+    fn prepare(&mut self) -> Result<(), AbortReason> {
+        self.way = Some(Way::new(self.target, self.angles));
+        Ok(())
+    }
+
+    fn commanded(&mut self, now: Instant) -> Arrival {
+        self.begin = Some(now);
+        let (tolerance, timeout) = (self.tolerance.degrees(), self.timeout);
+        let until = now + timeout.unwrap_or(ARRIVAL_TIMEOUT);
+        Arrival::new(now, Criteria { tolerance, still: STILL, not_before: now, until })
+    }
+
+    fn judge(&mut self, now: Instant, arrival: &mut Arrival) -> Result<Verdict, AbortReason> {
+        let speed = self.motion.speed;
+        let (Some(way), Some(begin)) = (&mut self.way, self.begin) else {
+            return Ok(Verdict::Moving);
+        };
+        if let Err(Jump { from, to }) = way.sample(self.angles, speed) {
+            self.way = None;
+            return Err(AbortReason::LostTurns { from, to });
+        }
+        let way = *way;
+        if !core::mem::replace(&mut self.is_sampled, true) {
+            if self.timeout.is_none() {
+                arrival.set_until(begin + self.default_timeout(way.longest()));
+            }
+            if way.is_ambiguous() {
+                arrival.set_not_before(begin + STALL_TIME);
+            }
+        }
+        if !self.errors.is_empty() {
+            return Err(AbortReason::Protection(self.errors));
+        }
+        let is_slow = speed.0.unsigned_abs() <= SLOW.unsigned_abs();
+        Ok(arrival.sample(now, way.remaining(), is_slow))
+    }
+
+    fn remaining(&self) -> f64 {
+        match (self.is_sampled, self.way) {
+            (true, Some(way)) => way.remaining(),
+            _ => f64::NAN,
         }
     }
 
-    /// Takes note that the replies went to their own requests: the sample counts.
-    pub fn confirmed(&mut self, now: Instant) {
-        if self.stage != Stage::Confirm {
-            return;
-        }
-        let Self { errors, remaining, .. } = *self;
-        self.stage = match errors.is_empty() {
-            false => Stage::Done(Err(NotArrived::Protection { errors, remaining })),
-            true => self.sampled(now),
-        };
+    fn arrived(&self) -> Arrived {
+        Arrived { angle: MultiTurnAngle { angle: self.angles.over_all }, motion: self.motion }
     }
+}
 
-    /// Records a lost or untrusted reply: the sample does not count.
-    pub fn lost(&mut self, now: Instant) {
-        let verdict = self.arrival.lost(now);
-        self.stage = self.after(now, verdict);
-    }
-
-    /// Distance to the target at the last sample, °, with sign; not a number before the first one.
-    pub fn remaining_degrees(&self) -> f64 {
-        self.remaining
-    }
-
-    fn sampled(&mut self, now: Instant) -> Stage {
-        let (remaining, speed) = (self.remaining, self.motion.speed.0);
-        let is_slow = speed.unsigned_abs() <= SLOW.unsigned_abs();
-        let verdict = self.arrival.sample(now, remaining, is_slow);
-        self.after(now, verdict)
-    }
-
-    fn after(&self, now: Instant, verdict: Verdict) -> Stage {
-        let remaining = self.remaining;
-        Stage::Done(Err(match verdict {
-            Verdict::Moving => return Stage::Wait(now + SAMPLE_TIME),
-            Verdict::Arrived => return Stage::Done(Ok(())),
-            Verdict::Stalled => NotArrived::Stalled { remaining },
-            Verdict::TimedOut { is_still } => NotArrived::TimedOut { remaining, is_still },
-            Verdict::Silent => NotArrived::Silent { remaining },
-        }))
-    }
-
-    fn default_timeout(&self) -> Micros {
-        let way = match self.target {
-            Target::MultiTurn(_) => self.remaining.abs(),
-            // Up to a turn, as its direction is not known here.
-            Target::SingleTurn(_) => 360.0,
-        };
+impl ArrivalSampler {
+    fn default_timeout(&self, way: f64) -> Micros {
         match self.max_speed {
-            Some(speed) if speed.0 > 0 && way.is_finite() => {
-                SPARE_TIME + Micros((2e6 * way / speed.dps()) as u64)
-            }
+            Some(speed) if speed.0 > 0 => SPARE_TIME + Micros((2e6 * way / speed.dps()) as u64),
             _ => ARRIVAL_TIMEOUT,
         }
     }
 }
 
-impl Target {
-    /// Distance from the angle of a reply to the target, °.
-    fn remaining(self, reply: &[u8; 8]) -> f64 {
+impl Reason for AbortReason {
+    const UNIT: &'static str = "°";
+    const DECIMALS: usize = 2;
+
+    fn state(&self) -> &'static str {
         match self {
-            Target::MultiTurn(target) => {
-                let angle = MultiTurnAngle::decode(reply).angle;
-                i64::from(target.0).saturating_sub(angle.0) as f64 / 100.0
-            }
-            Target::SingleTurn(target) => {
-                let turn = i32::from(FULL_TURN);
-                let angle = SingleTurnAngle::decode(reply).angle;
-                let ahead = i32::from(target.0).wrapping_sub(i32::from(angle.0)).rem_euclid(turn);
-                let nearest = if ahead > turn / 2 { ahead.wrapping_sub(turn) } else { ahead };
-                f64::from(nearest) / 100.0
-            }
+            AbortReason::Protection(_) => "while the motor has an error it is off",
+            AbortReason::LostTurns { .. } => "the motor still has its command",
         }
     }
 }
 
-impl fmt::Display for NotArrived {
+impl fmt::Display for AbortReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (NotArrived::TimedOut { remaining, .. }
-        | NotArrived::Stalled { remaining }
-        | NotArrived::Protection { remaining, .. }
-        | NotArrived::Silent { remaining }) = self;
         match self {
-            NotArrived::TimedOut { is_still: true, .. } => {
-                f.write_str("the time is over and the motor is still")?
-            }
-            NotArrived::TimedOut { .. } => {
-                f.write_str("the time is over and the motor is moving")?
-            }
-            NotArrived::Stalled { .. } => f.write_str("the motor stopped before its target")?,
-            NotArrived::Protection { errors, .. } => write!(f, "the motor reports {errors}")?,
-            NotArrived::Silent { .. } => f.write_str("the motor does not answer")?,
-        }
-        match remaining.is_nan() {
-            true => Ok(()),
-            false => write!(f, ", {:.2}° from its target", remaining.abs()),
+            AbortReason::Protection(errors) => write!(f, "the motor reports {errors}"),
+            AbortReason::LostTurns { from, to } => write!(
+                f,
+                "the motor lost its counted turns: its angle jumped from {from:.2}° to {to:.2}°, maybe because \
+                 its supply was interrupted"
+            ),
         }
     }
 }
 
-impl core::error::Error for NotArrived {}
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::super::message::SpinDirection;
+    use super::*;
+    use crate::arrival::Step;
+    use crate::units::Dps;
+
+    const ZERO_CW: Target =
+        Target::SingleTurn { angle: TurnCentiDegrees(0), direction: SpinDirection::Clockwise };
+    const ZERO: Target = Target::MultiTurn(CentiDegrees(0));
+
+    /// Follows a motor. Its angle over all turns, °, and its speed, °/s, are functions of the time since
+    /// the command, s. A reply takes 1 ms. The result is that of the wait and the time of it, ms.
+    fn followed(
+        target: Target,
+        tolerance: CentiDegrees,
+        motor: impl Fn(f64) -> (f64, i16),
+    ) -> (Result<(), NotArrived>, u64) {
+        let begin = Instant(0);
+        let mut watch = ArrivalWatch::new(target, tolerance, None, Some(SpeedLimit(360)));
+        let (mut now, mut commanded) = (begin, None);
+        for _ in 0..100_000 {
+            let since = commanded.map_or(-1e-3, |at| now.since(at).0 as f64 / 1e6);
+            let (degrees, speed) = motor(since);
+            let angle = (degrees * 100.0).round() as i64;
+            match watch.next(now) {
+                Step::Ask(request) => {
+                    now += Micros::from_millis(1);
+                    watch.replied(now, &reply(request[0], angle, speed));
+                }
+                Step::Confirm => watch.confirmed(now),
+                Step::Command => {
+                    now += Micros::from_millis(1);
+                    commanded = Some(now);
+                    watch.commanded(now);
+                }
+                Step::Wait(until) => now = until,
+                Step::Done(done) => {
+                    return (done.map(drop), now.since(commanded.unwrap()).0 / 1_000);
+                }
+            }
+        }
+        panic!("there was no end");
+    }
+
+    fn reply(code: u8, angle: i64, speed: i16) -> [u8; 8] {
+        let within = TurnCentiDegrees(angle.rem_euclid(36_000) as u16);
+        match code {
+            0x92 => MultiTurnAngle { angle: WideCentiDegrees(angle) }.encode_as(code),
+            0x94 => SingleTurnAngle { angle: within }.encode_as(code),
+            0x9C => MotionStatus { speed: Dps(speed), ..MotionStatus::default() }.encode_as(code),
+            0x9A => Status::default().encode_as(code),
+            code => panic!("{code:#x}"),
+        }
+    }
+
+    /// Turns by `way` with this acceleration and at most 360 °/s, and stops there at once.
+    fn accelerated(from: f64, way: f64, acceleration: f64) -> impl Fn(f64) -> (f64, i16) {
+        move |t| {
+            let t = t.max(0.0);
+            let time_to_full_speed = 360.0 / acceleration;
+            let gone = match t - time_to_full_speed {
+                rest if rest < 0.0 => acceleration * t * t / 2.0,
+                rest => 180.0 * time_to_full_speed + 360.0 * rest,
+            };
+            let speed = if gone < way { (acceleration * t).min(360.0) as i16 } else { 0 };
+            (from + gone.min(way), speed)
+        }
+    }
+
+    #[test]
+    fn a_full_turn_is_followed_from_a_motor_that_begins_slowly() {
+        for acceleration in [1.0, 20.0, 50.0, 1_000.0] {
+            for (from, way) in [(0.06, 359.94), (720.05, 359.95), (0.0, 360.0), (-0.06, 360.06)] {
+                let motor = accelerated(from, way, acceleration);
+                let (arrived, ms) = followed(ZERO_CW, ARRIVAL_TOLERANCE, &motor);
+                // Without the full turn in its default time the wait ends with an error.
+                let degrees = motor(ms as f64 / 1e3).0;
+                let is_there = (degrees - from - way).abs() <= 0.1;
+                assert_eq!(arrived.is_ok(), is_there, "{acceleration} {from}: {arrived:?} {ms}");
+                assert!(is_there || acceleration < 20.0, "{acceleration} {from}: {arrived:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wide_tolerance_makes_no_arrival_before_the_full_turn() {
+        let motor = accelerated(0.05, 359.95, 20.0);
+        let (arrived, ms) = followed(ZERO_CW, CentiDegrees(30), &motor);
+        assert!(arrived.is_ok() && motor(ms as f64 / 1e3).0 > 359.7, "{arrived:?} {ms}");
+    }
+
+    #[test]
+    fn a_motor_that_is_held_just_past_its_target_is_stalled() {
+        let (stalled, _) = followed(ZERO_CW, ARRIVAL_TOLERANCE, |_| (0.05, 0));
+        assert_eq!(stalled, Err(NotArrived::Stalled { remaining: 359.95 }));
+    }
+
+    #[test]
+    fn a_motor_that_stays_at_its_target_arrives_when_no_turn_can_begin() {
+        let (arrived, ms) = followed(ZERO_CW, ARRIVAL_TOLERANCE, |_| (359.98, 0));
+        assert!(arrived.is_ok() && (3_000..3_100).contains(&ms), "{arrived:?} {ms}");
+    }
+
+    #[test]
+    fn a_short_way_within_the_turn_ends_without_a_pause() {
+        let motor = accelerated(-10.0, 10.0, 1_000.0);
+        let (arrived, ms) = followed(ZERO_CW, ARRIVAL_TOLERANCE, motor);
+        assert!(arrived.is_ok() && ms < 500, "{arrived:?} {ms}");
+    }
+
+    #[test]
+    fn a_motor_that_loses_its_turns_has_not_arrived() {
+        for at in [0.0, 0.005, 0.2] {
+            let (lost, _) =
+                followed(
+                    ZERO,
+                    ARRIVAL_TOLERANCE,
+                    |t| {
+                        if t < at { (720.03, 10) } else { (0.03, 0) }
+                    },
+                );
+            let text = std::format!("{:#}", lost.unwrap_err());
+            let is_right = text.contains("its angle jumped from 720.03° to 0.03°")
+                && text.ends_with("; the motor still has its command");
+            assert!(is_right, "{at}: {text}");
+        }
+    }
+
+    #[test]
+    fn a_fast_motor_loses_no_turns() {
+        let fast = |t: f64| match t.max(0.0) {
+            t if t < 0.36 => (7_200.0 - 20_000.0 * t, -20_000),
+            _ => (0.0, 0),
+        };
+        assert!(followed(ZERO, ARRIVAL_TOLERANCE, fast).0.is_ok());
+    }
+}

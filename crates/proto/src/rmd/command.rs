@@ -371,6 +371,23 @@ mod tests {
     }
 
     #[test]
+    fn encoder_counts_are_in_four_replies_and_one_request() {
+        let counts =
+            |fields: &'static [Field]| fields.iter().filter(|field| field.is_encoder_counts());
+        for row in &COMMANDS {
+            let expected: &[&str] = match row.reply_name {
+                "Encoder" => &["position", "raw", "offset"],
+                "EncoderOffset" => &["offset"],
+                "MotionStatus" => &["encoder"],
+                _ => &[],
+            };
+            assert!(counts(row.reply).map(|field| field.name).eq(expected.iter().copied()));
+            let is_offset = row.stem == "write_encoder_offset_rom";
+            assert_eq!(counts(row.request).count(), usize::from(is_offset), "{}", row.stem);
+        }
+    }
+
+    #[test]
     fn the_flags_follow_the_document() {
         let with = |flag: fn(&CommandInfo) -> bool| {
             COMMANDS.iter().filter(move |row| flag(row)).map(|row| u8::from(row.code))

@@ -88,6 +88,12 @@ impl Doubt {
         self.heard = None;
     }
 
+    /// Moves the moments of this motor to a clock that was set back to `now`.
+    pub(super) fn begin_anew(&mut self, now: Instant, quarantine: Micros) {
+        self.until = self.until.min(now + quarantine);
+        self.heard = self.heard.map(|heard| heard.min(now));
+    }
+
     /// Records the reply to an open exchange.
     pub(super) fn answered(&mut self, now: Instant) {
         self.heard = Some(now);

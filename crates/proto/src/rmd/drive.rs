@@ -130,10 +130,12 @@ pub struct Drive {
     errors: Errors,
     last_command: Instant,
     ignored: Ignored,
+    is_on: bool,
 }
 
 impl Drive {
-    /// A drive with these ROM contents. It runs after [`power_on`](Self::power_on).
+    /// A drive with these ROM contents. Before [`power_on`](Self::power_on) it ignores all frames,
+    /// and does not command its motor.
     pub fn new(config: DriveConfig, rom: Settings) -> Self {
         Drive {
             config,
@@ -145,13 +147,14 @@ impl Drive {
             errors: Errors::NONE,
             last_command: Instant(0),
             ignored: Ignored::default(),
+            is_on: false,
         }
     }
 
     /// Starts the drive, also after a power cycle: settings come from ROM, the motor is off, no
     /// error is latched, and Run has no motion to resume.
     pub fn power_on(&mut self, now: Instant, motor: &mut impl MotorControl) {
-        *self = Drive { last_command: now, ..Drive::new(self.config, self.rom) };
+        *self = Drive { last_command: now, is_on: true, ..Drive::new(self.config, self.rom) };
         motor.configure(&self.ram);
         motor.set_mode(Mode::Off);
     }
@@ -167,7 +170,7 @@ impl Drive {
         let id = self.config.id;
         let own = u32::from(id.can_id());
         let everyones = frame.id() == u32::from(TORQUE4_ID) && reached(id);
-        if frame.id() != own && !everyones {
+        if !self.is_on || (frame.id() != own && !everyones) {
             return None;
         }
         let Some((_, data)) = frame.eight_bytes() else {
@@ -385,11 +388,15 @@ impl Drive {
         motor.set_mode(Mode::Off);
     }
 
+    /// Whether the shutdown time is over. A clock that was set back by as much ends it, too.
+    fn is_silent(&self, now: Instant) -> bool {
+        self.config.shutdown.is_some_and(|shutdown| now.distance(self.last_command) >= shutdown)
+    }
+
     fn watch(&mut self, now: Instant, motor: &mut impl MotorControl) -> Sense {
         let sense = motor.sense();
         self.errors = self.errors.union(sense.faults);
-        let silent = self.deadline().is_some_and(|deadline| now >= deadline);
-        if self.mode != Mode::Off && (silent || !self.errors.is_empty()) {
+        if self.mode != Mode::Off && (self.is_silent(now) || !self.errors.is_empty()) {
             self.off(motor);
         }
         sense

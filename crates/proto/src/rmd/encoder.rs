@@ -1,7 +1,9 @@
 //! Encoder counts and angles. Only this module computes with the zero point, so that encoder
 //! position, single-turn angle and multi-turn angle agree.
 
-use crate::units::{CentiDegrees, TurnCentiDegrees, WideCentiDegrees};
+use crate::units::{
+    CentiDegrees, Quantity, Rounding, Scale, TurnCentiDegrees, WideCentiDegrees, decimal_places,
+};
 
 /// Digits of 0.01° in a turn.
 pub const FULL_TURN: u16 = TurnCentiDegrees::MAX.0 + 1;
@@ -25,9 +27,18 @@ impl EncoderBits {
         self.0
     }
 
-    /// An encoder value of a frame as an angle in degrees, 0 to 360.
+    /// An encoder value of a frame as an angle of the motor shaft in degrees, 0 to 360.
     pub fn degrees(self, counts: u16) -> f64 {
-        f64::from(counts) * 360.0 / f64::from(1u32.wrapping_shl(u32::from(self.0.min(16))))
+        self.scale().value(counts.into())
+    }
+
+    /// The angle of a count of a frame. Its range ends with the last count of this encoder.
+    pub fn scale(self) -> Scale {
+        let last = i64::from(1u32.wrapping_shl(self.width().min(16))).wrapping_sub(1);
+        let digit = 360.0 / (last as f64 + 1.0);
+        let Scale { symbol, suffix, .. } = TurnCentiDegrees::UNIT;
+        let (decimals, rounding) = (decimal_places(digit), Rounding::Nearest);
+        Scale { digit, symbol, suffix, decimals, least: 0, most: last, rounding }
     }
 
     /// Limits a value from a frame to the range of this encoder.
@@ -100,6 +111,22 @@ mod tests {
     fn there_are_seven_widths_and_14_is_the_default() {
         assert!(widths().map(EncoderBits::bits).eq(12..=18));
         assert_eq!(EncoderBits::default().bits(), 14);
+    }
+
+    #[test]
+    fn a_count_is_a_part_of_a_turn_and_the_range_ends_with_the_last_count() {
+        for bits in widths() {
+            let scale = bits.scale();
+            assert_eq!(scale.most, (1 << bits.bits().min(16)) - 1);
+            for counts in [0, 1, 1000, scale.most] {
+                let exact = counts as f64 * 360.0 / (scale.most as f64 + 1.0);
+                assert!((scale.value(counts) - exact).abs() < 1e-9);
+                assert_eq!(bits.degrees(counts as u16), scale.value(counts));
+            }
+            assert!(scale.value(scale.most) < 360.0);
+        }
+        assert_eq!(EncoderBits::default().scale().decimals, 2);
+        assert_eq!(EncoderBits::new(18).unwrap().scale().decimals, 3);
     }
 
     #[test]

@@ -81,6 +81,8 @@ pub struct Host {
     torque4: Option<SetTorque4>,
     /// No deadline in `in_flight` is before this moment.
     earliest: Instant,
+    /// The time of the last poll or request.
+    seen: Instant,
     timeout: Micros,
     quarantine: Micros,
     counters: Counters,
@@ -111,6 +113,7 @@ impl Host {
             strays: MotorSet::EMPTY,
             torque4: None,
             earliest: NEVER,
+            seen: Instant(0),
             timeout: DEFAULT_TIMEOUT,
             quarantine: DEFAULT_QUARANTINE,
             counters: Counters {
@@ -230,6 +233,7 @@ impl Host {
 
     /// The next thing to do. Call until it is [`Output::Wait`].
     pub fn poll(&mut self, now: Instant) -> Output {
+        self.check_clock(now);
         if let Some(frame) = self.transmit(now) {
             return Output::Transmit(frame);
         }
@@ -280,6 +284,12 @@ impl Host {
             self.cancel(now, id);
             self.slot(id).doubt = Doubt::UNKNOWN;
         }
+    }
+
+    /// A question to a motor that confirms its replies so far: its reply has another code than the
+    /// last one. They are confirmed if [`take_stray`](Self::take_stray) then returns false.
+    pub fn confirmation(&self, id: MotorId) -> [u8; 8] {
+        question_behind(self.slots[id.index()].data[0])
     }
 
     /// Whether a motor sent a reply without a request, since it was trusted or since the last call.
@@ -408,6 +418,7 @@ impl Host {
         if self.busy().contains(id) {
             return Err(RequestError::Busy(id));
         }
+        self.check_clock(now);
         let quarantine = self.quarantine;
         let doubt = &mut self.slot(id).doubt;
         let was_trusted = doubt.is_none();
@@ -438,6 +449,19 @@ impl Host {
         let alone = self.in_flight.is_empty();
         self.earliest = if alone { deadline } else { self.earliest.min(deadline) };
         self.in_flight.insert(id);
+    }
+
+    /// Ends all waits if the clock was set back, or a counter wrapped around: the replies of open
+    /// exchanges are then missing. Quarantines begin anew.
+    fn check_clock(&mut self, now: Instant) {
+        if self.seen.since(now) > self.timeout {
+            self.earliest = now;
+            for slot in &mut self.slots {
+                slot.deadline = now;
+                slot.doubt.begin_anew(now, self.quarantine);
+            }
+        }
+        self.seen = now;
     }
 
     fn expire(&mut self, now: Instant) {

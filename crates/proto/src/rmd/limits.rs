@@ -17,7 +17,7 @@ use core::fmt;
 /// A limit applies to the values of a frame. A torque command contains no speed: the motor turns as
 /// fast as its load allows, whatever the speed limit. The current of a speed or position command is
 /// limited only by the drive's own settings. [`inward`](crate::units::inward) rounds a physical
-/// limit so that no digit exceeds it.
+/// limit so that no digit exceeds it. With any limit 0x88 is refused: it resumes an earlier motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Limits {
     /// Maximum torque current of 0xA1 and 0x280, 0.016 A a digit.
@@ -64,6 +64,9 @@ pub enum Exceeded {
     SingleTurnAngle(TurnCentiDegrees),
     /// A direction that the document does not name (3, Position control command 3).
     Direction(SpinDirection),
+    /// 0x88 resumes the motion before the stop while a limit is set. Its values are unknown: another
+    /// program may have commanded it.
+    Resumes,
     /// An unnamed code from 0xA0 to 0xAF while a limit is set. The meaning of its bytes is unknown.
     UnknownMotion(u8),
 }
@@ -97,6 +100,7 @@ impl Limits {
                 self.max_speed(command.max_speed)?;
                 circle(command.angle, command.direction)
             }
+            Code::Run if *self != Self::default() => Err(Exceeded::Resumes),
             Code::Unknown(code @ 0xA0..=0xAF) if *self != Self::default() => {
                 Err(Exceeded::UnknownMotion(code))
             }
@@ -187,6 +191,10 @@ impl fmt::Display for Exceeded {
             Exceeded::SingleTurnAngle(angle) => {
                 write!(f, "single-turn angle {:.2}° is not 0 to 359.99°", angle.degrees())
             }
+            Exceeded::Resumes => f.write_str(
+                "0x88 resumes the motion before the stop, and its values are unknown: it is not sent \
+                 while a limit is set; send a new motion command",
+            ),
             Exceeded::UnknownMotion(code) => write!(
                 f,
                 "{code:#04x} may move the motor, and V1.62 does not define it: it is not sent while a \
@@ -287,12 +295,23 @@ mod tests {
 
     #[test]
     fn every_motion_command_is_limited() {
-        // 0x88 carries no value: it resumes a motion that was allowed before.
-        for row in COMMANDS.iter().filter(|row| row.moves && row.code != Code::Run) {
+        for row in COMMANDS.iter().filter(|row| row.moves) {
             let mut data = [0x7F; 8];
             data[0] = row.code.into();
             assert!(LIMITS.check(&data).is_err(), "{}", row.code);
         }
+    }
+
+    #[test]
+    fn a_motion_of_unknown_size_is_not_resumed_while_there_is_a_limit() {
+        let run = [Code::Run.into(), 0, 0, 0, 0, 0, 0, 0];
+        let only_current = Limits { current: LIMITS.current, ..Limits::default() };
+        let only_speed = Limits { speed: LIMITS.speed, ..Limits::default() };
+        let only_angle = Limits { angle: LIMITS.angle, ..Limits::default() };
+        for limits in [LIMITS, only_current, only_speed, only_angle] {
+            assert_eq!(limits.check(&run), Err(Exceeded::Resumes));
+        }
+        assert_eq!(Limits::default().check(&run), Ok(()));
     }
 
     #[test]

@@ -12,6 +12,7 @@
 //! | command four torques in one frame | [`SetTorque4`], [`Host::set_torque4`] |
 //! | list all commands with their values and units | [`COMMANDS`] |
 //! | limit currents, speeds and angles | [`Limits`], [`Host::set_limits`] |
+//! | convert angles and speeds to the output shaft of a gear | [`GearRatio`] |
 //! | wait until a move has arrived | [`ArrivalWatch`] |
 //! | print a frame as text | [`describe`] |
 //!
@@ -43,6 +44,7 @@ mod describe;
 mod doubt;
 mod drive;
 mod encoder;
+mod gear;
 mod host;
 mod limits;
 mod message;
@@ -50,14 +52,17 @@ mod motor;
 mod outcome;
 mod payload;
 mod reply;
+mod way;
 
 pub use arrival::{
-    ARRIVAL_TIMEOUT, ARRIVAL_TOLERANCE, ArrivalStep, ArrivalWatch, NotArrived, Target,
+    ARRIVAL_TIMEOUT, ARRIVAL_TOLERANCE, AbortReason, ArrivalSampler, ArrivalWatch, Arrived,
+    NotArrived,
 };
 pub use command::*;
 pub use describe::{Described, Direction, describe};
 pub use drive::{Drive, DriveConfig, Ignored, Mode, MotorControl, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
+pub use gear::{GearRatio, InvalidGearRatio};
 pub use host::{DEFAULT_QUARANTINE, DEFAULT_TIMEOUT, Host, question_behind};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
@@ -65,3 +70,4 @@ pub use motor::{Dialect, IDENTIFIERS, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID}
 pub use outcome::{Counters, Failure, Output, RequestError};
 pub use payload::{Field, Meaning, Payload};
 pub use reply::*;
+pub use way::Target;

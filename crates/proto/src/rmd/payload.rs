@@ -80,6 +80,11 @@ impl Field {
         Shown { field: self, data }
     }
 
+    /// Whether the number is encoder counts of a turn. All numbers of 16 bits without a unit are.
+    pub fn is_encoder_counts(&self) -> bool {
+        self.len == 2 && self.scale.suffix.is_empty()
+    }
+
     /// The value in its physical unit, or the number without unit.
     pub fn value(&self, data: &[u8; 8]) -> f64 {
         self.scale.value(self.raw(data))

@@ -5,8 +5,8 @@ use super::{
     Counters, Effect, Frame, LimitError, Limits, MAX_FRAME, MotorNumber, Request, Started,
 };
 
-/// The limits of a master's caller, with the motors that it started and the motors that have a
-/// commanded speed.
+/// The limits of a master's caller, with the motors that it started, the motors that have a
+/// commanded speed, and the configured data segments.
 ///
 /// Call [`check`](Self::check) or [`check_frame`](Self::check_frame) before a master takes a request,
 /// [`sent`](Self::sent) after it took the request, and [`acknowledged`](Self::acknowledged) after the
@@ -17,6 +17,8 @@ pub struct Account {
     started: Started,
     /// Motors whose last setpoint is an acknowledged speed ramp. Bit n: motor n + 1.
     ramped: u8,
+    /// Data segments that were configured since the port was opened. Bit n: segment n.
+    configured: u8,
     /// The numbers of line losses and of identifications at the start of the request. A drive sends
     /// an identification after a reset.
     history: (u32, u32),
@@ -52,7 +54,9 @@ impl Account {
     }
 
     /// Checks a request for motor number `motor`, with the current counters of the line. Returns
-    /// its effect. While a speed limit is set, a start without a ramp is refused.
+    /// its effect. While a speed limit is set, a start without a ramp is refused. A read of a data
+    /// segment that was not configured is refused in any case: shipped firmware reads its frame as a
+    /// torque ramp (docs/SPEC-NOTES.md S7).
     ///
     /// # Errors
     /// The limit that the request exceeds.
@@ -63,6 +67,12 @@ impl Account {
         request: &Request<'_>,
     ) -> Result<Effect, LimitError> {
         self.limits.check(request)?;
+        match *request {
+            Request::GetSegment(segment) if self.configured & segment_bit(segment) == 0 => {
+                return Err(LimitError::NotConfigured { segment });
+            }
+            _ => {}
+        }
         self.check_start(seen, motor, Effect::of(request))
     }
 
@@ -84,7 +94,7 @@ impl Account {
         let history = (seen.losses, seen.identifications);
         if self.history != history {
             self.history = history;
-            self.reopened();
+            self.forget_setpoints();
         }
         let has_ramp =
             || self.started.addressed(motor).is_some_and(|motor| self.ramped & bit(motor) != 0);
@@ -119,14 +129,21 @@ impl Account {
     /// Records that the last sent request was acknowledged.
     pub fn acknowledged(&mut self) {
         self.started.acknowledged(self.addressed, self.effect);
-        if self.effect == Effect::Ramps {
-            self.ramped |= self.addressed.map_or(0, bit);
+        match self.effect {
+            Effect::Ramps => self.ramped |= self.addressed.map_or(0, bit),
+            Effect::Configures(segment) => self.configured |= segment_bit(segment),
+            _ => {}
         }
     }
 
     /// Records that the port was opened again. The drive may be another one, or may have been
-    /// reset: its setpoints and its current motor are unknown.
+    /// reset: its setpoints, its data segments and its current motor are unknown.
     pub fn reopened(&mut self) {
+        self.configured = 0;
+        self.forget_setpoints();
+    }
+
+    fn forget_setpoints(&mut self) {
         self.ramped = 0;
         self.started.forget_current();
     }
@@ -135,6 +152,11 @@ impl Account {
     pub fn forget_motor(&mut self, motor: MotorNumber) {
         self.started.forget_motor(motor);
     }
+}
+
+/// Bit n: segment n. No bit for a segment that cannot exist.
+fn segment_bit(segment: u8) -> u8 {
+    1u8.checked_shl(segment.into()).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -208,6 +230,27 @@ mod tests {
         account.set_limits(LIMITS);
         account.acknowledged();
         assert!(!starts(&mut account, 1));
+    }
+
+    #[test]
+    fn a_data_segment_is_read_only_after_it_was_configured() {
+        let mut account = Account::default();
+        let read =
+            |account: &mut Account, segment| account.check(NEW, 1, &Request::GetSegment(segment));
+        let refused = |segment| Err(LimitError::NotConfigured { segment });
+        assert_eq!(read(&mut account, 2), refused(2));
+        let configure = Request::ConfigureSegment { segment: 2, registers: &[0x02] };
+        let effect = account.check(NEW, 1, &configure).unwrap();
+        account.sent(1, effect);
+        assert_eq!(read(&mut account, 2), refused(2), "not acknowledged");
+        done(&mut account, 1, &configure);
+        assert_eq!(read(&mut account, 2), Ok(Effect::None));
+        assert_eq!(read(&mut account, 3), refused(3));
+        assert_eq!(read(&mut account, 200), refused(200));
+        let lost = Counters { losses: 1, ..NEW };
+        assert_eq!(account.check(lost, 1, &Request::GetSegment(2)), Ok(Effect::None));
+        account.reopened();
+        assert_eq!(read(&mut account, 2), refused(2), "it may be another drive");
     }
 
     #[test]

@@ -187,7 +187,7 @@ named_numbers! {
         8 Stop "STOP" "stopping";
         9 StopIdle "STOP_IDLE" "stopped, about to be idle";
         10 FaultNow "FAULT_NOW" "the cause of a fault is present";
-        11 FaultOver "FAULT_OVER" "a fault's cause is gone; it waits to be acknowledged";
+        11 FaultOver "FAULT_OVER" "a fault occurred; no cause is present, and the drive waits for FAULT_ACK";
         12 IclWait "ICLWAIT" "waiting for the inrush current limiter";
         13 AlignChargeBootCap "ALIGN_CHARGE_BOOT_CAP" "charging boot capacitors before alignment";
         14 AlignOffsetCalib "ALIGN_OFFSET_CALIB" "calibrating current offsets before alignment";

@@ -7,7 +7,7 @@ use super::{Bad, ErrorCode, Profile};
 pub enum ExchangeError {
     /// The drive refused the request.
     Refused(ErrorCode),
-    /// There is no reply that can be trusted. It is unknown whether the drive carried out the
+    /// No reply can be trusted. It is unknown whether the drive carried out the
     /// request.
     Failed(Failure),
 }

@@ -22,7 +22,6 @@ use super::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
 /// * an overshoot of the drive's regulator, and a motor that was already running;
 /// * a start after a reset of the drive that is not visible on the line, such as a power cycle
 ///   between the ramp and the start.
-///   and the start can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
     /// Maximum speed in either direction, rpm.
@@ -56,6 +55,12 @@ pub enum LimitError {
     Position {
         /// The speed limit, rpm.
         limit_rpm: u32,
+    },
+    /// A read of a data segment that was not configured since the port was opened. Shipped firmware
+    /// reads its frame as a torque ramp (docs/SPEC-NOTES.md S7, S18). Refused without limits, too.
+    NotConfigured {
+        /// The segment.
+        segment: u8,
     },
     /// A start whose target speed is unknown.
     NoRamp {
@@ -198,11 +203,15 @@ impl fmt::Display for LimitError {
                 "a position command carries no speed to hold to the limit of {limit_rpm} rpm that was \
                  set; nothing was sent; use speed ramps, or set no speed limit"
             ),
+            LimitError::NotConfigured { segment } => write!(
+                f,
+                "data segment {segment} was not configured since the port was opened. Shipped firmware \
+                 reads this request as a torque ramp, so nothing was sent; configure the segment first"
+            ),
             LimitError::NoRamp { limit_rpm } => write!(
                 f,
-                "a start goes to the drive's own speed unless a ramp within the limit of {limit_rpm} rpm \
-                 was acknowledged before; nothing was sent; first set a ramp within the limit, for this \
-                 motor by its number"
+                "with a speed limit of {limit_rpm} rpm a start needs a speed ramp within the limit, sent \
+                 before through the same connection and to the same motor number; nothing was sent"
             ),
         }
     }

@@ -46,6 +46,17 @@ pub struct RevupPhase {
     pub duration_ms: u16,
 }
 
+impl Ramp {
+    /// The highest speed that a drive can hold, rpm: 32767 digits of 0.1 Hz (SPEC-NOTES S12, S41). A
+    /// higher one becomes another speed in shipped firmware.
+    pub const MAX_SPEED_RPM: i32 = 32_767 * 6;
+
+    /// Whether a drive can hold the speed.
+    pub const fn is_possible(&self) -> bool {
+        self.speed_rpm.unsigned_abs() <= Self::MAX_SPEED_RPM.unsigned_abs()
+    }
+}
+
 /// SET_POSITION_CMD (profile `mcsdk-5.4`, SPEC-NOTES S8).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionMove {
@@ -342,6 +353,8 @@ const VERSION_SIZE: usize = 32;
 pub struct BoardInfo<'a> {
     /// Major, minor, patch. Shipped firmware sends ASCII digits; they are converted to numbers.
     pub version: [u8; 3],
+    /// The profile that has this form of the version (SPEC-NOTES S13).
+    pub profile: Profile,
     /// Name of the SDK.
     pub name: &'a str,
 }
@@ -352,8 +365,11 @@ impl<'a> BoardInfo<'a> {
     pub fn decode(payload: &'a [u8]) -> Option<Self> {
         let &[a, b, c, ref name @ ..] = payload else { return None };
         let raw = [a, b, c];
-        let version = if raw.iter().all(u8::is_ascii_digit) { raw.map(|b| b & 0x0F) } else { raw };
-        Some(BoardInfo { version, name: text(name) })
+        let (version, profile) = match raw.iter().all(u8::is_ascii_digit) {
+            true => (raw.map(|b| b & 0x0F), Profile::Mcsdk54),
+            false => (raw, Profile::Spec),
+        };
+        Some(BoardInfo { version, profile, name: text(name) })
     }
 
     /// Encodes the reply of a drive of `profile`: version bytes as integers or as ASCII digits.

@@ -66,9 +66,11 @@ mod account;
 mod arrival;
 mod code;
 mod command;
+mod confirm;
 mod drive;
 mod failure;
 mod frame;
+mod full_scale;
 mod limits;
 mod master;
 pub mod message;
@@ -76,21 +78,25 @@ mod payload;
 pub mod register;
 mod slave;
 mod started;
+mod starting;
 #[cfg(feature = "std")]
 mod value;
 mod verified;
 
 pub use account::Account;
 pub use arrival::{
-    ARRIVAL_SPARE_TIME, ARRIVAL_TOLERANCE_RAD, ArrivalStep, ArrivalWatch, NotArrived,
+    ARRIVAL_SPARE_TIME, ARRIVAL_TOLERANCE_RAD, AbortReason, ArrivalSampler, ArrivalWatch,
+    NotArrived,
 };
 pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
     NoSuchProfile, Profile, Status,
 };
+pub use confirm::{Confirmation, LastExchange};
 pub use drive::{MotorControl, MotorNumber};
 pub use failure::{ExchangeError, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
+pub use full_scale::{FullScale, InvalidFullScale};
 pub use limits::{LimitError, Limits};
 pub use master::{
     Counters, Master, MasterConfig, Output, Recovery, RequestError, SyncState, TIMEOUT,
@@ -103,6 +109,7 @@ pub use message::{
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
 pub use started::{Effect, Started};
+pub use starting::{NotStarted, Starting};
 #[cfg(feature = "std")]
 pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

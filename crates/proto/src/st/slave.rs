@@ -76,7 +76,7 @@ impl Slave {
 
     /// Returns the NACK TIMEOUT for a command that was not complete in time (4.1).
     pub fn poll(&mut self, now: Instant) -> Option<&[u8]> {
-        if self.deadline.is_none_or(|deadline| now < deadline) {
+        if self.deadline.is_none_or(|deadline| !deadline.is_over(RECEPTION_TIMEOUT, now)) {
             return None;
         }
         self.restart();

@@ -23,18 +23,15 @@ pub enum Effect {
     Supersedes,
     /// It may reset the drive.
     Resets,
+    /// It configures this data segment.
+    Configures(u8),
 }
 
 impl Effect {
     /// The effect of a request.
     pub fn of(request: &Request<'_>) -> Self {
         match request {
-            Request::ExecuteCommand(command) => match command {
-                Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
-                Command::StopMotor | Command::ScStop => Effect::Stops,
-                Command::Reset => Effect::Resets,
-                _ => Effect::None,
-            },
+            Request::ExecuteCommand(command) => Effect::of_command(*command),
             Request::SetRegister { register, .. } => match *register {
                 RegisterId::TARGET_MOTOR => Effect::Retargets,
                 RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
@@ -45,10 +42,36 @@ impl Effect {
                 _ => Effect::None,
             },
             Request::SetRamp(_) => Effect::Ramps,
+            Request::ConfigureSegment { segment, .. } => Effect::Configures(*segment),
             Request::SetCurrentReference(_)
             | Request::SetTorqueRamp(_)
             | Request::SetPosition(_) => Effect::Supersedes,
             _ => Effect::None,
+        }
+    }
+
+    /// The effect of EXECUTE_CMD.
+    const fn of_command(command: Command) -> Self {
+        match command {
+            Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
+            Command::StopMotor | Command::ScStop => Effect::Stops,
+            Command::Reset => Effect::Resets,
+            _ => Effect::None,
+        }
+    }
+
+    /// Whether a request stops a motor.
+    pub(super) fn stops(request: &Request<'_>) -> bool {
+        matches!(request, Request::ExecuteCommand(command) if Self::of_command(*command) == Effect::Stops)
+    }
+
+    /// Whether a raw frame stops a motor.
+    pub(super) fn frame_stops(frame: &Frame<'_>) -> bool {
+        match frame.payload {
+            [command, ..] if frame.code() == FrameCode::ExecuteCmd.number() => {
+                Self::of_command(Command::from(*command)) == Effect::Stops
+            }
+            _ => false,
         }
     }
 

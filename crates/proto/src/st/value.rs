@@ -117,6 +117,16 @@ impl Reading {
         }
     }
 
+    /// The same bits read in the other profile, if the value is not plausible in this one: the
+    /// document has a temperature or a power without a sign, shipped firmware sends it with one.
+    pub fn more_plausible(&self) -> Option<Reading> {
+        let shape = self.register.shape()?;
+        let profile = self.profile.other();
+        let is_signed_there = (shape.ty(self.profile), shape.ty(profile)) == (Type::U16, Type::I16);
+        let bits = (self.bits as u16).cast_signed();
+        (is_signed_there && bits < 0).then_some(Reading { bits: bits.into(), profile, ..*self })
+    }
+
     /// Number of decimal places that show every value exactly; `None` for a float.
     pub fn decimals(&self) -> Option<u8> {
         let is_float = self.ty() == Some(Type::F32);
@@ -127,6 +137,12 @@ impl Reading {
     /// Symbol of the physical unit; empty when there is none.
     pub fn unit(&self) -> &'static str {
         unit(self.register).quantity()
+    }
+
+    /// Whether the value is a current in digits of the drive, which a [`FullScale`](super::FullScale)
+    /// converts to A.
+    pub fn is_current(&self) -> bool {
+        unit(self.register) == Unit::S16A
     }
 
     /// The name of the value, for registers whose values have names.
@@ -205,7 +221,13 @@ pub fn parse_value(
     if (digits - digits.round()).abs() > 1e-6 {
         return Err(ValueError::Between { text, register, step: scale, unit: symbol });
     }
-    Ok(digits.round() as i64 as i32)
+    let bits = digits.round() as i64 as i32;
+    // A drive acknowledges another mode and ignores it (docs/SPEC-NOTES.md S15).
+    let is_mode = || ControlMode::ALL.iter().any(|&mode| i32::from(u8::from(mode)) == bits);
+    if unit(register) == Unit::ControlMode && !is_mode() {
+        return Err(not_a_value());
+    }
+    Ok(bits)
 }
 
 fn range(ty: Option<Type>) -> (i64, i64) {
@@ -289,6 +311,9 @@ mod tests {
         assert_eq!(parse(RegisterId(0xC0), "0xFFFFFFFF"), Ok(-1));
         assert_eq!(parse(RegisterId(0xC0), "-1"), Ok(-1));
         assert_eq!(parse(RegisterId::CONTROL_MODE, "speed"), Ok(1));
+        assert_eq!(parse(RegisterId::CONTROL_MODE, "1"), Ok(1));
+        let unknown = parse(RegisterId::CONTROL_MODE, "7").unwrap_err();
+        assert!(unknown.to_string().contains("TORQUE and SPEED are"), "{unknown}");
         assert_eq!(parse(RegisterId::DAC_OUT2, "I_ALPHA"), Ok(0x25));
         let tenths = parse_value(RegisterId::FLUXWK_BUS, "98.5", Profile::Mcsdk54, false);
         assert_eq!(tenths, Ok(985));

@@ -132,6 +132,11 @@ impl LinePort for Device {
     }
 
     fn at_baud(&self, baud: u32) -> Option<PortName> {
+        // A pty accepts each rate and has none.
+        let is_pty = self.path.canonicalize().is_ok_and(|path| path.starts_with("/dev/pts"));
+        if is_pty {
+            return None;
+        }
         Some(PortName::new(Device { baud, ..self.clone() }))
     }
 }

@@ -10,9 +10,6 @@ pub const TIMEOUT: Micros = Micros::from_millis(1_000);
 /// How the master recovers a lost line (SPEC-NOTES S16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Recovery {
-    /// No recovery: the line counts as in sync until it is lost.
-    /// [`Master::trust_line`](super::Master::trust_line) declares it in sync again.
-    None,
     /// Before the next request: wait for silence, then send a question whose reply cannot be
     /// confused with the reply to the lost request. Continue after the answer and another silence.
     /// Late replies are dropped if they come in order and at most twice the timeout late.
@@ -22,11 +19,14 @@ pub enum Recovery {
     /// waiting for. If the lost request was not a read, the padding may have completed it, so a
     /// STOP_MOTOR is sent before the question.
     Pad,
+    /// No recovery: the line counts as in sync until it is lost.
+    /// [`Master::trust_line`](super::Master::trust_line) declares it in sync again.
+    None,
 }
 
 impl Recovery {
     /// All modes.
-    pub const ALL: [Recovery; 3] = [Recovery::None, Recovery::Drain, Recovery::Pad];
+    pub const ALL: [Recovery; 3] = [Recovery::Drain, Recovery::Pad, Recovery::None];
 }
 
 /// Configuration of a [`Master`](super::Master).

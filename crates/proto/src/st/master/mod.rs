@@ -12,9 +12,10 @@ mod scan;
 
 pub use config::{MasterConfig, Recovery, TIMEOUT};
 pub use question::question_behind;
+pub(super) use question::{question_with_answer, size_behind};
 pub use resync::SyncState;
 
-use super::{ExchangeError, Failure, Frame, FrameCode, Profile, Request};
+use super::{Effect, ExchangeError, Failure, Frame, FrameCode, Profile, Request};
 use crate::time::Instant;
 use exchange::{Exchange, Received};
 use resync::{Resync, Stage, Step, Summary};
@@ -26,7 +27,7 @@ pub enum Output<'a> {
     Transmit(&'a [u8]),
     /// The exchange is over. The payload of the positive acknowledge, or the error.
     Done(Result<&'a [u8], ExchangeError>),
-    /// Pass received bytes until this time; `None` while there is no exchange.
+    /// Pass received bytes until this time. `None` if no exchange is open.
     Wait(Option<Instant>),
 }
 
@@ -115,17 +116,20 @@ impl Master {
     }
 
     /// Starts an exchange: `request` for motor number `motor`; 0 is the current motor (3.2).
+    ///
+    /// A request that stops a motor ([`Effect::Stops`]) is sent at once, also on a lost line. After
+    /// the recovery it is sent again, and only the reply to that counts.
     pub fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), RequestError> {
         if self.state != State::Idle {
             return Err(RequestError::Busy);
         }
         let stored = self.exchange.store(motor, request, self.config.profile);
         stored.ok_or(RequestError::TooLong)?;
-        self.begin(Summary::new(motor, Some(request.code())));
+        self.begin(Summary::new(motor, Some(request.code())), Effect::stops(request));
         Ok(())
     }
 
-    /// Starts an exchange with any header and payload, also unknown ones.
+    /// Like [`request`](Self::request), with any header and payload, also unknown ones.
     pub fn request_raw(&mut self, header: u8, payload: &[u8]) -> Result<(), RequestError> {
         if self.state != State::Idle {
             return Err(RequestError::Busy);
@@ -138,28 +142,20 @@ impl Master {
         let is_read = known.is_some_and(FrameCode::is_read) && other.is_none_or(FrameCode::is_read);
         let mut request = Summary::new(frame.motor(), known);
         request.is_read = is_read;
-        self.begin(request);
+        self.begin(request, Effect::frame_stops(&frame));
         Ok(())
     }
 
     // Inlining this into both kinds of request takes more flash, as for `lose`.
     #[inline(never)]
-    fn begin(&mut self, request: Summary) {
+    fn begin(&mut self, request: Summary, stops: bool) {
         self.request = request;
         self.state = match (self.sync_state(), Stage::first(self.config.recovery)) {
             (SyncState::InSync, _) => State::Send,
             (SyncState::Lost, Some(stage)) => State::Recovering(stage),
             (SyncState::Lost, None) => State::Done(Err(ExchangeError::Failed(Failure::Lost))),
         };
-    }
-
-    /// Sends the request that was just started at once, also on a lost line. After the recovery it
-    /// is sent again, and only the reply to that counts. For requests that stop a motor.
-    pub fn send_ahead(&mut self) {
-        self.is_ahead = matches!(
-            self.state,
-            State::Recovering(_) | State::Done(Err(ExchangeError::Failed(Failure::Lost)))
-        );
+        self.is_ahead = stops && !matches!(self.state, State::Send);
     }
 
     /// Cancels the open exchange. Its reply may still come, so the line is lost.
@@ -182,7 +178,7 @@ impl Master {
     /// caller guarantees that there are none.
     pub fn reopened(&mut self) {
         match self.config.recovery {
-            Recovery::None => self.resync.in_step(),
+            Recovery::None => self.resync.in_sync(),
             Recovery::Drain | Recovery::Pad => {
                 self.lose();
                 self.resync.forget();
@@ -193,7 +189,7 @@ impl Master {
 
     /// Declares that there are no pending replies: no request was sent on this line before.
     pub fn trust_line(&mut self) {
-        self.resync.in_step();
+        self.resync.in_sync();
         self.end();
     }
 
@@ -230,8 +226,11 @@ impl Master {
                 self.state = State::Waiting { deadline };
                 Output::Wait(Some(deadline))
             }
-            State::Waiting { deadline } if now < *deadline => Output::Wait(Some(*deadline)),
-            State::Waiting { .. } => {
+            State::Waiting { deadline } => {
+                let deadline = *deadline;
+                if !deadline.is_over(self.config.timeout, now) {
+                    return Output::Wait(Some(deadline));
+                }
                 self.lose();
                 self.state = State::Idle;
                 Output::Done(Err(ExchangeError::Failed(self.exchange.timeout())))

@@ -20,10 +20,29 @@ pub(super) const FLAGS: u8 = 8;
 /// answer. The two sizes differ, so the answer shows whether replies match requests. `turn`
 /// alternates from question to question; consecutive answers also have different sizes.
 pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'static>, usize) {
+    let size = match size {
+        Some(size) if size <= u8::MAX as usize => Some(size as u8),
+        _ => None,
+    };
+    let answer = size_behind(size, turn);
+    (question_with_answer(answer), answer as usize)
+}
+
+/// The answer size of [`question_behind`].
+pub const fn size_behind(size: Option<u8>, turn: bool) -> u8 {
     match (size, turn) {
-        (Some(1 | 4), true) => (Request::GetBoardInfo, 32),
-        (Some(1), false) | (_, true) => (Request::GetRegister(RegisterId::FLAGS), 4),
-        _ => (Request::GetRegister(RegisterId::STATUS), 1),
+        (Some(1 | 4), true) => 32,
+        (Some(1), false) | (_, true) => 4,
+        _ => 1,
+    }
+}
+
+/// The question of [`question_behind`] with an answer of this size.
+pub const fn question_with_answer(size: u8) -> Request<'static> {
+    match size {
+        1 => Request::GetRegister(RegisterId::STATUS),
+        4 => Request::GetRegister(RegisterId::FLAGS),
+        _ => Request::GetBoardInfo,
     }
 }
 
@@ -139,7 +158,7 @@ impl Question {
         self.echoed == self.size
     }
 
-    /// The failure if there is no answer.
+    /// The failure without an answer.
     pub(super) fn failure(&self) -> Failure {
         match self.scan.taken() {
             0 => self.trouble.unwrap_or(Failure::Timeout),

@@ -4,7 +4,7 @@
 use super::config::{MasterConfig, Recovery, TIMEOUT};
 use super::question::{FLAGS, INFO, PADDING, Question, REVUP, STATUS};
 use crate::st::{Failure, FrameCode};
-use crate::time::Instant;
+use crate::time::{Instant, Micros};
 
 /// Whether the line is in sync.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,7 +123,7 @@ impl Resync {
     }
 
     /// Declares that there are no pending replies.
-    pub(super) fn in_step(&mut self) {
+    pub(super) fn in_sync(&mut self) {
         self.line = SyncState::InSync;
         self.is_known = true;
         self.outstanding = 0;
@@ -166,23 +166,20 @@ impl Resync {
                 *stage = Stage::Settle(then);
                 Step::Transmit(&PADDING)
             }
-            Stage::Settle(then) => {
-                let until = now + config.quiet;
-                *stage = Stage::quiet(until, then, config);
-                Step::Wait(until)
-            }
-            Stage::Quiet { until, limit, .. } if now < until && now < limit => {
+            Stage::Settle(then) => settle(stage, now, then, config),
+            Stage::Quiet { until, limit, then } => {
+                if now >= until {
+                    return self.after_silence(stage, then);
+                }
+                if now >= limit {
+                    return Step::Failed(Failure::Noise);
+                }
+                if limit.is_over(longest(config), now) {
+                    // The clock was set back.
+                    let then = if then == Then::Send { Then::Probe } else { then };
+                    return settle(stage, now, then, config);
+                }
                 Step::Wait(until.min(limit))
-            }
-            Stage::Quiet { until, .. } if now < until => Step::Failed(Failure::Noise),
-            Stage::Quiet { then: Then::Stop, .. } => {
-                *stage = Stage::Settle(Then::Probe);
-                Step::Transmit(self.question.stop(self.lost.motor))
-            }
-            Stage::Quiet { then: Then::Probe, .. } => self.probe(stage, self.next_question()),
-            Stage::Quiet { then: Then::Send, .. } => {
-                self.in_step();
-                Step::Done
             }
             Stage::Probe(question) => self.probe(stage, question),
             Stage::Probed => {
@@ -190,15 +187,30 @@ impl Resync {
                 Step::Wait(now + config.timeout)
             }
             Stage::Answer { .. } if self.question.is_echo() => Step::Failed(Failure::Echo),
-            Stage::Answer { sent } if now < sent + config.timeout => {
-                Step::Wait(sent + config.timeout)
-            }
-            Stage::Answer { .. } => {
+            Stage::Answer { sent } => {
+                let deadline = sent + config.timeout;
+                if !deadline.is_over(config.timeout, now) {
+                    return Step::Wait(deadline);
+                }
                 self.outstanding |= self.question.kind();
                 Step::Failed(match self.is_known {
                     true => Failure::Lost,
                     false => self.question.failure(),
                 })
+            }
+        }
+    }
+
+    fn after_silence(&mut self, stage: &mut Stage, then: Then) -> Step<'_> {
+        match then {
+            Then::Stop => {
+                *stage = Stage::Settle(Then::Probe);
+                Step::Transmit(self.question.stop(self.lost.motor))
+            }
+            Then::Probe => self.probe(stage, self.next_question()),
+            Then::Send => {
+                self.in_sync();
+                Step::Done
             }
         }
     }
@@ -263,8 +275,9 @@ impl Resync {
         if !is_answered || self.question.is_echo() {
             return None;
         }
-        let is_prompt =
-            self.question.is_alone() && self.outstanding == 0 && now < sent + config.quiet;
+        let is_prompt = self.question.is_alone()
+            && self.outstanding == 0
+            && !(sent + config.quiet).is_over(config.quiet, now);
         let is_own = match self.question.kind() {
             kind if self.is_known => received.answers > 0 && self.outstanding & kind == 0,
             INFO if is_prompt => return Some(Stage::Probe(STATUS)),
@@ -280,4 +293,17 @@ impl Resync {
         let until = if is_own { now } else { expired };
         Some(Stage::quiet(until.max(now + config.quiet), Then::Send, config))
     }
+}
+
+/// Begins to wait for silence.
+#[inline(never)]
+fn settle<'a>(stage: &mut Stage, now: Instant, then: Then, config: &MasterConfig) -> Step<'a> {
+    let until = now + config.quiet;
+    *stage = Stage::quiet(until, then, config);
+    Step::Wait(until)
+}
+
+/// The longest wait for silence, with its limit.
+fn longest(config: &MasterConfig) -> Micros {
+    config.timeout + config.timeout + config.quiet
 }

@@ -55,6 +55,15 @@ impl RegisterId {
         }
     }
 
+    /// Whether `value` is in the range of the register's type. An unknown register takes every
+    /// value; of 32 bits without sign, `value` has the bits.
+    pub fn holds(self, profile: Profile, value: i32) -> bool {
+        let Some(shape) = self.shape() else { return true };
+        let size = usize::from(self.write_size(profile).min(shape.ty(profile).size()));
+        let bytes = value.to_le_bytes();
+        bytes.get(..size).and_then(|bytes| self.decode(profile, bytes)) == Some(value)
+    }
+
     /// Every register of the table, in the order of the ids.
     pub fn all() -> impl Iterator<Item = RegisterId> {
         IDS.into_iter()

@@ -146,7 +146,7 @@ registers! {
     0x3E DAC_USER2: i16, None, Dac, Dac, Table3, "User value of DAC channel 2";
     0x3F MAX_APP_SPEED: u32, Rpm, ReadOnly, Core, Table3 mcsdk(0, 0), "Highest speed of the application";
     0x40 MIN_APP_SPEED: u32, Rpm, ReadOnly, Core, Table3 mcsdk(0, 0), "Lowest speed of the application";
-    0x41 IQ_SPEEDMODE: i16, S16A, WriteOnly, Core, Table3 mcsdk(16, 16), "Id reference in speed mode";
+    0x41 IQ_SPEEDMODE: i16, S16A, WriteOnly, Core, Table3 mcsdk(16, 16), "Id reference in speed mode; the document also says Iq (S22)";
     0x42 EST_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverPll, Table3 mcsdk(0, 0), "Expected back-EMF level (PLL)";
     0x43 OBS_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverPll, Table3 mcsdk(0, 0), "Observed back-EMF level (PLL)";
     0x44 EST_CR_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverCordic, Table3 mcsdk(0, 0), "Expected back-EMF level (CORDIC)";

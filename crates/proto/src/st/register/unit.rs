@@ -13,7 +13,7 @@ macro_rules! units {
         pub enum Unit { $( #[doc = concat!("`", $symbol, "`")] $name, )+ }
 
         impl Unit {
-            /// The symbol to print after a value; empty if there is none.
+            /// The symbol of one digit in profile `spec`; empty if there is none.
             pub const fn symbol(self) -> &'static str {
                 match self { $( Unit::$name => $symbol, )+ }
             }
@@ -69,6 +69,14 @@ impl Unit {
             Unit::DeciHertz => 0.1,
             Unit::Percent if profile == Profile::Mcsdk54 => 0.1,
             _ => 1.0,
+        }
+    }
+
+    /// The symbol of the unit of one digit.
+    pub const fn symbol_in(self, profile: Profile) -> &'static str {
+        match (self, profile) {
+            (Unit::Percent, Profile::Mcsdk54) => "0.1 %",
+            _ => self.symbol(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! When a commanded position is reached. Positions and times are arguments.
+//! Judges samples of a position.
 
 use crate::time::{Instant, Micros};
 
@@ -115,6 +115,11 @@ impl Arrival {
     /// Sets the time at which the wait ends.
     pub fn set_until(&mut self, until: Instant) {
         self.criteria.until = until;
+    }
+
+    /// Sets the time before which the motor cannot have arrived.
+    pub fn set_not_before(&mut self, not_before: Instant) {
+        self.criteria.not_before = not_before;
     }
 
     /// Forgets the samples that may be older than they looked.
