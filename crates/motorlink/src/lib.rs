@@ -13,6 +13,7 @@
 //! | stop the motors of another program when it ends | [`relay::Relay`] |
 #![forbid(unsafe_code)]
 
+pub mod arrival;
 pub mod relay;
 pub mod rmd;
 pub mod st;

@@ -2,16 +2,25 @@
 
 use std::time::Duration;
 
+use motorlink_link::Clock;
 use motorlink_link::reopening::LinkState;
+use motorlink_proto::time::Micros;
 
-/// How often a motor is told to stop before that is given up.
-pub(crate) const STOP_ATTEMPTS: u32 = 4;
-/// The longest wait for a port to come back before the next attempt.
+/// The number of STOP commands before a stop has failed.
+pub const STOP_ATTEMPTS: u32 = 4;
+/// How long a stop of RMD motors is repeated, and at least [`STOP_ATTEMPTS`] times.
+pub const STOP_TIME: Micros = Micros::from_millis(2_000);
+/// The longest wait for a lost port before the next attempt.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Waits until a closed port may be opened again, though not for long; whether it is closed.
-pub(crate) fn await_retry(state: LinkState) -> bool {
-    let LinkState::Closed { retry_in } = state else { return false };
-    std::thread::sleep(retry_in.min(PATIENCE));
-    true
+/// The pause before the next attempt on an open port. A reply that is still on its way arrives in it.
+const PAUSE: Micros = Micros::from_millis(10);
+
+/// Waits before the next attempt. If the port is closed: until it may be opened again, though not
+/// for long.
+pub(crate) fn await_retry(state: LinkState, clock: &Clock) {
+    match state {
+        LinkState::Closed { retry_in } => std::thread::sleep(retry_in.min(PATIENCE)),
+        LinkState::Open => clock.wait(clock.now() + PAUSE),
+    }
 }

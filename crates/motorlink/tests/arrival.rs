@@ -1,10 +1,16 @@
 //! Moves that end when the motor has arrived, on virtual time.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use motorlink::Clock;
+use motorlink::arrival::Move;
+use motorlink::can::CanFrame;
+use motorlink::port::{CanLink, Link, PortError};
 use motorlink::rmd::{
-    self, ArrivalOptions, CentiDegrees, FullTurn, NotArrived, SpeedLimit, SpinDirection,
-    TurnCentiDegrees,
+    self, AbortReason, ArrivalOptions, CentiDegrees, DpsPerSecond, FullTurn, NotArrived,
+    SpeedLimit, SpinDirection, TurnCentiDegrees,
 };
 use motorlink::st::{self, PositionMove, Profile};
 use motorlink_link::fault::Faults;
@@ -24,6 +30,11 @@ fn rmd(bench: &Bench, faults: &str) -> rmd::Client {
 fn st(bench: &Bench) -> st::Client {
     let options = st::Options { profile: Profile::Mcsdk54, ..st::Options::default() };
     st::Client::over("bench", bench.bytes(&Faults::NONE), options)
+}
+
+fn prepared<'a>(motor: &rmd::Motor<'a>, degrees: f64) -> Result<Move<rmd::Motor<'a>>, rmd::Error> {
+    let target = rmd::Target::MultiTurn(CentiDegrees::from_degrees(degrees));
+    motor.prepare_move(target, MAX_SPEED, ArrivalOptions::default())
 }
 
 fn command(bench: &Bench, text: &str) {
@@ -60,7 +71,7 @@ fn a_motor_is_at_its_target_when_the_move_returns() {
 fn a_creeping_motor_has_not_arrived_before_it_is_still() {
     let bench = bench();
     let bus = rmd(&bench, "");
-    let options = ArrivalOptions { tolerance: CentiDegrees(200), timeout: None };
+    let options = ArrivalOptions { tolerance: Some(CentiDegrees(200)), timeout: None };
     let move_to =
         |angle| bus.motor(1).unwrap().set_position_and_wait(angle, Some(SpeedLimit(1)), options);
     move_to(CentiDegrees(300)).unwrap();
@@ -138,11 +149,11 @@ fn a_motor_that_is_switched_off_on_its_way_has_not_arrived() {
     let (bus, other) = (rmd(&bench, ""), rmd(&bench, ""));
     let motor = bus.motor(1).unwrap();
     let target = CentiDegrees(36_000);
+    let moved = prepared(&motor, 360.0).unwrap();
     motor.set_position(target, MAX_SPEED).unwrap();
     bench.run(motorlink::time::Micros::from_millis(300));
     other.motor(1).unwrap().off().unwrap();
-    let target = rmd::Target::MultiTurn(target);
-    let error = motor.wait_for_arrival(target, MAX_SPEED, ArrivalOptions::default()).unwrap_err();
+    let error = moved.wait().unwrap_err();
     assert!(matches!(error, rmd::Error::NotArrived { .. }), "{error}");
 }
 
@@ -153,12 +164,12 @@ fn on_a_bad_line_a_motor_that_arrived_is_there() {
             let bench = bench();
             let bus = rmd(&bench, &format!("{faults},seed={seed}"));
             let motor = bus.motor(1).unwrap();
+            let Ok(moved) = prepared(&motor, 180.0) else { continue };
             // A command whose reply is lost is an error, and tells nothing about the motor.
             if motor.set_position(CentiDegrees(18_000), MAX_SPEED).is_err() {
                 continue;
             }
-            let target = rmd::Target::MultiTurn(CentiDegrees(18_000));
-            match motor.wait_for_arrival(target, MAX_SPEED, ArrivalOptions::default()) {
+            match moved.wait() {
                 Ok(_) => assert!(stays_at(&bench, 180.0), "{faults} {seed}"),
                 Err(error) => panic!("{faults} {seed}: {error}"),
             }
@@ -166,14 +177,104 @@ fn on_a_bad_line_a_motor_that_arrived_is_there() {
     }
 }
 
+/// A bus that loses all replies once `is_mute` is set.
+struct Mute {
+    bus: Box<dyn CanLink>,
+    is_mute: Arc<AtomicBool>,
+}
+
+impl Link for Mute {
+    fn clock(&self) -> Option<Clock> {
+        self.bus.clock()
+    }
+}
+
+impl CanLink for Mute {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.bus.send(frame)
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let received = self.bus.receive(timeout)?;
+        Ok(received.filter(|_| !self.is_mute.load(Ordering::Relaxed)))
+    }
+}
+
 #[test]
 fn a_motor_that_falls_silent_is_an_error_of_the_line() {
     let bench = bench();
-    let bus = rmd(&bench, "drop=1,only=received");
-    let motor = bus.motor(1).unwrap();
-    let target = rmd::Target::MultiTurn(CentiDegrees(9_000));
-    let error = motor.wait_for_arrival(target, MAX_SPEED, ArrivalOptions::default()).unwrap_err();
+    let is_mute = Arc::new(AtomicBool::new(false));
+    let mute = Mute { bus: bench.can(&Faults::NONE), is_mute: Arc::clone(&is_mute) };
+    let bus = rmd::Client::over("bench", Box::new(mute), rmd::Options::default());
+    let moved = prepared(&bus.motor(1).unwrap(), 90.0).unwrap();
+    is_mute.store(true, Ordering::Relaxed);
+    let error = moved.wait().unwrap_err();
     assert!(error.is_line_failure(), "{error}");
+}
+
+/// Moves to 0° within the turn, from `degrees`, with a low acceleration. Returns whether the motor made a
+/// full turn, and the result of the wait.
+fn full_turn_from(degrees: f64, before: &str) -> (bool, Result<rmd::Arrived, rmd::Error>) {
+    let bench = bench();
+    let bus = rmd(&bench, "");
+    let motor = bus.motor(1).unwrap();
+    let angle = CentiDegrees::from_degrees(degrees);
+    motor.set_position_and_wait(angle, None, ArrivalOptions::default()).unwrap();
+    bench.run(motorlink::time::Micros::from_millis(1_000));
+    motor.write_acceleration_ram(DpsPerSecond(20)).unwrap();
+    if !before.is_empty() {
+        command(&bench, before);
+    }
+    let begin = value(&bench, "rmd1.output_degrees");
+    let (zero, options) = (TurnCentiDegrees(0), ArrivalOptions::default());
+    let result = motor.set_single_turn_position_and_wait(
+        zero,
+        SpinDirection::Clockwise,
+        MAX_SPEED,
+        FullTurn::Allowed,
+        options,
+    );
+    (value(&bench, "rmd1.output_degrees") - begin > 359.0, result)
+}
+
+#[test]
+fn a_full_turn_that_begins_slowly_is_waited_for() {
+    for degrees in [0.06, 0.1, 5.0] {
+        let (is_turned, result) = full_turn_from(degrees, "");
+        assert!(result.is_ok() && (is_turned || degrees > 1.0), "{degrees}: {result:?}");
+    }
+}
+
+#[test]
+fn a_motor_that_is_held_just_past_its_target_has_not_arrived() {
+    let held = r#"{"command":"lock-rotor","port":"rmd","motor":1,"locked":true}"#;
+    let (is_turned, result) = full_turn_from(0.1, held);
+    let error = result.unwrap_err();
+    let is_right = matches!(error, rmd::Error::NotArrived { why: NotArrived::Stalled { .. }, .. });
+    assert!(is_right && !is_turned, "{error}");
+}
+
+#[test]
+fn a_motor_that_loses_its_supply_on_its_way_has_not_arrived() {
+    let bench = bench();
+    let bus = rmd(&bench, "");
+    let motor = bus.motor(1).unwrap();
+    motor.set_position_and_wait(CentiDegrees(72_000), None, ArrivalOptions::default()).unwrap();
+    let slow = Some(SpeedLimit(10));
+    let options = ArrivalOptions::default();
+    let target = rmd::Target::MultiTurn(CentiDegrees(0));
+    let moved = motor.prepare_move(target, slow, options).unwrap();
+    motor.set_position(CentiDegrees(0), slow).unwrap();
+    command(&bench, r#"{"command":"power-cycle","port":"rmd","motor":1}"#);
+    let error = moved.wait().unwrap_err();
+    let is_right = matches!(
+        error,
+        rmd::Error::NotArrived {
+            why: NotArrived::Aborted { reason: AbortReason::LostTurns { .. }, .. },
+            ..
+        }
+    );
+    assert!(is_right, "{error}");
 }
 
 #[test]
@@ -197,7 +298,10 @@ fn an_st_motor_that_is_not_running_is_sent_no_move() {
     let motor = client.motor(2).unwrap();
     let target = PositionMove { angle_rad: 3.0, duration_s: 0.5 };
     let refused = motor.set_position_and_wait(target, st::ArrivalOptions::default()).unwrap_err();
-    assert_eq!(refused.to_string(), "motor 2 did not arrive: the motor is in IDLE, not in RUN");
+    assert_eq!(
+        refused.to_string(),
+        "motor 2 did not arrive: the motor is in IDLE, not in RUN; the move was not sent"
+    );
     motor.start().unwrap();
     bench.run(motorlink::time::Micros::from_millis(3_000));
     assert_eq!(motor.get(st::register::TARGET_POSITION).unwrap(), 0.0);
@@ -210,11 +314,17 @@ fn an_st_motor_that_is_stopped_on_its_way_has_not_arrived() {
     let motor = client.motor(2).unwrap();
     motor.start().unwrap();
     let target = PositionMove { angle_rad: 30.0, duration_s: 5.0 };
+    let moved = motor.prepare_move(target, st::ArrivalOptions::default()).unwrap();
     motor.set_position(target).unwrap();
     bench.run(motorlink::time::Micros::from_millis(2_000));
     other.motor(2).unwrap().stop().unwrap();
-    let error = motor.wait_for_arrival(target, st::ArrivalOptions::default()).unwrap_err();
-    let is_right =
-        matches!(error, st::Error::NotArrived { why: st::NotArrived::NotRunning { .. }, .. });
+    let error = moved.wait().unwrap_err();
+    let is_right = matches!(
+        error,
+        st::Error::NotArrived {
+            why: st::NotArrived::Aborted { reason: st::AbortReason::NotRunning(_), .. },
+            ..
+        }
+    );
     assert!(is_right, "{error}");
 }

@@ -1,4 +1,4 @@
-//! What happens to ports in real life: cables and adapters come out, reset, come back elsewhere.
+//! Ports that fail: cables and adapters are pulled, reset, and plugged in elsewhere.
 //! docs/HOST-FAULTS.md tells users what to expect.
 
 use std::fs::{self, File};
@@ -53,7 +53,7 @@ impl Device {
                 if !fds[1].revents().is_empty() {
                     return;
                 }
-                // Nobody has it open at the moment.
+                // The port is not open at the moment.
                 let Ok(size) = master.read(&mut bytes) else {
                     std::thread::sleep(Duration::from_millis(1));
                     continue;

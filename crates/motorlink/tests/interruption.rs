@@ -14,7 +14,7 @@ use motorlink::rmd::{self};
 use motorlink::st::{self, Error, Options, register};
 use served::Served;
 
-/// Whoever is in a hurry, and how often the port was opened.
+/// The flag that interrupts a call, and the number of times the port was opened.
 #[derive(Clone, Default)]
 struct Hurry(Arc<(AtomicBool, AtomicU32)>);
 
@@ -85,7 +85,7 @@ fn an_interrupted_exchange_leaves_the_line_open_and_the_next_one_right() {
         hurry.set(true);
         let error = motor.get(register::SPEED_KP).expect_err("no time");
         assert!(matches!(&error, Error::Port(port) if port.is_interruption()), "{error}");
-        assert!(!error.is_line_failure(), "nobody tries again for such a reason");
+        assert!(!error.is_line_failure(), "an interruption is no failure of the line");
         assert_eq!(client.link_state(), LinkState::Open);
         hurry.set(false);
         assert_eq!(motor.get(register::SPEED_KI).expect("an answer"), -7);

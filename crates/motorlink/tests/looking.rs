@@ -10,7 +10,7 @@ use std::time::Duration;
 use motorlink::can::CanFrame;
 use motorlink::port::PortError;
 use motorlink::rmd::{self};
-use motorlink::st::{self, register};
+use motorlink::st::{self, Command, register};
 use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 
 /// Longer than any test waits for a condition.
@@ -114,7 +114,8 @@ fn other_threads_wait_while_one_looks() {
     let client = Arc::new(client);
     let other = Arc::clone(&client);
     let sent = wire.clone();
-    let first = thread::spawn(move || client.motor(1).unwrap().start());
+    let start = Command::StartMotor;
+    let first = thread::spawn(move || client.motor(1).unwrap().execute(start));
     let second = thread::spawn(move || {
         while sent.sent().is_empty() {
             thread::yield_now();
@@ -165,7 +166,7 @@ fn an_error_of_the_look_interrupts_the_exchange_and_nothing_else() {
     let error = client.motor(1).unwrap().start().expect_err("no time");
     assert!(matches!(&error, st::Error::Port(port) if port.is_interruption()), "{error}");
     assert!(error.to_string().contains("enough"), "{error}");
-    assert!(!error.is_line_failure(), "nobody tries again for such a reason");
+    assert!(!error.is_line_failure(), "an interruption is no failure of the line");
     assert_eq!(client.link_state(), motorlink::LinkState::Open);
-    assert_eq!(client.started().count(), 1, "nobody knows whether it starts");
+    assert_eq!(client.started().count(), 1, "it is unknown whether it starts");
 }

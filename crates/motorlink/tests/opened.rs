@@ -97,7 +97,7 @@ impl CanLink for Motors {
 }
 
 #[test]
-fn a_cycle_brings_all_its_motors_in_step_at_once() {
+fn a_cycle_brings_all_its_motors_in_sync_at_once() {
     let motors = Motors::new(false);
     let bus = motors.bus();
     let ids = [1, 2, 9].map(|id| MotorId::new(id).unwrap());
@@ -113,7 +113,7 @@ fn a_cycle_brings_all_its_motors_in_step_at_once() {
 }
 
 #[test]
-fn torques_for_four_motors_are_sent_when_all_are_in_step() {
+fn torques_for_four_motors_are_sent_when_all_are_in_sync() {
     let motors = Motors::new(false);
     let bus = motors.bus();
     let ids: MotorSet = [1, 2, 4].into_iter().filter_map(MotorId::new).collect();
@@ -166,15 +166,15 @@ fn torques_for_a_motor_that_answers_somebody_else_are_an_error_for_each() {
 
 #[test]
 fn torques_for_motors_that_are_all_silent_are_not_sent() {
-    /// Nobody is there.
-    struct Nobody(Motors);
-    impl Link for Nobody {
+    /// A bus on which no motor answers.
+    struct Silence(Motors);
+    impl Link for Silence {
         fn clock(&self) -> Option<Clock> {
             self.0.clock()
         }
     }
 
-    impl CanLink for Nobody {
+    impl CanLink for Silence {
         fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
             assert_ne!(frame.id(), 0x280);
             Ok(())
@@ -184,7 +184,7 @@ fn torques_for_motors_that_are_all_silent_are_not_sent() {
         }
     }
     let bus =
-        rmd::Client::over("bus", Box::new(Nobody(Motors::new(false))), rmd::Options::default());
+        rmd::Client::over("bus", Box::new(Silence(Motors::new(false))), rmd::Options::default());
     for _ in 0..3 {
         let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4);
         let is_error = |reply: Option<Result<_, Error>>| reply.is_some_and(|reply| reply.is_err());

@@ -92,8 +92,20 @@ fn the_motor_is_stopped_when_its_client_is_silent() {
     let drives = Served::new("relay-silent");
     let options = RelayOptions { silence: Some(Duration::from_millis(100)) };
     let (mut relay, address) = relay(&drives, options);
-    let _client = start(&mut relay, &address);
+    let mut silent = start(&mut relay, &address);
     turn_until(&mut relay, |event| has_stopped(event, Reason::ClientSilent));
+    // A START that it sends too late is dropped with its connection.
+    silent.write_all(&START).expect("the kernel takes it");
+    turn_until(&mut relay, |event| matches!(event, Event::Disconnected));
+    silent.set_nonblocking(false).expect("set");
+    assert_eq!(silent.read(&mut [0; 8]).unwrap_or(0), 0, "closed or reset");
+    let events = relay.turn(Duration::from_millis(50)).expect("a turn");
+    assert!(events.is_empty(), "{events:?}");
+    let mut next = TcpStream::connect(&address).expect("connected");
+    next.write_all(&START).expect("written");
+    turn_until(&mut relay, |event| matches!(event, Event::Resumed));
+    drop(next);
+    turn_until(&mut relay, |event| has_stopped(event, Reason::ClientGone));
     assert!(relay.end().is_empty(), "nothing is left to stop");
 }
 

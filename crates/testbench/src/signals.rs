@@ -15,7 +15,7 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// The quantity in words, without drive and unit: `speed reference`.
+    /// The name of the quantity without drive and unit: `speed reference`.
     pub fn words(&self) -> String {
         let name = self.name.split_once('.').map_or(&*self.name, |(_, name)| name);
         let ending = UNITS.iter().find_map(|(ending, ..)| name.strip_suffix(ending));

@@ -46,7 +46,7 @@ pub struct Harness {
     /// The current motor before the case.
     pub(super) current: Option<u8>,
     /// Whether the drive may have received part of a frame, or may send more bytes.
-    pub(super) out_of_step: bool,
+    pub(super) out_of_sync: bool,
     /// Whether a reply is missing and may come late.
     pub(super) reply_pending: bool,
     /// Whether the case is over and its changes are being undone.
@@ -104,7 +104,7 @@ impl Harness {
             differences,
             undo,
             current: None,
-            out_of_step: true,
+            out_of_sync: true,
             reply_pending: false,
             restoring: false,
             moved: false,
@@ -237,7 +237,7 @@ impl Harness {
     pub(super) fn awaited(&mut self) -> Result<Reply, Stop> {
         let reply = self.reply(PATIENCE + self.on_the_line(MAX_FRAME))?;
         let Some(reply) = reply else {
-            (self.out_of_step, self.reply_pending) = (true, true);
+            (self.out_of_sync, self.reply_pending) = (true, true);
             return Err(self.failed("a reply"));
         };
         if !self.pending.is_empty() {
@@ -439,7 +439,7 @@ impl Harness {
         let bytes = std::mem::take(&mut self.pending);
         if !bytes.is_empty() {
             self.transcribe(false, &bytes);
-            self.out_of_step = true;
+            self.out_of_sync = true;
         }
     }
 

@@ -62,7 +62,7 @@ impl Subject for Harness {
         let mut rests = self.end_at_rest(may_turn);
         if let Err(Stop::Failed(_)) = rests {
             // Repeats it: an occasional error on the line must not leave a motor turning.
-            self.out_of_step = true;
+            self.out_of_sync = true;
             rests = self.end_at_rest(may_turn);
         }
         if rests.is_err() && may_turn {
@@ -74,7 +74,7 @@ impl Subject for Harness {
             let mut done = self.put_back(undo.clone());
             if done.is_err() {
                 // Repeats it: an occasional error on the line must not leave a drive changed.
-                self.out_of_step = true;
+                self.out_of_sync = true;
                 done = self.synchronise().and_then(|()| self.put_back(undo));
             }
             outcome = outcome.and(done);
@@ -204,13 +204,13 @@ impl Harness {
             self.drain(SILENCE)?;
             self.send_more(&stop)?;
         }
-        (self.out_of_step, self.reply_pending) = (true, true);
+        (self.out_of_sync, self.reply_pending) = (true, true);
         Ok(())
     }
 
     /// Brings the line in sync, if needed.
     fn synchronise(&mut self) -> Result<(), Stop> {
-        if !self.out_of_step {
+        if !self.out_of_sync {
             return Ok(());
         }
         // A late reply must not be matched to the next request.
@@ -232,7 +232,7 @@ impl Harness {
                     .to_owned(),
             ));
         }
-        self.out_of_step = false;
+        self.out_of_sync = false;
         Ok(())
     }
 

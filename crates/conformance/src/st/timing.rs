@@ -108,11 +108,11 @@ fn beginning(harness: &Harness, size: usize) -> Vec<u8> {
 
 /// Sends the beginning of a frame. Returns the NACK TIMEOUT, which must follow.
 fn timed_out(harness: &mut Harness, size: usize) -> Result<Reply, Stop> {
-    harness.out_of_step = true;
+    harness.out_of_sync = true;
     let bytes = beginning(harness, size);
     let reply = harness.exchange(&bytes)?;
     harness.require_nack(&reply, ErrorCode::Timeout)?;
-    harness.out_of_step = false;
+    harness.out_of_sync = false;
     Ok(reply)
 }
 
@@ -150,10 +150,10 @@ fn on_time(harness: &mut Harness) -> Result<(), Stop> {
 fn late_bytes(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
     timed_out(harness, 2)?;
-    harness.out_of_step = true;
+    harness.out_of_sync = true;
     let reply = harness.exchange(&bytes[2..])?;
     harness.require_nack(&reply, ErrorCode::Timeout)?;
-    harness.out_of_step = false;
+    harness.out_of_sync = false;
     harness.status().map(drop)
 }
 
@@ -161,7 +161,7 @@ fn late_bytes(harness: &mut Harness) -> Result<(), Stop> {
 /// NACK comes while bytes are still sent.
 fn trickle(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = beginning(harness, 8);
-    harness.out_of_step = true;
+    harness.out_of_sync = true;
     harness.send(&bytes[..1])?;
     for byte in &bytes[1..] {
         if let Some(reply) = harness.reply(Micros(RECEPTION.as_micros() * 6 / 10))? {
@@ -176,7 +176,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
     let too_slow = "this host cannot send the parts of a frame within 25 ms".to_owned();
     let mut outcome = Err(Stop::Skipped(too_slow));
-    harness.out_of_step = true;
+    harness.out_of_sync = true;
     for _ in 0..TRIES {
         let began = harness.clock.now();
         harness.send(&bytes[..2])?;
@@ -185,7 +185,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
         let took = harness.clock.now().since(began);
         let reply = harness.awaited()?;
         if reply.header == HEADER_ACK {
-            harness.out_of_step = false;
+            harness.out_of_sync = false;
             return Ok(());
         }
         if took < Micros(RECEPTION.as_micros() * 9 / 10) {

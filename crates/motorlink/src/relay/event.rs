@@ -29,6 +29,12 @@ pub enum Event {
         /// How many bytes, or frames, it left that were not sent any more.
         dropped: usize,
     },
+    /// The connection of a client that was silent for too long was closed, after its motors were
+    /// stopped. What the client sends on it is dropped.
+    Disconnected,
+    /// A client turns motors again, the first time since motors were stopped because a client was
+    /// silent.
+    Resumed,
     /// Someone came while the line was another's, or while motors have yet to be stopped.
     TurnedAway {
         /// The served port.
@@ -79,7 +85,7 @@ impl fmt::Display for Part {
     }
 }
 
-/// What came of stopping one part.
+/// The result of stopping one part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Halt {
     /// The part.

@@ -40,7 +40,7 @@ impl<L: Evented + 'static, T> Held<L, T> {
         Ok(if self.is_full { 0 } else { self.pace.room(now) })
     }
 
-    /// Drops what nobody takes: the port, if it `failed`, or the client, if there is none.
+    /// Drops what is not in use: the port if it `failed`, or the client if none is connected.
     pub(super) fn drop_untaken(&self, failed: bool, desk: &Desk) {
         let mut lane = self.lane.borrow_mut();
         if failed {

@@ -37,7 +37,7 @@ pub(super) trait Hold {
     /// Whether something was set turning and not stopped.
     fn owes(&self) -> bool;
 
-    /// Stops what was set turning, which takes as long as the drive needs to answer. After a stop that
-    /// failed [`owes`](Self::owes) is true still.
+    /// Stops the motors that were started, and waits for the drive's answers. If a stop fails,
+    /// [`owes`](Self::owes) stays true.
     fn stop(&mut self) -> Vec<Halt>;
 }

@@ -25,7 +25,7 @@ use crate::rmd::StopAction;
 pub use event::{Event, Halt, Outcome, Part, Reason};
 
 use hold::Hold;
-use station::Desk;
+use station::{Departure, Desk};
 
 /// How long after a stop that failed the next one is tried.
 const RETRY: Duration = Duration::from_secs(1);
@@ -33,7 +33,9 @@ const RETRY: Duration = Duration::from_secs(1);
 /// How a [`Relay`] behaves.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RelayOptions {
-    /// Stop the motors, too, when a connected client has sent nothing for so long.
+    /// Stop the motors, too, when a connected client has sent nothing for so long, and close its
+    /// connection. A program that was frozen and continues gets an error then: its commands do not
+    /// start the motors again.
     pub silence: Option<Duration>,
 }
 
@@ -63,8 +65,10 @@ pub struct Relay {
     hold: Box<dyn Hold>,
     desk: Rc<RefCell<Desk>>,
     silence: Option<Duration>,
-    /// The client is gone, and motors have to be stopped before anybody is let in.
-    is_owing: bool,
+    /// The client is gone for this reason, and motors have to be stopped before another is let in.
+    owing: Option<Reason>,
+    /// Motors were stopped because a client was silent, and did not turn since.
+    was_silent: bool,
     /// No stop is tried before.
     retry_at: Instant,
     /// The owner knows already that motors could not be stopped.
@@ -103,7 +107,8 @@ impl Relay {
             hold,
             desk: Rc::default(),
             silence: options.silence,
-            is_owing: false,
+            owing: None,
+            was_silent: false,
             retry_at: Instant(0),
             has_complained: false,
             is_over: false,
@@ -131,11 +136,14 @@ impl Relay {
         let is_open = self.hold.turn(&mut self.server, most)?;
         let now = self.server.now();
         let mut desk = self.desk.borrow_mut();
-        if desk.has_left {
-            desk.has_left = false;
+        if let Some(departure) = desk.left.take() {
             let dropped = self.hold.forget(now);
-            desk.events.push_back(Event::Left { dropped });
-            self.is_owing = self.hold.owes();
+            let (event, reason) = match departure {
+                Departure::Gone => (Event::Left { dropped }, Reason::ClientGone),
+                Departure::Disconnected => (Event::Disconnected, Reason::ClientSilent),
+            };
+            desk.events.push_back(event);
+            self.owing = self.hold.owes().then_some(reason);
         }
         if is_open {
             desk.port_is_open();
@@ -143,12 +151,16 @@ impl Relay {
         if let Err(error) = self.hold.pass(now, &mut desk) {
             desk.port_failed(error);
         }
+        if self.was_silent && self.owing.is_none() && self.hold.owes() {
+            self.was_silent = false;
+            desk.events.push_back(Event::Resumed);
+        }
         drop(desk);
         if let Some(reason) = self.due() {
             self.stop(reason);
         }
         let mut desk = self.desk.borrow_mut();
-        desk.is_shut = self.is_owing;
+        desk.is_shut = self.owing.is_some();
         Ok(desk.events.drain(..).collect())
     }
 
@@ -169,10 +181,10 @@ impl Relay {
     fn wait(&self, most: Duration) -> Duration {
         let now = self.server.now();
         let silent = self.silent_at().map(|silent| silent.max(self.retry_at));
-        let stop = match (self.hold.owes(), self.is_owing) {
+        let stop = match (self.hold.owes(), self.owing) {
             (false, _) => None,
-            (true, true) => Some(self.retry_at),
-            (true, false) => silent,
+            (true, Some(_)) => Some(self.retry_at),
+            (true, None) => silent,
         };
         let first = self.hold.due(now).into_iter().chain(stop).min();
         first.map_or(most, |first| most.min(first.since(now).into()))
@@ -191,16 +203,21 @@ impl Relay {
         if !self.hold.owes() || now < self.retry_at {
             return None;
         }
-        if self.is_owing {
-            return Some(Reason::ClientGone);
+        if self.owing.is_some() {
+            return self.owing;
         }
         self.silent_at().filter(|silent| now >= *silent).map(|_| Reason::ClientSilent)
     }
 
     fn stop(&mut self, reason: Reason) {
+        if reason == Reason::ClientSilent && self.owing.is_none() {
+            self.hold.forget(self.server.now());
+            self.desk.borrow_mut().ends_connection = true;
+            self.was_silent = true;
+        }
         let halts = self.hold.stop();
         let has_failed = self.hold.owes();
-        self.is_owing &= has_failed;
+        self.owing = self.owing.filter(|_| has_failed);
         if !(has_failed && self.has_complained) {
             self.desk.borrow_mut().events.push_back(Event::Stopped { reason, halts });
         }

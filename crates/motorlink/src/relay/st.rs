@@ -170,7 +170,7 @@ impl Hold for StHold {
     }
 }
 
-/// Waits until a motor that acknowledged its stop shows it; `None` when there is no such motor.
+/// Waits until the state of a motor confirms its acknowledged stop. `None`: the motor does not exist.
 fn seen_to_stop(client: &Client, Stopped { motor, result }: Stopped) -> Option<Halt> {
     let part = Part::Motor(motor.number());
     let failed = |error: Error| Halt { part, outcome: Outcome::Failed(error.to_string()) };

@@ -10,18 +10,29 @@ use motorlink_proto::time::Instant;
 
 use super::event::Event;
 
+/// Why a client has the line no more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Departure {
+    /// It closed its line, or died.
+    Gone,
+    /// The relay closed the connection.
+    Disconnected,
+}
+
 /// Who has the line, and what happened.
 #[derive(Debug, Default)]
 pub(super) struct Desk {
     /// The served port whose client has the line.
     pub(super) client: Option<String>,
-    /// The client left since this was looked at last.
-    pub(super) has_left: bool,
+    /// The client left since this was looked at last, and why.
+    pub(super) left: Option<Departure>,
+    /// The client was silent for too long: its connection is closed in the next turn.
+    pub(super) ends_connection: bool,
     /// When the client last sent something.
     pub(super) heard_at: Instant,
-    /// Nobody is let in.
+    /// No client may connect.
     pub(super) is_shut: bool,
-    /// That the drive's port failed was told.
+    /// The failure of the drive's port was reported.
     is_lost: bool,
     pub(super) events: VecDeque<Event>,
 }
@@ -41,9 +52,9 @@ impl Desk {
         }
     }
 
-    /// Gives the line to whoever is at `port`, if it is free.
+    /// Gives the line, if it is free, to the client at `port`.
     fn admit(&mut self, now: Instant, port: &str) -> bool {
-        if self.client.is_some() || self.has_left || self.is_shut {
+        if self.client.is_some() || self.left.is_some() || self.is_shut {
             return false;
         }
         self.client = Some(port.to_owned());
@@ -83,7 +94,7 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
     fn receive(&mut self, now: Instant, received: &[T], _: &mut Vec<T>) {
         let has_the_line = self.has_the_line();
         let mut desk = self.desk.borrow_mut();
-        // Whoever was turned away on a pty has stayed, and may have the line when it is free.
+        // On a pty a refused client stays connected. It gets the line when the line is free.
         if !has_the_line && !desk.admit(now, &self.port.borrow()) {
             return;
         }
@@ -95,10 +106,10 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
         replies.extend(self.lane.borrow_mut().to_client.drain(..));
     }
 
-    /// At once while there is something for the client.
+    /// At once while there is something to do with the client.
     fn deadline(&self) -> Option<Instant> {
         let is_waiting = self.has_the_line() && !self.lane.borrow().to_client.is_empty();
-        is_waiting.then_some(Instant(0))
+        (is_waiting || self.disconnects()).then_some(Instant(0))
     }
 
     fn client_connected(&mut self, now: Instant, others: usize) -> bool {
@@ -116,8 +127,14 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
     fn client_disconnected(&mut self, _: Instant) {
         if self.has_the_line() {
             let mut desk = self.desk.borrow_mut();
-            (desk.client, desk.has_left) = (None, true);
+            desk.client = None;
+            let is_ended = std::mem::take(&mut desk.ends_connection);
+            desk.left = Some(if is_ended { Departure::Disconnected } else { Departure::Gone });
         }
+    }
+
+    fn disconnects(&self) -> bool {
+        self.has_the_line() && self.desk.borrow().ends_connection
     }
 
     /// No more than one reading of a client waits here: the rest stays where it can be dropped.

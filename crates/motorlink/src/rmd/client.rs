@@ -28,7 +28,7 @@ pub enum ScanResult {
     /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
     /// motor. Option `echo=1` of an slcan port drops such echoes.
     Echo(MotorId),
-    /// A motor that answers another host all the time: its replies to us cannot be told apart.
+    /// A motor that answers another host all the time. Its replies to the two hosts look the same.
     Shared(MotorId),
 }
 
@@ -105,9 +105,9 @@ impl Client {
     /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
     /// error from it ends the exchange with an interruption.
     ///
-    /// `look` may use this bus, as a signal's handler does. What waits is given up then and ends with
-    /// [`PortError::Overtaken`]. If `look` does not use the bus, it goes on. Other threads wait for their
-    /// turn.
+    /// `look` may use this bus, as a signal's handler does. The call that waits then ends with
+    /// [`PortError::Overtaken`]. If `look` does not use the bus, that call continues. Other threads
+    /// wait until the bus is free.
     pub fn looking(
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
@@ -157,9 +157,23 @@ impl Client {
         self.turns.take().session.take_over(moving);
     }
 
-    /// Sets what a motor may be told; it holds for every call, raw frames included.
+    /// Sets the limits of commands to a motor. They apply to every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
         self.turns.take().session.set_limits(id, limits);
+    }
+
+    /// Changes the limits of a motor. `change` gets the present limits and returns the new ones.
+    pub fn change_limits(&self, id: MotorId, change: impl FnOnce(Limits) -> Limits) {
+        let mut driven = self.turns.take();
+        let limits = change(driven.session.limits(id));
+        driven.session.set_limits(id, limits);
+    }
+
+    /// The motors of [`moving`](Self::moving), and those that only a frame with four torques reached,
+    /// without an expected reply.
+    pub(super) fn moved(&self) -> (MotorSet, MotorSet) {
+        let driven = self.turns.take();
+        (driven.session.moving(), driven.session.unexpected())
     }
 
     /// Checks a request against the motor's limits. Nothing is sent.
@@ -200,21 +214,48 @@ impl Client {
     /// which is locked meanwhile. Requests are of one command, or eight bytes each.
     ///
     /// # Errors
-    /// The port's. What fails for one motor is told to `each`.
+    /// Errors of the port. [`Error::Limit`]: nothing was sent to any motor. `each` receives the other
+    /// errors of single motors.
     pub fn cycle<X: Exchange>(
         &self,
         requests: &[(MotorId, X)],
         mut each: impl FnMut(MotorId, Result<X::Reply, Error>),
     ) -> Result<(), Error> {
-        let mut driven = self.turns.take();
-        driven.ready(requests.iter().map(|(_, exchange)| exchange.request()))?;
+        let driven = self.turns.take();
         for (id, exchange) in requests {
+            driven.session.check_limits(*id, &exchange.request())?;
+        }
+        let requests = requests.iter().map(|(id, exchange)| (*id, exchange.request()));
+        self.begin_all(driven, requests, Session::request, |id, result| {
+            each(id, result.map(|reply| X::reply(&reply)));
+        })
+    }
+
+    /// As [`cycle`](Self::cycle). A motor in quarantine is waited for.
+    pub(super) fn insist(
+        &self,
+        requests: impl Iterator<Item = (MotorId, [u8; 8])> + Clone,
+        each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        self.begin_all(self.turns.take(), requests, Session::ask, each)
+    }
+
+    /// Begins these exchanges with `begin` and runs them to their end.
+    fn begin_all(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
+        requests: impl Iterator<Item = (MotorId, [u8; 8])> + Clone,
+        begin: fn(&mut Session, time::Instant, MotorId, [u8; 8]) -> Result<(), Error>,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        driven.ready(requests.clone().map(|(_, request)| request))?;
+        for (id, request) in requests {
             let now = driven.port.now();
-            if let Err(error) = driven.session.request(now, *id, exchange.request()) {
-                each(*id, Err(error));
+            if let Err(error) = begin(&mut driven.session, now, id, request) {
+                each(id, Err(error));
             }
         }
-        self.run(driven, |id, result| each(id, result.map(|reply| X::reply(&reply))))
+        self.run(driven, each)
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
@@ -271,11 +312,6 @@ impl Client {
             progress(done);
         }
         Ok(())
-    }
-
-    /// How long a late reply is awaited.
-    pub(super) fn quarantine(&self) -> Duration {
-        self.turns.take().session.quarantine().into()
     }
 
     /// Moves frames until no exchange is open.

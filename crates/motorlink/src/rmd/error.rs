@@ -140,14 +140,14 @@ pub enum Error {
         direction: SpinDirection,
     },
     /// A motor did not arrive at its target. It is not stopped.
-    #[error("motor {motor} did not arrive: {why}")]
+    #[error("motor {motor} did not arrive: {why:#}")]
     NotArrived {
         /// The motor.
         motor: MotorId,
         /// Why.
         why: NotArrived,
     },
-    /// There is no such motor; nothing was sent.
+    /// The motor does not exist. Nothing was sent.
     #[error("motor {0} does not exist: motor IDs are 1 to 32")]
     NoSuchMotor(u8),
     /// The frame with four torques reaches motors 1 to 4 only; nothing was sent.

@@ -1,4 +1,4 @@
-//! The bus for event loops: nothing in it waits, beside the opening of its port.
+//! The bus for event loops. Only the opening of the port waits.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -88,9 +88,23 @@ impl EventClient {
         self.driven.session.busy()
     }
 
-    /// Sets what a motor may be told; it holds for every call, raw frames included.
+    /// Sets the limits of commands to a motor. They apply to every call, raw frames included.
     pub fn set_limits(&mut self, id: MotorId, limits: Limits) {
         self.driven.session.set_limits(id, limits);
+    }
+
+    /// Changes the limits of a motor, as [`Client::change_limits`].
+    pub fn change_limits(&mut self, id: MotorId, change: impl FnOnce(Limits) -> Limits) {
+        let limits = change(self.driven.session.limits(id));
+        self.set_limits(id, limits);
+    }
+
+    /// Checks a request against the motor's limits. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`Error::Limit`].
+    pub fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
+        self.driven.session.check_limits(id, request)
     }
 
     /// Begins an exchange, as [`Client::raw`]: a motor in quarantine is waited for.
@@ -123,8 +137,9 @@ impl EventClient {
         self.driven.session.set_torque4(now, torques, expect)
     }
 
-    /// What to [`ask`](Self::ask) a motor for a confirmation, as [`Client::confirm`]: another code than the
-    /// last. [`confirmed`](Self::confirmed) says what came of it when that exchange is over.
+    /// The request of a confirmation ([`Client::confirm`]), for [`ask`](Self::ask). Its code differs
+    /// from that of the last request. After the exchange [`confirmed`](Self::confirmed) gives the
+    /// result.
     pub fn question(&self, id: MotorId) -> [u8; 8] {
         self.driven.session.question(id)
     }
@@ -144,7 +159,7 @@ impl EventClient {
         self.driven.session.cancel(now, id);
     }
 
-    /// Moves what can be moved without waiting; `each` is told the exchanges that are over. Gives the
+    /// Sends and receives without waiting. `each` receives the exchanges that are over. Gives the
     /// time after which to go on if the descriptor is not readable before; `None`: no exchange is
     /// under way.
     ///

@@ -20,7 +20,7 @@ pub(crate) struct Follower {
     moving: MotorSet,
     /// Requests without a reply yet, by motor, oldest first.
     asked: [VecDeque<SeenRequest>; MotorId::COUNT],
-    /// Motors whose commands by other nodes were told.
+    /// Motors for which commands of other nodes were reported.
     unguarded: MotorSet,
 }
 
@@ -53,7 +53,7 @@ impl Follower {
         self.moving = moving;
     }
 
-    /// What other nodes do is told to the next client again.
+    /// Commands of other nodes are reported to the next client again.
     pub(crate) fn client_left(&mut self) {
         self.unguarded = MotorSet::EMPTY;
     }
@@ -164,7 +164,7 @@ mod tests {
         // The first acknowledge is late, the second end was lost.
         let lost = [('>', 1, 0xA2), ('>', 1, 0x80), ('>', 1, 0xA2), ('>', 1, 0x80), ('<', 1, 0x80)];
         assert_eq!(ids(&after(&lost)), [1]);
-        // Another motor's, and one that nobody asked for.
+        // The reply of another motor, and a reply without a request.
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('>', 1, 0x80), ('<', 2, 0x80)])), [1]);
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('<', 1, 0x80)])), [1]);
     }

@@ -1,6 +1,6 @@
 //! Moves within the turn (0xA5, 0xA6) that could be nearly a full turn.
 
-use motorlink_proto::rmd::{FULL_TURN, MotorId, SpinDirection};
+use motorlink_proto::rmd::{MotorId, SpinDirection};
 use motorlink_proto::units::TurnCentiDegrees;
 
 use super::Error;
@@ -15,7 +15,7 @@ pub enum FullTurn {
         /// 0.01° a digit.
         tolerance: TurnCentiDegrees,
     },
-    /// The move is sent as it is; the motor is not asked for its angle.
+    /// The move is sent as it is.
     Allowed,
 }
 
@@ -43,7 +43,7 @@ impl FullTurn {
         direction: SpinDirection,
     ) -> Result<(), Error> {
         let FullTurn::Refused { tolerance } = self else { return Ok(()) };
-        let past = past(at, target, direction);
+        let past = direction.way(target, at);
         if past > tolerance {
             return Ok(());
         }
@@ -51,22 +51,10 @@ impl FullTurn {
     }
 }
 
-/// How far a motor is past its target, less than a turn.
-fn past(
-    at: TurnCentiDegrees,
-    target: TurnCentiDegrees,
-    direction: SpinDirection,
-) -> TurnCentiDegrees {
-    let (from, to) = match direction {
-        SpinDirection::Counterclockwise => (at, target),
-        _ => (target, at),
-    };
-    let way = (i32::from(to.0) - i32::from(from.0)).rem_euclid(FULL_TURN.into());
-    TurnCentiDegrees(way as u16)
-}
-
 #[cfg(test)]
 mod tests {
+    use motorlink_proto::rmd::FULL_TURN;
+
     use super::*;
 
     const CW: SpinDirection = SpinDirection::Clockwise;

@@ -22,15 +22,19 @@ mod motor;
 mod options;
 mod session;
 mod stop_on_drop;
+mod stopping;
 
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
-pub use arrival::{ArrivalOptions, ArrivalProgress};
+pub use arrival::ArrivalOptions;
 pub use client::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;
 pub use motor::Motor;
 pub use options::Options;
-pub use stop_on_drop::{StopAction, StopOnDrop, Stopped};
+pub use stop_on_drop::{StopOnDrop, Stopped};
+pub use stopping::{StopAction, Stopping};
+
+pub use crate::stopping::{STOP_ATTEMPTS, STOP_TIME};

@@ -138,10 +138,8 @@ impl Motor<'_> {
         angle: CentiDegrees,
         max_speed: Option<SpeedLimit>,
     ) -> Result<MotionStatus, Error> {
-        match max_speed {
-            None => self.ask(SetPosition { angle }),
-            Some(max_speed) => self.ask(SetPositionLimited { max_speed, angle }),
-        }
+        let request = move_request(Target::MultiTurn(angle), max_speed);
+        self.bus.raw(self.id, request).map(|reply| MotionStatus::decode(&reply))
     }
 
     /// Turns to an angle within the turn, this way round (0xA5), no faster than `max_speed` if
@@ -160,18 +158,39 @@ impl Motor<'_> {
         max_speed: Option<SpeedLimit>,
         full_turn: FullTurn,
     ) -> Result<MotionStatus, Error> {
-        let request = match max_speed {
-            None => SetSingleTurnPosition { direction, angle }.encode(),
-            Some(max_speed) => {
-                SetSingleTurnPositionLimited { direction, max_speed, angle }.encode()
-            }
-        };
+        let target = Target::SingleTurn { angle, direction };
+        let request = move_request(target, max_speed);
         if full_turn != FullTurn::Allowed {
-            self.bus.check_limits(self.id, &request)?;
+            self.check_move(target, max_speed)?;
             let at = self.single_turn_angle()?;
             self.bus.confirm(self.id)?;
             full_turn.check(self.id, at, angle, direction)?;
         }
         self.bus.raw(self.id, request).map(|reply| MotionStatus::decode(&reply))
+    }
+
+    /// Checks a move against the limits of the motor. Sends nothing.
+    pub(super) fn check_move(
+        &self,
+        target: Target,
+        max_speed: Option<SpeedLimit>,
+    ) -> Result<(), Error> {
+        self.bus.check_limits(self.id, &move_request(target, max_speed))
+    }
+}
+
+/// 0xA3 or 0xA5; with a maximum speed 0xA4 or 0xA6.
+fn move_request(target: Target, max_speed: Option<SpeedLimit>) -> [u8; 8] {
+    match (target, max_speed) {
+        (Target::MultiTurn(angle), None) => SetPosition { angle }.encode(),
+        (Target::MultiTurn(angle), Some(max_speed)) => {
+            SetPositionLimited { max_speed, angle }.encode()
+        }
+        (Target::SingleTurn { angle, direction }, None) => {
+            SetSingleTurnPosition { direction, angle }.encode()
+        }
+        (Target::SingleTurn { angle, direction }, Some(max_speed)) => {
+            SetSingleTurnPositionLimited { direction, max_speed, angle }.encode()
+        }
     }
 }

@@ -6,13 +6,14 @@ use motorlink_link::port::PortError;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
-    SetTorque, SetTorque4, question_behind,
+    SetTorque, SetTorque4, TORQUE4_ID,
 };
 use motorlink_proto::time::{Instant, Micros};
 
 use super::{Error, Options};
 
-/// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
+/// The longest time for which a motor with doubtful replies may go on sending, in addition to the
+/// times of its exchanges.
 const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
@@ -24,7 +25,12 @@ pub(super) struct Session {
     host: Host,
     /// Motors that were given something to do and not switched off.
     moving: MotorSet,
-    /// How long an exchange may be put off.
+    /// Motors that only a frame with four torques reached, and from which no reply was expected. Such
+    /// a motor may be absent, or moving.
+    unexpected: MotorSet,
+    /// The motors that have to answer the next frame with four torques.
+    expected: MotorSet,
+    /// The longest delay of an exchange.
     patience: Micros,
     /// What each motor was asked last.
     pending: [PendingRequest; MotorId::COUNT],
@@ -84,6 +90,8 @@ impl Session {
             port,
             host,
             moving: MotorSet::EMPTY,
+            unexpected: MotorSet::EMPTY,
+            expected: MotorSet::EMPTY,
             patience: SETTLE_LIMIT + times.into(),
             pending: [nothing; MotorId::COUNT],
             insisting: MotorSet::EMPTY,
@@ -103,17 +111,22 @@ impl Session {
         self.moving
     }
 
+    /// See [`Session::unexpected`].
+    pub(super) fn unexpected(&self) -> MotorSet {
+        self.unexpected.without(self.moving)
+    }
+
     /// Takes motors over that somebody else set moving.
     pub(super) fn take_over(&mut self, moving: MotorSet) {
         self.moving = self.moving.union(moving);
     }
 
-    pub(super) fn quarantine(&self) -> Micros {
-        self.host.quarantine()
-    }
-
     pub(super) fn set_limits(&mut self, id: MotorId, limits: Limits) {
         self.host.set_limits(id, limits);
+    }
+
+    pub(super) fn limits(&self, id: MotorId) -> Limits {
+        self.host.limits(id)
     }
 
     pub(super) fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
@@ -137,7 +150,7 @@ impl Session {
 
     /// A question with another code than what a motor was asked last.
     pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
-        question_behind(self.pending[id.index()].request[0])
+        self.host.confirmation(id)
     }
 
     /// Whether the motor's replies since the last confirmation went to their own requests.
@@ -148,7 +161,7 @@ impl Session {
         }
     }
 
-    /// Says that the motors owe no host a reply.
+    /// Declares that no motor still has to reply to an earlier host.
     pub(super) fn trust(&mut self) {
         self.host.trust(MotorSet::ALL);
     }
@@ -209,6 +222,7 @@ impl Session {
         }
         let begun = self.host.set_torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
+        self.expected = expect;
         let until = now + self.patience;
         for id in expect {
             self.pending[id.index()] = PendingRequest { request: torque, until };
@@ -250,7 +264,7 @@ impl Session {
             }
             match self.host.poll(now) {
                 proto::Output::Transmit(frame) => {
-                    self.moving = self.moving.union(MotorSet::moved_by(&frame));
+                    self.moved_by(&frame);
                     return SessionOutput::Transmit(frame);
                 }
                 proto::Output::Done { id, result: Err(proto::Failure::Quarantined) }
@@ -270,6 +284,7 @@ impl Session {
                     // until it has acknowledged that it is off or stopped.
                     if result.as_ref().is_ok_and(ends_motion) {
                         self.moving.remove(id);
+                        self.unexpected.remove(id);
                     }
                     let failed = |error| match error {
                         proto::Failure::Quarantined if is_outlasted => self.shared(id),
@@ -282,6 +297,16 @@ impl Session {
                 }
             }
         }
+    }
+
+    fn moved_by(&mut self, frame: &CanFrame) {
+        let moved = MotorSet::moved_by(frame);
+        let unexpected = match frame.id() == CanFrame::new(TORQUE4_ID, [0; 8]).id() {
+            true => moved.without(self.expected),
+            false => MotorSet::EMPTY,
+        };
+        self.unexpected = self.unexpected.union(unexpected);
+        self.moving = self.moving.union(moved.without(unexpected));
     }
 
     fn is_held(&self, id: MotorId) -> bool {

@@ -1,9 +1,9 @@
 //! Stops motors at the end of a scope, however it is left.
 
-use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
+use motorlink_proto::rmd::MotorId;
 
-use super::{Client, Error};
-use crate::stopping::{STOP_ATTEMPTS, await_retry};
+use super::stopping::Stopping;
+use super::{Client, Error, StopAction};
 
 impl Client {
     /// Stops the motors that this bus was used to move. From now on every request but Off and Stop is
@@ -21,28 +21,9 @@ impl Client {
     }
 }
 
-/// What a [`StopOnDrop`] does to the motors that it finds moving.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum StopAction {
-    /// Switches them off (0x80): a load that they hold falls.
-    Off,
-    /// Stops them (0x81); they hold still and remember their command.
-    #[default]
-    Stop,
-}
-
-impl StopAction {
-    /// What the motors are sent.
-    pub(crate) fn request(self) -> [u8; 8] {
-        match self {
-            StopAction::Off => Off.encode(),
-            StopAction::Stop => Stop.encode(),
-        }
-    }
-}
-
 /// Stops the motors that a [`Client`] was used to move when it is dropped: at the end of a scope, on
-/// an early return, on a panic. All are told before any answer is waited for.
+/// an early return, on a panic. The stop is sent to all motors before a reply is awaited, and repeated
+/// until it is confirmed ([`Client::stop_until_confirmed`]).
 pub struct StopOnDrop<'a> {
     bus: &'a Client,
     action: StopAction,
@@ -84,31 +65,10 @@ impl StopOnDrop<'_> {
     }
 
     fn stop_all(&self) -> Vec<Stopped> {
-        let mut stopped: Vec<Stopped> = Vec::new();
         self.bus.abandon();
-        let request = self.action.request();
-        for attempt in 1..=STOP_ATTEMPTS {
-            let requests: Vec<_> = self.bus.moving().map(|id| (id, request)).collect();
-            if requests.is_empty() {
-                break;
-            }
-            let mut told = Vec::new();
-            let cycle = self.bus.cycle(&requests, |id, result| {
-                told.push(Stopped { id, result: result.map(drop) });
-            });
-            // Motors that the port kept from hearing are not among those told.
-            let told_ids: MotorSet = told.iter().map(|one| one.id).collect();
-            let unheard = self.bus.moving().without(told_ids);
-            let unheard = unheard.map(|id| Stopped { id, result: cycle.clone() });
-            let outcomes = unheard.chain(told);
-            let last = attempt == STOP_ATTEMPTS;
-            stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
-            if !await_retry(self.bus.link_state()) && !self.bus.moving().is_empty() {
-                let clock = self.bus.clock();
-                clock.wait(clock.now() + self.bus.quarantine().into());
-            }
-        }
-        stopped
+        let Stopping { confirmed, failed, .. } = self.bus.stop_moved(self.action);
+        let failed = failed.into_iter().map(|(id, error)| Stopped { id, result: Err(error) });
+        confirmed.map(|id| Stopped { id, result: Ok(()) }).chain(failed).collect()
     }
 }
 

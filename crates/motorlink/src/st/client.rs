@@ -9,7 +9,9 @@ use motorlink_link::port::{ByteLink, Link, PortError, PortName};
 use motorlink_link::printable;
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Counters, MAX_FRAME, MotorNumber, Output, Profile, Request, SyncState};
+use motorlink_proto::st::{
+    Confirmation, Counters, MAX_FRAME, MotorNumber, Output, Profile, Recovery, Request, SyncState,
+};
 use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
@@ -28,6 +30,8 @@ pub struct BoardInfo {
     pub version: [u8; 3],
     /// Name of the SDK.
     pub name: String,
+    /// The profile that has this form of the version: shipped firmware sends ASCII digits.
+    pub profile: Profile,
 }
 
 /// What GET_FW_VERSION tells (4.12).
@@ -144,9 +148,28 @@ impl Client {
         self.turns.take().port.clock()
     }
 
-    /// Whether the last exchange ended in step.
+    /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
         self.turns.take().session.sync_state()
+    }
+
+    /// Whether the line has been in sync since the port was opened. If not, only questions and stops
+    /// were sent.
+    pub fn has_been_in_sync(&self) -> bool {
+        self.sync_state() == SyncState::InSync || self.counters().losses > 0
+    }
+
+    /// Recovers a lost line with [`Recovery::Pad`] instead of [`Recovery::Drain`] while `act` stops
+    /// motors. A drive that waits for the rest of a frame would not hear them. Padding may complete a
+    /// write that was cut off, so that a stop has to follow.
+    pub(super) fn padded<T>(&self, act: impl FnOnce() -> T) -> T {
+        let before = self.turns.take().session.set_recovery(Recovery::Pad);
+        if before == Recovery::None {
+            self.turns.take().session.set_recovery(before);
+        }
+        let result = act();
+        self.turns.take().session.set_recovery(before);
+        result
     }
 
     /// What came without being asked for.
@@ -168,7 +191,8 @@ impl Client {
     pub fn board_info(&self) -> Result<BoardInfo, Error> {
         self.exchange(0, &Request::GetBoardInfo, |payload| {
             let info = proto::BoardInfo::decode(payload)?;
-            Some(BoardInfo { version: info.version, name: printable(info.name) })
+            let proto::BoardInfo { version, profile, name } = info;
+            Some(BoardInfo { version, profile, name: printable(name) })
         })
     }
 
@@ -223,18 +247,21 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
-        let (losses, mut asked) = self.turns.take().session.question();
-        let mut answer = self.answers(asked);
-        if matches!(answer, Err(Error::Refused { .. })) {
-            // The refusal may be that of the last request: another question has another answer.
-            (_, asked) = self.turns.take().session.question();
-            answer = self.answers(asked);
+        let mut confirmation = self.turns.take().session.confirmation();
+        let mut answer = self.answers(&confirmation);
+        if matches!(answer, Err(Error::Refused { .. }))
+            && self.turns.take().session.repeat(&mut confirmation)
+        {
+            answer = self.answers(&confirmation);
         }
-        self.turns.take().session.confirmed(losses, answer)
+        self.turns.take().session.confirmed(&confirmation, answer)
     }
 
-    fn answers(&self, (question, size): (Request<'static>, usize)) -> Result<(), Error> {
-        self.exchange(0, &question, |payload| (payload.len() == size).then_some(()))
+    fn answers(&self, confirmation: &Confirmation) -> Result<(), Error> {
+        let accepted = |payload: &[u8]| confirmation.accepts(payload.len()).then_some(());
+        let mut driven = self.turns.take();
+        driven.ask(confirmation)?;
+        self.conclude(driven, accepted)
     }
 
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
@@ -320,6 +347,12 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.ready_for(Effect::of(request))?;
         self.session.request(motor, request)
+    }
+
+    /// Begins the exchange of a confirmation.
+    pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
+        self.ready()?;
+        self.session.ask(confirmation)
     }
 
     /// Begins an exchange with any frame code and payload, which has this effect.

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use motorlink_link::port::PortError;
-use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, NotArrived, RegisterId, Unverified};
+use motorlink_proto::st::{
+    ErrorCode, Failure, MotorNumber, NotArrived, NotStarted, RegisterId, Unverified,
+};
 
 use super::LimitError;
 
@@ -16,7 +18,7 @@ pub enum Error {
     Refused {
         /// The port.
         port: Arc<str>,
-        /// The motor, in words.
+        /// The motor, for messages.
         motor: Target,
         /// What was asked for.
         request: String,
@@ -25,12 +27,12 @@ pub enum Error {
         /// What to try, behind a semicolon; may be empty.
         hint: &'static str,
     },
-    /// There is no answer to trust; it is not known whether the drive did what was asked.
+    /// No answer can be trusted. It is unknown whether the drive carried out the request.
     #[error("{port}: {request} for {motor} failed: {failure}; {hint}")]
     Failed {
         /// The port.
         port: Arc<str>,
-        /// The motor, in words.
+        /// The motor, for messages.
         motor: Target,
         /// What was asked for.
         request: String,
@@ -47,14 +49,14 @@ pub enum Error {
     Reply {
         /// The port.
         port: Arc<str>,
-        /// The motor, in words.
+        /// The motor, for messages.
         motor: Target,
         /// What was asked for.
         request: String,
         /// Bytes of the reply's payload.
         size: usize,
     },
-    /// The line was not in step behind the last reply: one came twice, or late. What was read or
+    /// The line was not in sync behind the last reply: one came twice, or late. What was read or
     /// acknowledged before may have been the reply to something else.
     #[error(
         "{port}: replies and requests do not go together: one came twice or late, so that nothing that \
@@ -96,20 +98,28 @@ pub enum Error {
     /// A limit of the caller forbids it; nothing was sent.
     #[error("{motor}: {exceeded}")]
     Limit {
-        /// The motor, in words.
+        /// The motor, for messages.
         motor: Target,
         /// Which limit, and what to do.
         exceeded: LimitError,
     },
     /// A motor did not arrive at its target. It is not stopped.
-    #[error("{motor} did not arrive: {why}")]
+    #[error("{motor} did not arrive: {why:#}")]
     NotArrived {
         /// The motor.
         motor: MotorNumber,
         /// Why.
         why: NotArrived,
     },
-    /// There is no such motor number; nothing was sent.
+    /// The drive acknowledged START_MOTOR, and the motor did not start.
+    #[error("{motor} did not start: {why}")]
+    NotStarted {
+        /// The motor.
+        motor: Target,
+        /// Why.
+        why: NotStarted,
+    },
+    /// The motor number does not exist. Nothing was sent.
     #[error("motor {0} does not exist: motor numbers are 1 to 7")]
     NoSuchMotor(u8),
     /// The request does not fit a frame; nothing was sent.

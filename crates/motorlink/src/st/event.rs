@@ -1,11 +1,13 @@
-//! The client for event loops: nothing in it waits, beside the opening of its port.
+//! The client for event loops. Only the opening of the port waits.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_link::port::{ByteLink, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::st::{Counters, MotorNumber, Output, Profile, Request, SyncState};
+use motorlink_proto::st::{
+    Confirmation, Counters, MotorNumber, Output, Profile, Request, SyncState,
+};
 
 use super::client::Driven;
 use super::{Client, Error, Options};
@@ -24,19 +26,9 @@ pub struct EventClient {
 pub enum Progress<T> {
     /// It is over.
     Done(Result<T, Error>),
-    /// It goes on when the descriptor is readable, or when this time has passed. `None`: no exchange
-    /// is under way.
+    /// Call again when the descriptor is readable or after this time. `None`: no exchange is under
+    /// way.
     Wait(Option<Duration>),
-}
-
-/// A confirmation that is under way.
-#[derive(Debug)]
-pub struct Confirmation {
-    /// How often the line had been lost before.
-    losses: u32,
-    /// Size of the answer.
-    size: usize,
-    is_repeated: bool,
 }
 
 impl EventClient {
@@ -85,7 +77,7 @@ impl EventClient {
         self.driven.session.rules().profile
     }
 
-    /// Whether the last exchange ended in step.
+    /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
         self.driven.session.sync_state()
     }
@@ -118,32 +110,30 @@ impl EventClient {
         self.driven.begin_raw(motor, code, payload, effect)
     }
 
-    /// Begins to make sure that the replies so far went to their own requests, as [`Client::confirm`];
-    /// [`advance_confirmation`](Self::advance_confirmation) goes on with it.
+    /// Begins the check of [`Client::confirm`] that each reply so far belongs to its request.
+    /// [`advance_confirmation`](Self::advance_confirmation) continues it.
     ///
     /// # Errors
     /// Those of [`begin`](Self::begin).
     pub fn begin_confirmation(&mut self) -> Result<Confirmation, Error> {
-        let (losses, (question, size)) = self.driven.session.question();
-        self.begin(0, &question)?;
-        Ok(Confirmation { losses, size, is_repeated: false })
+        let confirmation = self.driven.session.confirmation();
+        self.driven.ask(&confirmation)?;
+        Ok(confirmation)
     }
 
     /// Moves a confirmation as far as [`advance`](Self::advance) does an exchange.
     pub fn advance_confirmation(&mut self, confirmation: &mut Confirmation) -> Progress<()> {
         loop {
-            let Confirmation { losses, size, is_repeated } = *confirmation;
-            match self.advance(|payload| (payload.len() == size).then_some(())) {
-                Progress::Done(Err(Error::Refused { .. })) if !is_repeated => {
-                    // The refusal may be that of the last request: another question has another answer.
-                    let (_, (question, size)) = self.driven.session.question();
-                    *confirmation = Confirmation { losses, size, is_repeated: true };
-                    if let Err(error) = self.begin(0, &question) {
+            match self.advance(|payload| confirmation.accepts(payload.len()).then_some(())) {
+                Progress::Done(Err(Error::Refused { .. }))
+                    if self.driven.session.repeat(confirmation) =>
+                {
+                    if let Err(error) = self.driven.ask(confirmation) {
                         return Progress::Done(Err(error));
                     }
                 }
                 Progress::Done(answer) => {
-                    return Progress::Done(self.driven.session.confirmed(losses, answer));
+                    return Progress::Done(self.driven.session.confirmed(confirmation, answer));
                 }
                 waits => return waits,
             }

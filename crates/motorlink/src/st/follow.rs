@@ -9,7 +9,7 @@ use motorlink_proto::st::{
 ///
 /// It errs to one side. A START counts wherever in the stream its bytes stand: a drive that is out
 /// of step, or that completes a frame which was cut off, may take them for one. A STOP counts only
-/// when it was one whole request and was acknowledged, on a line that has been in step all the time.
+/// when it was one whole request and was acknowledged, on a line that has been in sync all the time.
 /// So it is with PFC_ENABLE and PFC_DISABLE.
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
@@ -23,7 +23,7 @@ pub(crate) struct Follower {
     /// The reply is whole.
     is_answered: bool,
     /// Something did not look like requests and replies in turn.
-    out_of_step: bool,
+    out_of_sync: bool,
     /// The last bytes that were sent, as many as the longest frame has.
     recent: Vec<u8>,
 }
@@ -56,7 +56,7 @@ impl Follower {
     /// The bytes whose reply may still come, or that a drive may take for half a frame; `None` when
     /// the line is at rest.
     pub(crate) fn unanswered(&self) -> Option<&[u8]> {
-        let is_at_rest = !self.out_of_step && (self.is_answered || self.request.is_empty());
+        let is_at_rest = !self.out_of_sync && (self.is_answered || self.request.is_empty());
         (!is_at_rest).then_some(self.request.as_slice())
     }
 
@@ -119,7 +119,7 @@ impl Follower {
         let effect = Effect::of_frame(&frame);
         let addressed = self.started.request_sent(frame.motor(), effect);
         match (header, code) {
-            (HEADER_ACK, _) if !self.out_of_step => {
+            (HEADER_ACK, _) if !self.out_of_sync => {
                 if command(&frame) == Some(Command::PfcDisable) {
                     self.pfc = None;
                 }
@@ -133,9 +133,9 @@ impl Follower {
         }
     }
 
-    /// Says that replies may come that nobody waits for.
+    /// Declares that replies without a waiting request may come.
     pub(crate) fn lose(&mut self) {
-        self.out_of_step = true;
+        self.out_of_sync = true;
         self.started.forget_current();
     }
 
@@ -148,7 +148,7 @@ impl Follower {
             };
             if Effect::of_frame(&frame) == Effect::Starts {
                 // What is unanswered before it may change the current motor.
-                if self.out_of_step || self.request.len() != size {
+                if self.out_of_sync || self.request.len() != size {
                     self.started.forget_current();
                 }
                 self.started.presume(frame.motor());
@@ -277,10 +277,10 @@ mod tests {
     }
 
     #[test]
-    fn on_a_line_that_was_out_of_step_no_stop_counts() {
+    fn on_a_line_that_was_out_of_sync_no_stop_counts() {
         let disturbances: [(&[u8], &[u8]); 5] = [
-            // A reply that nobody asked for, one that is none, one that is cut off, bytes that are
-            // no request, and two requests at once.
+            // A reply without a request, bytes that are no reply, a reply that is cut off, bytes that
+            // are no request, and two requests at once.
             (&[], &ACK),
             (&[0x06, 0x00, 0x06], &[0xF0, 0x00, 0x00]),
             (&[0x06, 0x00, 0x06], &[0xF0]),

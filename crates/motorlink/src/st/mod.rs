@@ -26,17 +26,18 @@ mod stop_on_drop;
 mod transcript;
 
 pub use motorlink_proto::st::{
-    ARRIVAL_TOLERANCE_RAD, ArrivalWatch, Command, ControlMode, Counters, CurrentReference,
-    ErrorCode, Failure, Feature, Features, Flags, FrameCode, LimitError, Limits, MasterConfig,
-    MotorNumber, NoSuchProfile, NotArrived, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
-    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status, SyncState,
-    TorqueRamp, Unverified, VERIFY_ATTEMPTS, VerifiedWrite, register,
+    ARRIVAL_TOLERANCE_RAD, AbortReason, ArrivalSampler, ArrivalWatch, Command, Confirmation,
+    ControlMode, Counters, CurrentReference, Effect, ErrorCode, Failure, Feature, Features, Flags,
+    Frame, FrameCode, FullScale, InvalidFullScale, LimitError, Limits, MAX_FRAME, MasterConfig,
+    MotorNumber, NoSuchProfile, NotArrived, NotStarted, PositionMove, Profile, REVUP_PHASES, Ramp,
+    Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Starting,
+    Status, SyncState, TorqueRamp, Unverified, VERIFY_ATTEMPTS, VerifiedWrite, register,
 };
 
-pub use arrival::{ArrivalOptions, ArrivalProgress};
+pub use arrival::ArrivalOptions;
 pub use client::{BoardInfo, Client, FirmwareVersion};
-pub use error::{Error, Unverifiable};
-pub use event::{Confirmation, EventClient, Progress};
+pub use error::{Error, Target, Unverifiable};
+pub use event::{EventClient, Progress};
 pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use options::Options;

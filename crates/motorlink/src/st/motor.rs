@@ -3,10 +3,10 @@
 use motorlink_proto::st::register::{Readable, Register, Value, Writable};
 use motorlink_proto::st::{
     Command, CurrentReference, Flags, MotorNumber, PositionMove, Profile, Ramp, RegisterId,
-    Request, RevupPhase, Status, TorqueRamp, VerifiedWrite, register,
+    Request, RevupPhase, Starting, Status, TorqueRamp, VerifiedWrite, register,
 };
 
-use super::{Client, Error};
+use super::{Client, Error, Target};
 
 /// One motor of a drive. Every call is one exchange; its errors are those of
 /// [`Client::exchange`].
@@ -119,13 +119,33 @@ impl Motor<'_> {
     }
 
     /// Executes a command (4.6). An acknowledge does not say that it had an effect: a START_MOTOR
-    /// with a fault pending has none.
+    /// with a fault pending has none ([`start`](Self::start) detects this).
     pub fn execute(&self, command: Command) -> Result<(), Error> {
         self.tell(&Request::ExecuteCommand(command))
     }
 
+    /// Starts the motor, then reads its state: a drive also acknowledges a START_MOTOR that has no
+    /// effect. Returns the state.
+    ///
+    /// # Errors
+    /// [`Error::NotStarted`] if a fault is pending or the motor is still stopping. Those of
+    /// [`Client::exchange`]: the motor may have started.
+    pub fn start(&self) -> Result<Status, Error> {
+        let mut starting = Starting::default();
+        loop {
+            let bits = match starting.request() {
+                Request::GetRegister(register) => self.get_raw(register)?,
+                command => self.tell(&command).map(|()| 0)?,
+            };
+            if let Some(started) = starting.replied(bits) {
+                return started
+                    .map_err(|why| Error::NotStarted { motor: Target(self.motor.number()), why });
+            }
+        }
+    }
+
     commands! {
-        start StartMotor, stop StopMotor, stop_ramp StopRamp, start_stop StartStop, fault_ack FaultAck,
+        stop StopMotor, stop_ramp StopRamp, start_stop StartStop, fault_ack FaultAck,
         encoder_align EncoderAlign, iqdref_clear IqdrefClear, pfc_enable PfcEnable,
         pfc_disable PfcDisable, pfc_fault_ack PfcFaultAck,
     }

@@ -15,7 +15,7 @@ pub struct Options {
     pub profile: Profile,
     /// How long a reply may take.
     pub timeout: Duration,
-    /// How a lost line comes back.
+    /// The way to recover a line.
     pub recovery: Recovery,
     /// The silence after which nothing more is expected to come.
     pub quiet: Duration,

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Account, Command, Counters, Effect, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master,
-    MotorNumber, Output, Profile, RegisterId, Request, RequestError, Started, SyncState,
-    question_behind,
+    Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_FRAME,
+    MAX_PAYLOAD, Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError,
+    Started, SyncState,
 };
 use motorlink_proto::time::Instant;
 
@@ -33,12 +33,7 @@ pub(super) struct Session {
     master: Master,
     account: Account,
     pending: PendingRequest,
-    /// The size of the last acknowledge's payload, and how often the line had been lost when that was
-    /// asked for.
-    last_size: Option<usize>,
-    losses: u32,
-    /// Changes with each confirmation.
-    turn: bool,
+    last: LastExchange,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
 }
@@ -50,7 +45,7 @@ struct PendingRequest {
     what: What,
 }
 
-/// A request in words, for messages.
+/// The text of a request, for messages.
 #[derive(Debug, Clone, Copy)]
 enum What {
     Writing(RegisterId),
@@ -93,9 +88,7 @@ impl Session {
             master,
             account: Account::new(options.limits),
             pending: asked,
-            last_size: None,
-            losses: 0,
-            turn: false,
+            last: LastExchange::default(),
             is_retired: false,
         }
     }
@@ -112,6 +105,11 @@ impl Session {
         self.master.counters()
     }
 
+    /// How a lost line is recovered from the next request on; gives how it was until now.
+    pub(super) fn set_recovery(&mut self, recovery: Recovery) -> Recovery {
+        std::mem::replace(&mut self.master.config_mut().recovery, recovery)
+    }
+
     pub(super) fn started(&self) -> Started {
         self.account.started()
     }
@@ -123,10 +121,19 @@ impl Session {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         addressable(motor)?;
         self.check_retired(Effect::of(request))?;
+        self.begin(motor, request)
+    }
+
+    /// Begins the exchange of a confirmation. A retired session does so, too, to confirm its stops.
+    pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
+        self.begin(0, &confirmation.request())
+    }
+
+    fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         let checked = self.account.check(self.master.counters(), motor, request);
         let effect = checked.map_err(|why| limited(motor, why))?;
         let begun = self.master.request(motor, request);
-        self.begun(begun, effect, motor, What::of(request))?;
+        self.begun(begun, motor, What::of(request))?;
         self.account.sent(motor, effect);
         Ok(())
     }
@@ -141,12 +148,12 @@ impl Session {
         let checked = self.account.check_frame(self.master.counters(), &frame);
         let effect = checked.map_err(|why| limited(motor, why))?;
         let begun = self.master.request_raw(frame.header, payload);
-        self.begun(begun, effect, motor, What::Raw(code))?;
+        self.begun(begun, motor, What::Raw(code))?;
         self.account.sent_frame(&frame, effect);
         Ok(())
     }
 
-    /// Sends nothing any more but what stops motors.
+    /// From now on only stops and their confirmations are sent.
     pub(super) fn retire(&mut self) {
         self.is_retired = true;
     }
@@ -161,17 +168,13 @@ impl Session {
     fn begun(
         &mut self,
         begun: Result<(), RequestError>,
-        effect: Effect,
         motor: u8,
         what: What,
     ) -> Result<(), Error> {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
-        if effect == Effect::Stops {
-            self.master.send_ahead();
-        }
-        self.losses = self.master.counters().losses;
+        self.last.requested(self.master.counters());
         self.pending = PendingRequest { motor, what };
         Ok(())
     }
@@ -191,7 +194,7 @@ impl Session {
         outcome: Result<(Option<T>, usize), proto::ExchangeError>,
     ) -> Result<T, Error> {
         let PendingRequest { motor, what } = self.pending;
-        self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
+        self.last.finished(outcome.as_ref().ok().map(|(_, size)| *size));
         let (port, target) = (Arc::clone(&self.port), Target(motor));
         match outcome {
             Ok((Some(value), _)) => {
@@ -214,15 +217,14 @@ impl Session {
         }
     }
 
-    /// Whether the answer to a question shows that replies and requests go together: `losses` is what
-    /// [`question`](Self::question) gave. A line that was lost since then has been brought in step, which
-    /// says nothing of what was read before.
+    /// Whether the answer shows that the replies so far match their requests. A line that was lost
+    /// meanwhile has been recovered, which says nothing about the replies before.
     pub(super) fn confirmed(
         &mut self,
-        losses: u32,
+        confirmation: &Confirmation,
         answer: Result<(), Error>,
     ) -> Result<(), Error> {
-        let is_same_line = self.master.counters().losses == losses;
+        let is_same_line = confirmation.is_the_same(self.master.counters());
         let port = Arc::clone(&self.port);
         match answer {
             Ok(()) if is_same_line => Ok(()),
@@ -235,11 +237,15 @@ impl Session {
         }
     }
 
-    /// A question behind the last reply, with the size of its answer, and how often the line had been lost
-    /// when that reply was asked for.
-    pub(super) fn question(&mut self) -> (u32, (Request<'static>, usize)) {
-        self.turn = !self.turn;
-        (self.losses, question_behind(self.last_size, self.turn))
+    /// Starts a confirmation of the replies so far.
+    pub(super) fn confirmation(&mut self) -> Confirmation {
+        self.last.confirm()
+    }
+
+    /// Takes another question for a confirmation whose question was refused; false if it was
+    /// refused twice.
+    pub(super) fn repeat(&mut self, confirmation: &mut Confirmation) -> bool {
+        confirmation.repeat(&mut self.last)
     }
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.
@@ -258,7 +264,7 @@ impl Session {
         self.master.trust_line();
     }
 
-    /// A STOP_MOTOR to be sent beside the exchanges, without waiting for an answer.
+    /// A STOP_MOTOR that is sent outside the exchanges. No answer is expected.
     pub(super) fn stop_unheard<'a>(
         &mut self,
         motor: MotorNumber,

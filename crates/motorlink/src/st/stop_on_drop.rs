@@ -1,8 +1,8 @@
 //! Stops motors at the end of a scope, however it is left.
 
-use motorlink_proto::st::{ErrorCode, MotorNumber, SyncState};
+use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, SyncState};
 
-use super::{Client, Error};
+use super::{Client, Error, Motor};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
 impl Client {
@@ -19,28 +19,125 @@ impl Client {
     pub fn stop_on_drop(&self) -> StopOnDrop<'_> {
         StopOnDrop { client: self, armed: true, report: |_| {} }
     }
+
+    /// Stops these motors, each with at most [`STOP_ATTEMPTS`] commands whose reply is waited for. The
+    /// first one is sent without padding: padded questions do not detect an echo.
+    fn stop_motors(&self, motors: Vec<MotorNumber>) -> Vec<Stopped> {
+        let (mut failed, mut stopped) = divided(self.stop_once(&motors));
+        let echo = failed.iter().find_map(echo_of);
+        for _ in 1..STOP_ATTEMPTS {
+            if failed.is_empty() {
+                return stopped;
+            }
+            await_retry(self.link_state(), &self.clock());
+            let left: Vec<_> = failed.iter().map(|one| one.motor).collect();
+            let (again, done) = divided(self.padded(|| self.stop_once(&left)));
+            failed = again;
+            stopped.extend(done);
+        }
+        for Stopped { motor, result } in &mut failed {
+            // The padding may have completed a write. If this fails, so did the last attempt.
+            let _ = self.stop_unheard(*motor);
+            if let Some(echo) = echo {
+                *result = Err(self.unanswered(*motor, echo));
+            }
+        }
+        stopped.extend(failed);
+        stopped
+    }
+
+    /// Sends a stop to each of these motors. If the drive does not answer one, the others are sent
+    /// theirs without a wait for an answer.
+    fn stop_once(&self, motors: &[MotorNumber]) -> Vec<Stopped> {
+        let mut silent = None;
+        let mut is_sent_to_all = false;
+        let stop = |(n, &motor): (usize, &MotorNumber)| {
+            if !is_sent_to_all && self.sync_state() == SyncState::Lost {
+                is_sent_to_all = true;
+                // `stop` begins with a stop to this motor, unless it is skipped.
+                for &motor in &motors[n + usize::from(silent.is_none())..] {
+                    // If it fails, so does the stop below, which says why.
+                    let _ = self.stop_unheard(motor);
+                }
+            }
+            let result = match silent {
+                Some(failure) => Err(self.unanswered(motor, failure)),
+                None => self.stop_and_confirm(motor),
+            };
+            if let Err(Error::Failed { failure, .. }) = &result
+                && self.sync_state() == SyncState::Lost
+            {
+                silent = Some(*failure);
+            }
+            Stopped { motor, result }
+        };
+        motors.iter().enumerate().map(stop).collect()
+    }
+
+    fn stop_and_confirm(&self, motor: MotorNumber) -> Result<(), Error> {
+        let result = self.motor(motor.number())?.stop();
+        if result.is_ok() || result.as_ref().is_err_and(Error::is_refusal) {
+            self.confirm().inspect_err(|_| {
+                // The acknowledge may be that of another request.
+                let mut started = self.hand_over();
+                started.presume(motor.number());
+                self.take_over(started);
+            })?;
+        }
+        result
+    }
+}
+
+fn echo_of(stopped: &Stopped) -> Option<Failure> {
+    match stopped.result {
+        Err(Error::Failed { failure: Failure::Echo, .. }) => Some(Failure::Echo),
+        _ => None,
+    }
+}
+
+/// The stops to repeat, and those that are done or refused.
+fn divided(stopped: Vec<Stopped>) -> (Vec<Stopped>, Vec<Stopped>) {
+    stopped.into_iter().partition(is_to_be_repeated)
+}
+
+fn is_to_be_repeated(stopped: &Stopped) -> bool {
+    stopped.result.as_ref().is_err_and(|error| !error.is_refusal())
+}
+
+impl Motor<'_> {
+    /// Stops the motor, also one that another program started. Sends STOP_MOTOR until the drive
+    /// acknowledges it and the replies and requests match, at most 4 times. On a lost line padding
+    /// completes what a 5.x drive may wait for ([`Recovery::Pad`](super::Recovery::Pad)).
+    ///
+    /// # Errors
+    /// Those of the last attempt. The motor may still be turning.
+    pub fn stop_until_confirmed(&self) -> Result<(), Error> {
+        let stopped = self.client().stop_motors(vec![self.number()]);
+        stopped.into_iter().try_for_each(|one| one.result)
+    }
 }
 
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
-/// early return, on a panic. Where the drive does not answer it may still hear, so that STOP_MOTOR
-/// is sent to every motor before any answer is waited for again.
+/// early return, on a panic. Each motor is stopped as by [`Motor::stop_until_confirmed`]. If the drive
+/// does not answer, it may still receive: STOP_MOTOR is sent to all motors before the next wait for an
+/// answer.
 pub struct StopOnDrop<'a> {
     client: &'a Client,
     armed: bool,
     report: fn(&Stopped),
 }
 
-/// What a [`StopOnDrop`] did to one motor.
+/// The result of the stop of one motor.
 #[derive(Debug)]
 pub struct Stopped {
     /// The motor.
     pub motor: MotorNumber,
-    /// Whether the drive acknowledged STOP_MOTOR.
+    /// Whether the drive acknowledged STOP_MOTOR, and replies and requests match.
     pub result: Result<(), Error>,
 }
 
 impl StopOnDrop<'_> {
-    /// Calls `report` with what was done to each motor, when all is done.
+    /// Calls `report` with the result for each motor, after all stops.
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
         self
@@ -51,62 +148,22 @@ impl StopOnDrop<'_> {
         self.armed = false;
     }
 
-    /// Stops the motors now; gives what was done to each. Those that failed stay to be stopped.
+    /// Stops the motors now. Returns the result for each motor. A motor that did not acknowledge the stop
+    /// still counts as started.
     pub fn stop_now(mut self) -> Vec<Stopped> {
         self.armed = false;
         self.stop_all()
     }
 
-    /// Stops a motor; `Err` leaves it to the next attempt.
-    fn stop(&self, motor: MotorNumber) -> Result<(), Error> {
-        match self.client.motor(motor.number())?.stop() {
-            // What is not there does not turn.
-            Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
-                self.client.forget_motor(motor);
-                Ok(())
-            }
-            result => result,
-        }
-    }
-
     fn stop_all(&self) -> Vec<Stopped> {
-        let mut stopped: Vec<Stopped> = Vec::new();
         self.client.abandon();
-        let mut left: Vec<MotorNumber> = self.client.started().collect();
-        for attempt in 1..=STOP_ATTEMPTS {
-            let mut failed = Vec::new();
-            let mut told = false;
-            // How the drive failed to answer: it would not answer for the others either.
-            let mut silent = None;
-            for (n, &motor) in left.iter().enumerate() {
-                if !told && self.client.sync_state() == SyncState::Lost {
-                    told = true;
-                    // That to this motor is the first thing that `stop` sends, unless it is skipped.
-                    for &motor in &left[n + usize::from(silent.is_none())..] {
-                        // If it fails, so does the stop below, which says why.
-                        let _ = self.client.stop_unheard(motor);
-                    }
-                }
-                let result = match silent {
-                    Some(failure) => Err(self.client.unanswered(motor, failure)),
-                    None => self.stop(motor),
-                };
-                if let Err(Error::Failed { failure, .. }) = &result
-                    && self.client.sync_state() == SyncState::Lost
-                {
-                    silent = Some(*failure);
-                }
-                if result.is_err() && attempt < STOP_ATTEMPTS {
-                    failed.push(motor);
-                } else {
-                    stopped.push(Stopped { motor, result });
-                }
+        let mut stopped = self.client.stop_motors(self.client.started().collect());
+        for Stopped { motor, result } in &mut stopped {
+            // A motor that does not exist does not turn.
+            if let Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) = result {
+                self.client.forget_motor(*motor);
+                *result = Ok(());
             }
-            left = failed;
-            if left.is_empty() {
-                break;
-            }
-            await_retry(self.client.link_state());
         }
         stopped
     }

@@ -1,4 +1,4 @@
-//! What passes a serial line, in words: requests by themselves, replies with the request before.
+//! The text of the traffic of a serial line: each request, and each reply with its request.
 
 use motorlink_link::printable;
 use motorlink_proto::st::{
@@ -112,7 +112,7 @@ impl Transcript {
                 Some(Reading { register, bits, profile: self.profile }.to_string())
             }
             ReplyKind::BoardInfo => {
-                let BoardInfo { version: [major, minor, patch], name } =
+                let BoardInfo { version: [major, minor, patch], name, .. } =
                     BoardInfo::decode(payload)?;
                 Some(format!("{} {major}.{minor}.{patch}", printable(name)))
             }

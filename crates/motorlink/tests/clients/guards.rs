@@ -56,7 +56,7 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
         let _ = (&theirs).read_to_end(&mut heard);
         heard
     });
-    client.motor(1).unwrap().start().unwrap();
+    client.motor(1).unwrap().execute(Command::StartMotor).unwrap();
     drop(client.stop_on_drop());
     drop(client);
     let stops = drive.join().unwrap().windows(4).filter(|w| *w == [0x23, 0x01, 0x02, 0x26]).count();
@@ -152,7 +152,7 @@ fn a_guard_waits_for_a_port_that_comes_back() {
         (&theirs).read_exact(&mut start).unwrap();
         (&theirs).write_all(&[0xF0, 0x00, 0xF0]).unwrap();
     });
-    client.motor(1).unwrap().start().unwrap();
+    client.motor(1).unwrap().execute(Command::StartMotor).unwrap();
     drive.join().unwrap();
     drop(client.stop_on_drop());
     assert_eq!(client.started().count(), 0);
@@ -163,8 +163,11 @@ fn answer_everything(stream: UnixStream) {
     let mut slave = st::Slave::new(st::Profile::Spec, st::MotorNumber::FIRST);
     let mut drive = motorlink_sim::st::StDrive::demo(motorlink::time::Instant(0));
     let mut byte = [0];
+    let begin = std::time::Instant::now();
     while (&stream).read_exact(&mut byte).is_ok() {
-        if let Some(reply) = slave.receive(motorlink::time::Instant(0), byte[0], &mut drive) {
+        // Its reception timeout ends the frame that the padding of a recovery begins.
+        let now = motorlink::time::Instant(begin.elapsed().as_micros() as u64);
+        if let Some(reply) = slave.receive(now, byte[0], &mut drive) {
             let _ = (&stream).write_all(reply);
         }
     }

@@ -86,7 +86,7 @@ impl CanLink for Wire<CanFrame> {
     }
 }
 
-/// A link whose drives owe no earlier host a reply.
+/// A link whose drives have no reply to an earlier host outstanding.
 pub struct Fresh<L>(pub L);
 
 impl<L: Send> Link for Fresh<L> {

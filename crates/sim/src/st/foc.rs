@@ -81,12 +81,12 @@ impl Foc {
     /// Starts without current and voltage.
     pub(super) fn begin(&mut self) {
         (self.d, self.q) = (Regulator::default(), Regulator::default());
-        self.reference = Vector::ZERO;
         self.stop();
     }
 
-    /// Sets the measured currents to 0.
+    /// Sets the references and the measured currents to 0.
     pub(super) fn stop(&mut self) {
+        self.reference = Vector::ZERO;
         self.stator_current = Vector::ZERO;
         self.current = Vector::ZERO;
         self.voltage = Vector::ZERO;

@@ -226,7 +226,7 @@ impl Expectation {
         }
         let moment = if moment { format!(" at {} s", short(at(n))) } else { String::new() };
         let miss = short(miss);
-        (false, format!("{} {unit}{moment}, {miss} {unit} outside {bounds}", short(value)))
+        (false, format!("{} {unit}{moment}, expected {bounds}: off by {miss} {unit}", short(value)))
     }
 }
 
@@ -281,18 +281,22 @@ mod tests {
     #[test]
     fn numbers_are_compared_and_the_worst_is_reported() {
         holds("speed between = [0.3, 0.5]\nmin = 3\nmax = 6", true, "3 to 5 rpm");
-        let found = "6 rpm at 0.6 s, 1 rpm outside 3 to 5 rpm";
+        let found = "6 rpm at 0.6 s, expected 3 to 5 rpm: off by 1 rpm";
         holds("speed between = [0.3, 0.6]\nmin = 3\nmax = 5", false, found);
         holds("speed at = 0.72\nvalue = 7.5\nwithin = 0.5", true, "7 rpm throughout");
-        holds("speed max = 9", false, "10 rpm at 1 s, 1 rpm outside at most 9 rpm");
+        holds("speed max = 9", false, "10 rpm at 1 s, expected at most 9 rpm: off by 1 rpm");
         holds("speed of = \"some\"\nmin = 4\nmax = 5", true, "4 rpm at 0.4 s");
-        let found = "10 rpm at 1 s, 10 rpm outside at least 20 rpm";
+        let found = "10 rpm at 1 s, expected at least 20 rpm: off by 10 rpm";
         holds("speed of = \"some\"\nmin = 20", false, found);
         holds("speed of = \"mean\"\nvalue = 5\nwithin = 0", true, "5 rpm");
-        holds("speed of = \"mean\"\nmin = 6", false, "5 rpm, 1 rpm outside at least 6 rpm");
+        holds(
+            "speed of = \"mean\"\nmin = 6",
+            false,
+            "5 rpm, expected at least 6 rpm: off by 1 rpm",
+        );
         holds("speed of = \"swing\"\nmin = 10", true, "10 rpm");
         holds("speed of = \"slope\"\nmin = 9.99", true, "10 rpm/s throughout");
-        let found = "10 rpm/s at 0 s, 5 rpm/s outside at most 5 rpm/s";
+        let found = "10 rpm/s at 0 s, expected at most 5 rpm/s: off by 5 rpm/s";
         holds("speed of = \"slope\"\nmax = 5", false, found);
     }
 
