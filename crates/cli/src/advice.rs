@@ -1,12 +1,16 @@
 //! Advice after errors of the library: a command or an option to try.
 
-use motorlink::port::PortError;
+use motorlink::arrival::NotArrived;
+use motorlink::port::{NameError, PortError};
 use motorlink::relay::RelayError;
 use motorlink::st::{ErrorCode, Failure, Profile, Unverifiable};
 use motorlink::{rmd, st};
 
 /// After any error about a register's name.
 pub const LIST_REGISTERS: &str = "`motorlink st registers` lists them";
+/// After a stop that failed.
+pub const STOP_AGAIN: &str = "repeat the stop; end other programs that use the port; if the motor \
+                              still turns, use the emergency stop";
 const TRY_RATES: &str = "`motorlink st scan` tries the usual rates";
 
 pub fn port(error: &PortError) -> Option<&'static str> {
@@ -15,6 +19,29 @@ pub fn port(error: &PortError) -> Option<&'static str> {
             Some("`motorlink ports` lists what is there")
         }
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),
+        _ => None,
+    }
+}
+
+/// The name to try for a port of the other kind.
+pub fn port_kind(error: &PortError) -> Option<String> {
+    let PortError::WrongKind { port, wanted, .. } = error else { return None };
+    if *wanted == "CAN bus" {
+        let line = port.strip_prefix("serial:").unwrap_or(port);
+        return Some(format!("for a CAN adapter on this line write -p slcan:{line}"));
+    }
+    Some(match port.strip_prefix("slcan:") {
+        Some(line) => format!("for an ST drive on this line write -p {line}"),
+        None => "for RMD motors on a CAN bus use `motorlink rmd`".to_owned(),
+    })
+}
+
+/// A name that is not the name of a port.
+pub fn port_name(error: &NameError) -> Option<&'static str> {
+    match error {
+        NameError::UnknownForm { .. } | NameError::Windows { .. } => {
+            Some("`motorlink ports` lists what is connected")
+        }
         _ => None,
     }
 }
@@ -30,18 +57,18 @@ pub fn rmd(error: &rmd::Error) -> Option<&'static str> {
     match error {
         rmd::Error::Port(error) => port(error),
         rmd::Error::Timeout { .. } => Some("`motorlink rmd scan` lists the motors that answer"),
-        rmd::Error::NotArrived { why, .. } => match why {
-            rmd::NotArrived::Protection { .. } => {
+        rmd::Error::Limit { exceeded: rmd::Exceeded::NoSpeed { .. }, .. } => {
+            Some("add --max-speed to `position` or `single-turn-position`")
+        }
+        rmd::Error::NotArrived { why, .. } => not_arrived(why, |reason| match reason {
+            rmd::AbortReason::Protection(_) => {
                 Some("remove the cause, then `motorlink rmd clear-errors`")
             }
-            rmd::NotArrived::TimedOut { is_still: false, .. } => {
-                Some("try a longer --wait-timeout")
-            }
-            rmd::NotArrived::TimedOut { .. } | rmd::NotArrived::Stalled { .. } => {
-                Some("is the shaft blocked, or --wait-tolerance too small?")
+            rmd::AbortReason::LostTurns { .. } => {
+                Some("check the supply, then read the angle with `motorlink rmd angle`")
             }
             _ => None,
-        },
+        }),
         _ => None,
     }
 }
@@ -63,24 +90,37 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
         st::Error::Refused { code: ErrorCode::BadMotorSelected, .. } => {
             Some("give another --motor")
         }
-        st::Error::NotArrived { why, .. } => match why {
-            st::NotArrived::Faults { .. } => {
-                Some("remove the cause, then `motorlink st fault-ack`")
-            }
-            st::NotArrived::NotRunning { .. } => {
-                Some("start the motor first: `motorlink st start`")
-            }
-            st::NotArrived::TimedOut { is_still: false, .. } => Some("try a longer --wait-timeout"),
-            st::NotArrived::TimedOut { .. } | st::NotArrived::Stalled { .. } => {
-                Some("is the shaft blocked, or --wait-tolerance too small?")
-            }
+        st::Error::Refused { code: ErrorCode::BadFrameId, .. } => Some(
+            "the drive is built without this function, or it speaks the other profile: try --profile \
+             spec or --profile mcsdk-5.4",
+        ),
+        st::Error::NotArrived { why, .. } => not_arrived(why, |reason| match reason {
+            st::AbortReason::Faults(_) => Some("remove the cause, then `motorlink st fault-ack`"),
+            st::AbortReason::NotRunning(_) => Some("start the motor first: `motorlink st start`"),
             _ => None,
-        },
+        }),
+        st::Error::NotStarted { why: st::NotStarted::Faults { .. }, .. } => {
+            Some("remove the cause, then `motorlink st fault-ack`")
+        }
         st::Error::Limit { exceeded: st::LimitError::NoRamp { .. }, .. } => {
             Some("give the ramp with the start: `motorlink st start --ramp RPM MS`")
         }
         st::Error::NotVerifiable { why: Unverifiable::NotReadable, .. } => {
             Some("`motorlink st registers` says what can")
+        }
+        _ => None,
+    }
+}
+
+fn not_arrived<R>(
+    why: &NotArrived<R>,
+    after: impl FnOnce(&R) -> Option<&'static str>,
+) -> Option<&'static str> {
+    match why {
+        NotArrived::NotReady(reason) | NotArrived::Aborted { reason, .. } => after(reason),
+        NotArrived::TimedOut { is_still: false, .. } => Some("try a longer --wait-timeout"),
+        NotArrived::TimedOut { .. } | NotArrived::Stalled { .. } => {
+            Some("is the shaft blocked, or --wait-tolerance too small?")
         }
         _ => None,
     }

@@ -44,6 +44,11 @@ impl Connection {
         self.port.name()
     }
 
+    /// The port as the user wrote it.
+    pub fn port_text(&self) -> &str {
+        self.port.port.as_deref().unwrap_or_default()
+    }
+
     /// Wraps a serial line each time it is opened, for --trace and --fault. Each opening has other damage.
     pub fn around_line(
         &self,

@@ -7,7 +7,7 @@ use motorlink_link::fault::FaultError;
 use motorlink_link::{printable, printable_lines};
 use serde_json::{Map, Value, json};
 
-use crate::advice;
+use crate::{advice, pasteable};
 
 /// Why the program ends early.
 #[derive(Debug)]
@@ -27,6 +27,8 @@ pub struct Problem {
     message: String,
     /// What to try.
     advice: Option<String>,
+    /// Whether the message has angles or speeds of a motor shaft.
+    is_of_motor_shaft: bool,
     /// `port`, `motor`, `code` and `name`, where they are known.
     facts: Map<String, Value>,
 }
@@ -118,6 +120,44 @@ impl Failure {
         self
     }
 
+    /// With something else to try.
+    pub fn trying_also(mut self, advice: &str) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            let before =
+                problem.advice.take().map(|before| format!("{before}; ")).unwrap_or_default();
+            problem.advice = Some(before + advice);
+        }
+        self
+    }
+
+    /// After a command to stop `motor` that may not have been carried out.
+    pub fn of_stop(self, motor: impl std::fmt::Display) -> Self {
+        match &self {
+            Failure::Failed(problem) if !matches!(problem.kind, Kind::Usage | Kind::Output) => self
+                .with_fact(format!("{motor} may still be turning"))
+                .trying_also(advice::STOP_AGAIN),
+            _ => self,
+        }
+    }
+
+    /// After a motion command that was sent to `motor`: it may have been carried out, unless the motor
+    /// refused it. `stop` is the command that stops the motor.
+    pub fn of_motion(self, motor: impl std::fmt::Display, stop: &str) -> Self {
+        if !matches!(self, Failure::Failed(_)) || !self.is_outcome_unknown() {
+            return self;
+        }
+        self.with_fact(format!("{motor} may be turning now"))
+            .trying_also(&format!("stop it: `{stop}`"))
+    }
+
+    /// Whether the command may have been carried out.
+    pub fn is_outcome_unknown(&self) -> bool {
+        match self {
+            Failure::Failed(problem) => !matches!(problem.kind, Kind::Refused | Kind::Usage),
+            _ => true,
+        }
+    }
+
     /// With other words for what happened.
     pub fn saying(mut self, message: String) -> Self {
         if let Failure::Failed(problem) = &mut self {
@@ -137,7 +177,21 @@ impl Failure {
     /// With a fact behind what happened.
     pub fn then(mut self, fact: impl std::fmt::Display) -> Self {
         if let Failure::Failed(problem) = &mut self {
-            problem.message = format!("{}; {fact}", problem.message);
+            let joint = if problem.message.ends_with('?') { "" } else { ";" };
+            problem.message = format!("{}{joint} {fact}", problem.message);
+        }
+        self
+    }
+
+    /// With the shaft of the angles and speeds in the message, if it has some.
+    pub fn at_motor_shaft(mut self, gear_ratio: f64) -> Self {
+        if let Failure::Failed(problem) = &mut self
+            && std::mem::take(&mut problem.is_of_motor_shaft)
+        {
+            return self.then(format!(
+                "angles and speeds in this message are those of the motor shaft, {gear_ratio} times those \
+                 of the output shaft"
+            ));
         }
         self
     }
@@ -184,7 +238,8 @@ impl Failure {
 
 impl Problem {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Problem { kind, message: printable_lines(&message.into()), advice: None, facts: Map::new() }
+        let message = printable_lines(&message.into());
+        Problem { kind, message, advice: None, is_of_motor_shaft: false, facts: Map::new() }
     }
 
     /// What an error of the library is, with what to try.
@@ -206,18 +261,27 @@ impl Problem {
 
     /// For people: what happened, and what to try.
     pub fn text(&self) -> String {
-        let message = &self.message;
+        let message = self.pasteable(&self.message);
         let joint = if message.ends_with('?') { "" } else { ";" };
-        self.advice
-            .as_ref()
-            .map_or_else(|| message.clone(), |advice| format!("{message}{joint} {advice}"))
+        match &self.advice {
+            Some(advice) => format!("{message}{joint} {}", self.pasteable(advice)),
+            None => message,
+        }
+    }
+
+    /// With the options of the command line in each command.
+    fn pasteable(&self, text: &str) -> String {
+        let motor = self.facts.get("motor").and_then(Value::as_u64);
+        pasteable::complete(text, motor.and_then(|motor| motor.try_into().ok()))
     }
 
     /// For programs: docs/JSON.md.
     pub fn object(&self) -> Value {
-        let mut object = json!({ "kind": self.kind.word(), "message": self.message });
+        let mut object =
+            json!({ "kind": self.kind.word(), "message": self.pasteable(&self.message) });
         let members = object.as_object_mut().expect("an object was made");
-        members.extend(self.advice.as_ref().map(|advice| ("try".to_owned(), json!(advice))));
+        let advice = self.advice.as_deref().map(|advice| self.pasteable(advice));
+        members.extend(advice.map(|advice| ("try".to_owned(), json!(advice))));
         members.extend(self.facts.clone());
         object
     }
@@ -234,6 +298,7 @@ impl From<st::Error> for Failure {
         let kind = match &error {
             st::Error::Refused { .. }
             | st::Error::Differs { .. }
+            | st::Error::NotStarted { .. }
             | st::Error::NotArrived { .. } => Kind::Refused,
             st::Error::Port(error) => return error.into(),
             error if error.is_line_failure() => Kind::Link,
@@ -247,6 +312,7 @@ impl From<st::Error> for Failure {
                 problem.fact("name", code.to_string());
             }
             st::Error::NotArrived { motor, .. } => problem.motor(motor.number()),
+            st::Error::NotStarted { motor, .. } => problem.motor(motor.0),
             st::Error::Failed { motor, .. } | st::Error::Reply { motor, .. } => {
                 problem.motor(motor.0);
             }
@@ -267,6 +333,8 @@ impl From<rmd::Error> for Failure {
             _ => Kind::Usage,
         };
         let mut problem = Problem::of(kind, &error, advice::rmd(&error));
+        problem.is_of_motor_shaft =
+            matches!(error, Limit { .. } | FullTurn { .. } | NotArrived { .. });
         if let Some(motor) = error.motor().filter(|_| kind != Kind::Usage) {
             problem.motor(motor.number());
         }
@@ -286,7 +354,11 @@ impl From<&PortError> for Failure {
             PortError::WrongKind { .. } => Kind::Usage,
             _ => Kind::Link,
         };
-        Problem::of(kind, error, advice::port(error)).into()
+        let failure: Failure = Problem::of(kind, error, advice::port(error)).into();
+        match advice::port_kind(error) {
+            Some(advice) => failure.trying(advice),
+            None => failure,
+        }
     }
 }
 
@@ -318,10 +390,23 @@ macro_rules! usage {
         }
     )+ };
 }
-usage!(NameError, FaultError, st::ValueError);
+usage!(FaultError, st::ValueError);
+
+impl From<NameError> for Failure {
+    fn from(error: NameError) -> Self {
+        Problem::of(Kind::Usage, &error, advice::port_name(&error)).into()
+    }
+}
 
 impl From<st::UnknownRegister> for Failure {
     fn from(error: st::UnknownRegister) -> Self {
-        Failure::usage(error.to_string()).trying(advice::LIST_REGISTERS)
+        let failure = Failure::usage(error.to_string());
+        match error.text.contains(['*', '?']) {
+            true => failure.trying(format!(
+                "`motorlink st registers '{}'` lists the registers that match: give their names",
+                error.text
+            )),
+            false => failure.trying(advice::LIST_REGISTERS),
+        }
     }
 }

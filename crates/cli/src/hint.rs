@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command, Error};
-use motorlink::rmd::{MotorId, MotorSet, Payload, Pid, SpinDirection};
-use motorlink::st::{Profile, RegisterId};
+use motorlink::rmd::{EncoderBits, GearRatio, MotorId, MotorSet, Payload, Pid, SpinDirection};
+use motorlink::st::{FullScale, MotorNumber, Profile, RegisterId};
 
 /// A parser with words for completions. The argument needs `hide_possible_values`, so that its help does
 /// not list them.
@@ -64,7 +64,40 @@ pub fn ids() -> Hinted<impl TypedValueParser<Value = MotorSet>> {
 /// A number of an ST motor.
 pub fn motor() -> Hinted<impl TypedValueParser<Value = u8>> {
     let words = || (1..=7).map(|number: u8| number.to_string()).collect();
-    Hinted { parser: clap::value_parser!(u8).range(1..=7), words }
+    Hinted { parser: parse_motor, words }
+}
+
+/// The width of the encoder of an RMD motor, bits.
+pub fn encoder_bits() -> Hinted<impl TypedValueParser<Value = EncoderBits>> {
+    let words = || {
+        let widths = (0..=u8::MAX).filter_map(EncoderBits::new);
+        widths.map(|width| width.bits().to_string()).collect()
+    };
+    let parser = |text: &str| {
+        let bits = text.parse().ok().and_then(EncoderBits::new);
+        bits.ok_or("the encoder of an RMD motor has 12 to 18 bits: give a whole number")
+    };
+    Hinted { parser, words }
+}
+
+/// The ratio of a gear.
+pub fn gear_ratio() -> impl TypedValueParser<Value = GearRatio> {
+    |text: &str| {
+        let ratio = text
+            .parse::<f64>()
+            .map_err(|_| format!("`{text}` is not a number: for a gear of 6:1 give 6"))?;
+        GearRatio::new(ratio).map_err(|error| error.to_string())
+    }
+}
+
+/// The current of digit 32767 of an ST drive, A.
+pub fn full_scale() -> impl TypedValueParser<Value = FullScale> {
+    |text: &str| {
+        let amps = text.parse::<f64>().map_err(|_| {
+            format!("`{text}` is not a number: give the full scale in A, such as 16.5")
+        })?;
+        FullScale::from_amps(amps).map_err(|error| error.to_string())
+    }
 }
 
 /// A profile of ST's protocol.
@@ -80,6 +113,19 @@ pub fn direction() -> Hinted<impl TypedValueParser<Value = SpinDirection>> {
     };
     let words = || SpinDirection::NAMES.iter().map(|(_, name)| (*name).to_owned()).collect();
     Hinted { parser, words }
+}
+
+/// Reads the number of an ST motor. In frames, 0 is the motor of the previous request.
+fn parse_motor(text: &str) -> Result<u8, String> {
+    match text.parse::<u8>() {
+        Ok(0) => {
+            Err("motor numbers are 1 to 7: the first motor is 1. In a frame, 0 means the motor of \
+                      the previous request; write 1 for a drive with one motor"
+                .to_owned())
+        }
+        Ok(number) if MotorNumber::new(number).is_some() => Ok(number),
+        _ => Err("motor numbers are 1 to 7".to_owned()),
+    }
 }
 
 /// Reads the motors that `--id` means: `3`, `1,3`, `1-4`.

@@ -6,14 +6,15 @@
 use std::ops::RangeInclusive;
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Condvar, Mutex, OnceLock, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use motorlink::Clock;
 use signal_hook::consts::*;
 use signal_hook::iterator::{Handle, Signals};
 
-use crate::output::note;
+use crate::advice::STOP_AGAIN;
+use crate::output::{finish, never_wait_for_messages, note};
 
 /// Exit code of a program that a signal ended.
 const INTERRUPTED_CODE: i32 = 130;
@@ -31,6 +32,8 @@ const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 static HANDLE: OnceLock<Handle> = OnceLock::new();
 static TAKEN_OVER: AtomicBool = AtomicBool::new(false);
 static HOLDS: AtomicBool = AtomicBool::new(false);
+/// The motors of a stop that is not confirmed.
+static STOPPING: Mutex<Option<String>> = Mutex::new(None);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
@@ -70,6 +73,24 @@ pub fn hold() {
     }
 }
 
+/// As [`take_over`], for a stop of `motors`: the first signal does not end it, because its time is
+/// bounded. A second signal ends the process and prints that the motors may still be turning.
+pub fn complete_stop(motors: impl Into<String>) {
+    never_wait_for_messages();
+    *stopping() = Some(motors.into());
+    take_over();
+}
+
+/// The stop has its outcome: signals end the process at once again.
+pub fn stop_is_complete() {
+    TAKEN_OVER.store(false, Ordering::SeqCst);
+    *stopping() = None;
+}
+
+fn stopping() -> MutexGuard<'static, Option<String>> {
+    STOPPING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 fn obey(signal: i32) {
     if SUSPENDING.contains(&signal) {
         return note(
@@ -78,6 +99,10 @@ fn obey(signal: i32) {
     }
     let is_first = !INTERRUPTED.swap(true, Ordering::SeqCst);
     if !TAKEN_OVER.load(Ordering::SeqCst) || !(is_first || HOLDS.load(Ordering::SeqCst)) {
+        if let Some(motors) = stopping().take() {
+            note(format!("{motors} may still be turning: a signal ended the stop; {STOP_AGAIN}"));
+            finish();
+        }
         exit(INTERRUPTED_CODE);
     }
     let _held = LOCK.lock().unwrap_or_else(PoisonError::into_inner);

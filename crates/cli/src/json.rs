@@ -1,10 +1,17 @@
 //! Results for programs, as docs/JSON.md describes them. All values are made here.
 
-use motorlink::rmd::{Field, Meaning, Scale};
-use motorlink::st::{Flags, Reading, RegisterId};
+use motorlink::rmd::{EncoderBits, Field, GearRatio, Meaning, Quantity, Scale};
+use motorlink::st::register::Unit;
+use motorlink::st::{Flags, FullScale, Reading, RegisterId};
 use serde_json::{Map, Value, json};
 
 use crate::failure::Failure;
+
+/// The member of an ST current with its value in A.
+const AMPS: &str = "amps";
+
+/// The member of an angle, a speed or an acceleration with its shaft, if it is not the motor shaft.
+const SHAFT: &str = "shaft";
 
 /// A named value: as text and as JSON.
 #[derive(Clone)]
@@ -72,23 +79,47 @@ impl Row {
         Row { name: name.to_owned(), text, value: quantity(value, decimals, unit) }
     }
 
+    /// An ST current: digits, and with the full scale also A.
+    pub fn current(name: &str, digits: i64, full_scale: Option<FullScale>) -> Self {
+        let s16a = Unit::S16A.symbol();
+        let Some(full_scale) = full_scale else {
+            return Row::quantity(name, digits as f64, 0, s16a);
+        };
+        let Scale { decimals, symbol, .. } = full_scale.scale();
+        let amps = full_scale.scale().value(digits);
+        let text = format!("{amps:.*} {symbol} ({digits} {s16a})", usize::from(decimals));
+        let value = json!({ "value": digits, "unit": s16a, AMPS: number(amps, decimals) });
+        Row { name: name.to_owned(), text, value }
+    }
+
     /// The unit; empty where there is none.
     pub fn unit(&self) -> &str {
-        self.value.get("unit").and_then(Value::as_str).unwrap_or_default()
+        match self.value.get(AMPS) {
+            Some(_) => Unit::Ampere.symbol(),
+            None => self.value.get("unit").and_then(Value::as_str).unwrap_or_default(),
+        }
+    }
+
+    /// The shaft of an angle or a speed, if it was converted to another.
+    pub fn shaft(&self) -> Option<&str> {
+        self.value.get(SHAFT).and_then(Value::as_str)
     }
 
     /// The number alone: in the unit, or with --raw as it is on the wire.
     pub fn number(&self) -> String {
-        let number = self.value.get("value").or_else(|| self.value.get("digits"));
+        let number = [AMPS, "value", "digits"].into_iter().find_map(|name| self.value.get(name));
         number.filter(|number| !number.is_null()).map(Value::to_string).unwrap_or_default()
     }
 
     /// The text without its unit, and for values with names the names alone.
     pub fn short(&self) -> &str {
-        match self.text.rsplit_once(" (0x") {
-            Some((names, _)) => names,
-            None => self.text.strip_suffix(self.unit()).unwrap_or(&self.text).trim_end(),
-        }
+        let before = |mark: &str| self.text.split_once(mark).map(|(before, _)| before);
+        let text = match self.value.get(AMPS) {
+            Some(_) => before(" ("),
+            None => before(" (0x"),
+        };
+        let text = text.unwrap_or(&self.text);
+        text.strip_suffix(self.unit()).unwrap_or(text).trim_end()
     }
 }
 
@@ -157,30 +188,88 @@ impl From<Line> for Value {
     }
 }
 
-/// A field of a message, as the command table has it.
-pub fn field(field: &Field, data: &[u8; 8], raw: bool) -> Row {
-    let digits = field.raw(data);
-    if raw {
-        return Row::digits(field.name, digits);
+/// How the values of RMD motors are shown.
+#[derive(Clone, Copy, Default)]
+pub struct RmdUnits {
+    /// Digits instead of physical values.
+    pub raw: bool,
+    /// Angles, speeds and accelerations are those of the output shaft of this gear.
+    pub gear: Option<GearRatio>,
+    /// Encoder counts are shown as angles, too.
+    pub encoder_bits: Option<EncoderBits>,
+}
+
+impl RmdUnits {
+    /// A scale of the motor shaft as the scale of the shown shaft.
+    pub fn scale(&self, scale: Scale) -> Scale {
+        self.gear.map_or(scale, |gear| gear.scale(scale))
     }
-    let text = field.shown(data).to_string();
-    let value = match field.meaning {
-        Meaning::Bits(bits) => {
-            let set = bits.iter().filter(|(bit, _)| digits & i64::from(*bit) != 0);
-            json!({ "value": digits, "names": set.map(|(_, name)| *name).collect::<Value>() })
+
+    /// A value as people read it.
+    pub fn shown<Q: Quantity>(&self, value: Q) -> String {
+        match self.raw {
+            true => value.digits().to_string(),
+            false => self.quantity("", Q::UNIT, value.digits()).text,
         }
-        Meaning::Words(_) => json!({ "value": digits, "name": text }),
-        Meaning::Number => {
-            let Scale { decimals, symbol, .. } = field.scale;
-            quantity(field.value(data), decimals, symbol)
+    }
+
+    /// A field of a message, as the command table has it.
+    pub fn field(&self, field: &Field, data: &[u8; 8]) -> Row {
+        let digits = field.raw(data);
+        if self.raw {
+            return Row::digits(field.name, digits);
         }
-    };
-    Row { name: field.name.to_owned(), text, value }
+        let value = match field.meaning {
+            Meaning::Number if field.scale.symbol.is_empty() => json!({ "value": digits }),
+            Meaning::Number => return self.quantity(field.name, field.scale, digits),
+            Meaning::Bits(bits) => {
+                let set = bits.iter().filter(|(bit, _)| digits & i64::from(*bit) != 0);
+                json!({ "value": digits, "names": set.map(|(_, name)| *name).collect::<Value>() })
+            }
+            Meaning::Words(_) => {
+                json!({ "value": digits, "name": field.shown(data).to_string() })
+            }
+        };
+        Row { name: field.name.to_owned(), text: field.shown(data).to_string(), value }
+    }
+
+    /// The angle of encoder counts, with --encoder-bits.
+    ///
+    /// # Errors
+    /// The encoder has more bits than were given.
+    pub fn encoder_angle(&self, field: &Field, data: &[u8; 8]) -> Result<Option<Row>, Failure> {
+        let Some(bits) = self.encoder_bits.filter(|_| field.is_encoder_counts()) else {
+            return Ok(None);
+        };
+        let (name, counts, scale) = (field.name, field.raw(data), bits.scale());
+        if counts > scale.most {
+            let bits = bits.bits();
+            return Err(Failure::refused(format!(
+                "{name} is {counts} counts, and an encoder of {bits} bits ends at {}",
+                scale.most
+            ))
+            .trying("give --encoder-bits the width of this motor's encoder"));
+        }
+        Ok(Some(self.quantity(&format!("{name}_angle"), scale, counts)))
+    }
+
+    /// A quantity with its scale at the motor shaft. A gear adds the shaft to an angle or a speed.
+    fn quantity(&self, name: &str, scale: Scale, digits: i64) -> Row {
+        let scale = self.scale(scale);
+        let mut row = Row::quantity(name, scale.value(digits), scale.decimals, scale.symbol);
+        if self.gear.is_some() && scale.is_motion() {
+            row.value[SHAFT] = json!("output");
+        }
+        row
+    }
 }
 
 /// A register that was read, with `text` for people.
-pub fn register(reading: &Reading, text: String, raw: bool) -> Row {
+pub fn register(reading: &Reading, text: String, raw: bool, full_scale: Option<FullScale>) -> Row {
     let digits = reading.digits();
+    if full_scale.is_some() && !raw && reading.is_current() {
+        return Row::current(&reading.register.to_string(), digits, full_scale);
+    }
     let value = match (reading.register, reading.name()) {
         _ if raw => json!({ "digits": digits }),
         (RegisterId::FLAGS, _) => {
@@ -234,7 +323,7 @@ mod tests {
         let [phase, ..] = PhaseCurrents::FIELDS else { panic!("there is no phase") };
         for digits in i16::MIN..=i16::MAX {
             let [low, high] = digits.to_le_bytes();
-            let row = field(phase, &[0x9D, 0, low, high, 0, 0, 0, 0], false);
+            let row = RmdUnits::default().field(phase, &[0x9D, 0, low, high, 0, 0, 0, 0]);
             let text = row.text.strip_suffix(" A").unwrap();
             assert_eq!(text.parse().ok(), row.value["value"].as_f64(), "{digits}");
         }

@@ -2,6 +2,8 @@
 //! program can be the same command.
 
 mod advice;
+mod angle;
+mod arrival;
 mod columns;
 mod conformance;
 mod connection;
@@ -14,6 +16,7 @@ mod interrupt;
 mod json;
 mod output;
 mod palette;
+mod pasteable;
 mod ports;
 mod recording;
 mod repeat;
@@ -111,7 +114,11 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Conformance(args) => conformance::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut command(), "motorlink", &mut script);
+            let mut command = command();
+            clap_complete::generate(shell, &mut command, "motorlink", &mut script);
+            if shell == clap_complete::Shell::Fish {
+                script.extend(help::fish_positionals(&command).into_bytes());
+            }
             output::print_line(&String::from_utf8_lossy(&script).trim_end())
         }
         Command::Man { folder } => help::write_manual(command(), &folder),
@@ -131,7 +138,9 @@ fn command() -> clap::Command {
 
 fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
     let mut command = command();
-    let matches = command.try_get_matches_from_mut(words).map_err(help::without_motion)?;
+    let matches = command
+        .try_get_matches_from_mut(&words)
+        .map_err(|error| help::with_tip(help::without_motion(error), &command, &words))?;
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 

@@ -53,7 +53,10 @@ impl Recording {
         if self.columns.is_none() {
             self.columns = Some(cells.len());
             let names = cells.iter().map(|cell| match cell.row() {
-                Some(row) if !row.unit().is_empty() => format!("{} [{}]", row.name, row.unit()),
+                Some(row) if !row.unit().is_empty() => {
+                    let shaft = row.shaft().map(|shaft| format!(" {shaft} shaft"));
+                    format!("{} [{}{}]", row.name, row.unit(), shaft.unwrap_or_default())
+                }
                 _ => cell.name().to_owned(),
             });
             let names: Vec<String> = names.collect();

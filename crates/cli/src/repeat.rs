@@ -42,34 +42,38 @@ pub fn repeated(
 ) -> Result<(), Failure> {
     let Some(every) = repeat.every else { return output.cells(object.clone(), sample()?) };
     let mut sink = Sink::new(repeat, output, object)?;
-    let began = clock.now();
     interrupt::take_over();
     let mut outage = None;
     let mut left = repeat.count.unwrap_or(u64::MAX);
-    let elapsed = || Duration::from(clock.now().since(began));
+    let mut began = None;
     let mut due = Duration::ZERO;
     while left > 0 && !interrupt::interrupted() {
-        match sample() {
+        let sampled = sample();
+        // The time starts with the first sample, because the first exchange also recovers the line.
+        let now = clock.now();
+        let began = *began.get_or_insert(now);
+        let elapsed = Duration::from(now.since(began));
+        match sampled {
             Ok(cells) if cells.iter().all(|cell| cell.row().is_none()) => {
                 return output.cells(object.clone(), cells);
             }
             Ok(cells) => {
                 if let Some(kind) = outage.take() {
-                    sink.back(elapsed(), kind)?;
+                    sink.back(elapsed, kind)?;
                 }
-                sink.sample(elapsed(), cells)?;
+                sink.sample(elapsed, cells)?;
                 left -= 1;
             }
             Err(Failure::Failed(problem)) if matches!(problem.kind, Kind::Link | Kind::Silent) => {
                 if outage.is_none() {
                     outage = Some(problem.kind);
-                    sink.outage(elapsed(), &problem)?;
+                    sink.outage(elapsed, &problem)?;
                 }
             }
             Err(other) => return Err(other),
         }
         // If the line is slow, samples are skipped.
-        let now = elapsed();
+        let now = Duration::from(clock.now().since(began));
         while due <= now {
             due += every;
         }

@@ -20,11 +20,29 @@ pub fn span_up_to(
     }
 }
 
+/// Reads a duration that may be 0, s.
+pub fn parse_duration(text: &str) -> Result<f32, String> {
+    match seconds(text)? as f32 {
+        seconds if seconds.is_finite() && seconds >= 0.0 => Ok(seconds),
+        _ => Err("it must be 0s or more".to_owned()),
+    }
+}
+
+/// Reads the duration of a ramp in ms: a number of ms, or a number with its unit.
+pub fn parse_milliseconds(text: &str) -> Result<u16, String> {
+    let ms = text.parse::<f64>().or_else(|_| seconds(text).map(|seconds| seconds * 1e3))?;
+    let whole = ms.round();
+    match (ms - whole).abs() < 1e-6 && (0.0..=f64::from(u16::MAX)).contains(&whole) {
+        true => Ok(whole as u16),
+        false => Err(format!("give a whole number of ms, 0 to {} ms", u16::MAX)),
+    }
+}
+
 /// Reads a distance: a number that is not negative.
 pub fn parse_distance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(distance) if distance.is_finite() && distance >= 0.0 => Ok(distance),
-        _ => Err("give a number, 0 or more".to_owned()),
+        _ => Err("give a number without a unit, 0 or more".to_owned()),
     }
 }
 
@@ -64,6 +82,27 @@ mod tests {
             let refused = parse_span(number).unwrap_err();
             assert_eq!(refused, format!("the unit is missing: write {number}ms or {number}s"));
         }
+    }
+
+    #[test]
+    fn a_duration_may_be_zero() {
+        assert_eq!(parse_duration("0s"), Ok(0.0));
+        assert_eq!(parse_duration("1500ms"), Ok(1.5));
+        for odd in ["-1s", "1e60s", "NaNs"] {
+            assert_eq!(parse_duration(odd).unwrap_err(), "it must be 0s or more", "{odd}");
+        }
+        assert!(parse_duration("1").unwrap_err().contains("the unit is missing"));
+    }
+
+    #[test]
+    fn the_duration_of_a_ramp_may_have_a_unit() {
+        for (text, ms) in [("1000", 1000), ("0", 0), ("1s", 1000), ("1.5s", 1500), ("20ms", 20)] {
+            assert_eq!(parse_milliseconds(text), Ok(ms), "{text}");
+        }
+        for odd in ["65536", "66s", "-1", "0.5", "0.5ms"] {
+            assert!(parse_milliseconds(odd).unwrap_err().contains("whole number"), "{odd}");
+        }
+        assert!(parse_milliseconds("soon").unwrap_err().contains("such as 100ms"));
     }
 
     #[test]

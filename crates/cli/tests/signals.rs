@@ -1,6 +1,6 @@
 //! A program that stops its motors at a signal, as docs/RUST.md shows.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{self, Command};
 use std::sync::Arc;
@@ -38,33 +38,40 @@ fn program() {
     }
 }
 
-/// Answers the questions that come first on a line that was just opened, with zeros.
-fn answer_questions(line: &mut TcpStream) {
-    let questions: [(&[u8], u8, u8); 3] = [
-        (&[0x06, 0x00, 0x06], 32, 0x11),
-        (&[0x02, 0x01, 0x02, 0x05], 1, 0xF1),
-        (&[0x02, 0x01, 0x01, 0x04], 4, 0xF4),
-    ];
-    for (question, size, checksum) in questions {
-        let mut heard = vec![0; question.len()];
-        line.read_exact(&mut heard).unwrap();
-        assert_eq!(heard, question);
-        let reply = [&[0xF0, size], &[0; 32][..size.into()], &[checksum]].concat();
-        line.write_all(&reply).unwrap();
-    }
+/// The reply to a read: motor 1 runs, and all other values are 0. `None`: another request.
+fn answer(request: &[u8]) -> Option<Vec<u8>> {
+    let (value, checksum): (&[u8], u8) = match request {
+        [0x06, 0x00, 0x06] => (&[0; 32], 0x11),
+        [0x02, 0x01, 0x02, 0x05] => (&[0], 0xF1),
+        [0x22, 0x01, 0x02, 0x25] => (&[6], 0xF7),
+        [0x02 | 0x22, 0x01, 0x01, _] => (&[0; 4], 0xF4),
+        _ => return None,
+    };
+    Some([&[0xF0, value.len() as u8], value, &[checksum]].concat())
 }
 
-/// Acknowledges commands until the line is closed; calls `after` with the number of each.
-fn drive(mut line: TcpStream, mut after: impl FnMut(usize)) -> Vec<[u8; 4]> {
-    answer_questions(&mut line);
+/// The next request. An error: the line is closed.
+fn request(line: &mut TcpStream) -> io::Result<Vec<u8>> {
+    let mut head = [0; 2];
+    line.read_exact(&mut head)?;
+    let mut rest = vec![0; usize::from(head[1]) + 1];
+    line.read_exact(&mut rest)?;
+    Ok([&head[..], &rest].concat())
+}
+
+/// Answers questions and acknowledges commands until the line is closed; calls `after` with the number
+/// of each command. Returns the commands.
+fn drive(mut line: TcpStream, mut after: impl FnMut(usize)) -> Vec<Vec<u8>> {
     let mut commands = Vec::new();
-    let mut command = [0; 4];
-    while line.read_exact(&mut command).is_ok() {
-        commands.push(command);
-        if line.write_all(&ACK).is_err() {
+    while let Ok(request) = request(&mut line) {
+        let question = answer(&request);
+        if line.write_all(question.as_deref().unwrap_or(&ACK)).is_err() {
             break;
         }
-        after(commands.len());
+        if question.is_none() {
+            commands.push(request);
+            after(commands.len());
+        }
     }
     commands
 }
@@ -87,12 +94,12 @@ fn nothing_is_started_after_a_signal_has_stopped_the_motor() {
         });
         assert_eq!(child.wait().unwrap().code(), Some(130));
         assert_eq!(commands[..20], [START; 20]);
-        assert_eq!(commands.last(), Some(&STOP), "{signal:?}");
+        assert_eq!(commands.last().unwrap(), &STOP, "{signal:?}");
         assert_eq!(commands.iter().filter(|command| **command == STOP).count(), 1);
     }
 }
 
-/// A bus on which every request comes back.
+/// A bus that echoes every request.
 struct Echo(Option<CanFrame>);
 
 impl Link for Echo {

@@ -1,5 +1,5 @@
-//! A drive that stands still for a while and then answers everything at once: its process is
-//! stopped with SIGSTOP. No reply may pass for another request's, and the client comes back in time.
+//! A drive whose process is frozen with SIGSTOP for a while. Afterwards it answers all requests at
+//! once. No reply may be taken for that of another request, and each call of the client ends in time.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use motorlink::rmd::{self};
 use motorlink::st::{self, register};
 use rustix::process::{Pid, Signal, kill_process};
 
-/// How long a drive stands still.
+/// The time for which a drive is frozen, in ms.
 const PAUSES: [u64; 6] = [100, 300, 900, 1_500, 2_500, 5_000];
 /// The longest that an exchange of either protocol waits for its reply.
 const TIMEOUT: Duration = Duration::from_secs(1);
@@ -67,7 +67,7 @@ impl Drive {
         while stopped.elapsed() < pause {
             failures += u32::from(exchange().is_err());
         }
-        assert!(failures > 0 || pause <= TIMEOUT, "a drive that stands still does not answer");
+        assert!(failures > 0 || pause <= TIMEOUT, "a frozen drive does not answer");
         self.signal(Signal::CONT);
         let continued = Instant::now();
         while exchange().is_err() {
@@ -137,7 +137,7 @@ fn rmd_stands_still(pause: Duration) {
             written.map_err(|error| error.to_string())?;
             assert_eq!(read.map_err(|error| error.to_string())?, own, "somebody else's reply");
         }
-        // Motors 3 and 4 in cycles, which wait for nobody.
+        // Motors 3 and 4 in cycles, which do not wait for slow motors.
         let [a, b, c, d] = number.to_le_bytes();
         let cycle = |request: [u8; 8]| {
             let requests = [3, 4].map(|id| (rmd::MotorId::new(id).expect("an ID"), request));

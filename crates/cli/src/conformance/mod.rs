@@ -7,9 +7,10 @@ mod screen;
 mod world;
 
 use motorlink::port::PortName;
+use motorlink::st::Profile;
 use motorlink::time::Micros;
 use motorlink_conformance::{
-    Case, Need, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
+    Case, Need, Report, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
 };
 
 pub use args::Args;
@@ -36,7 +37,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let world = Box::new(Commands::new(&run));
             let bench = st::Harness::new(link, world, options);
             interrupt::hold();
-            conduct("st", &run, st::suite(profile), bench)
+            conduct("st", &run, st::suite(profile), bench, |report| other_profile(profile, report))
         }
         Command::Rmd { port, run, write_rom, id, encoder } => {
             let link = port.name()?.open_can()?;
@@ -46,7 +47,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Harness::new(link, world, options);
             interrupt::hold();
-            conduct("rmd", &run, rmd::suite(), bench)
+            conduct("rmd", &run, rmd::suite(), bench, |_| None)
         }
         Command::Host(args) => host::run(&args),
         Command::Scenarios { which: Which::St } => {
@@ -70,6 +71,7 @@ fn conduct<B: Subject>(
     run: &Run,
     mut suite: Vec<Case<B>>,
     mut bench: B,
+    advice: impl Fn(&Report) -> Option<String>,
 ) -> Result<(), Failure> {
     let results = &run.results;
     suite.retain(|case| results.wants(&case.name, case.clauses));
@@ -83,7 +85,20 @@ fn conduct<B: Subject>(
     if interrupt::interrupted() {
         return Err(Failure::Interrupted);
     }
-    verdict(&report, "the drive")
+    verdict(&report, "the drive").map_err(|failure| match advice(&report) {
+        Some(advice) => failure.trying(advice),
+        None => failure,
+    })
+}
+
+/// What to try if the drive seems to follow the other profile.
+fn other_profile(profile: Profile, report: &Report) -> Option<String> {
+    let (other, failures) = st::other_profile(profile, report)?;
+    Some(format!(
+        "try --profile {}: {failures} of these cases exist only in profile {}",
+        other.name(),
+        profile.name()
+    ))
 }
 
 impl Run {

@@ -9,7 +9,7 @@ use super::table::{self, Row};
 
 /// How often a plain line is printed for a motor that is being watched.
 const PLAIN_EVERY: Duration = Duration::from_millis(500);
-/// Width where there is no terminal.
+/// Width without a terminal.
 const WIDTH: usize = 80;
 /// Lines that a terminal needs for the table.
 const LEAST_LINES: u16 = 12;

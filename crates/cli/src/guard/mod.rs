@@ -42,6 +42,10 @@ One program at a time: over TCP and Unix sockets a second connection is closed a
 second program that locks its port, as motorlink does, gets an error. The baud rate or bitrate of a \
 program has no effect; the rate of the guard is used.
 
+With --silence: a program that is silent while a motor may turn loses its connection after the stop, \
+so that a frozen program that continues gets an error. The guard prints when a program turns motors \
+again. On a pty a new pty is made, and the link moves to it: open the link, not its path.
+
 Limits: a guard cannot stop a motor if the guard is killed with SIGKILL, if the cable to the drive is \
 cut, or if the computer stops. If people can be hurt, use an emergency stop in hardware.
 
@@ -52,7 +56,10 @@ first. Exit code 0, or 3 if a motor did not confirm that it stops. contrib/ has 
 pub struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    #[command(flatten)]
+    #[command(
+        flatten,
+        next_help_heading = "Options for an ST drive, as of `guard st` (for RMD: `motorlink guard rmd --help`)"
+    )]
     st: StArgs,
 }
 
@@ -111,14 +118,15 @@ enum OnLoss {
 
 #[derive(clap::Args)]
 struct Common {
-    /// Also stop the motors when the program sends nothing for this time, such as 2s
+    /// Also stop the motors when the program sends nothing for this time, such as 2s, and close its
+    /// connection
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     silence: Option<Duration>,
     /// Print events as JSON, one object per line
     #[arg(long)]
     json: bool,
     /// Test the guard: turn a motor, kill the program that turns it, and measure the time until the
-    /// motor stands still
+    /// motor is still
     #[arg(long, requires = "spin", conflicts_with = "serve")]
     prove: bool,
     /// Speed for --prove: rpm (ST) or °/s (RMD)

@@ -1,4 +1,4 @@
-//! Events of a guard in words and as JSON.
+//! Events of a guard as text and as JSON.
 
 use motorlink::relay::{Event, Halt, Outcome, Part, Reason};
 use serde_json::{Value, json};
@@ -20,7 +20,15 @@ pub fn of(event: &Event) -> (String, Value) {
             ),
             json!({ "event": "left", "dropped": dropped }),
         ),
-        // A program cannot be disconnected from a pty.
+        Event::Disconnected => (
+            "closed the connection of the silent program; it has to open the port again".into(),
+            json!({ "event": "disconnected" }),
+        ),
+        Event::Resumed => (
+            "a program turns motors again, the first time since a program was silent".into(),
+            json!({ "event": "resumed" }),
+        ),
+        // Another program on the same pty cannot be refused.
         Event::TurnedAway { port } if port.contains("pty:") => (
             format!(
                 "{port}: a second program opened the port; if it does not check the lock, both use \

@@ -1,14 +1,18 @@
 //! Help that belongs to more than one command: exit codes, ports, --fault, examples; manual pages.
 
 mod examples;
+mod fish;
 mod manual;
 mod suggestions;
+mod tips;
 
 use clap::Command;
 use motorlink::port::{Carries, schemes};
 
+pub use fish::positionals as fish_positionals;
 pub use manual::write_manual;
 pub use suggestions::without_motion;
+pub use tips::with_tip;
 
 /// Heading of the options that all commands of a protocol have.
 pub const GLOBAL: &str = "Options of every command";

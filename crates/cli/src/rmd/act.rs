@@ -1,18 +1,30 @@
 //! Commands that change something in a motor.
 
 use motorlink::rmd::{
-    Code, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus, MotorSet, SetTorque4,
-    SpeedLimit, SpinDirection, Target, TurnCentiDegrees,
+    ArrivalOptions, CentiDps, Code, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus,
+    MotorId, MotorSet, SetTorque4, SpeedLimit, SpinDirection, StopAction, Target, TurnCentiDegrees,
 };
 
-use super::args::{self, Act, MaxSpeed};
-use super::arrival;
+use super::args::{self, Act, MaxSpeed, Wait};
 use super::session::Session;
 use super::settings;
+use crate::arrival;
 use crate::failure::Failure;
+use crate::interrupt;
+use crate::json::Row;
 use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
+    let (can_turn, is_stop) = (act.can_turn(), matches!(act, Act::Off { .. } | Act::Stop { .. }));
+    let done = carry_out(session, act).map_err(|failure| session.at_motor_shaft(failure));
+    done.map_err(|failure| match (can_turn, is_stop) {
+        (true, _) => session.of_motion(failure, session.id),
+        (_, true) => failure.of_stop(format!("motor {}", session.id)),
+        _ => failure,
+    })
+}
+
+fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let id = motor.id();
     match act {
@@ -23,34 +35,46 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;
+            let rows = session.rows(&EncoderOffset { offset });
+            let rows = rows.map_err(|failure| failure.then("the zero is set"))?;
             session.output.result(
                 format!("motor {id} has its zero here (offset {offset}), effective after the next power cycle"),
-                session.line(session.id).ok(true).values(&session.rows(&EncoderOffset { offset })),
+                session.line(session.id).ok(true).values(&rows),
             )
         }
         Act::Off { .. } => {
-            motor.off()?;
-            session.done(format!("motor {id} is off"))
+            stopped(motor.off_until_confirmed())?;
+            session.done(halted(id, StopAction::Off))
         }
         Act::Stop { .. } => {
-            motor.stop()?;
-            session.done(format!("motor {id} is stopped; `run` resumes"))
+            stopped(motor.stop_until_confirmed())?;
+            session.done(halted(id, StopAction::Stop))
         }
         Act::Run => {
             motor.run()?;
             session.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
-        Act::Torque { amps } => session.replied(&motor.set_torque(session.wanted(amps)?)?),
-        Act::Speed { dps } => session.replied(&motor.set_speed(session.wanted(dps)?)?),
+        Act::Torque { amps } => {
+            let current = session.wanted::<IqCommand>(amps)?;
+            let status = motor.set_torque(current)?;
+            session.commanded(format!("turns with {}", session.shown(current)), &status)
+        }
+        Act::Speed { dps } => {
+            let speed = session.wanted::<CentiDps>(dps)?;
+            let status = motor.set_speed(speed)?;
+            session.commanded(format!("turns at {}", session.shown(speed)), &status)
+        }
         Act::Position { degrees, most, wait } => {
             let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
             let command = || Ok(motor.set_position(angle, max_speed)?);
-            arrival::command(session, command, Target::MultiTurn(angle), max_speed, &wait)
+            move_to(session, command, Target::MultiTurn(angle), max_speed, &wait)
         }
         Act::SingleTurnPosition { degrees, direction, most, full_turn, wait } => {
+            session.wants_no_gear()?;
             let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
             let command = || turn(session, angle, max_speed, direction, &full_turn);
-            arrival::command(session, command, Target::SingleTurn(angle), max_speed, &wait)
+            let target = Target::SingleTurn { angle, direction };
+            move_to(session, command, target, max_speed, &wait)
         }
         Act::ClearErrors => {
             let status = motor.clear_errors()?;
@@ -63,12 +87,64 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             ))
             .about(&session.port, session.id);
             let object = session.line(session.id).failed(&failure);
-            session.output.rows(object, &session.rows(&status))?;
+            session.output.rows(object, &session.rows(&status)?)?;
             Err(failure)
         }
-        Act::Torque4 { amps } => set_torque4(session, &amps),
+        Act::Torque4 { amps, expect } => {
+            set_torque4(session, &amps, expect.into_iter().flatten().collect())
+        }
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
+}
+
+fn stopped(outcome: Result<(), Error>) -> Result<(), Error> {
+    interrupt::stop_is_complete();
+    outcome
+}
+
+/// The result of a stop.
+pub fn halted(id: MotorId, action: StopAction) -> String {
+    match action {
+        StopAction::Off => format!("motor {id} is off"),
+        StopAction::Stop => format!("motor {id} is stopped; `run` resumes"),
+    }
+}
+
+/// Sends a command to move. With `--wait` it returns when the move is over.
+fn move_to(
+    session: &Session,
+    command: impl FnOnce() -> Result<MotionStatus, Failure>,
+    target: Target,
+    max_speed: Option<SpeedLimit>,
+    wait: &Wait,
+) -> Result<(), Failure> {
+    if !wait.wait {
+        let place = match target {
+            Target::MultiTurn(angle) => session.shown(angle),
+            Target::SingleTurn { angle, direction } => {
+                format!("{} {direction}", session.shown(angle))
+            }
+        };
+        return session.commanded(format!("turns to {place}"), &command()?);
+    }
+    let motor = session.motor()?;
+    let tolerance = wait.wait_tolerance.map(|degrees| session.wanted(degrees)).transpose()?;
+    let options = ArrivalOptions { tolerance, timeout: wait.wait_timeout };
+    let arrived = arrival::move_and_wait(
+        motor,
+        || motor.prepare_move(target, max_speed, options),
+        || command().map(drop),
+        |_| {
+            // Motors that were moved before this one are stopped, too.
+            let stopped = session.bus.stop_on_drop().stop_now();
+            stopped.into_iter().map(|one| (one.id.number(), one.result)).collect()
+        },
+        " and holds still",
+    )?;
+    let angle = session.rows(&arrived.angle)?.into_iter();
+    let angle = angle.map(|row| Row { name: "multi_turn_angle".to_owned(), ..row });
+    let rows: Vec<Row> = angle.chain(session.rows(&arrived.motion)?).collect();
+    session.output.rows(session.line(session.id).ok(true), &rows)
 }
 
 fn max_speed(session: &Session, most: &MaxSpeed) -> Result<Option<SpeedLimit>, Failure> {
@@ -102,25 +178,27 @@ fn turn(
     })
 }
 
-fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
+fn set_torque4(session: &Session, amps: &[f64], expect: MotorSet) -> Result<(), Failure> {
     let mut torques = [IqCommand(0); 4];
     for (slot, &amps) in torques.iter_mut().zip(amps) {
         *slot = session.wanted(amps)?;
     }
-    let replies = session.bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4)?;
+    let replies = session.bus.set_torque4(SetTorque4(torques), expect)?;
     let mut failures = Vec::new();
     for (reply, id) in replies.into_iter().zip(1..) {
         let object = session.line(id);
         match reply {
             Some(Ok(status)) => {
                 let rows = session.rows(&status);
+                let rows = rows.map_err(|failure| failure.then("the motors took the torques"))?;
                 let texts: Vec<&str> = rows.iter().map(|row| row.text.as_str()).collect();
                 let text = format!("motor {id}  {}", texts.join("   "));
                 session.output.result(text, object.ok(true).values(&rows))?;
             }
             Some(Err(error)) => {
                 let id = error.motor().unwrap_or(session.motor()?.id());
-                session.failed(id, error.into(), &mut failures)?;
+                let failure = session.of_motion(error.into(), id.number());
+                session.failed(id, failure, &mut failures)?;
             }
             None => {}
         }

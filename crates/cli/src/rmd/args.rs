@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::rmd::{MotorId, MotorSet, SpinDirection};
+use motorlink::rmd::{EncoderBits, GearRatio, MotorId, MotorSet, SpinDirection};
 
 use crate::connection::Connection;
+use crate::pasteable::{self, number_options, port_option};
 use crate::repeat::Repeat;
 use crate::span::{parse_distance, parse_span, span_up_to};
 use crate::{help, hint};
@@ -24,7 +25,7 @@ pub struct Args {
 #[derive(clap::Args)]
 #[command(next_help_heading = help::GLOBAL)]
 pub struct MotorArgs {
-    /// The motor's ID, 1 to 32 (default 1); several as 1,3 or 1-4, or with several --id
+    /// The motor's ID, 1 to 32 (default 1, not for off and stop); several as 1,3 or 1-4
     #[arg(short, long, global = true, value_name = "ID",
           value_parser = hint::ids(), hide_possible_values = true)]
     pub id: Vec<MotorSet>,
@@ -32,9 +33,52 @@ pub struct MotorArgs {
     #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
           value_parser = span_up_to(Duration::from_secs(10)))]
     pub timeout: Duration,
+    /// Refuse commands for more speed than this, °/s, rounded down; moves need --max-speed
+    ///
+    /// The limit applies to `raw` too. It does not limit the speed of `torque`. `run` resumes an
+    /// earlier command, whose speed is unknown: it is refused. Nothing is sent if a command exceeds the limit.
+    #[arg(long, global = true, value_name = "DPS", value_parser = parse_distance)]
+    pub speed_limit: Option<f64>,
+    /// Refuse commands for more torque current than this, A
+    ///
+    /// The limit applies to `torque`, `torque4` and `raw`. Nothing is sent if a command exceeds it. The
+    /// current of a speed or position command is limited only by the motor's own settings.
+    #[arg(long, global = true, value_name = "AMPS", value_parser = parse_distance)]
+    pub current_limit: Option<f64>,
+    /// Take and show angles, speeds and accelerations of the output shaft of this gear, not of the motor
+    ///
+    /// The gear ratio is the turns of the motor shaft for one turn of the output shaft: 6 for a gear of
+    /// 6:1. Without it all values are those of the motor shaft. It applies to each value in degrees, °/s
+    /// and °/s²: commands, limits, tolerances, readings. It does not apply to `raw` and --trace.
+    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true,
+          value_parser = hint::gear_ratio())]
+    pub gear_ratio: Option<GearRatio>,
+    /// Show encoder counts also in degrees. The width of the encoder, 12 to 18 bits
+    #[arg(long, global = true, value_name = "BITS", value_parser = hint::encoder_bits(),
+          hide_possible_values = true)]
+    pub encoder_bits: Option<EncoderBits>,
     /// Allow writes to the ROM of the motor. Each write wears the ROM
     #[arg(long, global = true)]
     pub write_rom: bool,
+}
+
+impl MotorArgs {
+    /// Commands in messages repeat these options.
+    pub fn repeat_in_hints(&self, port: &str) {
+        let mut ids = self.ids().map(MotorId::number);
+        pasteable::set_options(pasteable::Options {
+            protocol: "rmd",
+            of_port: port_option(port),
+            of_motor: number_options([
+                ("--gear-ratio", self.gear_ratio.map(GearRatio::ratio)),
+                ("--speed-limit", self.speed_limit),
+                ("--current-limit", self.current_limit),
+            ]),
+            number: "--id",
+            default_motor: 1,
+            motor: ids.next().filter(|_| ids.next().is_none()),
+        });
+    }
 }
 
 #[derive(Subcommand)]
@@ -95,13 +139,13 @@ pub enum Act {
     },
     /// Set the zero to the current position, effective after the next power cycle (needs --write-rom)
     Zero,
-    /// Switch the motor off: it turns freely, and a load may fall
+    /// Switch motors off: they turn freely, and a load may fall. Give --id or --all
     Off {
         /// Switch off all motors on the bus: IDs 1 to 32
         #[arg(long)]
         all: bool,
     },
-    /// Stop the motor and hold it; `run` resumes the last command
+    /// Stop motors and hold them; `run` resumes the last command. Give --id or --all
     Stop {
         /// Stop all motors on the bus: IDs 1 to 32
         #[arg(long)]
@@ -157,6 +201,10 @@ pub enum Act {
         /// Torque currents of motors 1, 2, 3 and 4, A
         #[arg(num_args = 4, required = true, allow_negative_numbers = true, value_name = "AMPS")]
         amps: Vec<f64>,
+        /// The motors that must answer, such as 1,2. The frame still reaches motors 1 to 4
+        #[arg(long, default_value = "1-4", value_name = "ID", value_parser = hint::ids(),
+              hide_possible_values = true)]
+        expect: Vec<MotorSet>,
     },
     /// Send any eight bytes
     Raw {
@@ -196,7 +244,7 @@ pub struct Wait {
     /// the motor completes the move.
     #[arg(long)]
     pub wait: bool,
-    /// How far from the target the motor may be to have arrived, degrees (default 0.1)
+    /// How far from the target the motor may be to have arrived, degrees (default: 0.1 at the motor shaft)
     ///
     /// The default is more than one count of the coarsest encoder (12 bits, 0.088°).
     #[arg(long, value_name = "DEGREES", requires = "wait", value_parser = parse_distance)]
@@ -213,6 +261,13 @@ impl MotorArgs {
             return MotorId::new(1).into_iter().collect();
         }
         self.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more))
+    }
+
+    /// The motors, for messages: `motor 1`, `motors 1, 3`.
+    pub fn names(&self) -> String {
+        let numbers: Vec<String> = self.ids().map(|id| id.number().to_string()).collect();
+        let noun = if numbers.len() == 1 { "motor" } else { "motors" };
+        format!("{noun} {}", numbers.join(", "))
     }
 }
 
@@ -231,6 +286,15 @@ impl Command {
 }
 
 impl Act {
+    /// Whether the motor may be turning after the command, and no stop follows.
+    pub fn can_turn(&self) -> bool {
+        match self {
+            Act::Run | Act::Torque { .. } | Act::Speed { .. } => true,
+            Act::Position { wait, .. } | Act::SingleTurnPosition { wait, .. } => !wait.wait,
+            _ => false,
+        }
+    }
+
     /// Whether the command is never given to several motors at once.
     pub fn is_for_one(&self) -> bool {
         matches!(self, Act::Zero | Act::EncoderOffset { .. })

@@ -2,20 +2,20 @@
 
 mod act;
 mod args;
-mod arrival;
 mod read;
 mod session;
 mod settings;
 mod several;
 
 pub use args::Args;
-use args::{Command, Read};
+use args::{Act, Command, Read};
 use session::connect;
 
 use motorlink::rmd::MotorId;
 
 use crate::failure::Failure;
-use crate::output::keep_error;
+use crate::interrupt;
+use crate::output::{keep_error, kept_error};
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, motor, command } = args;
@@ -24,12 +24,31 @@ pub fn run(args: Args) -> Result<(), Failure> {
     {
         return Err(Failure::usage(format!("{why}: leave out --id")));
     }
+    let is_stop = matches!(command, Command::Act(Act::Off { .. } | Act::Stop { .. }));
+    if is_stop && command.without_id().is_none() && motor.id.is_empty() {
+        return Err(Failure::usage("the motors to stop are not named; nothing was sent")
+            .trying("name the motors: --id 1, or --all"));
+    }
     let port = connection.port()?;
+    motor.repeat_in_hints(connection.port_text());
+    if is_stop {
+        interrupt::complete_stop(match command.without_id() {
+            Some(_) => "all motors".to_owned(),
+            None => motor.names(),
+        });
+    }
     let (session, ids) = (connect(&connection, &motor, &port), motor.ids());
+    let session =
+        session.map_err(|failure| if is_stop { failure.of_stop("the motor") } else { failure });
     let done = session.and_then(|mut session| match command {
         Command::Act(act) => {
             keep_error();
-            several::run(&mut session, ids, &act)
+            several::run(&mut session, ids, &act)?;
+            kept_error().map_err(|failure| match (act.can_turn(), ids.len()) {
+                (true, 1) => session.of_motion(failure, session.id),
+                (true, _) => failure.of_motion("the motors", "motorlink rmd stop --all"),
+                _ => failure,
+            })
         }
         Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
         Command::Read(Read::Status { repeat } | Read::Angle { repeat })

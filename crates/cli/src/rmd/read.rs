@@ -33,7 +33,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     for motor in &found {
         match motor {
             ScanResult::Motor(id, status) => {
-                let rows = session.rows(status);
+                let rows = session.rows(status)?;
                 let texts: Vec<String> =
                     rows.iter().map(|row| format!("{:>6}", row.text)).collect();
                 session.output.result(
@@ -71,10 +71,10 @@ pub fn status(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
         // JSON names the motor outside of the values, and a loop is about one motor.
         let names_motor = !session.output.json && repeat.every.is_none();
         let id = names_motor.then(|| Row::plain("motor", motor.id().number().into()));
-        let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)).collect();
+        let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)?).collect();
         // Both replies have the temperature.
-        all.extend(session.rows(&motor.motion_status()?).into_iter().skip(1));
-        all.extend(session.rows(&motor.phase_currents()?));
+        all.extend(session.rows(&motor.motion_status()?)?.into_iter().skip(1));
+        all.extend(session.rows(&motor.phase_currents()?)?);
         all.extend(angles(session)?);
         Ok(all)
     })
@@ -99,8 +99,8 @@ fn show(
 
 fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
     let motor = session.motor()?;
-    let multi_turn = session.rows(&MultiTurnAngle { angle: motor.multi_turn_angle()? });
-    let single_turn = session.rows(&SingleTurnAngle { angle: motor.single_turn_angle()? });
+    let multi_turn = session.rows(&MultiTurnAngle { angle: motor.multi_turn_angle()? })?;
+    let single_turn = session.rows(&SingleTurnAngle { angle: motor.single_turn_angle()? })?;
     let named = |name: &'static str, rows: Vec<Row>| {
         rows.into_iter().map(move |row| Row { name: name.to_owned(), ..row })
     };

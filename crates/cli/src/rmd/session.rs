@@ -1,12 +1,12 @@
 //! An open bus, for all commands.
 
 use motorlink::port::PortName;
-use motorlink::rmd::{Client, Motor, MotorId, Options, Payload, Quantity};
+use motorlink::rmd::{Client, Limits, MotionStatus, Motor, MotorId, Options, Payload, Quantity};
 
 use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::json::{self, Line, Row};
+use crate::json::{Line, RmdUnits, Row};
 use crate::output::Printer;
 
 /// An open bus, the selected motor, and how its values are shown.
@@ -14,7 +14,7 @@ pub struct Session {
     pub bus: Client,
     pub id: u8,
     pub output: Printer,
-    pub raw: bool,
+    pub units: RmdUnits,
     pub write_rom: bool,
     pub port: String,
 }
@@ -24,12 +24,54 @@ pub fn connect(
     motor: &MotorArgs,
     port: &PortName,
 ) -> Result<Session, Failure> {
-    let options = Options { timeout: motor.timeout, ..Options::default() };
+    let units = units(connection, motor)?;
+    let wanted_limits = limits(motor, &units)?;
+    let options = Options { timeout: motor.timeout, limits: wanted_limits, ..Options::default() };
     let bus = Client::open_wrapped(port, connection.around_bus()?, options)?;
-    let (output, raw) = (connection.output(), connection.raw);
+    let output = connection.output();
     let id = motor.ids().map(MotorId::number).next().unwrap_or(1);
     let (write_rom, port) = (motor.write_rom, port.to_string());
-    Ok(Session { bus, id, output, raw, write_rom, port })
+    Ok(Session { bus, id, output, units, write_rom, port })
+}
+
+/// --raw and an option that converts values contradict each other.
+fn units(connection: &Connection, motor: &MotorArgs) -> Result<RmdUnits, Failure> {
+    let MotorArgs { gear_ratio: gear, encoder_bits, .. } = *motor;
+    let option = match (gear, encoder_bits) {
+        (Some(_), _) => "--gear-ratio",
+        (None, Some(_)) => "--encoder-bits",
+        (None, None) => return Ok(RmdUnits { raw: connection.raw, ..RmdUnits::default() }),
+    };
+    if connection.raw {
+        return Err(Failure::usage(format!(
+            "--raw has the values of the protocol, and {option} converts them; nothing was sent"
+        ))
+        .trying("leave one out"));
+    }
+    Ok(RmdUnits { raw: false, gear, encoder_bits })
+}
+
+fn limits(motor: &MotorArgs, units: &RmdUnits) -> Result<Limits, Failure> {
+    Ok(Limits {
+        speed: motor.speed_limit.map(|dps| limit(dps, units, "--speed-limit")).transpose()?,
+        current: motor
+            .current_limit
+            .map(|amps| limit(amps, units, "--current-limit"))
+            .transpose()?,
+        angle: None,
+    })
+}
+
+fn limit<Q: Quantity>(value: f64, units: &RmdUnits, option: &str) -> Result<Q, Failure> {
+    wanted(value, units).map_err(|failure| failure.with_fact(option))
+}
+
+/// A value in the physical unit at the shown shaft, or with --raw in digits. A value that no frame can
+/// carry is refused, never cut.
+fn wanted<Q: Quantity>(value: f64, units: &RmdUnits) -> Result<Q, Failure> {
+    let scale = if units.raw { Q::UNIT.raw() } else { units.scale(Q::UNIT) };
+    let digits = scale.wanted(value);
+    digits.map(Q::from_digits).map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
 }
 
 impl Session {
@@ -50,26 +92,75 @@ impl Session {
 
     /// Prints the result, with the values of the reply.
     pub fn replied<P: Payload>(&self, reply: &P) -> Result<(), Failure> {
-        self.output.rows(self.line(self.id).ok(true), &self.rows(reply))
+        let rows =
+            self.rows(reply).map_err(|failure| failure.then("the motor took the command"))?;
+        self.output.rows(self.line(self.id).ok(true), &rows)
+    }
+
+    /// Prints what the motor was commanded to do, and the state that it replied with.
+    pub fn commanded(&self, what: String, status: &MotionStatus) -> Result<(), Failure> {
+        if !self.output.json {
+            let text = format!("motor {} {what}; its state at the reply:", self.id);
+            self.output.result(text, self.line(self.id))?;
+        }
+        self.replied(status)
+    }
+
+    /// A value that was commanded, as people read it.
+    pub fn shown<Q: Quantity>(&self, value: Q) -> String {
+        self.units.shown(value)
+    }
+
+    /// A failure of a motion command, if the command was sent.
+    pub fn of_motion(&self, failure: Failure, id: u8) -> Failure {
+        let is_sent = self.bus.moving().any(|moving| moving.number() == id);
+        if !is_sent {
+            return failure;
+        }
+        failure.of_motion(format_args!("motor {id}"), &format!("motorlink rmd --id {id} stop"))
     }
 
     /// Shows the values of a reply once it is confirmed.
     pub fn show<P: Payload>(&self, reply: &P) -> Result<(), Failure> {
         self.confirm()?;
-        self.output.rows(self.line(self.id), &self.rows(reply))
+        self.output.rows(self.line(self.id), &self.rows(reply)?)
     }
 
-    /// The values of a message, as the command table has them.
-    pub fn rows<P: Payload>(&self, message: &P) -> Vec<Row> {
+    /// The values of a message, as the command table has them, with the angle of encoder counts behind
+    /// them.
+    pub fn rows<P: Payload>(&self, message: &P) -> Result<Vec<Row>, Failure> {
         let data = message.encode_as(0);
-        P::FIELDS.iter().map(|field| json::field(field, &data, self.raw)).collect()
+        let mut rows = Vec::new();
+        for field in P::FIELDS {
+            rows.push(self.units.field(field, &data));
+            rows.extend(self.units.encoder_angle(field, &data)?);
+        }
+        Ok(rows)
     }
 
-    /// A value in the physical unit, or with --raw in digits. A value that no frame can carry is
-    /// refused, never cut.
+    /// A value in the physical unit at the shown shaft, or with --raw in digits.
     pub fn wanted<Q: Quantity>(&self, value: f64) -> Result<Q, Failure> {
-        let wanted = if self.raw { Q::wanted_digits(value) } else { Q::wanted(value) };
-        wanted.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
+        wanted(value, &self.units)
+    }
+
+    /// Refuses an angle within the turn of the motor shaft: the output shaft has it several times.
+    pub fn wants_no_gear(&self) -> Result<(), Failure> {
+        match self.units.gear {
+            Some(gear) if gear.ratio() != 1.0 => Err(Failure::usage(
+                "the angle of this command is within one turn of the motor shaft, so the angle of the \
+                 output shaft is not determined; nothing was sent",
+            )
+            .trying("use `position`; or leave out --gear-ratio and give the angle of the motor shaft")),
+            _ => Ok(()),
+        }
+    }
+
+    /// A failure of a motor. The library has angles and speeds of the motor shaft.
+    pub fn at_motor_shaft(&self, failure: Failure) -> Failure {
+        match self.units.gear {
+            Some(gear) => failure.at_motor_shaft(gear.ratio()),
+            None => failure,
+        }
     }
 
     /// Keeps the failure of one of several motors; a program has it in its results.
@@ -79,7 +170,7 @@ impl Session {
         failure: Failure,
         failures: &mut Vec<Failure>,
     ) -> Result<(), Failure> {
-        let failure = failure.about(&self.port, id.number());
+        let failure = self.at_motor_shaft(failure).about(&self.port, id.number());
         if self.output.json {
             self.output.result("", self.line(id.number()).failed(&failure))?;
         }

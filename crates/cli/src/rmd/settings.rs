@@ -47,6 +47,8 @@ pub fn acceleration(session: &Session, limit: Option<f64>) -> Result<(), Failure
 /// `rmd encoder-offset`: the reply to the write has the offset that the motor took.
 pub fn encoder_offset(session: &Session, offset: u16) -> Result<(), Failure> {
     session.rom("setting the encoder offset")?;
+    // Refuses an offset beyond --encoder-bits before it is written.
+    session.rows(&EncoderOffset { offset }).map_err(|failure| failure.then("nothing was sent"))?;
     let motor = session.motor()?;
     let before = motor.encoder().map_err(|error| unwritten(error, "the offset was"))?.offset;
     session.confirm()?;
@@ -63,7 +65,7 @@ fn changed<P: Payload + PartialEq>(
     wanted: &P,
     after: &P,
 ) -> Result<(), Failure> {
-    let [old, written, new] = [before, wanted, after].map(|payload| session.rows(payload));
+    let (old, written, new) = (session.rows(before)?, session.rows(wanted)?, session.rows(after)?);
     let object = session.line(session.id).with_values("before", &old);
     let id = session.id;
     if wanted != after {

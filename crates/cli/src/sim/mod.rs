@@ -7,16 +7,18 @@ mod run;
 
 use std::io::{ErrorKind, Read};
 use std::os::fd::AsFd;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use motorlink::st::Profile;
 use motorlink_link::serve::ServeName;
+use motorlink_testbench::scenario::Scenario;
 use motorlink_testbench::{BenchConfig, ConfigError, RomError, RomFolder, ServeError, SimServer};
 use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
 use crate::failure::Failure;
+use crate::hint;
 use crate::interrupt::{self, interrupted};
 use crate::output;
 use crate::voice::Voice;
@@ -44,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "PORT")]
     rmd: Vec<String>,
     /// Protocol profile of the ST drive, instead of the configuration's
-    #[arg(long)]
+    #[arg(long, value_parser = hint::profile())]
     profile: Option<Profile>,
     /// Keep the ROM of RMD motors in this folder; without it their ROM is lost at the end
     #[arg(long, value_name = "DIR")]
@@ -72,7 +74,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     }
     interrupt::take_over();
     let mut config = match &args.config {
-        Some(path) => BenchConfig::read(path)?,
+        Some(path) => BenchConfig::read(path).map_err(|error| wrong_config(path, error))?,
         None => BenchConfig::default(),
     };
     if let Some(profile) = args.profile {
@@ -90,6 +92,23 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let out = output::never_wait(output::missed);
     serve(&mut bench, &config, &st, &rmd, out)?;
     obey(&mut bench, std::io::stdin(), out, |end| interrupted() || end && args.stdin)
+}
+
+/// The word after `sim` may have been meant as a scenario or a subcommand.
+fn wrong_config(path: &Path, error: ConfigError) -> Failure {
+    let play = format!("`motorlink sim run {}` plays a scenario", path.display());
+    let is_scenario = Scenario::read(path).is_ok();
+    let advice = match &error {
+        ConfigError::Unreadable { .. } if path.extension().is_none() => {
+            "`motorlink sim --help` lists the commands".to_owned()
+        }
+        ConfigError::Unreadable { .. } => {
+            format!("`sim` takes a file that describes drives; {play}")
+        }
+        _ if is_scenario => format!("the file is a scenario; {play}"),
+        _ => return error.into(),
+    };
+    Failure::from(error).trying(advice)
 }
 
 /// Serves the ports and prints one JSON line per port on `out`.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motorlink::st::register::Unit;
+use motorlink_link::printable;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
@@ -36,6 +37,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.plot.is_some() && scenario.panels.is_empty() {
         let why = "the scenario has no panels to plot: add a [[panel]] with signals";
         return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
+    }
+    if let Some(plot) = &args.plot
+        && let Some(other) = other_format(plot)
+    {
+        let why =
+            format!("--plot writes SVG, not {other}: `{}`", printable(&plot.display().to_string()));
+        return Err(Failure::usage(why).trying(
+            "give a name that ends in .svg; browsers show it, and Inkscape or rsvg-convert convert it",
+        ));
     }
     let inputs: Vec<&Path> =
         std::iter::once(&args.scenario).chain(&scenario.files).map(|path| &**path).collect();
@@ -77,6 +87,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // The result of the run comes first: its exit code counts.
     let failures = [judged, report, csv, plot].into_iter().filter_map(Result::err);
     failures.reduce(Failure::and).map_or(Ok(()), Err)
+}
+
+/// The extension of a file name that promises another format than SVG. Names without an extension and
+/// devices may have any content.
+fn other_format(plot: &Path) -> Option<String> {
+    let extension = plot.extension()?.to_str()?.to_ascii_lowercase();
+    let is_other = ["png", "jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
+        .contains(&&*extension);
+    is_other.then(|| extension.to_uppercase())
 }
 
 fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Vec<String> {

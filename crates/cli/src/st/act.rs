@@ -3,22 +3,31 @@
 use std::time::Duration;
 
 use motorlink::st::{
-    Command as Execute, CurrentReference, Flags, PositionMove, Profile, REVUP_PHASES, Ramp,
-    RegisterId, Request, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, register::Unit,
+    ArrivalOptions, Command as Execute, CurrentReference, Flags, PositionMove, Profile,
+    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, TorqueRamp, VERIFY_ATTEMPTS,
+    register::Unit,
 };
 use motorlink::time;
 
-use super::args::{Act, Pfc};
-use super::arrival;
+use super::args::{Act, Pfc, Wait};
 use super::read::explain;
 use super::session::Session;
-use super::set;
+use super::{mode, set};
+use crate::arrival;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::Row;
-use crate::output::{hex, parse_hex};
+use crate::output::{hex, kept_error, parse_hex};
+use crate::span::parse_milliseconds;
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
+    let can_turn = act.can_turn();
+    carry_out(session, act)
+        .and_then(|()| kept_error())
+        .map_err(|failure| if can_turn { session.of_motion(failure) } else { failure })
+}
+
+fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     match act {
         Act::Set { register, value, verify } => {
@@ -26,12 +35,18 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             set::run(session, &register, &value, attempts)
         }
         Act::Start { ramp } => {
-            if let [rpm, ms] = ramp[..] {
-                set_ramp(session, rpm, ms)?;
-            }
-            start(session)
+            let note = match &ramp[..] {
+                [rpm, ms] => Some(set_ramp(session, rpm, ms)?),
+                _ => None,
+            };
+            start(session, note)
         }
-        Act::Stop => execute(session, Execute::StopMotor),
+        Act::Stop => {
+            let stopped = motor.stop_until_confirmed();
+            interrupt::stop_is_complete();
+            stopped?;
+            session.acknowledged(format!("{}: {} acknowledged", motor.number(), Execute::StopMotor))
+        }
         Act::StartStop => execute(session, Execute::StartStop),
         Act::StopRamp => execute(session, Execute::StopRamp),
         Act::FaultAck => acknowledge(session),
@@ -41,40 +56,57 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
-            motor.set_ramp(Ramp { speed_rpm: rpm, duration_ms: ms })?;
-            session.done(format!(
-                "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
-                motor.number()
-            ))
+            let held = mode::set_ramp(session, Ramp { speed_rpm: rpm, duration_ms: ms })?;
+            let text = format!(
+                "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs{}",
+                motor.number(),
+                held.note
+            );
+            match held.bits {
+                Some(bits) => session.done_with(text, RegisterId::RAMP_FINAL_SPEED, bits),
+                None => session.done(text),
+            }
         }
         Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
-            motor.set_torque_ramp(TorqueRamp { torque_s16a: iq, duration_ms: ms })?;
-            session.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
+            let torque_s16a = session.current(iq)?;
+            motor.set_torque_ramp(TorqueRamp { torque_s16a, duration_ms: ms })?;
+            let iq = session.current_text(torque_s16a);
+            session.done(format!(
+                "{}: ramp to Iq {iq} in {ms} ms acknowledged; {}",
+                motor.number(),
+                session.torque_control()
+            ))
         }
         Act::Position { rad, seconds, wait } => {
             session.wants(Profile::Mcsdk54, "moves")?;
-            let position = PositionMove { angle_rad: rad, duration_s: seconds };
+            let position = PositionMove { angle_rad: rad as f32, duration_s: seconds };
+            let angle = format!("{} rad ({:.1}°)", position.angle_rad, rad.to_degrees());
             if !position.is_possible() {
-                return Err(Failure::usage(format!("{rad} rad in {seconds} s is not possible")));
+                return Err(Failure::usage(format!("{angle} is farther than a frame can carry")));
             }
             session.client.check(session.motor, &Request::SetPosition(position))?;
             if wait.wait {
-                return arrival::move_and_wait(session, position, &wait);
+                return move_and_wait(session, position, &wait);
             }
             motor.set_position(position)?;
-            session
-                .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
+            session.done(format!("{}: move to {angle} in {seconds} s acknowledged", motor.number()))
         }
         Act::CurrentReference { iq, id } => {
-            motor.set_current_reference(CurrentReference { iq_s16a: iq, id_s16a: id })?;
-            session.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
+            let (iq_s16a, id_s16a) = (session.current(iq)?, session.current(id)?);
+            motor.set_current_reference(CurrentReference { iq_s16a, id_s16a })?;
+            let [iq, id] = [iq_s16a, id_s16a].map(|digits| session.current_text(digits));
+            session.done(format!(
+                "{}: references Iq {iq}, Id {id}; {}",
+                motor.number(),
+                session.torque_control()
+            ))
         }
         Act::RevupData { phase: None, .. } => revup(session),
         Act::RevupData { phase: Some(phase), rpm, torque, ms } => {
             let data = RevupPhase {
                 speed_rpm: rpm.unwrap_or_default(),
-                torque_s16a: torque.unwrap_or_default(),
+                torque_s16a: session.current(torque.unwrap_or_default())?,
                 duration_ms: ms.unwrap_or_default(),
             };
             motor.set_revup_data(phase, data)?;
@@ -84,48 +116,56 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     }
 }
 
+/// Commands a move and waits for its end.
+fn move_and_wait(session: &Session, target: PositionMove, wait: &Wait) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    let options = ArrivalOptions { tolerance: wait.wait_tolerance, timeout: wait.wait_timeout };
+    let position_rad = arrival::move_and_wait(
+        motor,
+        || motor.prepare_move(target, options),
+        || Ok(motor.set_position(target)?),
+        |is_sent| match is_sent {
+            true => vec![(session.motor, motor.stop_until_confirmed())],
+            false => Vec::new(),
+        },
+        " and holds no load",
+    )?;
+    let text = format!("{} arrived at {position_rad:.4} rad", motor.number());
+    session.done_with(text, RegisterId::CURRENT_POSITION, position_rad.to_bits() as i32)
+}
+
 fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.execute(command)?;
     session.done(format!("{}: {command} acknowledged", motor.number()))
 }
 
-/// The ramp that a start executes.
-fn set_ramp(session: &Session, speed_rpm: i32, ms: i32) -> Result<(), Failure> {
-    let duration_ms = u16::try_from(ms).map_err(|_| {
-        Failure::usage(format!(
-            "the duration of a ramp is 0 to {} ms, not {ms}; nothing was sent",
-            u16::MAX
-        ))
+/// Sets the ramp that a start executes. Returns how it differs from the requested one.
+fn set_ramp(session: &Session, rpm: &str, ms: &str) -> Result<String, Failure> {
+    let not_sent = |why: String| Failure::usage(format!("--ramp: {why}; nothing was sent"));
+    let speed_rpm = rpm.parse().map_err(|_| {
+        not_sent(format!("`{rpm}` is not a speed: give a whole number of rpm without a unit"))
     })?;
-    Ok(session.motor()?.set_ramp(Ramp { speed_rpm, duration_ms })?)
+    let duration_ms = parse_milliseconds(ms).map_err(|why| not_sent(format!("`{ms}`: {why}")))?;
+    Ok(mode::set_ramp(session, Ramp { speed_rpm, duration_ms })?.note)
 }
 
-/// A drive also acknowledges a START that has no effect, so its state is read.
-fn start(session: &Session) -> Result<(), Failure> {
+/// Starts the motor. The control mode decides what it does, so it is read first: while the motor starts,
+/// TORQUE_REF has the reference of the rev-up.
+fn start(session: &Session, note: Option<String>) -> Result<(), Failure> {
     let motor = session.motor()?;
-    motor.start()?;
-    let status = motor.status()?;
-    match status {
-        Status::FaultNow | Status::FaultOver => {
-            let faults = explain(motor.flags()?);
-            Err(Failure::refused(format!(
-                "{} did not start, its state is {status}: {faults}\nremove the cause, then run \
-                 `motorlink st fault-ack`",
-                motor.number()
-            )))
-        }
-        Status::AnyStop | Status::Stop | Status::StopIdle | Status::WaitStopMotor => {
-            Err(Failure::refused(format!(
-                "{} did not start, it is still stopping ({status}); start it when it is IDLE",
-                motor.number()
-            )))
-        }
-        _ => {
-            let text = format!("{} starts: {status}", motor.number());
-            session.done_with(text, RegisterId::STATUS, u8::from(status).into())
-        }
-    }
+    // Without a ramp, a start with a limit is refused and nothing is sent.
+    let is_refused = session.has_speed_limit && note.is_none();
+    let mode = if is_refused { mode::Mode::default() } else { mode::read(session)? };
+    let note = note.unwrap_or_default();
+    let status = motor.start()?;
+    let state = session.reading(RegisterId::STATUS, u8::from(status).into());
+    let rows: Vec<Row> =
+        [state].iter().chain(&mode.readings).map(|reading| session.row(reading)).collect();
+    session.confirmed()?.result(
+        format!("{} starts: {status}{}{note}", motor.number(), mode.text),
+        session.line().ok(true).values(&rows),
+    )
 }
 
 /// How long the state machine may take to follow FAULT_ACK.
@@ -135,13 +175,17 @@ const ACKNOWLEDGED_WITHIN: time::Micros = time::Micros::from_millis(200);
 /// moment to follow.
 fn acknowledge(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
+    let before = motor.flags()?;
     motor.fault_ack()?;
     let clock = session.client.clock();
     let give_up = clock.now() + ACKNOWLEDGED_WITHIN;
     loop {
         let faults = motor.flags()?;
         if faults == Flags::default() {
-            let text = format!("{}: no faults", motor.number());
+            let text = match before == Flags::default() {
+                true => format!("{}: there were no faults", motor.number()),
+                false => format!("{}: {before} acknowledged, no faults left", motor.number()),
+            };
             return session.done_with(text, RegisterId::FLAGS, 0);
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
@@ -166,9 +210,10 @@ fn revup(session: &Session) -> Result<(), Failure> {
             ("torque", torque_s16a.into(), Unit::S16A),
             ("duration", duration_ms.into(), Unit::Millisecond),
         ];
-        let rows = values.map(|(name, value, unit)| match session.raw {
-            true => Row::digits(name, value.into()),
-            false => Row::quantity(name, value.into(), 0, unit.symbol()),
+        let rows = values.map(|(name, value, unit)| match unit {
+            _ if session.raw => Row::digits(name, value.into()),
+            Unit::S16A => Row::current(name, value.into(), session.full_scale),
+            unit => Row::quantity(name, value.into(), 0, unit.symbol()),
         });
         let texts = rows.iter().map(|row| format!("  {:>11}", row.text));
         session.output.result(
@@ -188,7 +233,13 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
             ));
         }
     };
+    let meaning = mode::meaning(session, code, payload);
     let reply = session.client.raw(session.motor, code, payload)?;
-    let text = if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
+    let acknowledge =
+        if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
+    let text = match meaning {
+        Some(meaning) => format!("{acknowledge}; {meaning}"),
+        None => acknowledge,
+    };
     session.confirmed()?.result(text, session.line().ok(true).with("data", hex(&reply)))
 }

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::st::Profile;
+use motorlink::st::{FullScale, Profile};
 
 use super::registers::Filter;
+use crate::angle::{parse_angle, parse_tolerance};
 use crate::connection::Connection;
+use crate::pasteable::{self, number_options, port_option, unless_default};
 use crate::repeat::Repeat;
-use crate::span::{parse_distance, parse_span, span_up_to};
+use crate::span::{parse_distance, parse_duration, parse_milliseconds, parse_span, span_up_to};
 use crate::{help, hint};
 
 #[derive(clap::Args)]
@@ -30,7 +32,8 @@ pub struct DriveArgs {
           hide_possible_values = true)]
     pub motor: u8,
     /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
-    #[arg(long, default_value = "spec", global = true, value_parser = hint::profile())]
+    #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", global = true,
+          value_parser = hint::profile())]
     pub profile: Profile,
     /// How long to wait for a reply, 1ms to 60s [default: 1s, in a scan 200ms]
     #[arg(long, global = true, value_name = "TIME",
@@ -43,15 +46,50 @@ pub struct DriveArgs {
     /// alignment, and to a motor that already turns. Nothing is sent if a command exceeds the limit.
     #[arg(long, global = true, value_name = "RPM", value_parser = parse_distance)]
     pub speed_limit: Option<f64>,
-    /// Refuse commands for more current than this, s16A digits, rounded down
+    /// Take and show currents in A: the full scale of the drive's current measurement, A
+    ///
+    /// The full scale is the current of digit 32767. It is in the manual of the board. A wrong full scale
+    /// gives wrong currents. Without it currents are digits (s16A). It applies to `get`, `segment`,
+    /// `status`, `set`, `current-reference`, `torque-ramp`, `revup-data` and --current-limit. It does not
+    /// apply to gains, `raw` and --trace. Requested currents are rounded towards 0 to a digit.
+    #[arg(long, global = true, value_name = "AMPS", allow_negative_numbers = true,
+          value_parser = hint::full_scale())]
+    pub full_scale: Option<FullScale>,
+    /// Refuse commands for more current than this, s16A digits (A with --full-scale), rounded down
     ///
     /// The limit applies to Iq and Id in `current-reference`, `torque-ramp`, `revup-data`, `set` and
     /// `raw`. Nothing is sent if a command exceeds it.
-    #[arg(long, global = true, value_name = "S16A", value_parser = parse_distance)]
+    #[arg(long, global = true, value_name = "CURRENT", value_parser = parse_distance)]
     pub current_limit: Option<f64>,
-    /// After an error, send padding bytes to a 5.x drive that waits for the rest of a frame
+    /// After an error, send 132 padding bytes before the next request
+    ///
+    /// Use it if a drive of MCSDK 5.x stays silent after a damaged or cut-off frame: it waits for the rest
+    /// of the frame, without a timeout. The bytes complete the frame. `stop` always sends them on a lost
+    /// line.
     #[arg(long, global = true)]
     pub pad: bool,
+}
+
+impl DriveArgs {
+    /// Commands in messages repeat these options.
+    pub fn repeat_in_hints(&self, port: &str) {
+        let profile = Profile::default().name();
+        let mut of_motor =
+            unless_default("--profile", self.profile.name(), "MOTORLINK_PROFILE", profile);
+        of_motor.extend(number_options([
+            ("--full-scale", self.full_scale.map(FullScale::amps)),
+            ("--speed-limit", self.speed_limit),
+            ("--current-limit", self.current_limit),
+        ]));
+        pasteable::set_options(pasteable::Options {
+            protocol: "st",
+            of_port: port_option(port),
+            of_motor,
+            number: "--motor",
+            default_motor: 1,
+            motor: Some(self.motor),
+        });
+    }
 }
 
 #[derive(Subcommand)]
@@ -68,7 +106,10 @@ pub enum Read {
     /// Show the name and version of the SDK and the firmware
     Info,
     /// Show state, faults, speed, current, voltage and temperature
-    Status,
+    Status {
+        #[command(flatten)]
+        repeat: Repeat,
+    },
     /// List the registers: id, name, type, access, unit, meaning
     Registers {
         #[command(flatten)]
@@ -111,7 +152,7 @@ pub enum Act {
         /// Name or number
         #[arg(value_parser = hint::register(), hide_possible_values = true)]
         register: String,
-        /// A number in the register's unit, or a name (SPEED, I_ALPHA)
+        /// A number in the register's unit (currents in A with --full-scale), or a name (SPEED, I_ALPHA)
         #[arg(allow_negative_numbers = true)]
         value: String,
         /// Repeat the write until the register has the value, at most this many times (default 3)
@@ -121,9 +162,10 @@ pub enum Act {
     },
     /// Start the motor
     Start {
-        /// Set this ramp first: speed at the end, rpm, and duration, ms. Needed with --speed-limit
+        /// Set this ramp first: speed at the end, rpm, and duration, ms (or with a unit: 1s). Needed with
+        /// --speed-limit
         #[arg(long, num_args = 2, value_names = ["RPM", "MS"], allow_negative_numbers = true)]
-        ramp: Vec<i32>,
+        ramp: Vec<String>,
     },
     /// Stop the motor
     Stop,
@@ -136,7 +178,8 @@ pub enum Act {
         /// Speed at the end, rpm
         #[arg(allow_negative_numbers = true)]
         rpm: i32,
-        /// Duration of the ramp, ms
+        /// Duration of the ramp, ms, or with a unit: 1s
+        #[arg(value_parser = parse_milliseconds)]
         ms: u16,
     },
     /// Show the rev-up phases, or set one
@@ -148,37 +191,40 @@ pub enum Act {
         /// Speed at the end of the phase, rpm
         #[arg(requires = "torque", allow_negative_numbers = true)]
         rpm: Option<i32>,
-        /// Iq at the end of the phase, s16A digits
+        /// Iq at the end of the phase, s16A digits (A with --full-scale)
         #[arg(requires = "ms", allow_negative_numbers = true)]
-        torque: Option<i16>,
-        /// Duration of the phase, ms
+        torque: Option<f64>,
+        /// Duration of the phase, ms, or with a unit: 300ms
+        #[arg(value_parser = parse_milliseconds)]
         ms: Option<u16>,
     },
-    /// Set the current references, s16A digits
+    /// Set the current references, s16A digits (A with --full-scale)
     #[command(visible_alias = "current")]
     CurrentReference {
         /// Iq
         #[arg(allow_negative_numbers = true)]
-        iq: i16,
+        iq: f64,
         /// Id
         #[arg(allow_negative_numbers = true)]
-        id: i16,
+        id: f64,
     },
     /// Change the torque current (Iq) in a given time; profile mcsdk-5.4 only
     TorqueRamp {
-        /// Iq at the end, s16A digits
+        /// Iq at the end, s16A digits (A with --full-scale)
         #[arg(allow_negative_numbers = true)]
-        iq: i32,
-        /// Duration of the ramp, ms
+        iq: f64,
+        /// Duration of the ramp, ms, or with a unit: 1s
+        #[arg(value_parser = parse_milliseconds)]
         ms: u16,
     },
     /// Turn to an angle in a given time; profile mcsdk-5.4 with position control only
     #[command(visible_alias = "move")]
     Position {
-        /// Angle, rad
-        #[arg(allow_negative_numbers = true)]
-        rad: f32,
-        /// Duration of the move, s
+        /// Angle with its unit, such as 90deg or 1.57rad
+        #[arg(allow_hyphen_values = true, value_name = "ANGLE", value_parser = parse_angle)]
+        rad: f64,
+        /// Duration of the move with its unit, such as 2s or 500ms
+        #[arg(value_name = "TIME", value_parser = parse_duration)]
         seconds: f32,
         #[command(flatten)]
         wait: Wait,
@@ -203,6 +249,21 @@ pub enum Act {
     },
 }
 
+impl Act {
+    /// Whether the motor may be turning after the command, and no stop follows.
+    pub fn can_turn(&self) -> bool {
+        match self {
+            Act::Start { .. }
+            | Act::StartStop
+            | Act::Ramp { .. }
+            | Act::TorqueRamp { .. }
+            | Act::CurrentReference { .. } => true,
+            Act::Position { wait, .. } => !wait.wait,
+            _ => false,
+        }
+    }
+}
+
 /// Whether to wait for the end of a move.
 #[derive(clap::Args)]
 pub struct Wait {
@@ -215,8 +276,8 @@ pub struct Wait {
     /// load. After kill -9 the motor completes the move.
     #[arg(long)]
     pub wait: bool,
-    /// How far from the target the motor may be to have arrived, rad (default 0.01)
-    #[arg(long, value_name = "RAD", requires = "wait", value_parser = parse_distance)]
+    /// How far from the target the motor may be to have arrived (default 0.01rad)
+    #[arg(long, value_name = "ANGLE", requires = "wait", value_parser = parse_tolerance)]
     pub wait_tolerance: Option<f64>,
     /// How long to wait (default: the length of the move and 10s)
     #[arg(long, value_name = "TIME", requires = "wait", value_parser = parse_span)]

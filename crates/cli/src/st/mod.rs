@@ -2,7 +2,7 @@
 
 mod act;
 mod args;
-mod arrival;
+mod mode;
 mod read;
 mod refusal;
 mod registers;
@@ -11,13 +11,14 @@ mod session;
 mod set;
 
 pub use args::Args;
-use args::{Command, DriveArgs, Read};
+use args::{Act, Command, DriveArgs, Read};
 use motorlink::port::PortName;
 use motorlink::st::SCAN_TIMEOUT;
 use session::connect;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output::keep_error;
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -26,8 +27,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
         return registers::list(connection.output(), filter);
     }
     let port = connection.port()?;
+    drive.repeat_in_hints(connection.port_text());
+    let is_stop = matches!(command, Command::Act(Act::Stop));
+    if is_stop {
+        interrupt::complete_stop(format!("motor {}", drive.motor));
+    }
     let done = run_at(&connection, &drive, &port, command);
-    done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
+    done.map_err(
+        |failure| if is_stop { failure.of_stop(format!("motor {}", drive.motor)) } else { failure },
+    )
+    .map_err(|failure| failure.about(&port.to_string(), drive.motor))
 }
 
 fn run_at(
@@ -52,7 +61,7 @@ fn run_at(
                 read::segment(&connect()?, segment, &registers, &repeat)
             }
             Read::Info => read::info(&connect()?),
-            Read::Status => read::status(&connect()?),
+            Read::Status { repeat } => read::status(&connect()?, &repeat),
         },
     }
 }

@@ -1,12 +1,13 @@
 //! Commands that read.
 
-use motorlink::st::{FirmwareVersion, Flags, Profile, Reading, RegisterId, Status, find_register};
+use motorlink::st::{Error, FirmwareVersion, Flags, Profile, RegisterId, Status, find_register};
 use serde_json::{Value, json};
 
 use super::refusal;
 use super::session::Session;
 use crate::failure::Failure;
-use crate::json::{self, Cell, Line, Row};
+use crate::json::{Cell, Line};
+use crate::output::note;
 use crate::repeat::{Repeat, repeated};
 
 pub fn info(session: &Session) -> Result<(), Failure> {
@@ -22,6 +23,16 @@ pub fn info(session: &Session) -> Result<(), Failure> {
         Err(error) if error.is_refusal() => ("has no version".to_owned(), Value::Null),
         Err(error) => return Err(error.into()),
     };
+    if info.profile != session.client.profile() {
+        let looks_like = match info.profile {
+            Profile::Mcsdk54 => "ST's firmware",
+            Profile::Spec => "a drive that follows the document",
+        };
+        note(format!(
+            "note: this looks like {looks_like}: add --profile {}, or set MOTORLINK_PROFILE",
+            info.profile.name()
+        ));
+    }
     session.confirmed()?.result(
         format!("board     {} {major}.{minor}.{patch}\nfirmware  {text}", info.name),
         Line::about(&session.port, None).with("board", board).with("firmware", firmware),
@@ -42,7 +53,10 @@ const STATUS: [RegisterId; 10] = [
     RegisterId::MOTOR_POWER,
 ];
 
-pub fn status(session: &Session) -> Result<(), Failure> {
+pub fn status(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
+    if repeat.every.is_some() {
+        return show(session, repeat, || read_all(session, &STATUS));
+    }
     let mut cells = read_all(session, &STATUS)?;
     for (register, cell) in STATUS.into_iter().zip(&mut cells) {
         let Cell::Read(row) = cell else { continue };
@@ -96,8 +110,7 @@ pub fn segment(
         }
         session.client.confirm()?;
         let read = registers.iter().zip(values);
-        let row = |(&register, bits)| Cell::Read(row(session, &session.reading(register, bits)));
-        Ok(read.map(row).collect())
+        Ok(read.map(|(&register, bits)| cell(session, register, bits)).collect())
     })
 }
 
@@ -113,27 +126,38 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
     names.iter().map(|name| find_register(name).map_err(Failure::from)).collect()
 }
 
-/// Reads registers, and confirms each reply. If the drive refuses one, the others are read all the same.
+/// Reads registers, and confirms each reply. If the drive refuses one, or replies as in the other
+/// profile, the others are still read.
 fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Failure> {
     let motor = session.motor()?;
     registers
         .iter()
         .map(|&register| {
-            let cell = match motor.get_raw(register) {
-                Ok(bits) => Cell::Read(row(session, &session.reading(register, bits))),
+            let read = motor.get_raw(register);
+            // After a lost exchange, the next one recovers the line first. Earlier values are confirmed.
+            if !read.as_ref().is_err_and(Error::is_line_failure) {
+                session.client.confirm()?;
+            }
+            match read {
+                Ok(bits) => Ok(cell(session, register, bits)),
                 Err(error) if refusal::is_about_register(&error) => {
                     let failure = refusal::of_read(error, register, session.client.profile());
-                    Cell::Refused(register.to_string(), session.about(failure))
+                    Ok(Cell::Refused(register.to_string(), session.about(failure)))
                 }
-                Err(error) => return Err(error.into()),
-            };
-            session.client.confirm()?;
-            Ok(cell)
+                Err(error) => Err(error.into()),
+            }
         })
         .collect()
 }
 
-/// A register with its value as people read it.
-fn row(session: &Session, reading: &Reading) -> Row {
-    json::register(reading, session.text(reading), session.raw)
+/// A register with its value as people read it, or why its value is not plausible.
+fn cell(session: &Session, register: RegisterId, bits: i32) -> Cell {
+    let reading = session.reading(register, bits);
+    match reading.more_plausible() {
+        Some(other) if !session.raw => {
+            let failure = refusal::of_value(&session.port, &reading, &other);
+            Cell::Refused(register.to_string(), session.about(failure))
+        }
+        _ => Cell::Read(session.row(&reading)),
+    }
 }

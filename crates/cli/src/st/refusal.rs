@@ -1,7 +1,9 @@
 //! Refusals of registers, explained with the table of registers.
 
 use motorlink::st::register::{Access, Origin, Writing};
-use motorlink::st::{Error, ErrorCode, Feature, Features, Profile, RegisterId};
+use motorlink::st::{
+    Error, ErrorCode, Failure as ExchangeFailure, Feature, Features, Profile, Reading, RegisterId,
+};
 
 use crate::failure::Failure;
 
@@ -11,9 +13,27 @@ pub struct Known {
     pub advice: Option<String>,
 }
 
-/// Whether an error is about the register, not about the motor or the line.
+/// Whether an error is about the register, not about the motor or the line. A reply with the size of the
+/// other profile is about the register.
 pub fn is_about_register(error: &Error) -> bool {
-    matches!(error, Error::Refused { code, .. } if *code != ErrorCode::BadMotorSelected)
+    match error {
+        Error::Refused { code, .. } => *code != ErrorCode::BadMotorSelected,
+        Error::Failed { failure, .. } => {
+            matches!(failure, ExchangeFailure::Size { fits: Some(_), .. })
+        }
+        _ => false,
+    }
+}
+
+/// A value that is plausible in another profile only.
+pub fn of_value(port: &str, reading: &Reading, other: &Reading) -> Failure {
+    let (register, fits) = (reading.register, other.profile);
+    Failure::refused(format!(
+        "{port}: {register} is {reading} in profile {}, which is not plausible, and {other} in profile {}",
+        reading.profile.name(),
+        fits.name()
+    ))
+    .trying(format!("{}; --raw prints the digits", advice_profile(fits)))
 }
 
 /// A refusal to read a register.

@@ -9,7 +9,7 @@ use motorlink::st::{BAUD_RATES, Error, ScanResult, scan_baud};
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::Line;
-use crate::output::Printer;
+use crate::output::{Printer, note};
 
 pub fn run(
     connection: &Connection,
@@ -24,7 +24,13 @@ pub fn run(
         return Err(Failure::usage("a scan of baud rates cannot be used with --fault"));
     }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
-    let rates = if port.at_baud(rates[0]).is_some() { rates } else { &rates[..1] };
+    let rates = match port.at_baud(rates[0]) {
+        Some(_) => rates,
+        None => {
+            note(format!("note: {port} has no baud rate, so it is asked once"));
+            &rates[..1]
+        }
+    };
     let output = connection.output();
     let bar = crate::output::progress(rates.len());
     let (mut is_found, mut echoes) = (false, false);

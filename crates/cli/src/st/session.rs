@@ -1,12 +1,16 @@
 //! An open drive, for all commands.
 
 use motorlink::port::PortName;
-use motorlink::st::{Client, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId};
+use motorlink::rmd::Scale;
+use motorlink::st::register::Unit;
+use motorlink::st::{
+    Client, FullScale, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId, parse_value,
+};
 
 use super::args::DriveArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::json::{self, Line};
+use crate::json::{self, Line, Row};
 use crate::output::Printer;
 
 /// An open drive, and how its values are shown.
@@ -15,6 +19,9 @@ pub struct Session {
     pub motor: u8,
     pub output: Printer,
     pub raw: bool,
+    /// Currents are in A if it is known.
+    pub full_scale: Option<FullScale>,
+    pub has_speed_limit: bool,
     pub port: String,
 }
 
@@ -23,6 +30,12 @@ pub fn connect(
     drive: &DriveArgs,
     port: &PortName,
 ) -> Result<Session, Failure> {
+    if connection.raw && drive.full_scale.is_some() {
+        return Err(Failure::usage(
+            "--raw has the values of the protocol, and --full-scale converts them; nothing was sent",
+        )
+        .trying("leave one out"));
+    }
     let defaults = Options::default();
     let timeout = drive.timeout.unwrap_or(defaults.timeout);
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
@@ -31,14 +44,19 @@ pub fn connect(
     let options = Options { profile, timeout, recovery, limits, ..defaults };
     let client = Client::open_wrapped(port, connection.around_line(profile)?, options)?;
     let (motor, output, raw) = (drive.motor, connection.output(), connection.raw);
-    Ok(Session { client, motor, output, raw, port: port.to_string() })
+    let (full_scale, port) = (drive.full_scale, port.to_string());
+    let has_speed_limit = drive.speed_limit.is_some();
+    Ok(Session { client, motor, output, raw, full_scale, has_speed_limit, port })
 }
 
 /// Limits are rounded towards 0, and saturate: a limit never allows more than was given.
 fn limits(drive: &DriveArgs) -> Limits {
     Limits {
         speed_rpm: drive.speed_limit.map(|rpm| rpm as u32),
-        current_s16a: drive.current_limit.map(|digits| digits as u16),
+        current_s16a: drive.current_limit.map(|limit| match drive.full_scale {
+            Some(full_scale) => full_scale.limit(limit),
+            None => limit as u16,
+        }),
     }
 }
 
@@ -58,6 +76,14 @@ impl Session {
         failure.about(&self.port, self.motor)
     }
 
+    /// A failure of a motion command. It was not sent if the line has never been in sync.
+    pub fn of_motion(&self, failure: Failure) -> Failure {
+        if !self.client.has_been_in_sync() {
+            return failure;
+        }
+        failure.of_motion(format_args!("motor {}", self.motor), "motorlink st stop")
+    }
+
     /// The first members of a JSON result.
     pub fn line(&self) -> Line {
         Line::about(&self.port, Some(self.motor))
@@ -65,12 +91,18 @@ impl Session {
 
     /// Prints the result, after the acknowledgement is confirmed.
     pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
-        self.confirmed()?.result(text, self.line().ok(true))
+        self.client.confirm()?;
+        self.acknowledged(text)
+    }
+
+    /// Prints the result of a command that is confirmed.
+    pub fn acknowledged(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
+        self.output.result(text, self.line().ok(true))
     }
 
     /// As [`done`](Self::done), with the new value of a register.
     pub fn done_with(&self, text: String, register: RegisterId, bits: i32) -> Result<(), Failure> {
-        let value = json::register(&self.reading(register, bits), String::new(), self.raw);
+        let value = self.row(&self.reading(register, bits));
         self.confirmed()?.result(text, self.line().ok(true).values(&[value]))
     }
 
@@ -85,14 +117,62 @@ impl Session {
         Reading { register, bits, profile: self.client.profile() }
     }
 
+    /// A register with its value as people and programs read it.
+    pub fn row(&self, reading: &Reading) -> Row {
+        json::register(reading, self.text(reading), self.raw, self.full_scale)
+    }
+
     /// A register's value as people read it.
     pub fn text(&self, reading: &Reading) -> String {
         match (self.raw, reading.name()) {
             (true, _) => reading.digits().to_string(),
+            _ if reading.is_current() => self.current_text(reading.digits()),
             (false, Some(name)) if reading.register != RegisterId::TARGET_MOTOR => {
                 format!("{name} ({:#x})", reading.digits())
             }
             _ => reading.to_string(),
+        }
+    }
+
+    /// A current as people read it: with --full-scale in A, with its digits behind it.
+    pub fn current_text(&self, digits: impl Into<i64>) -> String {
+        Row::current("", digits.into(), self.full_scale).text
+    }
+
+    /// The digits of a current: of A with --full-scale, otherwise the number itself.
+    pub fn current<T: TryFrom<i64>>(&self, current: f64) -> Result<T, Failure> {
+        let unfit = |why: String| Failure::usage(format!("{why}; nothing was sent"));
+        let digits = match self.full_scale {
+            Some(full_scale) => {
+                full_scale.scale().wanted(current).map_err(|error| unfit(error.to_string()))?
+            }
+            None => {
+                let whole = Scale::plain(i64::MIN, i64::MAX).wanted(current);
+                let whole = whole.ok().filter(|&digits| digits as f64 == current);
+                let unit = Unit::S16A.symbol();
+                whole.ok_or_else(|| {
+                    unfit(format!(
+                        "{current} is not a whole number, and a current is in digits, {unit}"
+                    ))
+                    .trying("for currents in A add --full-scale")
+                })?
+            }
+        };
+        let unit = Unit::S16A.symbol();
+        T::try_from(digits).map_err(|_| unfit(format!("{digits} {unit} does not fit the message")))
+    }
+
+    /// The bits of a value for a register: a current as [`current`](Self::current).
+    pub fn bits(&self, register: RegisterId, text: &str) -> Result<i32, Failure> {
+        let is_current = self.reading(register, 0).is_current();
+        match text.parse::<f64>() {
+            Ok(amps) if is_current && self.full_scale.is_some() => {
+                Ok(i32::from(self.current::<i16>(amps)?))
+            }
+            Err(_) if is_current && self.full_scale.is_some() => Err(Failure::usage(format!(
+                "`{text}` is not a current: with --full-scale give a number in A; nothing was sent"
+            ))),
+            _ => Ok(parse_value(register, text, self.client.profile(), self.raw)?),
         }
     }
 

@@ -3,13 +3,13 @@
 use std::convert::Infallible;
 
 use motorlink::st::{
-    Error, Reading, RegisterId, Request, Unverified, VerifiedWrite, find_register, parse_value,
+    Error, Reading, RegisterId, Request, Unverified, VerifiedWrite, find_register,
 };
 
-use super::refusal;
 use super::session::Session;
+use super::{mode, refusal};
 use crate::failure::Failure;
-use crate::json::{self, Line};
+use crate::json::Line;
 
 /// The result of reading a register.
 enum Look {
@@ -21,7 +21,7 @@ enum Look {
 pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> Result<(), Failure> {
     let register = find_register(name)?;
     let profile = session.client.profile();
-    let bits = parse_value(register, text, profile, session.raw)?;
+    let bits = session.bits(register, text)?;
     let motor = session.motor()?;
     let (bytes, size) = (bits.to_le_bytes(), usize::from(register.write_size(profile)));
     let write = Request::SetRegister { register, value: &bytes[..size.min(bytes.len())] };
@@ -59,6 +59,13 @@ pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> R
         let (expected, read) = (write.expected(), after.bits);
         return Err(Error::Differs { motor: motor.number(), register, expected, read }.into());
     }
+    if let Look::Value(after) = &after
+        && register == RegisterId::CONTROL_MODE
+        && after.bits != bits
+    {
+        let read = after.bits;
+        return Err(Error::Differs { motor: motor.number(), register, expected: bits, read }.into());
+    }
     let mut said = format!("{}: {}", motor.number(), words(session, register, &before, &after));
     if let (Err(Unverified::Acts), Look::Value(after)) = (comparable, &after)
         && after.bits != bits
@@ -66,6 +73,9 @@ pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> R
         let written = session.text(&session.reading(register, bits));
         said +=
             &format!("; {written} was written, and the drive may change this register by itself");
+    }
+    if mode::is_torque_command(register, bits) {
+        said += &format!("; {}", session.torque_control());
     }
     if let Some(attempt @ 2..) = attempt {
         said += &format!(" (written {attempt} times)");
@@ -123,9 +133,7 @@ fn words(session: &Session, register: RegisterId, before: &Look, after: &Look) -
 
 fn with_look(object: Line, session: &Session, name: &str, look: &Look) -> Line {
     match look {
-        Look::Value(reading) => {
-            object.with_values(name, &[json::register(reading, String::new(), session.raw)])
-        }
+        Look::Value(reading) => object.with_values(name, &[session.row(reading)]),
         Look::Unreadable(_) => object,
     }
 }

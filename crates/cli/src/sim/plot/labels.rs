@@ -69,7 +69,7 @@ mod tests {
     fn labels_and_lines_do_not_cross_and_stay_in_the_picture() {
         let marks = [
             mark(0.0, "a long label at the beginning"),
-            mark(0.1, "another one beside it"),
+            mark(0.1, "a second event"),
             mark(0.1, "at the same moment"),
             mark(1.0, "under the line of which is text"),
             mark(3.0, "short"),
@@ -77,7 +77,7 @@ mod tests {
             mark(10.0, "a long label at the end"),
         ];
         let labels = place(&marks, 10.0);
-        assert_eq!(labels[1].text, "another one beside it, at the same moment");
+        assert_eq!(labels[1].text, "a second event, at the same moment");
         assert_eq!((labels[0].row, labels[4].from > labels[4].x), (0, true));
         assert!(labels.last().unwrap().from < labels.last().unwrap().x, "turned to the left");
         for (n, a) in labels.iter().enumerate() {
