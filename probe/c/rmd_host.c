@@ -7,6 +7,7 @@ static motorlink_rmd_host state;
 int main(void)
 {
     motorlink_rmd_output todo;
+    motorlink_rmd_motion_status status = { 0 };
     static motorlink_can_frame frame;
 
     motorlink_rmd_host_init(&state, sizeof state);
@@ -20,7 +21,8 @@ int main(void)
         frame.size = 8;
         motorlink_rmd_host_receive(&state, now, &frame);
         motorlink_rmd_host_poll(&state, now, &todo);
-        use(todo.frame.data, (size_t)motorlink_rmd_decode_motion_status(todo.reply).speed_dps);
+        motorlink_rmd_decode_motion_status(todo.reply, &status);
+        use(todo.frame.data, (size_t)status.speed_dps);
         motorlink_rmd_host_cancel(&state, now, motor);
     }
 }

@@ -86,17 +86,20 @@ fn request(out: &mut String, row: &'static CommandInfo, replies: &[Reply]) {
 
 fn decoder(out: &mut String, reply: &Reply) {
     let Reply { noun, fields, .. } = reply;
-    let (ty, read, doc) = match fields.as_slice() {
-        [one] => (type_of(one).to_owned(), number(one), format!(": {}", doc_of(one))),
-        _ => (format!("motorlink_rmd_{noun}"), "reply.into()".to_owned(), ".".to_owned()),
+    let (name, ty, read, doc) = match fields.as_slice() {
+        [one] => (name_of(one), type_of(one).to_owned(), number(one), format!(": {}", doc_of(one))),
+        _ => (noun.clone(), format!("motorlink_rmd_{noun}"), "reply.into()".into(), ".".into()),
     };
-    line!(out, "/// Reads the reply to {}{doc}", commands(reply));
+    let codes = commands(reply);
+    line!(out, "/// Reads the reply to {codes}{doc}");
+    line!(out, "///\n/// `BAD_ARGUMENT`: the reply is that of another command.");
     line!(out, "#[unsafe(no_mangle)]");
-    line!(
-        out,
-        "pub extern \"C\" fn motorlink_rmd_decode_{noun}(reply: motorlink_rmd_data) -> {ty} {{"
-    );
-    line!(out, "let reply = {}::decode(&reply.bytes);\n{read} }}", proto(noun));
+    line!(out, "pub unsafe extern \"C\" fn motorlink_rmd_decode_{noun}(");
+    line!(out, "reply: motorlink_rmd_data, {name}: *mut {ty}) -> motorlink_error {{");
+    line!(out, "promised!({name});");
+    line!(out, "answer(|| {{ let place = {name}.place()?;");
+    line!(out, "let reply: {} = decode(&reply, &[{codes}])?;", proto(noun));
+    line!(out, "place.set({read}); Ok(()) }}) }}");
 }
 
 fn doc_of(field: &Field) -> String {

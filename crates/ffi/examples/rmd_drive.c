@@ -61,9 +61,11 @@ int main(void) {
     ready[0].events = POLLIN;
     ready[1].fd = fd;
     ready[1].events = POLLIN;
-    if (poll(ready, 2, -1) < 0 && errno != EINTR) {
+    if (poll(ready, 2, 1) < 0 && errno != EINTR) {
       fail("poll");
     }
+    /* Each millisecond: a fault switches the motor off also while no host sends. */
+    check(motorlink_rmd_drive_poll(&drive, now_us()));
     if (ready[0].revents != 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0) {
       break;
     }

@@ -84,7 +84,19 @@ static motorlink_rmd_output next_done(int fd) {
   return output;
 }
 
-/* Asks for Off, in place of the exchange under way, and waits for the reply. */
+/* Waits until the exchange with the motor is over; gives its result. */
+static motorlink_error result_of(int fd, uint8_t motor) {
+  motorlink_rmd_output output;
+  do {
+    output = next_outcome(fd);
+  } while (output.motor != motor);
+  return output.result;
+}
+
+/*
+ * Asks for Off, in place of the exchange under way, and waits for the reply. The confirmation shows that
+ * the reply belongs to this Off.
+ */
 static void switch_off(int fd) {
   uint64_t retry_us;
   motorlink_error result;
@@ -98,12 +110,9 @@ static void switch_off(int fd) {
     return;
   }
   check(fd, result);
-  for (;;) {
-    motorlink_rmd_output output = next_outcome(fd);
-    if (output.motor == MOTOR) {
-      turning = output.result != MOTORLINK_OK;
-      return;
-    }
+  if (result_of(fd, MOTOR) == MOTORLINK_OK) {
+    check(fd, motorlink_rmd_host_confirm(&host, now_us(), MOTOR));
+    turning = result_of(fd, MOTOR) != MOTORLINK_OK;
   }
 }
 
@@ -119,6 +128,12 @@ static void leave(int fd, const char *why, int code) {
   exit(code);
 }
 
+/* Ends the program if the motor's replies so far may belong to other requests. */
+static void confirm(int fd, uint8_t motor) {
+  check(fd, motorlink_rmd_host_confirm(&host, now_us(), motor));
+  check(fd, result_of(fd, motor));
+}
+
 /* Asks until the motor can be trusted, for 2 s at the most. */
 static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data request) {
   uint64_t give_up = now_us() + 2000000U, retry_us;
@@ -130,13 +145,12 @@ static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data req
         return output.reply;
       }
       result = output.result;
-    } else if (result == MOTORLINK_ERROR_QUARANTINED) {
-      check(fd, motorlink_rmd_host_retry(&host, &retry_us));
-      hear(fd, retry_us);
     }
     if (result != MOTORLINK_ERROR_QUARANTINED || now_us() > give_up) {
       check(fd, result);
     }
+    check(fd, motorlink_rmd_host_retry(&host, &retry_us));
+    hear(fd, retry_us);
   }
 }
 
@@ -167,17 +181,18 @@ int main(int argc, char **argv) {
   send_line(fd, &line);
   hear(fd, now_us() + 100000U);
 
-  status = motorlink_rmd_decode_status(exchange(fd, 1, motorlink_rmd_read_status()));
+  check(fd, motorlink_rmd_decode_status(exchange(fd, 1, motorlink_rmd_read_status()), &status));
   printf("motor 1: %d degrees Celsius, %u.%u V, errors 0x%02x\n", (int)status.temperature_celsius,
          (unsigned)(status.voltage_decivolts / 10), (unsigned)(status.voltage_decivolts % 10),
          (unsigned)status.errors);
 
   turning = 1;
   exchange(fd, 1, motorlink_rmd_set_position_limited(9000, 360));
+  confirm(fd, 1);
   give_up = now_us() + 20000000U;
   do {
     motorlink_rmd_data reply = exchange(fd, 1, motorlink_rmd_read_multi_turn_angle());
-    angle = motorlink_rmd_decode_multi_turn_angle(reply);
+    check(fd, motorlink_rmd_decode_multi_turn_angle(reply, &angle));
   } while ((angle < 8900 || angle > 9100) && now_us() < give_up);
 
   for (motor = 2; motor <= 4; motor++) {
@@ -186,7 +201,8 @@ int main(int argc, char **argv) {
   check(fd, motorlink_rmd_host_set_torque4(&host, now_us(), torques, 0x0F));
   for (left = 4; left > 0; left--) {
     motorlink_rmd_output output = next_done(fd);
-    motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(output.reply);
+    motorlink_rmd_motion_status motion;
+    check(fd, motorlink_rmd_decode_motion_status(output.reply, &motion));
     speeds_dps[output.motor - 1] = motion.speed_dps;
   }
 
@@ -199,7 +215,11 @@ int main(int argc, char **argv) {
     leave(fd, "the limit did not hold", 3);
   }
   exchange(fd, 1, motorlink_rmd_off());
+  confirm(fd, 1);
   turning = 0;
+  for (motor = 2; motor <= 4; motor++) {
+    confirm(fd, motor);
+  }
   printf("motor 1: %ld hundredths of a degree\n", (long)angle);
   for (motor = 1; motor <= 4; motor++) {
     printf("motor %u: %d degrees per second\n", (unsigned)motor, (int)speeds_dps[motor - 1]);

@@ -45,18 +45,23 @@ static int32_t conduct(int fd, int may_end, motorlink_st_output *output) {
   return MOTORLINK_OK;
 }
 
+static int succeeds(int fd, motorlink_error begun) {
+  motorlink_st_output output;
+  return begun == MOTORLINK_OK && conduct(fd, 0, &output) == MOTORLINK_OK &&
+         output.result == MOTORLINK_OK;
+}
+
 /*
  * Stops the motor. If the line failed, STOP_MOTOR goes out at once and again after the recovery: the
- * drive may hear and not be heard.
+ * drive may hear and not be heard. The confirmation shows that the acknowledge belongs to the stop.
  */
 static void stop(int fd) {
   int attempt;
   for (attempt = 0; started && attempt < STOP_ATTEMPTS; attempt++) {
-    motorlink_st_output output;
     motorlink_st_master_abandon(&master);
-    if (motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR) ==
-            MOTORLINK_OK &&
-        conduct(fd, 0, &output) == MOTORLINK_OK && output.result == MOTORLINK_OK) {
+    if (succeeds(fd, motorlink_st_master_execute(&master, MOTOR,
+                                                 MOTORLINK_ST_COMMAND_STOP_MOTOR)) &&
+        succeeds(fd, motorlink_st_master_confirm(&master))) {
       started = 0;
     }
   }
@@ -141,11 +146,12 @@ int main(int argc, char **argv) {
   state = read_register(fd, MOTORLINK_ST_REG_STATUS);
   faults = read_register(fd, MOTORLINK_ST_REG_FLAGS);
   done(fd, "stop", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  done(fd, "confirm", motorlink_st_master_confirm(&master));
   started = 0;
   printf("%ld rpm, state %ld, faults 0x%08lx\n", (long)speed, (long)state,
          (unsigned long)(uint32_t)faults);
 
-  /* What is read-only is refused, and the line stays in step. */
+  /* What is read-only is refused, and the line stays in sync. */
   output = exchange(fd, "write", motorlink_st_master_set_register(&master, MOTOR,
                                                                   MOTORLINK_ST_REG_SPEED_MEAS, 1));
   if (output.result != MOTORLINK_ERROR_REFUSED ||
@@ -154,5 +160,10 @@ int main(int argc, char **argv) {
     return 3;
   }
   close(fd);
-  return labs((long)speed - rpm) > labs((long)rpm) / 20 ? 3 : 0;
+  if (labs((long)speed - rpm) > labs((long)rpm) / 20) {
+    fprintf(stderr, "the motor did not reach %ld rpm within 20 s; START_MOTOR has no effect while the motor is "
+                    "stopping or in fault\n", (long)rpm);
+    return 3;
+  }
+  return 0;
 }

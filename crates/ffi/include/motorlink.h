@@ -41,8 +41,9 @@
  * Ownership. The caller owns the storage of every object: static, on the stack or on the heap. It is
  * opaque. `_init` begins an object there, whatever the storage held before. There is nothing to
  * release. A function uses a pointer during the call only, unless its description says that the
- * pointer is kept. Pointers in one call must not overlap one another or an object's storage. The bytes
- * that an output or a reply points to are in that storage: copy them before you hand them in again.
+ * pointer is kept. Pointers in one call must not overlap one another or an object's storage, unless the
+ * description says that they may. An output or a reply points to bytes in the storage of the object. The
+ * next call for the object overwrites them: send or copy them before, also before a transfer by DMA.
  *
  * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange. `_poll`
  * conducts it: send what it gives, hand in what arrives, until it gives DONE. Until then every other
@@ -55,11 +56,13 @@
  * Numbers with names. Registers, commands, error codes, states and the like have an enum each. Its name
  * is the type in calls. The type has one byte, with -fshort-enums and without. In C it is `uint8_t`; from
  * C23 on and in C++ it is the enum itself, so that C++ needs a cast for a plain number. A drive may send
- * a number without a name: it is handed on unchanged. Numbers from the caller are checked. Sums of
- * bits are plain integers.
+ * a number without a name: it is handed on unchanged. A caller may pass a register or a command without
+ * a name; other numbers without a name give BAD_ARGUMENT. Sums of bits are plain integers.
  *
  * Time is in microseconds since any moment. Use the same clock for all calls of an object. Time must
- * not run backwards.
+ * not run backwards: a counter of 32 bits wraps around after 71 minutes, and a tick of milliseconds is not
+ * in microseconds. Extend it to 64 bits; C.md has the lines. If time runs backwards all the same, waits
+ * end: an exchange with TIMEOUT, and an RMD drive with a shutdown time switches its motor off.
  *
  * Errors. A function returns MOTORLINK_OK, or another `motorlink_error`: then it has done nothing.
  * Any function may return NULL_POINTER and MISALIGNED, and, if it takes an object, UNINITIALISED,
@@ -67,7 +70,8 @@
  *
  * Reentrancy. Calls for different objects are independent; there are no globals. A call for an object
  * that is in a call already (from one of its callbacks, from an interrupt, from another thread)
- * returns IN_USE and does nothing. On a processor without compare-and-exchange, such as a Cortex-M0,
+ * returns IN_USE and does nothing. The bytes of that call are lost, so do not hand in bytes from an
+ * interrupt: put them into a ring, which the main loop empties. On a processor without compare-and-exchange, such as a Cortex-M0,
  * this holds for callbacks and interrupts only. `_init` cannot detect it and must not be called then.
  *
  * Callbacks must return: not leave by longjmp or by a C++ exception. The program may change the table
@@ -116,9 +120,9 @@ enum motorlink_st_recovery
   : uint8_t
 #endif
  {
-  MOTORLINK_ST_RECOVERY_NONE  = 0x00, /**< no recovery: the line is in step at first, and after a failure out of step until `motorlink_st_master_trust_line` is called */
-  MOTORLINK_ST_RECOVERY_DRAIN = 0x01, /**< waits for silence, asks a question, continues after the answer */
-  MOTORLINK_ST_RECOVERY_PAD   = 0x02  /**< sends bytes that complete a frame for which a 5.x drive may still wait, then as DRAIN */
+  MOTORLINK_ST_RECOVERY_DRAIN = 0x00, /**< waits for silence, asks a question, continues after the answer */
+  MOTORLINK_ST_RECOVERY_PAD   = 0x01, /**< sends bytes that complete a frame for which a 5.x drive may still wait, then as DRAIN */
+  MOTORLINK_ST_RECOVERY_NONE  = 0x02  /**< never recovers. The line counts as in sync from the start, so that a late reply to an earlier program is taken for the reply to the first request. After a failure it is out of sync until `motorlink_st_master_trust_line` is called */
 };
 #if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
 typedef enum motorlink_st_recovery motorlink_st_recovery;
@@ -126,7 +130,7 @@ typedef enum motorlink_st_recovery motorlink_st_recovery;
 typedef uint8_t motorlink_st_recovery;
 #endif
 
-/** Registers (table 3). A comment has access (D: for the DAC only), type and unit. */
+/** Registers (table 3). A comment has access (D: for the DAC only), type and unit. Units: 32767 s16A is full scale of the drive's current measurement, 32767 s16V full scale of its voltage, 65536 s16degree one electrical turn. */
 enum motorlink_st_reg
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint8_t
@@ -156,7 +160,7 @@ enum motorlink_st_reg
   MOTORLINK_ST_REG_PLL_KP                = 0x15, /**< RW i16 dpp/s16V: PLL regulator Kp, numerator */
   MOTORLINK_ST_REG_FLUXWK_KP             = 0x16, /**< RW i16 s16A/s16V²: Flux weakening regulator Kp */
   MOTORLINK_ST_REG_FLUXWK_KI             = 0x17, /**< RW i16 s16A/s16V²: Flux weakening regulator Ki */
-  MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< RW u16 %: Share of the bus voltage that flux weakening may use */
+  MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< RW u16 %: Share of the bus voltage that flux weakening may use (mcsdk-5.4: 0.1 %) */
   MOTORLINK_ST_REG_BUS_VOLTAGE           = 0x19, /**< R  u16 V: Bus voltage */
   MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< R  u16 °C: Heatsink temperature (mcsdk-5.4: i16) */
   MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< R  u16 W: Electrical power into the motor (mcsdk-5.4: i16) */
@@ -165,7 +169,7 @@ enum motorlink_st_reg
   MOTORLINK_ST_REG_SPEED_MEAS            = 0x1E, /**< R  i32 rpm: Mechanical speed, averaged */
   MOTORLINK_ST_REG_TORQUE_MEAS           = 0x1F, /**< R  i16 s16A: Iq, measured */
   MOTORLINK_ST_REG_FLUX_MEAS             = 0x20, /**< R  i16 s16A: Id, measured */
-  MOTORLINK_ST_REG_FLUXWK_BUS_MEAS       = 0x21, /**< R  u16 %: Share of the bus voltage in use */
+  MOTORLINK_ST_REG_FLUXWK_BUS_MEAS       = 0x21, /**< R  u16 %: Share of the bus voltage in use (mcsdk-5.4: 0.1 %) */
   MOTORLINK_ST_REG_RUC_STAGE_NBR         = 0x22, /**< R  u8: Number of rev-up phases */
   MOTORLINK_ST_REG_I_A                   = 0x23, /**< D  i16 s16A: Phase A current */
   MOTORLINK_ST_REG_I_B                   = 0x24, /**< D  i16 s16A: Phase B current */
@@ -197,7 +201,7 @@ enum motorlink_st_reg
   MOTORLINK_ST_REG_DAC_USER2             = 0x3E, /**< D  i16: User value of DAC channel 2 */
   MOTORLINK_ST_REG_MAX_APP_SPEED         = 0x3F, /**< R  u32 rpm: Highest speed of the application */
   MOTORLINK_ST_REG_MIN_APP_SPEED         = 0x40, /**< R  u32 rpm: Lowest speed of the application */
-  MOTORLINK_ST_REG_IQ_SPEEDMODE          = 0x41, /**< W  i16 s16A: Id reference in speed mode */
+  MOTORLINK_ST_REG_IQ_SPEEDMODE          = 0x41, /**< W  i16 s16A: Id reference in speed mode; the document also says Iq (S22) */
   MOTORLINK_ST_REG_EST_BEMF_LEVEL        = 0x42, /**< R  i16 s16V²: Expected back-EMF level (PLL) */
   MOTORLINK_ST_REG_OBS_BEMF_LEVEL        = 0x43, /**< R  i16 s16V²: Observed back-EMF level (PLL) */
   MOTORLINK_ST_REG_EST_CR_BEMF_LEVEL     = 0x44, /**< R  i16 s16V²: Expected back-EMF level (CORDIC) */
@@ -371,7 +375,7 @@ enum motorlink_st_status
   MOTORLINK_ST_STATUS_STOP                  = 0x08, /**< stopping */
   MOTORLINK_ST_STATUS_STOP_IDLE             = 0x09, /**< stopped, about to be idle */
   MOTORLINK_ST_STATUS_FAULT_NOW             = 0x0A, /**< the cause of a fault is present */
-  MOTORLINK_ST_STATUS_FAULT_OVER            = 0x0B, /**< a fault's cause is gone; it waits to be acknowledged */
+  MOTORLINK_ST_STATUS_FAULT_OVER            = 0x0B, /**< a fault occurred; no cause is present, and the drive waits for FAULT_ACK */
   MOTORLINK_ST_STATUS_ICLWAIT               = 0x0C, /**< waiting for the inrush current limiter */
   MOTORLINK_ST_STATUS_ALIGN_CHARGE_BOOT_CAP = 0x0D, /**< charging boot capacitors before alignment */
   MOTORLINK_ST_STATUS_ALIGN_OFFSET_CALIB    = 0x0E, /**< calibrating current offsets before alignment */
@@ -495,7 +499,7 @@ enum motorlink_rmd_can_id {
 
 
 /**
- * Success.
+ * Success, the same as MOTORLINK_ERROR_OK.
  */
 #define MOTORLINK_OK 0
 
@@ -507,7 +511,7 @@ enum motorlink_rmd_can_id {
 /**
  * In limits: no limit.
  */
-#define MOTORLINK_NO_LIMIT -1
+#define MOTORLINK_NO_LIMIT (-1)
 
 /**
  * Words of 8 bytes in a `motorlink_st_slave`.
@@ -517,12 +521,12 @@ enum motorlink_rmd_can_id {
 /**
  * Words of 8 bytes in a `motorlink_st_master`.
  */
-#define MOTORLINK_ST_MASTER_WORDS 35
+#define MOTORLINK_ST_MASTER_WORDS 37
 
 /**
  * Words of 8 bytes in a `motorlink_rmd_host`.
  */
-#define MOTORLINK_RMD_HOST_WORDS 333
+#define MOTORLINK_RMD_HOST_WORDS 335
 
 /**
  * Words of 8 bytes in a `motorlink_rmd_drive`.
@@ -637,12 +641,12 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_AMBIGUOUS = 26,
   /**
-   * The line was out of step before, and the drive does not answer a test question. The request was
+   * The line was out of sync before, and the drive does not answer a test question. The request was
    * not sent (ST).
    */
   MOTORLINK_ERROR_LOST = 27,
   /**
-   * The line was out of step before, and bytes keep arriving. Nothing was sent (ST).
+   * The line was out of sync before, and bytes keep arriving. Nothing was sent (ST).
    */
   MOTORLINK_ERROR_NOISE = 28,
   /**
@@ -672,6 +676,11 @@ enum motorlink_error
    * same. Only a read was sent to a drive (ST). It is not known what the motor did (RMD).
    */
   MOTORLINK_ERROR_ECHO = 44,
+  /**
+   * Replies since the last confirmation may belong to other requests: a reply came twice or late, or
+   * the confirmation failed.
+   */
+  MOTORLINK_ERROR_UNCONFIRMED = 45,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -839,15 +848,16 @@ typedef struct motorlink_st_revup_phase {
 } motorlink_st_revup_phase;
 
 /**
- * How a master behaves.
+ * How a master behaves. Begin with `motorlink_st_master_defaults()`, then change fields. A field that is 0
+ * has its default.
  */
 typedef struct motorlink_st_master_config {
   /**
-   * How long to wait for a reply, µs.
+   * How long to wait for a reply, µs. 0: 1 s, as in the document.
    */
   uint32_t timeout_us;
   /**
-   * The line counts as silent after this time without a byte, µs.
+   * The line counts as silent after this time without a byte, µs. 0: 50 ms.
    */
   uint32_t quiet_us;
   /**
@@ -860,7 +870,7 @@ typedef struct motorlink_st_master_config {
    */
   motorlink_st_profile profile;
   /**
-   * How the master recovers a line that is out of step.
+   * How the master recovers a line that is out of sync.
    */
   motorlink_st_recovery recovery;
 } motorlink_st_master_config;
@@ -902,7 +912,7 @@ typedef struct motorlink_st_limits {
 } motorlink_st_limits;
 
 /**
- * Bytes that belong to an object: send or copy them before the next call for it.
+ * Bytes in the storage of an object: send or copy them before the next call for it.
  */
 typedef struct motorlink_bytes {
   /**
@@ -991,8 +1001,9 @@ typedef struct motorlink_st_version {
  * The drive behind a slave. The slave has checked the frame, the motor, the register's existence and
  * access, and every size before it calls.
  *
- * Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
- * call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+ * `execute` is required. Every other callback may be NULL. Callbacks are called from within
+ * `motorlink_st_slave_receive`, and may not call for the same slave: such calls give `IN_USE`. `motor`
+ * is 1 to 7, and exists.
  *
  * `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
  * a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
@@ -1014,8 +1025,9 @@ typedef struct motorlink_st_motor_control {
   uint16_t (*features)(void *context, uint8_t motor);
   /**
    * The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
-   * the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
-   * floating-point register is its bits. NULL: 0.
+   * the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS have 0.1 % a digit here and in
+   * `set_register`, in both profiles; the slave converts. The value of a floating-point register is
+   * its bits. NULL: 0.
    *
    * STATUS is IDLE at rest and RUN once the motor runs, FAULT_NOW and FAULT_OVER in fault; FLAGS
    * has the faults that occurred in the low half and those present in the high half (S14).
@@ -1041,8 +1053,8 @@ typedef struct motorlink_st_motor_control {
                                           motorlink_st_reg reg,
                                           int32_t value);
   /**
-   * Executes a command. What the state does not allow has no effect (4.6).
-   * NULL: none has.
+   * Executes a command. What the state does not allow has no effect (4.6). Required: the slave
+   * acknowledges the command, and a master relies on an acknowledged STOP_MOTOR.
    *
    * In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
    * neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
@@ -1053,7 +1065,7 @@ typedef struct motorlink_st_motor_control {
   void (*execute)(void *context, uint8_t motor, motorlink_st_command command);
   /**
    * Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
-   * NULL: without effect.
+   * NULL: acknowledged, without effect.
    */
   void (*set_ramp)(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
   /**
@@ -1064,7 +1076,7 @@ typedef struct motorlink_st_motor_control {
                          uint8_t phase,
                          struct motorlink_st_revup_phase *data);
   /**
-   * Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
+   * Sets rev-up phase 0 to 4 (4.10). NULL: acknowledged, without effect.
    */
   void (*set_revup_data)(void *context,
                          uint8_t motor,
@@ -1072,15 +1084,15 @@ typedef struct motorlink_st_motor_control {
                          const struct motorlink_st_revup_phase *data);
   /**
    * Sets the current references: at once in RUN, else when RUN is reached (4.11).
-   * NULL: without effect.
+   * NULL: acknowledged, without effect.
    */
   void (*set_current_reference)(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
   /**
-   * Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
+   * Programs a torque ramp (profile MCSDK 5.4). NULL: acknowledged, without effect.
    */
   void (*set_torque_ramp)(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
   /**
-   * Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
+   * Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: acknowledged, without effect.
    */
   void (*set_position)(void *context, uint8_t motor, float angle_rad, float duration_s);
   /**
@@ -1416,8 +1428,9 @@ typedef struct motorlink_rmd_sense {
 /**
  * The motor behind a drive: the power stage, its control loops and its sensors.
  *
- * Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
- * and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+ * `set_mode` is required. Every other callback may be NULL. Callbacks are called from within
+ * `motorlink_rmd_drive_power_on`, `_receive` and `_poll`, and may not call for the same drive: such calls
+ * give `IN_USE`.
  *
  * `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
  * a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
@@ -1429,14 +1442,14 @@ typedef struct motorlink_rmd_motor_control {
    */
   void *context;
   /**
-   * Does this from now on. NULL: without effect.
+   * Does this from now on. Required: the drive acknowledges Off and Stop, and a host relies on that.
    *
    * Positive speed and torque turn clockwise, to larger counts (R36). A move is as fast as
    * `max_speed_dps` lets it be, and does not turn with 0 (R13, R40).
    */
   void (*set_mode)(void *context, const struct motorlink_rmd_motion *motion);
   /**
-   * Uses these gains and this acceleration limit from now on. NULL: without effect.
+   * Uses these gains and this acceleration limit from now on. NULL: acknowledged, without effect.
    *
    * The limit holds for all motion commands but torque (R39); 0 or less means no limit (R24). Without
    * position gains the motor does not go to a position (R41).
@@ -1535,7 +1548,8 @@ motorlink_error motorlink_st_decode_revup_data(const uint8_t *payload,
 /**
  * Reads the payload of an answer to `motorlink_st_master_get_segment`: the values of the `count`
  * registers that the segment was configured with, in the same order, into as many `values`, each
- * as in `motorlink_st_output`.
+ * as in `motorlink_st_output`. The payload has no register numbers: other registers of the same sizes, or
+ * another order, are not detected.
  *
  * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are unchanged.
  */
@@ -1582,6 +1596,10 @@ motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
 
 /**
  * Takes bytes that came from the drive at `now_us`, in any pieces. `bytes` must not be in the storage.
+ *
+ * Only `motorlink_st_master_poll` ends an exchange with TIMEOUT. If no poll came after the deadline, a reply
+ * that is handed in now ends the exchange, because it may have waited in a buffer. Poll first if a reply
+ * after the deadline must not count.
  */
 motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
                                             uint64_t now_us,
@@ -1589,12 +1607,12 @@ motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
                                             size_t size);
 
 /**
- * Cancels the exchange under way. Its reply may still come, so the line is out of step.
+ * Cancels the exchange under way. Its reply may still come, so the line is out of sync.
  */
 motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
 
 /**
- * Marks the line as out of step: something else has sent or received on it. An exchange under way ends
+ * Marks the line as out of sync: something else has sent or received on it. An exchange under way ends
  * without a result.
  */
 motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
@@ -1607,13 +1625,13 @@ motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
 motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
 
 /**
- * Marks the line as in step: no late reply can come, because nothing was asked on it. An exchange under
+ * Marks the line as in sync: no late reply can come, because nothing was asked on it. An exchange under
  * way ends without a result.
  */
 motorlink_error motorlink_st_master_trust_line(struct motorlink_st_master *master);
 
 /**
- * Sets `lost` to 1 if the line is out of step: it was just opened, or an exchange failed. The next
+ * Sets `lost` to 1 if the line is out of sync: it was just opened, or an exchange failed. The next
  * request then recovers it first. Sets `lost` to 0 otherwise.
  */
 motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
@@ -1626,8 +1644,10 @@ motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *mas
                                                  motorlink_st_reg reg);
 
 /**
- * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
- * register `value` is the bits. Any number is allowed.
+ * Begins to write a register. Of a floating-point register `value` is the bits, of a register of type u32
+ * the value's cast to `int32_t`. Registers without a name are allowed; they are written with 4 bytes.
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or `value` is outside of the range of the register's type.
  */
 motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
                                                  uint8_t motor,
@@ -1637,9 +1657,15 @@ motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *mas
 /**
  * Begins to execute a command. Any number is allowed.
  *
+ * A drive also acknowledges START_MOTOR and FAULT_ACK if they have no effect. After START_MOTOR read
+ * STATUS: FAULT_NOW and FAULT_OVER mean that the motor did not start because of the faults in FLAGS,
+ * ANY_STOP, STOP, STOP_IDLE and WAIT_STOP_MOTOR that it is still stopping. The motor starts in its
+ * control mode, which a stop does not change: in torque mode with the last current reference.
+ *
  * What stops a motor (STOP_MOTOR, SC_STOP) is sent at once if the line is lost or was just opened, then
  * the line is recovered, then it is sent again. The result is that of the second. If it is not
- * `MOTORLINK_OK`, begin again: the motor may still turn.
+ * `MOTORLINK_OK`, begin again: the motor may still turn. A drive acknowledges START_MOTOR also where it has
+ * no effect: while the motor runs, is stopping or is in fault. Read STATUS.
  */
 motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
                                             uint8_t motor,
@@ -1728,6 +1754,9 @@ motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master
 /**
  * Begins to read a data segment (profile SPEC): the values of its registers in their order,
  * little-endian, each in its own size.
+ *
+ * `LIMIT`: this master has not configured the segment since the port was opened. Nothing is sent:
+ * shipped firmware reads this request as a torque ramp.
  */
 motorlink_error motorlink_st_master_get_segment(struct motorlink_st_master *master,
                                                 uint8_t motor,
@@ -1743,6 +1772,16 @@ motorlink_error motorlink_st_master_get_profiler_info(struct motorlink_st_master
                                                       uint8_t motor,
                                                       const uint8_t *steps,
                                                       size_t count);
+
+/**
+ * Begins a confirmation: a question that shows whether the replies since the last confirmation belong to
+ * their own requests. A reply that comes twice, or late, shifts all later replies by one, which no other
+ * exchange detects. Confirm what you read before you rely on it, and a stop before the program ends.
+ *
+ * The result is `MOTORLINK_OK` or `UNCONFIRMED`. After `UNCONFIRMED` do not use what was read or
+ * acknowledged since the last confirmation; the line is recovered before the next request.
+ */
+motorlink_error motorlink_st_master_confirm(struct motorlink_st_master *master);
 
 /**
  * Begins an exchange with any frame code and any payload of up to 128 bytes, which is copied.
@@ -1761,7 +1800,8 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
  * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
  * may be constant. Not from a callback of the same slave.
  *
- * `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1 to 7.
+ * `NULL_POINTER`: also if `execute` is NULL. `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1
+ * to 7.
  */
 motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
                                         size_t size,
@@ -1810,9 +1850,11 @@ motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
 struct motorlink_bytes motorlink_st_reg_name(motorlink_st_reg reg);
 
 /**
- * The symbol of the unit of a register's value; empty if it has none.
+ * The symbol of the unit of one digit of a register's value, in a profile; empty if it has none. FLUXWK_BUS
+ * and FLUXWK_BUS_MEAS have `%` in profile SPEC and `0.1 %` in MCSDK54. All other units are the same.
  */
-struct motorlink_bytes motorlink_st_reg_unit(motorlink_st_reg reg);
+struct motorlink_bytes motorlink_st_reg_unit(motorlink_st_profile profile,
+                                             motorlink_st_reg reg);
 
 /**
  * The name of an error code.
@@ -1976,48 +2018,75 @@ struct motorlink_rmd_data motorlink_rmd_set_single_turn_position_limited(motorli
 
 /**
  * Reads the reply to 0x30, 0x31, 0x32.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-struct motorlink_rmd_pid motorlink_rmd_decode_pid(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_pid(struct motorlink_rmd_data reply,
+                                         struct motorlink_rmd_pid *pid);
 
 /**
  * Reads the reply to 0x33, 0x34: 1 °/s² a digit; 0 is no limit.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-int32_t motorlink_rmd_decode_acceleration(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_acceleration(struct motorlink_rmd_data reply,
+                                                  int32_t *acceleration_dps2);
 
 /**
  * Reads the reply to 0x90.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-struct motorlink_rmd_encoder motorlink_rmd_decode_encoder(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_encoder(struct motorlink_rmd_data reply,
+                                             struct motorlink_rmd_encoder *encoder);
 
 /**
- * Reads the reply to 0x92: 0.01° a digit, positive is clockwise; 56 bits travel (docs/SPEC-NOTES.md R2).
+ * Reads the reply to 0x92: 0.01° a digit, positive is clockwise; 56 bits travel (SPEC-NOTES.md R2).
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-int64_t motorlink_rmd_decode_multi_turn_angle(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_multi_turn_angle(struct motorlink_rmd_data reply,
+                                                      int64_t *angle_centidegrees);
 
 /**
  * Reads the reply to 0x94: 0.01° a digit, 0 to 35999, growing clockwise from the encoder's zero.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-uint16_t motorlink_rmd_decode_single_turn_angle(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_single_turn_angle(struct motorlink_rmd_data reply,
+                                                       uint16_t *angle_centidegrees);
 
 /**
  * Reads the reply to 0x9A, 0x9B.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-struct motorlink_rmd_status motorlink_rmd_decode_status(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_status(struct motorlink_rmd_data reply,
+                                            struct motorlink_rmd_status *status);
 
 /**
  * Reads the reply to 0x9C, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-struct motorlink_rmd_motion_status motorlink_rmd_decode_motion_status(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_motion_status(struct motorlink_rmd_data reply,
+                                                   struct motorlink_rmd_motion_status *motion_status);
 
 /**
  * Reads the reply to 0x9D.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-struct motorlink_rmd_phase_currents motorlink_rmd_decode_phase_currents(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_phase_currents(struct motorlink_rmd_data reply,
+                                                    struct motorlink_rmd_phase_currents *phase_currents);
 
 /**
  * Reads the reply to 0x91, 0x19: Encoder counts.
+ *
+ * `BAD_ARGUMENT`: the reply is that of another command.
  */
-uint16_t motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply);
+motorlink_error motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply,
+                                                    uint16_t *offset);
 
 /**
  * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no
@@ -2029,6 +2098,8 @@ motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t 
 /**
  * Sets how long a reply may take, and how long after a timeout a late reply may still come. Effective
  * from the next request.
+ *
+ * `BAD_ARGUMENT`: a time is 0. Without quarantine a late reply would be taken for another request's.
  */
 motorlink_error motorlink_rmd_host_set_times(struct motorlink_rmd_host *host,
                                              uint32_t timeout_us,
@@ -2050,9 +2121,11 @@ motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,
  *
  * A motor that did not answer before may be asked for its status instead; the exchange ends in
  * `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
- * by two different questions; when it was silent for the quarantine time the request is taken. Off and
- * Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
- * to a motor that was not asked before they go out ahead of the questions.
+ * by two different questions; when it was silent for the quarantine time the request is taken.
+ *
+ * Off and Stop are also sent during a quarantine. Exception: if the reply to an earlier Off is missing,
+ * another Off gives `QUARANTINED` until the quarantine is over; the same for Stop. To a motor that was not
+ * asked before, Off and Stop are sent before the questions.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
  * or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -2064,11 +2137,26 @@ motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
                                            struct motorlink_rmd_data request);
 
 /**
+ * Begins a confirmation: a question to a motor that shows whether its replies since the last confirmation
+ * belong to their own requests. A reply that comes twice answers the next request with the same code, which
+ * no other exchange detects. Confirm what you read before you rely on it, and a stop before the program
+ * ends.
+ *
+ * The result is `MOTORLINK_OK`, `UNCONFIRMED`, or an error of the question. If it is not `MOTORLINK_OK`, do
+ * not use what the motor replied since the last confirmation.
+ *
+ * `BAD_ARGUMENT`, `BUSY`, `QUARANTINED`: as `motorlink_rmd_host_request`. Nothing is sent then.
+ */
+motorlink_error motorlink_rmd_host_confirm(struct motorlink_rmd_host *host,
+                                           uint64_t now_us,
+                                           uint8_t motor);
+
+/**
  * Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
- * digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
- * `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
- * Where one of `expect` did not answer before or was not asked before, each of them is asked for
- * its status instead.
+ * digit. `expect` has a bit for each motor that has to answer, bit 0 for motor 1. Each of them ends in a
+ * `DONE`. The frame reaches all four motors. Those that are not in `expect` are in quarantine afterwards.
+ * If a motor of `expect` did not answer its last request, or was not asked before, the frame is not sent:
+ * each motor of `expect` is asked for its status, and its exchange ends in `QUARANTINED`.
  *
  * As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
  * `BAD_ARGUMENT`: a bit above 3 is set.
@@ -2079,9 +2167,11 @@ motorlink_error motorlink_rmd_host_set_torque4(struct motorlink_rmd_host *host,
                                                uint8_t expect);
 
 /**
- * When to ask again what was last refused with `QUARANTINED`; a reply may make it sooner or later.
+ * Gives when to ask again after the last `QUARANTINED`, of a call or of an exchange, of any motor. Call it
+ * before the next call for another motor. A reply may move the moment.
  */
-motorlink_error motorlink_rmd_host_retry(struct motorlink_rmd_host *host, uint64_t *at_us);
+motorlink_error motorlink_rmd_host_retry(struct motorlink_rmd_host *host,
+                                         uint64_t *at_us);
 
 /**
  * What to do next. Call until it is `WAIT`.
@@ -2101,8 +2191,8 @@ motorlink_error motorlink_rmd_host_receive(struct motorlink_rmd_host *host,
                                            const struct motorlink_can_frame *frame);
 
 /**
- * Gives up the exchange with a motor without a result, so that another request can be made. A frame
- * of `motorlink_rmd_host_set_torque4` that still waits and would reach the motor is given up for all.
+ * Cancels the exchange with a motor, without a result. Another request can then be made. A frame of
+ * `motorlink_rmd_host_set_torque4` that is not yet sent and would reach the motor is cancelled for all.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32.
  */
@@ -2111,13 +2201,14 @@ motorlink_error motorlink_rmd_host_cancel(struct motorlink_rmd_host *host,
                                           uint8_t motor);
 
 /**
- * Tells that these motors owe no earlier host a reply, so that no question goes before the first
- * request: a bit each, bit 0 for motor 1.
+ * Marks these motors as without a pending reply to an earlier host. No question is then sent before the
+ * first request. `motors` has a bit for each, bit 0 for motor 1.
  */
-motorlink_error motorlink_rmd_host_trust(struct motorlink_rmd_host *host, uint32_t motors);
+motorlink_error motorlink_rmd_host_trust(struct motorlink_rmd_host *host,
+                                         uint32_t motors);
 
 /**
- * Tells that the bus was opened anew: what the motors may still answer is not known, as after
+ * Call it after the bus was opened again. Late replies may still come, as after
  * `motorlink_rmd_host_init`. Exchanges under way end without a result.
  */
 motorlink_error motorlink_rmd_host_reopened(struct motorlink_rmd_host *host, uint64_t now_us);
@@ -2128,14 +2219,15 @@ motorlink_error motorlink_rmd_host_reopened(struct motorlink_rmd_host *host, uin
 motorlink_error motorlink_rmd_host_busy(struct motorlink_rmd_host *host, uint32_t *motors);
 
 /**
- * Begins a drive, whatever the storage held before. It does nothing before
- * `motorlink_rmd_drive_power_on`.
+ * Begins a drive, whatever the storage held before. Before `motorlink_rmd_drive_power_on` it ignores all
+ * frames, and does not command its motor.
  *
  * `size` is `sizeof *drive`. `config` and `rom` (what the ROM holds; NULL: zeros) are copied.
  * `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
  * callback of the same drive.
  *
- * `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits` neither 0 nor 12 to 18.
+ * `NULL_POINTER`: also if `set_mode` is NULL. `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits`
+ * neither 0 nor 12 to 18.
  */
 motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
                                          size_t size,
@@ -2152,7 +2244,7 @@ motorlink_error motorlink_rmd_drive_power_on(struct motorlink_rmd_drive *drive, 
 /**
  * Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
  * `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are
- * not eight bytes of standard data are not answered.
+ * not eight bytes of standard data are not answered. `reply` and `frame` may be the same.
  *
  * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
  */
@@ -2162,13 +2254,15 @@ motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
                                             struct motorlink_can_frame *reply);
 
 /**
- * Latches faults, and switches the motor off after a fault or the shutdown time. Call it at the
- * deadline, and as often as a fault needs it.
+ * Latches faults, and switches the motor off after a fault or the shutdown time. Call it each millisecond,
+ * also while no frame arrives.
  */
-motorlink_error motorlink_rmd_drive_poll(struct motorlink_rmd_drive *drive, uint64_t now_us);
+motorlink_error motorlink_rmd_drive_poll(struct motorlink_rmd_drive *drive,
+                                         uint64_t now_us);
 
 /**
- * Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time.
+ * Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time. It
+ * does not know of faults.
  */
 motorlink_error motorlink_rmd_drive_deadline(struct motorlink_rmd_drive *drive,
                                              uint64_t *deadline_us);

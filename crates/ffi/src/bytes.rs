@@ -6,7 +6,7 @@ pub const MOTORLINK_NEVER: u64 = u64::MAX;
 /// In limits: no limit.
 pub const MOTORLINK_NO_LIMIT: i32 = -1;
 
-/// Bytes that belong to an object: send or copy them before the next call for it.
+/// Bytes in the storage of an object: send or copy them before the next call for it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_bytes {

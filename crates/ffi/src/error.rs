@@ -43,10 +43,10 @@ pub enum motorlink_error {
     NotUnderstood = 25,
     /// Two different replies arrived at once (ST).
     Ambiguous = 26,
-    /// The line was out of step before, and the drive does not answer a test question. The request was
+    /// The line was out of sync before, and the drive does not answer a test question. The request was
     /// not sent (ST).
     Lost = 27,
-    /// The line was out of step before, and bytes keep arriving. Nothing was sent (ST).
+    /// The line was out of sync before, and bytes keep arriving. Nothing was sent (ST).
     Noise = 28,
     /// The drive acknowledged, but the reply does not contain a value of the register (ST).
     WrongReply = 29,
@@ -63,9 +63,12 @@ pub enum motorlink_error {
     /// The frame that was sent was received: an adapter or the wiring echoes, or another host sends the
     /// same. Only a read was sent to a drive (ST). It is not known what the motor did (RMD).
     Echo = 44,
+    /// Replies since the last confirmation may belong to other requests: a reply came twice or late, or
+    /// the confirmation failed.
+    Unconfirmed = 45,
 }
 
-/// Success.
+/// Success, the same as MOTORLINK_ERROR_OK.
 pub const MOTORLINK_OK: i32 = 0;
 
 impl motorlink_error {
@@ -91,15 +94,16 @@ impl motorlink_error {
             Self::Lost => c"the line is lost and the drive does not answer",
             Self::Noise => c"the line does not fall silent",
             Self::WrongReply => c"the reply has no value of a register",
-            Self::Quarantined => c"the motor cannot be trusted yet: ask again",
+            Self::Quarantined => c"a late reply of the motor may still come: ask again after motorlink_rmd_host_retry",
             Self::Limit => c"beyond a limit",
             Self::Foreign => c"the motor answers in another protocol",
             Self::Altered => c"the reply does not repeat the request",
             Self::Echo => c"what was sent came back",
+            Self::Unconfirmed => c"the last replies may belong to other requests",
         }
     }
 
-    const ALL: [Self; 25] = [
+    const ALL: [Self; 26] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -125,6 +129,7 @@ impl motorlink_error {
         Self::Foreign,
         Self::Altered,
         Self::Echo,
+        Self::Unconfirmed,
     ];
 }
 

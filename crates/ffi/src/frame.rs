@@ -28,12 +28,13 @@ plain!(motorlink_can_frame);
 
 impl From<CanFrame> for motorlink_can_frame {
     fn from(frame: CanFrame) -> Self {
-        let mut data = [0; 8];
-        for (slot, byte) in data.iter_mut().zip(frame.data()) {
-            *slot = *byte;
+        motorlink_can_frame {
+            id: frame.id(),
+            extended: frame.is_extended().into(),
+            remote: frame.is_remote().into(),
+            size: frame.len(),
+            data: frame.padded_data(),
         }
-        let (extended, remote) = (frame.is_extended().into(), frame.is_remote().into());
-        motorlink_can_frame { id: frame.id(), extended, remote, size: frame.len(), data }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The only file with `unsafe`: it converts pointers of C to safe types of Rust.
 
 use core::marker::PhantomData;
-use core::mem::{MaybeUninit, size_of};
+use core::mem::{MaybeUninit, align_of, size_of};
 use core::ops::{Deref, DerefMut};
 use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -60,10 +60,16 @@ macro_rules! promised {
 pub(crate) use promised;
 
 fn check<T>(pointer: *const T) -> Result<()> {
-    if pointer.is_null() {
+    check_address(pointer.addr(), align_of::<T>())
+}
+
+// One function for pointers of all types takes less flash.
+#[inline(never)]
+fn check_address(address: usize, alignment: usize) -> Result<()> {
+    if address == 0 {
         return Err(motorlink_error::NullPointer);
     }
-    if !pointer.is_aligned() {
+    if address & alignment.wrapping_sub(1) != 0 {
         return Err(motorlink_error::Misaligned);
     }
     Ok(())
@@ -251,9 +257,7 @@ impl<K: Storage> Out<K> {
         if let Err(found) = take(tag, K::TAG) {
             return Err(match found {
                 busy if busy == !K::TAG => motorlink_error::InUse,
-                other if tag::ALL.iter().any(|&tag| other == tag || other == !tag) => {
-                    motorlink_error::WrongKind
-                }
+                other if tag::is_of_any_kind(other) => motorlink_error::WrongKind,
                 _ => motorlink_error::Uninitialised,
             });
         }

@@ -3,9 +3,9 @@
 /// Words of 8 bytes in a `motorlink_st_slave`.
 pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
 /// Words of 8 bytes in a `motorlink_st_master`.
-pub const MOTORLINK_ST_MASTER_WORDS: usize = 35;
+pub const MOTORLINK_ST_MASTER_WORDS: usize = 37;
 /// Words of 8 bytes in a `motorlink_rmd_host`.
-pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
+pub const MOTORLINK_RMD_HOST_WORDS: usize = 335;
 /// Words of 8 bytes in a `motorlink_rmd_drive`.
 pub const MOTORLINK_RMD_DRIVE_WORDS: usize = 13;
 

@@ -38,6 +38,7 @@ static void tick_handler(void) {}
 /* A fault, or an unexpected interrupt: the board stops. */
 static void stuck_handler(void)
 {
+    /* Switch the power stage off here. */
     for (;;) {
         __asm volatile("wfi");
     }

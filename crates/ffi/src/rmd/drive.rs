@@ -101,8 +101,9 @@ pub struct motorlink_rmd_drive_config {
 
 /// The motor behind a drive: the power stage, its control loops and its sensors.
 ///
-/// Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
-/// and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+/// `set_mode` is required. Every other callback may be NULL. Callbacks are called from within
+/// `motorlink_rmd_drive_power_on`, `_receive` and `_poll`, and may not call for the same drive: such calls
+/// give `IN_USE`.
 ///
 /// `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
 /// a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
@@ -112,12 +113,12 @@ pub struct motorlink_rmd_drive_config {
 pub struct motorlink_rmd_motor_control {
     /// Handed to each callback.
     pub context: *mut c_void,
-    /// Does this from now on. NULL: without effect.
+    /// Does this from now on. Required: the drive acknowledges Off and Stop, and a host relies on that.
     ///
     /// Positive speed and torque turn clockwise, to larger counts (R36). A move is as fast as
     /// `max_speed_dps` lets it be, and does not turn with 0 (R13, R40).
     pub set_mode: Option<extern "C" fn(context: *mut c_void, motion: *const motorlink_rmd_motion)>,
-    /// Uses these gains and this acceleration limit from now on. NULL: without effect.
+    /// Uses these gains and this acceleration limit from now on. NULL: acknowledged, without effect.
     ///
     /// The limit holds for all motion commands but torque (R39); 0 or less means no limit (R24). Without
     /// position gains the motor does not go to a position (R41).
@@ -244,14 +245,15 @@ impl MotorControl for Kept<motorlink_rmd_motor_control> {
     }
 }
 
-/// Begins a drive, whatever the storage held before. It does nothing before
-/// `motorlink_rmd_drive_power_on`.
+/// Begins a drive, whatever the storage held before. Before `motorlink_rmd_drive_power_on` it ignores all
+/// frames, and does not command its motor.
 ///
 /// `size` is `sizeof *drive`. `config` and `rom` (what the ROM holds; NULL: zeros) are copied.
 /// `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
 /// callback of the same drive.
 ///
-/// `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits` neither 0 nor 12 to 18.
+/// `NULL_POINTER`: also if `set_mode` is NULL. `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits`
+/// neither 0 nor 12 to 18.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_init(
     drive: *mut motorlink_rmd_drive,
@@ -263,15 +265,18 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
     promised!(drive, config, rom, motor);
     answer(|| {
         let motor = motor.keep()?;
+        if motor.now().set_mode.is_none() {
+            return Err(motorlink_error::NullPointer);
+        }
         let config = config.read()?;
         let rom = rom.read_optional()?.map_or_else(Settings::default, Settings::from);
-        let encoder = match config.encoder_bits {
-            0 => Some(EncoderBits::default()),
-            bits => EncoderBits::new(bits),
+        let bits = match config.encoder_bits {
+            0 => EncoderBits::default().bits(),
+            bits => bits,
         };
         let config = DriveConfig {
             id: MotorId::new(config.id).ok_or(motorlink_error::BadArgument)?,
-            encoder: encoder.ok_or(motorlink_error::BadArgument)?,
+            encoder: EncoderBits::new(bits).ok_or(motorlink_error::BadArgument)?,
             shutdown: (config.shutdown_us != 0).then_some(Micros(config.shutdown_us)),
             clear_reply_0x9b: config.clear_reply_0x9b != 0,
         };
@@ -297,7 +302,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
 
 /// Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
 /// `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are
-/// not eight bytes of standard data are not answered.
+/// not eight bytes of standard data are not answered. `reply` and `frame` may be the same.
 ///
 /// `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
 #[unsafe(no_mangle)]
@@ -319,8 +324,8 @@ pub unsafe extern "C" fn motorlink_rmd_drive_receive(
     })
 }
 
-/// Latches faults, and switches the motor off after a fault or the shutdown time. Call it at the
-/// deadline, and as often as a fault needs it.
+/// Latches faults, and switches the motor off after a fault or the shutdown time. Call it each millisecond,
+/// also while no frame arrives.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     drive: *mut motorlink_rmd_drive,
@@ -335,7 +340,8 @@ pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     })
 }
 
-/// Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time.
+/// Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time. It
+/// does not know of faults.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
     drive: *mut motorlink_rmd_drive,

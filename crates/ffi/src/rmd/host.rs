@@ -52,8 +52,10 @@ plain!(motorlink_rmd_limits);
 /// What the storage of a host holds.
 pub(crate) struct State {
     host: Host,
-    /// When what was last refused may be asked again.
+    /// When to ask again after the last `QUARANTINED`.
     retry: Instant,
+    /// Motors with a confirmation under way.
+    confirming: MotorSet,
 }
 
 storage!(motorlink_rmd_host: State, tag::RMD_HOST);
@@ -63,6 +65,10 @@ fn id(motor: u8) -> Result<MotorId, motorlink_error> {
 }
 
 impl State {
+    fn request(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<(), motorlink_error> {
+        self.host.request(now, id, data).map_err(|refused| self.refused(refused))
+    }
+
     fn refused(&mut self, refused: RequestError) -> motorlink_error {
         match refused {
             RequestError::Busy(_) => motorlink_error::Busy,
@@ -85,11 +91,15 @@ pub unsafe extern "C" fn motorlink_rmd_host_init(
     size: usize,
 ) -> motorlink_error {
     promised!(host);
-    answer(|| host.init(size, State { host: Host::new(), retry: Instant(0) }))
+    answer(|| {
+        host.init(size, State { host: Host::new(), retry: Instant(0), confirming: MotorSet::EMPTY })
+    })
 }
 
 /// Sets how long a reply may take, and how long after a timeout a late reply may still come. Effective
 /// from the next request.
+///
+/// `BAD_ARGUMENT`: a time is 0. Without quarantine a late reply would be taken for another request's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     host: *mut motorlink_rmd_host,
@@ -98,6 +108,9 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_times(
 ) -> motorlink_error {
     promised!(host);
     answer(|| {
+        if timeout_us == 0 || quarantine_us == 0 {
+            return Err(motorlink_error::BadArgument);
+        }
         let mut state = host.enter()?;
         state.host.set_timeout(Micros(timeout_us.into()));
         state.host.set_quarantine(Micros(quarantine_us.into()));
@@ -133,9 +146,11 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
 ///
 /// A motor that did not answer before may be asked for its status instead; the exchange ends in
 /// `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
-/// by two different questions; when it was silent for the quarantine time the request is taken. Off and
-/// Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
-/// to a motor that was not asked before they go out ahead of the questions.
+/// by two different questions; when it was silent for the quarantine time the request is taken.
+///
+/// Off and Stop are also sent during a quarantine. Exception: if the reply to an earlier Off is missing,
+/// another Off gives `QUARANTINED` until the quarantine is over; the same for Stop. To a motor that was not
+/// asked before, Off and Stop are sent before the questions.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
 /// or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -148,18 +163,40 @@ pub unsafe extern "C" fn motorlink_rmd_host_request(
     request: motorlink_rmd_data,
 ) -> motorlink_error {
     promised!(host);
+    answer(|| host.enter()?.request(Instant(now_us), id(motor)?, request.bytes))
+}
+
+/// Begins a confirmation: a question to a motor that shows whether its replies since the last confirmation
+/// belong to their own requests. A reply that comes twice answers the next request with the same code, which
+/// no other exchange detects. Confirm what you read before you rely on it, and a stop before the program
+/// ends.
+///
+/// The result is `MOTORLINK_OK`, `UNCONFIRMED`, or an error of the question. If it is not `MOTORLINK_OK`, do
+/// not use what the motor replied since the last confirmation.
+///
+/// `BAD_ARGUMENT`, `BUSY`, `QUARANTINED`: as `motorlink_rmd_host_request`. Nothing is sent then.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_confirm(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    motor: u8,
+) -> motorlink_error {
+    promised!(host);
     answer(|| {
         let mut state = host.enter()?;
-        let taken = state.host.request(Instant(now_us), id(motor)?, request.bytes);
-        taken.map_err(|refused| state.refused(refused))
+        let id = id(motor)?;
+        let question = state.host.confirmation(id);
+        state.request(Instant(now_us), id, question)?;
+        state.confirming.insert(id);
+        Ok(())
     })
 }
 
 /// Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
-/// digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
-/// `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
-/// Where one of `expect` did not answer before or was not asked before, each of them is asked for
-/// its status instead.
+/// digit. `expect` has a bit for each motor that has to answer, bit 0 for motor 1. Each of them ends in a
+/// `DONE`. The frame reaches all four motors. Those that are not in `expect` are in quarantine afterwards.
+/// If a motor of `expect` did not answer its last request, or was not asked before, the frame is not sent:
+/// each motor of `expect` is asked for its status, and its exchange ends in `QUARANTINED`.
 ///
 /// As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
 /// `BAD_ARGUMENT`: a bit above 3 is set.
@@ -188,7 +225,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_torque4(
     })
 }
 
-/// When to ask again what was last refused with `QUARANTINED`; a reply may make it sooner or later.
+/// Gives when to ask again after the last `QUARANTINED`, of a call or of an exchange, of any motor. Call it
+/// before the next call for another motor. A reply may move the moment.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_retry(
     host: *mut motorlink_rmd_host,
@@ -220,7 +258,9 @@ pub unsafe extern "C" fn motorlink_rmd_host_poll(
             kind: motorlink_output::Wait,
             motor: 0,
         };
-        match host.enter()?.host.poll(Instant(now_us)) {
+        let mut state = host.enter()?;
+        let State { host, retry, confirming } = &mut *state;
+        match host.poll(Instant(now_us)) {
             Output::Wait(until) => output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
             Output::Transmit(frame) => {
                 output.kind = motorlink_output::Transmit;
@@ -233,9 +273,18 @@ pub unsafe extern "C" fn motorlink_rmd_host_poll(
                     Ok(bytes) => output.reply = motorlink_rmd_data { bytes },
                     Err(Failure::Foreign(_)) => output.result = motorlink_error::Foreign,
                     Err(Failure::Altered) => output.result = motorlink_error::Altered,
-                    Err(Failure::Quarantined) => output.result = motorlink_error::Quarantined,
+                    Err(Failure::Quarantined) => {
+                        output.result = motorlink_error::Quarantined;
+                        *retry = Instant(now_us) + host.quarantine();
+                    }
                     Err(Failure::Echo) => output.result = motorlink_error::Echo,
                     Err(_) => output.result = motorlink_error::Timeout,
+                }
+                if confirming.contains(id) {
+                    confirming.remove(id);
+                    if result.is_ok() && host.take_stray(id) {
+                        output.result = motorlink_error::Unconfirmed;
+                    }
                 }
             }
         }
@@ -262,8 +311,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_receive(
     })
 }
 
-/// Gives up the exchange with a motor without a result, so that another request can be made. A frame
-/// of `motorlink_rmd_host_set_torque4` that still waits and would reach the motor is given up for all.
+/// Cancels the exchange with a motor, without a result. Another request can then be made. A frame of
+/// `motorlink_rmd_host_set_torque4` that is not yet sent and would reach the motor is cancelled for all.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32.
 #[unsafe(no_mangle)]
@@ -274,13 +323,16 @@ pub unsafe extern "C" fn motorlink_rmd_host_cancel(
 ) -> motorlink_error {
     promised!(host);
     answer(|| {
-        host.enter()?.host.cancel(Instant(now_us), id(motor)?);
+        let mut state = host.enter()?;
+        let id = id(motor)?;
+        state.host.cancel(Instant(now_us), id);
+        state.confirming.remove(id);
         Ok(())
     })
 }
 
-/// Tells that these motors owe no earlier host a reply, so that no question goes before the first
-/// request: a bit each, bit 0 for motor 1.
+/// Marks these motors as without a pending reply to an earlier host. No question is then sent before the
+/// first request. `motors` has a bit for each, bit 0 for motor 1.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_trust(
     host: *mut motorlink_rmd_host,
@@ -293,7 +345,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_trust(
     })
 }
 
-/// Tells that the bus was opened anew: what the motors may still answer is not known, as after
+/// Call it after the bus was opened again. Late replies may still come, as after
 /// `motorlink_rmd_host_init`. Exchanges under way end without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_reopened(
@@ -302,7 +354,9 @@ pub unsafe extern "C" fn motorlink_rmd_host_reopened(
 ) -> motorlink_error {
     promised!(host);
     answer(|| {
-        host.enter()?.host.reopened(Instant(now_us));
+        let mut state = host.enter()?;
+        state.host.reopened(Instant(now_us));
+        state.confirming = MotorSet::EMPTY;
         Ok(())
     })
 }

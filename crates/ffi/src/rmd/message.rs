@@ -3,7 +3,9 @@
 use motorlink_proto::rmd::{self as proto, Command, EncoderBits, FULL_TURN, Payload};
 use motorlink_proto::units::Quantity;
 
+use crate::error::{answer, motorlink_error};
 use crate::number::motorlink_rmd_spin_direction;
+use crate::pointer::promised;
 
 /// The eight bytes of a request or a reply.
 #[repr(C)]
@@ -15,6 +17,15 @@ pub struct motorlink_rmd_data {
 
 fn data(command: impl Command) -> motorlink_rmd_data {
     motorlink_rmd_data { bytes: command.encode() }
+}
+
+/// The values of a reply with one of these codes.
+fn decode<T: Payload>(reply: &motorlink_rmd_data, codes: &[u8]) -> Result<T, motorlink_error> {
+    let [code, ..] = reply.bytes;
+    match codes.contains(&code) {
+        true => Ok(T::decode(&reply.bytes)),
+        false => Err(motorlink_error::BadArgument),
+    }
 }
 
 // From the rows of the command table, by build.rs.

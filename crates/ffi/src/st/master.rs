@@ -1,34 +1,35 @@
 //! The master's end: one exchange at a time.
 
 use motorlink_proto::st::{
-    Account, ExchangeError, Failure, Limits, MAX_PAYLOAD, Master, MasterConfig, Output, Profile,
-    Recovery, RegisterId, SyncState,
+    Account, Confirmation, ExchangeError, Failure, LastExchange, Limits, MAX_PAYLOAD, Master,
+    MasterConfig, Output, Profile, Recovery, SyncState,
 };
 use motorlink_proto::time::{Instant, Micros};
 
+use super::exchange::State;
 use super::motorlink_st_master;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes, motorlink_output};
 use crate::error::{answer, motorlink_error};
 use crate::number::{
     limit, motorlink_st_error_code, motorlink_st_profile, motorlink_st_recovery, one_of,
 };
-use crate::pointer::{plain, promised, storage};
-use crate::tag;
+use crate::pointer::{plain, promised};
 
-/// How a master behaves.
+/// How a master behaves. Begin with `motorlink_st_master_defaults()`, then change fields. A field that is 0
+/// has its default.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_master_config {
-    /// How long to wait for a reply, µs.
+    /// How long to wait for a reply, µs. 0: 1 s, as in the document.
     pub timeout_us: u32,
-    /// The line counts as silent after this time without a byte, µs.
+    /// The line counts as silent after this time without a byte, µs. 0: 50 ms.
     pub quiet_us: u32,
     /// The line's baud rate, for ports that take bytes faster than the line sends them, as ports of computers
     /// do. The silence of a recovery then begins when its bytes have left the port. 0: not known.
     pub baud: u32,
     /// How the drive behaves.
     pub profile: motorlink_st_profile,
-    /// How the master recovers a line that is out of step.
+    /// How the master recovers a line that is out of sync.
     pub recovery: motorlink_st_recovery,
 }
 
@@ -77,17 +78,6 @@ pub struct motorlink_st_limits {
 
 plain!(motorlink_st_master_config, motorlink_st_limits);
 
-/// What the storage of a master holds.
-pub(crate) struct State {
-    pub(super) master: Master,
-    pub(super) account: Account,
-    pub(super) profile: Profile,
-    /// The register whose value is asked for.
-    pub(super) asked: Option<RegisterId>,
-}
-
-storage!(motorlink_st_master: State, tag::ST_MASTER);
-
 /// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence, no baud rate.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
@@ -118,10 +108,11 @@ pub unsafe extern "C" fn motorlink_st_master_init(
     answer(|| {
         let config = config.read_optional()?.unwrap_or_else(|| motorlink_st_master_defaults());
         let profile = one_of(&Profile::ALL, config.profile)?;
+        let default = MasterConfig::default();
         let behaviour = MasterConfig {
-            timeout: Micros(config.timeout_us.into()),
+            timeout: time_or(config.timeout_us, default.timeout),
             recovery: one_of(&Recovery::ALL, config.recovery)?,
-            quiet: Micros(config.quiet_us.into()),
+            quiet: time_or(config.quiet_us, default.quiet),
             profile,
         };
         let behaviour = match config.baud {
@@ -133,9 +124,15 @@ pub unsafe extern "C" fn motorlink_st_master_init(
             account: Account::default(),
             profile,
             asked: None,
+            last: LastExchange::default(),
+            confirmation: None,
         };
         master.init(size, state)
     })
+}
+
+fn time_or(us: u32, default: Micros) -> Micros {
+    if us == 0 { default } else { Micros(us.into()) }
 }
 
 /// Sets the limits. Effective from the next request. Ramps that were acknowledged before no longer allow
@@ -167,8 +164,35 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
     promised!(master, output);
     answer(|| {
         let place = output.place()?;
-        let mut state = master.enter()?;
-        let State { master, account, profile, asked } = &mut *state;
+        place.set(master.enter()?.poll(Instant(now_us))?);
+        Ok(())
+    })
+}
+
+impl State {
+    fn poll(&mut self, now: Instant) -> Result<motorlink_st_output, motorlink_error> {
+        loop {
+            let (mut output, end) = self.poll_exchange(now);
+            let Some(outcome) = end else { return Ok(output) };
+            let Some(mut confirmation) = self.confirmation.take() else { return Ok(output) };
+            if matches!(outcome, Err(ExchangeError::Refused(_)))
+                && confirmation.repeat(&mut self.last)
+            {
+                self.ask(confirmation)?;
+                continue;
+            }
+            output.result = self.confirmed(&confirmation, outcome);
+            output.bytes = (&[][..]).into();
+            output.error_code = 0;
+            return Ok(output);
+        }
+    }
+
+    /// What to do next, and the payload's size or the error if the exchange is over.
+    fn poll_exchange(
+        &mut self,
+        now: Instant,
+    ) -> (motorlink_st_output, Option<Result<usize, ExchangeError>>) {
         let mut output = motorlink_st_output {
             until_us: MOTORLINK_NEVER,
             bytes: (&[][..]).into(),
@@ -177,31 +201,54 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
             kind: motorlink_output::Wait,
             error_code: 0,
         };
-        match master.poll(Instant(now_us)) {
-            Output::Wait(until) => output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
+        let result = match self.master.poll(now) {
+            Output::Wait(until) => {
+                output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0);
+                return (output, None);
+            }
             Output::Transmit(bytes) => {
                 output.kind = motorlink_output::Transmit;
                 output.bytes = bytes.into();
+                return (output, None);
             }
-            Output::Done(result) => {
-                output.kind = motorlink_output::Done;
-                match result {
-                    Ok(payload) => {
-                        account.acknowledged();
-                        output.bytes = payload.into();
-                        match asked.map(|register| register.decode(*profile, payload)) {
-                            Some(Some(value)) => output.value = value,
-                            Some(None) => output.result = motorlink_error::WrongReply,
-                            None => {}
-                        }
-                    }
-                    Err(error) => (output.result, output.error_code) = failed(error),
+            Output::Done(result) => result,
+        };
+        output.kind = motorlink_output::Done;
+        match result {
+            Ok(payload) => {
+                self.account.acknowledged();
+                output.bytes = payload.into();
+                match self.asked.map(|register| register.decode(self.profile, payload)) {
+                    Some(Some(value)) => output.value = value,
+                    Some(None) => output.result = motorlink_error::WrongReply,
+                    None => {}
                 }
             }
+            Err(error) => (output.result, output.error_code) = failed(error),
         }
-        place.set(output);
-        Ok(())
-    })
+        let outcome = result.map(<[u8]>::len);
+        self.last.finished(outcome.ok());
+        (output, Some(outcome))
+    }
+
+    fn confirmed(
+        &mut self,
+        confirmation: &Confirmation,
+        outcome: Result<usize, ExchangeError>,
+    ) -> motorlink_error {
+        match outcome {
+            Ok(size) if confirmation.accepts(size) => {
+                match confirmation.is_the_same(self.master.counters()) {
+                    true => motorlink_error::Ok,
+                    false => motorlink_error::Unconfirmed,
+                }
+            }
+            _ => {
+                self.master.lost();
+                motorlink_error::Unconfirmed
+            }
+        }
+    }
 }
 
 fn failed(error: ExchangeError) -> (motorlink_error, motorlink_st_error_code) {
@@ -225,6 +272,10 @@ fn failed(error: ExchangeError) -> (motorlink_error, motorlink_st_error_code) {
 }
 
 /// Takes bytes that came from the drive at `now_us`, in any pieces. `bytes` must not be in the storage.
+///
+/// Only `motorlink_st_master_poll` ends an exchange with TIMEOUT. If no poll came after the deadline, a reply
+/// that is handed in now ends the exchange, because it may have waited in a buffer. Poll first if a reply
+/// after the deadline must not count.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_receive(
     master: *mut motorlink_st_master,
@@ -240,7 +291,7 @@ pub unsafe extern "C" fn motorlink_st_master_receive(
     })
 }
 
-/// Cancels the exchange under way. Its reply may still come, so the line is out of step.
+/// Cancels the exchange under way. Its reply may still come, so the line is out of sync.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_abandon(
     master: *mut motorlink_st_master,
@@ -252,7 +303,7 @@ pub unsafe extern "C" fn motorlink_st_master_abandon(
     })
 }
 
-/// Marks the line as out of step: something else has sent or received on it. An exchange under way ends
+/// Marks the line as out of sync: something else has sent or received on it. An exchange under way ends
 /// without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_lost(
@@ -281,7 +332,7 @@ pub unsafe extern "C" fn motorlink_st_master_reopened(
     })
 }
 
-/// Marks the line as in step: no late reply can come, because nothing was asked on it. An exchange under
+/// Marks the line as in sync: no late reply can come, because nothing was asked on it. An exchange under
 /// way ends without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_trust_line(
@@ -294,7 +345,7 @@ pub unsafe extern "C" fn motorlink_st_master_trust_line(
     })
 }
 
-/// Sets `lost` to 1 if the line is out of step: it was just opened, or an exchange failed. The next
+/// Sets `lost` to 1 if the line is out of sync: it was just opened, or an exchange failed. The next
 /// request then recovers it first. Sets `lost` to 0 otherwise.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_is_lost(

@@ -132,7 +132,8 @@ pub unsafe extern "C" fn motorlink_st_decode_revup_data(
 
 /// Reads the payload of an answer to `motorlink_st_master_get_segment`: the values of the `count`
 /// registers that the segment was configured with, in the same order, into as many `values`, each
-/// as in `motorlink_st_output`.
+/// as in `motorlink_st_output`. The payload has no register numbers: other registers of the same sizes, or
+/// another order, are not detected.
 ///
 /// `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are unchanged.
 #[unsafe(no_mangle)]

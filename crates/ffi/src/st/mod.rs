@@ -1,5 +1,6 @@
 //! ST's Motor Control Protocol.
 
+mod exchange;
 pub mod master;
 pub mod message;
 pub mod names;

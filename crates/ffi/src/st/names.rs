@@ -1,10 +1,11 @@
 //! The document's names, for programs that print. One that calls none of this carries no names.
 
-use motorlink_proto::st::{Command, ErrorCode, RegisterId, Status};
+use motorlink_proto::st::{Command, ErrorCode, Profile, RegisterId, Status};
 
 use crate::bytes::motorlink_bytes;
 use crate::number::{
-    motorlink_st_command, motorlink_st_error_code, motorlink_st_reg, motorlink_st_status,
+    motorlink_st_command, motorlink_st_error_code, motorlink_st_profile, motorlink_st_reg,
+    motorlink_st_status, one_of,
 };
 
 fn text(text: Option<&'static str>) -> motorlink_bytes {
@@ -18,10 +19,16 @@ pub extern "C" fn motorlink_st_reg_name(reg: motorlink_st_reg) -> motorlink_byte
     text(RegisterId(reg).text().map(|text| text.name))
 }
 
-/// The symbol of the unit of a register's value; empty if it has none.
+/// The symbol of the unit of one digit of a register's value, in a profile; empty if it has none. FLUXWK_BUS
+/// and FLUXWK_BUS_MEAS have `%` in profile SPEC and `0.1 %` in MCSDK54. All other units are the same.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_reg_unit(reg: motorlink_st_reg) -> motorlink_bytes {
-    text(RegisterId(reg).shape().map(|shape| shape.unit.symbol()))
+pub extern "C" fn motorlink_st_reg_unit(
+    profile: motorlink_st_profile,
+    reg: motorlink_st_reg,
+) -> motorlink_bytes {
+    let profile = one_of(&Profile::ALL, profile).ok();
+    let shape = profile.zip(RegisterId(reg).shape());
+    text(shape.map(|(profile, shape)| shape.unit.symbol_in(profile)))
 }
 
 /// The name of an error code.

@@ -1,11 +1,9 @@
 //! Requests of a master: every function begins an exchange.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Effect, Frame, LimitError, MotorNumber, PositionMove, REVUP_PHASES,
-    Ramp, RegisterId, Request, RequestError, TorqueRamp,
+    Command, CurrentReference, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, TorqueRamp,
 };
 
-use super::master::State;
 use super::message::motorlink_st_revup_phase;
 use super::motorlink_st_master;
 use crate::error::{answer, motorlink_error};
@@ -19,45 +17,7 @@ fn request(
     request: &Request<'_>,
 ) -> Result<(), motorlink_error> {
     let mut state = master.enter()?;
-    begin(&mut state, motor, request)
-}
-
-/// Begins any request. A refused request changes nothing.
-fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), motorlink_error> {
-    check_motor(motor)?;
-    let effect = state.account.check(state.master.counters(), motor, request).map_err(limited)?;
-    state.master.request(motor, request).map_err(refused)?;
-    state.send_stop_ahead(effect);
-    state.account.sent(motor, effect);
-    state.asked = match request {
-        Request::GetRegister(register) => Some(*register),
-        _ => None,
-    };
-    Ok(())
-}
-
-impl State {
-    /// What stops a motor does not wait for the recovery of a lost line.
-    fn send_stop_ahead(&mut self, effect: Effect) {
-        if effect == Effect::Stops {
-            self.master.send_ahead();
-        }
-    }
-}
-
-fn check_motor(motor: u8) -> Result<(), motorlink_error> {
-    if motor <= MotorNumber::MAX { Ok(()) } else { Err(motorlink_error::BadArgument) }
-}
-
-fn limited(_: LimitError) -> motorlink_error {
-    motorlink_error::Limit
-}
-
-fn refused(error: RequestError) -> motorlink_error {
-    match error {
-        RequestError::Busy => motorlink_error::Busy,
-        RequestError::TooLong => motorlink_error::TooLong,
-    }
+    state.begin(motor, request)
 }
 
 /// Begins to read a register; `value` of the result is its value. Any number is allowed.
@@ -71,8 +31,10 @@ pub unsafe extern "C" fn motorlink_st_master_get_register(
     answer(|| request(master, motor, &Request::GetRegister(RegisterId(reg))))
 }
 
-/// Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
-/// register `value` is the bits. Any number is allowed.
+/// Begins to write a register. Of a floating-point register `value` is the bits, of a register of type u32
+/// the value's cast to `int32_t`. Registers without a name are allowed; they are written with 4 bytes.
+///
+/// `BAD_ARGUMENT`: `motor` is over 7, or `value` is outside of the range of the register's type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_set_register(
     master: *mut motorlink_st_master,
@@ -84,18 +46,27 @@ pub unsafe extern "C" fn motorlink_st_master_set_register(
     answer(|| {
         let mut state = master.enter()?;
         let register = RegisterId(reg);
+        if !register.holds(state.profile, value) {
+            return Err(motorlink_error::BadArgument);
+        }
         let size = register.write_size(state.profile);
         let bytes = value.to_le_bytes();
         let value = bytes.get(..usize::from(size)).unwrap_or(&bytes);
-        begin(&mut state, motor, &Request::SetRegister { register, value })
+        state.begin(motor, &Request::SetRegister { register, value })
     })
 }
 
 /// Begins to execute a command. Any number is allowed.
 ///
+/// A drive also acknowledges START_MOTOR and FAULT_ACK if they have no effect. After START_MOTOR read
+/// STATUS: FAULT_NOW and FAULT_OVER mean that the motor did not start because of the faults in FLAGS,
+/// ANY_STOP, STOP, STOP_IDLE and WAIT_STOP_MOTOR that it is still stopping. The motor starts in its
+/// control mode, which a stop does not change: in torque mode with the last current reference.
+///
 /// What stops a motor (STOP_MOTOR, SC_STOP) is sent at once if the line is lost or was just opened, then
 /// the line is recovered, then it is sent again. The result is that of the second. If it is not
-/// `MOTORLINK_OK`, begin again: the motor may still turn.
+/// `MOTORLINK_OK`, begin again: the motor may still turn. A drive acknowledges START_MOTOR also where it has
+/// no effect: while the motor runs, is stopping or is in fault. Read STATUS.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_execute(
     master: *mut motorlink_st_master,
@@ -242,6 +213,9 @@ pub unsafe extern "C" fn motorlink_st_master_configure_segment(
 
 /// Begins to read a data segment (profile SPEC): the values of its registers in their order,
 /// little-endian, each in its own size.
+///
+/// `LIMIT`: this master has not configured the segment since the port was opened. Nothing is sent:
+/// shipped firmware reads this request as a torque ramp.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_get_segment(
     master: *mut motorlink_st_master,
@@ -267,6 +241,24 @@ pub unsafe extern "C" fn motorlink_st_master_get_profiler_info(
     answer(|| request(master, motor, &Request::GetProfilerInfo(steps.slice(count)?)))
 }
 
+/// Begins a confirmation: a question that shows whether the replies since the last confirmation belong to
+/// their own requests. A reply that comes twice, or late, shifts all later replies by one, which no other
+/// exchange detects. Confirm what you read before you rely on it, and a stop before the program ends.
+///
+/// The result is `MOTORLINK_OK` or `UNCONFIRMED`. After `UNCONFIRMED` do not use what was read or
+/// acknowledged since the last confirmation; the line is recovered before the next request.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_master_confirm(
+    master: *mut motorlink_st_master,
+) -> motorlink_error {
+    promised!(master);
+    answer(|| {
+        let mut state = master.enter()?;
+        let confirmation = state.last.confirm();
+        state.ask(confirmation)
+    })
+}
+
 /// Begins an exchange with any frame code and any payload of up to 128 bytes, which is copied.
 ///
 /// `BAD_ARGUMENT`: `motor` is over 7, or `code` over 31. `TOO_LONG`: over 128 bytes.
@@ -282,17 +274,6 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
     answer(|| {
         let payload = payload.slice(size)?;
         let mut state = master.enter()?;
-        check_motor(motor)?;
-        let frame = Frame { header: Frame::header(code, motor), payload };
-        if frame.code() != code {
-            return Err(motorlink_error::BadArgument);
-        }
-        let counters = state.master.counters();
-        let effect = state.account.check_frame(counters, &frame).map_err(limited)?;
-        state.master.request_raw(frame.header, payload).map_err(refused)?;
-        state.send_stop_ahead(effect);
-        state.account.sent_frame(&frame, effect);
-        state.asked = None;
-        Ok(())
+        state.begin_raw(motor, code, payload)
     })
 }

@@ -38,8 +38,9 @@ pub struct motorlink_st_version {
 /// The drive behind a slave. The slave has checked the frame, the motor, the register's existence and
 /// access, and every size before it calls.
 ///
-/// Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
-/// call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+/// `execute` is required. Every other callback may be NULL. Callbacks are called from within
+/// `motorlink_st_slave_receive`, and may not call for the same slave: such calls give `IN_USE`. `motor`
+/// is 1 to 7, and exists.
 ///
 /// `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
 /// a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
@@ -55,8 +56,9 @@ pub struct motorlink_st_motor_control {
     /// NULL: nothing.
     pub features: Option<extern "C" fn(context: *mut c_void, motor: u8) -> u16>,
     /// The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
-    /// the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
-    /// floating-point register is its bits. NULL: 0.
+    /// the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS have 0.1 % a digit here and in
+    /// `set_register`, in both profiles; the slave converts. The value of a floating-point register is
+    /// its bits. NULL: 0.
     ///
     /// STATUS is IDLE at rest and RUN once the motor runs, FAULT_NOW and FAULT_OVER in fault; FLAGS
     /// has the faults that occurred in the low half and those present in the high half (S14).
@@ -83,8 +85,8 @@ pub struct motorlink_st_motor_control {
             value: i32,
         ) -> motorlink_st_error_code,
     >,
-    /// Executes a command. What the state does not allow has no effect (4.6).
-    /// NULL: none has.
+    /// Executes a command. What the state does not allow has no effect (4.6). Required: the slave
+    /// acknowledges the command, and a master relies on an acknowledged STOP_MOTOR.
     ///
     /// In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
     /// neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
@@ -94,7 +96,7 @@ pub struct motorlink_st_motor_control {
     pub execute:
         Option<extern "C" fn(context: *mut c_void, motor: u8, command: motorlink_st_command)>,
     /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
-    /// NULL: without effect.
+    /// NULL: acknowledged, without effect.
     pub set_ramp:
         Option<extern "C" fn(context: *mut c_void, motor: u8, speed_rpm: i32, duration_ms: u16)>,
     /// Gives rev-up phase 0 to 4 (4.9); what is not set is 0. NULL: all is 0.
@@ -106,7 +108,7 @@ pub struct motorlink_st_motor_control {
             data: *mut motorlink_st_revup_phase,
         ),
     >,
-    /// Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
+    /// Sets rev-up phase 0 to 4 (4.10). NULL: acknowledged, without effect.
     pub set_revup_data: Option<
         extern "C" fn(
             context: *mut c_void,
@@ -116,13 +118,13 @@ pub struct motorlink_st_motor_control {
         ),
     >,
     /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
-    /// NULL: without effect.
+    /// NULL: acknowledged, without effect.
     pub set_current_reference:
         Option<extern "C" fn(context: *mut c_void, motor: u8, iq_s16a: i16, id_s16a: i16)>,
-    /// Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
+    /// Programs a torque ramp (profile MCSDK 5.4). NULL: acknowledged, without effect.
     pub set_torque_ramp:
         Option<extern "C" fn(context: *mut c_void, motor: u8, torque_s16a: i32, duration_ms: u16)>,
-    /// Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
+    /// Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: acknowledged, without effect.
     pub set_position:
         Option<extern "C" fn(context: *mut c_void, motor: u8, angle_rad: f32, duration_s: f32)>,
     /// Registers that a step of the motor profiler shows (profile MCSDK 5.4, with PROFILER): gives
@@ -251,7 +253,8 @@ impl MotorControl for Kept<motorlink_st_motor_control> {
 /// `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
 /// may be constant. Not from a callback of the same slave.
 ///
-/// `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1 to 7.
+/// `NULL_POINTER`: also if `execute` is NULL. `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1
+/// to 7.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_init(
     slave: *mut motorlink_st_slave,
@@ -263,6 +266,9 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
     promised!(slave, drive);
     answer(|| {
         let drive = drive.keep()?;
+        if drive.now().execute.is_none() {
+            return Err(motorlink_error::NullPointer);
+        }
         let profile = one_of(&Profile::ALL, profile)?;
         let motors = MotorNumber::new(motors).ok_or(motorlink_error::BadArgument)?;
         slave.init(size, State { slave: Slave::new(profile, motors), drive })

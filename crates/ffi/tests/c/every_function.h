@@ -40,6 +40,7 @@ static void st_master(motorlink_st_master *master, motorlink_error expected) {
   REFUSED(motorlink_st_master_get_segment(master, 1, 0));
   REFUSED(motorlink_st_master_get_profiler_info(master, 1, bytes, sizeof bytes));
   REFUSED(motorlink_st_master_raw(master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, bytes, sizeof bytes));
+  REFUSED(motorlink_st_master_confirm(master));
   REFUSED(motorlink_st_master_poll(master, 0, &output));
   REFUSED(motorlink_st_master_receive(master, 0, bytes, sizeof bytes));
   REFUSED(motorlink_st_master_abandon(master));
@@ -71,6 +72,7 @@ static void rmd_host(motorlink_rmd_host *host, motorlink_error expected) {
   REFUSED(motorlink_rmd_host_set_limits(host, 1, &limits));
   REFUSED(motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_off()));
   REFUSED(motorlink_rmd_host_set_torque4(host, 0, torques, 0x0F));
+  REFUSED(motorlink_rmd_host_confirm(host, 0, 1));
   REFUSED(motorlink_rmd_host_retry(host, &at));
   REFUSED(motorlink_rmd_host_poll(host, 0, &output));
   REFUSED(motorlink_rmd_host_receive(host, 0, &frame));

@@ -79,7 +79,8 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     case MOTORLINK_RMD_CODE_WRITE_PID_RAM:
     case MOTORLINK_RMD_CODE_WRITE_PID_ROM:
     {
-      motorlink_rmd_pid read = motorlink_rmd_decode_pid(reply);
+      motorlink_rmd_pid read;
+      OK(motorlink_rmd_decode_pid(reply, &read));
       CHECK(read.position_kp == number(f, "position_kp"));
       CHECK(read.position_ki == number(f, "position_ki"));
       CHECK(read.speed_kp == number(f, "speed_kp"));
@@ -90,26 +91,40 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     }
     case MOTORLINK_RMD_CODE_READ_ACCELERATION:
     case MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM:
-      CHECK(motorlink_rmd_decode_acceleration(reply) == number(f, "acceleration"));
+    {
+      int32_t read;
+      OK(motorlink_rmd_decode_acceleration(reply, &read));
+      CHECK(read == number(f, "acceleration"));
       break;
+    }
     case MOTORLINK_RMD_CODE_READ_ENCODER:
     {
-      motorlink_rmd_encoder read = motorlink_rmd_decode_encoder(reply);
+      motorlink_rmd_encoder read;
+      OK(motorlink_rmd_decode_encoder(reply, &read));
       CHECK(read.position == number(f, "position"));
       CHECK(read.raw == number(f, "raw"));
       CHECK(read.offset == number(f, "offset"));
       break;
     }
     case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
-      CHECK(motorlink_rmd_decode_multi_turn_angle(reply) == number(f, "angle"));
+    {
+      int64_t read;
+      OK(motorlink_rmd_decode_multi_turn_angle(reply, &read));
+      CHECK(read == number(f, "angle"));
       break;
+    }
     case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE:
-      CHECK(motorlink_rmd_decode_single_turn_angle(reply) == number(f, "angle"));
+    {
+      uint16_t read;
+      OK(motorlink_rmd_decode_single_turn_angle(reply, &read));
+      CHECK(read == number(f, "angle"));
       break;
+    }
     case MOTORLINK_RMD_CODE_READ_STATUS:
     case MOTORLINK_RMD_CODE_CLEAR_ERRORS:
     {
-      motorlink_rmd_status read = motorlink_rmd_decode_status(reply);
+      motorlink_rmd_status read;
+      OK(motorlink_rmd_decode_status(reply, &read));
       CHECK(read.voltage_decivolts == number(f, "voltage"));
       CHECK(read.temperature_celsius == number(f, "temperature"));
       CHECK(read.errors == number(f, "errors"));
@@ -123,7 +138,8 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION:
     case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED:
     {
-      motorlink_rmd_motion_status read = motorlink_rmd_decode_motion_status(reply);
+      motorlink_rmd_motion_status read;
+      OK(motorlink_rmd_decode_motion_status(reply, &read));
       CHECK(read.iq_digits == number(f, "iq"));
       CHECK(read.speed_dps == number(f, "speed"));
       CHECK(read.encoder == number(f, "encoder"));
@@ -132,7 +148,8 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     }
     case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS:
     {
-      motorlink_rmd_phase_currents read = motorlink_rmd_decode_phase_currents(reply);
+      motorlink_rmd_phase_currents read;
+      OK(motorlink_rmd_decode_phase_currents(reply, &read));
       CHECK(read.phase_a_digits == number(f, "phase_a"));
       CHECK(read.phase_b_digits == number(f, "phase_b"));
       CHECK(read.phase_c_digits == number(f, "phase_c"));
@@ -140,8 +157,12 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     }
     case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM:
     case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM:
-      CHECK(motorlink_rmd_decode_encoder_offset(reply) == number(f, "offset"));
+    {
+      uint16_t read;
+      OK(motorlink_rmd_decode_encoder_offset(reply, &read));
+      CHECK(read == number(f, "offset"));
       break;
+    }
     default:
       CHECK(json_object_size(f) == 0);
   }

@@ -9,6 +9,18 @@
 
 #define GIVES(error, call) CHECK((call) == MOTORLINK_ERROR_##error)
 
+static void ignore_command(void *context, uint8_t motor, motorlink_st_command command) {
+  (void)context;
+  (void)motor;
+  (void)command;
+}
+
+static void ignore_motion(void *context, const motorlink_rmd_motion *motion) {
+  (void)context;
+  (void)motion;
+}
+
+/* The callbacks that are required, set by main. */
 static motorlink_st_motor_control no_drive;
 static motorlink_rmd_motor_control no_motor;
 
@@ -143,6 +155,16 @@ static void wrong_pointers(void) {
   GIVES(MISALIGNED, motorlink_st_decode_segment(bytes, 1, registers, 1, (int32_t *)(void *)odd));
   OK(motorlink_st_decode_segment(NULL, 0, NULL, 0, NULL));
 
+  GIVES(NULL_POINTER, motorlink_rmd_decode_pid(motorlink_rmd_read_pid(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_acceleration(motorlink_rmd_read_acceleration(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_encoder(motorlink_rmd_read_encoder(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_multi_turn_angle(motorlink_rmd_read_multi_turn_angle(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_single_turn_angle(motorlink_rmd_read_single_turn_angle(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_status(motorlink_rmd_read_status(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_motion_status(motorlink_rmd_read_motion_status(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_phase_currents(motorlink_rmd_read_phase_currents(), NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_decode_encoder_offset(motorlink_rmd_write_zero_rom(), NULL));
+
   GIVES(NULL_POINTER, motorlink_rmd_host_set_limits(&host, 1, NULL));
   GIVES(NULL_POINTER, motorlink_rmd_host_set_torque4(&host, 0, NULL, 0));
   GIVES(MISALIGNED, motorlink_rmd_host_set_torque4(&host, 0, (int16_t *)(void *)odd, 0));
@@ -234,7 +256,7 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 8, registers, SIZE_MAX, &value));
   CHECK(motorlink_st_reg_name(unnamed[0]).size == 0 && motorlink_st_reg_name(unnamed[0]).data != NULL);
   CHECK(named(motorlink_st_reg_name(MOTORLINK_ST_REG_SPEED_MEAS), "SPEED_MEAS"));
-  CHECK(named(motorlink_st_reg_unit(MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
+  CHECK(named(motorlink_st_reg_unit(MOTORLINK_ST_PROFILE_SPEC, MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
   CHECK(named(motorlink_st_error_code_name(MOTORLINK_ST_ERROR_CODE_WRONG_SET), "WRONG_SET"));
   CHECK(named(motorlink_st_status_name(MOTORLINK_ST_STATUS_RUN), "RUN"));
   CHECK(named(motorlink_st_command_name(MOTORLINK_ST_COMMAND_FAULT_ACK), "FAULT_ACK"));
@@ -262,6 +284,7 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 0, motorlink_rmd_off()));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 33, motorlink_rmd_off()));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_cancel(&host, 0, 33));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_confirm(&host, 0, 33));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x10));
   GIVES(LIMIT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x0F));
   GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_torque(-2001)));
@@ -369,6 +392,7 @@ static void reentered(void) {
   size_t at;
 
   subject = "called from a callback";
+  drive.execute = ignore_command;
   drive.features = features;
   drive.get_register = read_register;
   OK(motorlink_st_slave_init(&calling_slave, sizeof calling_slave, MOTORLINK_ST_PROFILE_SPEC, 1, &drive));
@@ -416,6 +440,8 @@ static void versions(void) {
 }
 
 int main(void) {
+  no_drive.execute = ignore_command;
+  no_motor.set_mode = ignore_motion;
   versions();
   wrong_storage();
   wrong_sizes();

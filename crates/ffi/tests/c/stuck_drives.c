@@ -1,17 +1,25 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /*
- * A drive on a pty whose motor never arrives: stuck_drives st|rmd [mute]
+ * A drive on a pty whose motor never arrives: stuck_drives st|rmd [mute|twice]
  *
- * With `mute` it does not answer after its motor was started, but still executes commands. Prints the
- * path of the pty, and later "started" and "stopped". Ends with its stdin.
+ * After its motor was started it does not answer (`mute`), or sends each reply twice (`twice`), but still
+ * executes commands. Prints the path of the pty, and later "started" and "stopped". Ends with its stdin.
  */
 #include "../../examples/posix.h"
 
 #include "check.h"
 
-static int becomes_mute;
 static int running;
-static int mute;
+/* How often a reply is sent, now and after the start. */
+static int replies = 1;
+static int later_replies = 1;
+
+static void answer(int fd, const uint8_t *bytes, size_t size) {
+  int left;
+  for (left = replies; left > 0; left--) {
+    send_all(fd, bytes, size);
+  }
+}
 
 static void report(int is_running) {
   if (running != is_running) {
@@ -19,7 +27,7 @@ static void report(int is_running) {
     fflush(stdout);
   }
   running = is_running;
-  mute = becomes_mute;
+  replies = later_replies;
 }
 
 static int32_t get_register(void *context, uint8_t motor, motorlink_st_reg reg) {
@@ -57,9 +65,7 @@ static motorlink_slcan_device adapter;
 static void serve_st(int fd, uint8_t byte) {
   motorlink_bytes reply;
   OK(motorlink_st_slave_receive(&slave, now_us(), byte, &reply));
-  if (!mute) {
-    send_all(fd, reply.data, reply.size);
-  }
+  answer(fd, reply.data, reply.size);
 }
 
 static void serve_rmd(int fd, uint8_t byte) {
@@ -71,9 +77,9 @@ static void serve_rmd(int fd, uint8_t byte) {
     return;
   }
   OK(motorlink_rmd_drive_receive(&drive, now_us(), &frame, &reply));
-  if (reply.id != MOTORLINK_NO_FRAME && !mute) {
+  if (reply.id != MOTORLINK_NO_FRAME) {
     OK(motorlink_slcan_device_deliver(&adapter, now_us(), &reply, &line));
-    send_all(fd, line.bytes, line.size);
+    answer(fd, line.bytes, line.size);
   }
 }
 
@@ -85,7 +91,11 @@ int main(int argc, char **argv) {
   motorlink_rmd_motor_control motor;
   motorlink_rmd_drive_config config;
 
-  becomes_mute = argc > 2 && strcmp(argv[2], "mute") == 0;
+  if (argc > 2 && strcmp(argv[2], "mute") == 0) {
+    later_replies = 0;
+  } else if (argc > 2 && strcmp(argv[2], "twice") == 0) {
+    later_replies = 2;
+  }
   memset(&control, 0, sizeof control);
   control.version.name = "Mute";
   control.get_register = get_register;

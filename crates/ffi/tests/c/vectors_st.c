@@ -109,6 +109,20 @@ static motorlink_st_reg register_of(const json_t *f) {
   return (motorlink_st_reg)number(f, "register");
 }
 
+/* A master reads only a segment that it configured. */
+static void configure(uint8_t motor, uint8_t segment) {
+  static const motorlink_st_reg registers[] = {MOTORLINK_ST_REG_STATUS};
+  static const uint8_t acknowledge[] = {0xF0, 0x00, 0xF0};
+  motorlink_st_output output;
+  CHECK(motorlink_st_master_get_segment(&master, motor, segment) == MOTORLINK_ERROR_LIMIT);
+  OK(motorlink_st_master_configure_segment(&master, motor, segment, registers, 1));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  OK(motorlink_st_master_receive(&master, 0, acknowledge, sizeof acknowledge));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  CHECK(output.kind == MOTORLINK_OUTPUT_DONE && output.result == MOTORLINK_OK);
+}
+
 /* Begins the exchange that a vector's fields describe. */
 static void begin(const char *code, uint8_t motor, const json_t *f) {
   if (strcmp(code, "SET_REG") == 0) {
@@ -138,6 +152,7 @@ static void begin(const char *code, uint8_t motor, const json_t *f) {
   } else if (strcmp(code, "GET_FW_VERSION") == 0) {
     OK(motorlink_st_master_get_firmware_version(&master, motor));
   } else if (strcmp(code, "GET_DATA_ELEMENT") == 0) {
+    configure(motor, (uint8_t)number(f, "segment"));
     OK(motorlink_st_master_get_segment(&master, motor, (uint8_t)number(f, "segment")));
   } else if (strcmp(code, "CONFIG_DYN_STRUCT") == 0) {
     struct bytes registers = hex(f, "registers");

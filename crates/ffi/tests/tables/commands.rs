@@ -83,12 +83,14 @@ fn struct_of(out: &mut String, reply: &Reply) {
 fn decoder(out: &mut String, reply: &Reply) {
     let noun = &reply.noun;
     if let [field] = reply.fields.as_slice() {
-        let name = field.name;
-        line!(out, "      CHECK(motorlink_rmd_decode_{noun}(reply) == number(f, \"{name}\"));");
-        line!(out, "      break;");
+        line!(out, "    {{\n      {} read;", c_type(field));
+        line!(out, "      OK(motorlink_rmd_decode_{noun}(reply, &read));");
+        line!(out, "      CHECK(read == number(f, \"{}\"));", field.name);
+        line!(out, "      break;\n    }}");
         return;
     }
-    line!(out, "    {{\n      motorlink_rmd_{noun} read = motorlink_rmd_decode_{noun}(reply);");
+    line!(out, "    {{\n      motorlink_rmd_{noun} read;");
+    line!(out, "      OK(motorlink_rmd_decode_{noun}(reply, &read));");
     for field in &reply.fields {
         line!(out, "      CHECK(read.{} == number(f, \"{}\"));", name_of(field), field.name);
     }
@@ -101,10 +103,13 @@ fn code(row: &CommandInfo) -> String {
 
 /// The value of a vector for a field, in C's type.
 fn number(field: &Field) -> String {
-    let ty = match type_of(field) {
+    format!("({})number(f, \"{}\")", c_type(field), field.name)
+}
+
+fn c_type(field: &Field) -> String {
+    match type_of(field) {
         named if named.starts_with("motorlink") => named.to_owned(),
         unsigned if unsigned.starts_with('u') => format!("uint{}_t", &unsigned[1..]),
         signed => format!("int{}_t", &signed[1..]),
-    };
-    format!("({ty})number(f, \"{}\")", field.name)
+    }
 }

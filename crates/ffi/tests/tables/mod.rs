@@ -24,10 +24,11 @@ enum Kind {
 const PROFILES: [&str; Profile::ALL.len()] =
     ["the document as written", "what firmware of MCSDK 5.4 does on the wire"];
 const RECOVERIES: [&str; Recovery::ALL.len()] = [
-    "no recovery: the line is in step at first, and after a failure out of step until \
-     `motorlink_st_master_trust_line` is called",
     "waits for silence, asks a question, continues after the answer",
     "sends bytes that complete a frame for which a 5.x drive may still wait, then as DRAIN",
+    "never recovers. The line counts as in sync from the start, so that a late reply to an earlier \
+     program is taken for the reply to the first request. After a failure it is out of sync until \
+     `motorlink_st_master_trust_line` is called",
 ];
 
 pub fn text() -> String {
@@ -62,7 +63,9 @@ pub fn text() -> String {
         &mut out,
         Kind::Byte,
         "motorlink_st_reg",
-        "Registers (table 3). A comment has access (D: for the DAC only), type and unit.",
+        "Registers (table 3). A comment has access (D: for the DAC only), type and unit. Units: 32767 s16A \
+         is full scale of the drive's current measurement, 32767 s16V full scale of its voltage, 65536 \
+         s16degree one electrical turn.",
         registers(),
     );
     let frames = FrameCode::ALL.iter().map(|code| {
@@ -227,6 +230,10 @@ fn registers() -> impl Iterator<Item = (String, u32, String)> {
         write!(doc, ": {}", text.doc).expect("a string");
         if shape.origin == Origin::Firmware {
             doc.push_str(" (firmware only)");
+        }
+        let [unit, mcsdk_unit] = Profile::ALL.map(|profile| shape.unit.symbol_in(profile));
+        if mcsdk_unit != unit {
+            write!(doc, " (mcsdk-5.4: {mcsdk_unit})").expect("a string");
         }
         if mcsdk != ty {
             write!(doc, " (mcsdk-5.4: {mcsdk})").expect("a string");

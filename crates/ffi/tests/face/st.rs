@@ -1,30 +1,12 @@
-//! Calls the C face as C does: both ends connected, and wrong calls. Also runs in Miri.
-#![allow(clippy::undocumented_unsafe_blocks, reason = "every call here is one of C's")]
+//! ST's protocol: a master and a slave, connected.
 
 use std::ffi::c_void;
-use std::mem::MaybeUninit;
-use std::ptr::{null, null_mut};
-use std::slice;
+use std::ptr::null;
 
-use motorlink_ffi::motorlink_error as Error;
-use motorlink_ffi::rmd::{drive::*, host::*, message::*, *};
-use motorlink_ffi::slcan::*;
 use motorlink_ffi::st::{master::*, message::*, request::*, slave::*, *};
 use motorlink_ffi::*;
 
-const OK: Error = Error::Ok;
-
-macro_rules! gives {
-    ($error:ident, $($call:expr),+ $(,)?) => { $( assert_eq!(unsafe { $call }, Error::$error); )+ };
-}
-
-fn zeroed<T>() -> T {
-    unsafe { MaybeUninit::zeroed().assume_init() }
-}
-
-fn bytes(bytes: &motorlink_bytes) -> Vec<u8> {
-    unsafe { slice::from_raw_parts(bytes.data, bytes.size) }.to_vec()
-}
+use crate::{Error, OK, bytes, execute_nothing, gives, zeroed};
 
 #[derive(Default)]
 struct Fan {
@@ -87,6 +69,18 @@ extern "C" fn profiler_step(_: *mut c_void, _: u8, step: u8, registers: *mut *co
     2
 }
 
+/// The bytes that the master sends next; `None` when the exchange is over.
+fn sent(master: &mut motorlink_st_master, output: &mut motorlink_st_output) -> Option<Vec<u8>> {
+    gives!(Ok, motorlink_st_master_poll(master, 0, output));
+    let sent = match output.kind {
+        motorlink_output::Done => return None,
+        motorlink_output::Wait => panic!("the slave did not answer"),
+        motorlink_output::Transmit => bytes(&output.bytes),
+    };
+    gives!(Ok, motorlink_st_master_poll(master, 0, output));
+    Some(sent)
+}
+
 struct StBench {
     master: motorlink_st_master,
     slave: motorlink_st_slave,
@@ -108,23 +102,16 @@ impl StBench {
         assert_eq!(begun, OK);
         let StBench { master, slave } = self;
         let (mut output, mut reply): (motorlink_st_output, motorlink_bytes) = (zeroed(), zeroed());
-        loop {
-            gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
-            match output.kind {
-                motorlink_output::Done => return (output, bytes(&output.bytes)),
-                motorlink_output::Wait => panic!("the slave did not answer"),
-                motorlink_output::Transmit => {}
-            }
-            let sent = bytes(&output.bytes);
-            gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
+        while let Some(sent) = sent(master, &mut output) {
             for byte in sent {
                 gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
                 gives!(Ok, motorlink_st_master_receive(master, 0, reply.data, reply.size));
             }
         }
+        (output, bytes(&output.bytes))
     }
 
-    /// Brings the line in step and conducts the exchange that was begun; gives its result and the
+    /// Brings the line in sync and conducts the exchange that was begun; gives its result and the
     /// headers of the frames that were sent.
     ///
     /// A loop that hands in what came before it polls may have the answer before the poll that follows
@@ -212,14 +199,8 @@ fn a_master_and_a_slave_understand_each_other() {
 }
 
 #[test]
-fn the_version_is_a_text_of_c() {
-    let version = unsafe { std::ffi::CStr::from_ptr(motorlink_version()) };
-    assert_eq!(version.to_str(), Ok(env!("CARGO_PKG_VERSION")));
-}
-
-#[test]
-fn a_drive_without_callbacks_answers() {
-    let nothing: motorlink_st_motor_control = zeroed();
+fn a_drive_with_the_required_callback_answers() {
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
     let mut bench = StBench::new(0, &nothing);
     assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 0);
     assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, 1)).0.error_code, 0x05);
@@ -250,7 +231,7 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
 
 #[test]
 fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
-    let nothing: motorlink_st_motor_control = zeroed();
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_get_register(master, 1, 2));
@@ -259,7 +240,7 @@ fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
 
 #[test]
 fn three_questions_bring_a_just_opened_line_in_sync() {
-    let nothing: motorlink_st_motor_control = zeroed();
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     let mut lost = 0;
@@ -299,9 +280,93 @@ fn a_stop_is_sent_at_once_to_a_drive_that_does_not_answer() {
     }
 }
 
+fn confirm(bench: &mut StBench) -> (motorlink_st_output, Vec<u8>) {
+    let begun = unsafe { motorlink_st_master_confirm(&mut bench.master) };
+    bench.done(begun)
+}
+
+#[test]
+fn replies_to_their_own_requests_are_confirmed() {
+    let mut fan = Fan { rpm: 1500, ..Fan::default() };
+    let drive = drive(&mut fan);
+    let mut bench = StBench::new(0, &drive);
+    assert_eq!(confirm(&mut bench).0.result, OK);
+    for register in [0x1E, 0x02, 0x00] {
+        assert_eq!(exchange!(bench, motorlink_st_master_get_register(register)).0.result, OK);
+        let (output, payload) = confirm(&mut bench);
+        assert_eq!((output.result, output.value, payload), (OK, 0, vec![]), "{register:#04x}");
+    }
+    assert_eq!(exchange!(bench, motorlink_st_master_execute(0x0A)).0.result, OK);
+    assert_eq!(confirm(&mut bench).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
+}
+
+/// The drive sends the reply before, as after a reply that came twice.
+fn shifted(bench: &mut StBench, before: &[u8]) -> motorlink_st_output {
+    let (master, slave) = (&mut bench.master, &mut bench.slave);
+    let (mut output, mut reply): (motorlink_st_output, motorlink_bytes) = (zeroed(), zeroed());
+    let mut before = before.to_vec();
+    while let Some(sent) = sent(master, &mut output) {
+        for byte in sent {
+            gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
+        }
+        gives!(Ok, motorlink_st_master_receive(master, 0, before.as_ptr(), before.len()));
+        before = bytes(&reply);
+    }
+    output
+}
+
+#[test]
+fn replies_that_belong_to_other_requests_are_not_confirmed() {
+    let mut fan = Fan { rpm: 1500, ..Fan::default() };
+    let drive = drive(&mut fan);
+    let acknowledge = [0xF0, 0x00, 0xF0];
+    let speed = [0xF0, 0x04, 0xDC, 0x05, 0x00, 0x00, 0xD6];
+    let refusal = [0xFF, 0x01, 0x07, 0x08];
+    for late in [&acknowledge[..], &speed, &refusal] {
+        let mut bench = StBench::new(0, &drive);
+        assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
+        gives!(Ok, motorlink_st_master_confirm(&mut bench.master));
+        let output = shifted(&mut bench, late);
+        assert_eq!((output.result, output.error_code), (Error::Unconfirmed, 0), "{late:x?}");
+        let mut lost = 0;
+        gives!(Ok, motorlink_st_master_is_lost(&mut bench.master, &mut lost));
+        assert_eq!(lost, 1, "{late:x?}");
+    }
+}
+
+#[test]
+fn a_refusal_of_the_last_request_is_confirmed_by_another_question() {
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
+    let mut bench = StBench::new(0, &nothing);
+    let (mut output, mut frames): (motorlink_st_output, _) = (zeroed(), Vec::new());
+    gives!(Ok, motorlink_st_master_confirm(&mut bench.master));
+    for reply in [&[0xFF, 0x01, 0x07, 0x08][..], &[0xF0, 0x01, 0x06, 0xF7]] {
+        gives!(Ok, motorlink_st_master_poll(&mut bench.master, 0, &mut output));
+        assert_eq!(output.kind, motorlink_output::Transmit);
+        frames.push(bytes(&output.bytes));
+        gives!(Ok, motorlink_st_master_receive(&mut bench.master, 0, reply.as_ptr(), reply.len()));
+    }
+    gives!(Ok, motorlink_st_master_poll(&mut bench.master, 0, &mut output));
+    assert_eq!((output.kind, output.result), (motorlink_output::Done, OK));
+    assert_eq!(frames, [[0x02, 0x01, 0x01, 0x04], [0x02, 0x01, 0x02, 0x05]]);
+}
+
+#[test]
+fn an_abandoned_confirmation_does_not_affect_the_next_exchange() {
+    let mut fan = Fan { rpm: 1500, ..Fan::default() };
+    let drive = drive(&mut fan);
+    let mut bench = StBench::new(0, &drive);
+    let master: *mut motorlink_st_master = &mut bench.master;
+    gives!(Ok, motorlink_st_master_confirm(master));
+    gives!(Busy, motorlink_st_master_confirm(master));
+    gives!(Ok, motorlink_st_master_abandon(master), motorlink_st_master_trust_line(master));
+    assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
+}
+
 #[test]
 fn a_line_that_echoes_is_no_drive() {
-    let nothing: motorlink_st_motor_control = zeroed();
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_execute(master, 1, 1));
@@ -334,7 +399,7 @@ fn a_name_that_is_too_long_is_cut_between_characters() {
 /// A reply with three bytes, or none, is an error and never the value 0.
 #[test]
 fn a_read_that_is_answered_with_no_value_says_so() {
-    let nothing: motorlink_st_motor_control = zeroed();
+    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
     let mut output: motorlink_st_output = zeroed();
     for reply in [&[0xF0, 0x00, 0xF0][..], &[0xF0, 0x03, 1, 2, 3, 0xF9]] {
         let mut bench = StBench::new(0, &nothing);
@@ -346,47 +411,6 @@ fn a_read_that_is_answered_with_no_value_says_so() {
         assert_eq!((output.kind, output.result), (motorlink_output::Done, Error::WrongReply));
         assert_eq!(output.value, 0);
     }
-}
-
-/// A callback may change the table that it is called from.
-#[test]
-fn callbacks_may_change_their_table() {
-    extern "C" fn other(_: *mut c_void, _: u8, _: u8) -> i32 {
-        7
-    }
-    extern "C" fn features_and_more(context: *mut c_void, _: u8) -> u16 {
-        unsafe { (*context.cast::<motorlink_st_motor_control>()).get_register = Some(other) };
-        0
-    }
-    let table: *mut motorlink_st_motor_control = Box::into_raw(Box::new(zeroed()));
-    let features = Some(features_and_more as _);
-    unsafe { *table = motorlink_st_motor_control { context: table.cast(), features, ..zeroed() } };
-    let mut slave: motorlink_st_slave = zeroed();
-    let mut reply: motorlink_bytes = zeroed();
-    gives!(Ok, motorlink_st_slave_init(&mut slave, size_of_val(&slave), 0, 1, table));
-    for byte in [0x22, 0x01, 0x02, 0x25] {
-        gives!(Ok, motorlink_st_slave_receive(&mut slave, 0, byte, &mut reply));
-    }
-    assert_eq!(bytes(&reply), [0xF0, 0x01, 7, 0xF8]);
-    drop(unsafe { Box::from_raw(table) });
-
-    extern "C" fn once(context: *mut c_void, _: *const motorlink_rmd_motion) {
-        unsafe { (*context.cast::<motorlink_rmd_motor_control>()).set_mode = None };
-    }
-    let table: *mut motorlink_rmd_motor_control = Box::into_raw(Box::new(zeroed()));
-    let set_mode = Some(once as _);
-    unsafe { *table = motorlink_rmd_motor_control { context: table.cast(), set_mode, ..zeroed() } };
-    let config =
-        motorlink_rmd_drive_config { shutdown_us: 0, id: 1, encoder_bits: 0, clear_reply_0x9b: 0 };
-    let mut drive: motorlink_rmd_drive = zeroed();
-    gives!(
-        Ok,
-        motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), table),
-        motorlink_rmd_drive_power_on(&mut drive, 0),
-        motorlink_rmd_drive_poll(&mut drive, 0),
-    );
-    assert!(unsafe { (*table).set_mode }.is_none());
-    drop(unsafe { Box::from_raw(table) });
 }
 
 #[test]
@@ -401,123 +425,4 @@ fn a_slave_that_is_called_from_its_callback_is_in_use() {
     }
     assert_eq!(bytes(&reply), [0xF0, 0x01, 42, 0x1C]);
     drop(unsafe { Box::from_raw(slave) });
-}
-
-#[test]
-fn storage_that_is_not_one_is_refused() {
-    let mut memory = [0u64; 400];
-    let (size, at): (usize, *mut u64) = (size_of_val(&memory), memory.as_mut_ptr());
-    let mut output: motorlink_st_output = zeroed();
-    let mut deadline = 0;
-    gives!(
-        Uninitialised,
-        motorlink_st_master_poll(at.cast(), 0, &mut output),
-        motorlink_rmd_host_cancel(at.cast(), 0, 1),
-    );
-    gives!(NullPointer, motorlink_st_master_poll(null_mut(), 0, &mut output));
-    gives!(Misaligned, motorlink_st_master_poll(at.byte_add(1).cast(), 0, &mut output));
-    gives!(
-        StorageTooSmall,
-        motorlink_rmd_host_init(at.cast(), size_of::<motorlink_rmd_host>() - 1)
-    );
-    gives!(Ok, motorlink_rmd_host_init(at.cast(), size));
-    gives!(
-        WrongKind,
-        motorlink_st_slave_deadline(at.cast(), &mut deadline),
-        motorlink_rmd_drive_deadline(at.cast(), &mut deadline),
-    );
-    gives!(NullPointer, motorlink_rmd_host_retry(at.cast(), null_mut()));
-    gives!(Ok, motorlink_rmd_host_retry(at.cast(), &mut deadline));
-}
-
-/// An adapter in between, so that a request is a frame, a line, a frame and back.
-#[test]
-fn a_host_commands_a_drive_through_an_adapter() {
-    extern "C" fn sense(_: *mut c_void, sense: *mut motorlink_rmd_sense) {
-        unsafe { (*sense).temperature_celsius = 25 };
-    }
-    let mut motor: motorlink_rmd_motor_control = zeroed();
-    motor.sense = Some(sense);
-    let config =
-        motorlink_rmd_drive_config { shutdown_us: 0, id: 3, encoder_bits: 0, clear_reply_0x9b: 0 };
-    let (mut host, mut drive): (motorlink_rmd_host, motorlink_rmd_drive) = (zeroed(), zeroed());
-    let (mut adapter, mut codec): (motorlink_slcan_device, motorlink_slcan_host) =
-        (zeroed(), zeroed());
-    gives!(
-        Ok,
-        motorlink_rmd_host_init(&mut host, size_of_val(&host)),
-        motorlink_rmd_host_trust(&mut host, 1 << 2),
-        motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), &motor),
-        motorlink_rmd_drive_power_on(&mut drive, 0),
-        motorlink_slcan_device_init(&mut adapter, size_of_val(&adapter)),
-        motorlink_slcan_host_init(&mut codec, size_of_val(&codec)),
-    );
-    let (mut line, mut answer): (motorlink_slcan_line, motorlink_slcan_line) = (zeroed(), zeroed());
-    let mut frame: motorlink_can_frame = zeroed();
-    let (mut output, mut said): (motorlink_rmd_output, _) =
-        (zeroed(), motorlink_slcan_answer::None);
-    gives!(Ok, motorlink_slcan_open(1_000_000, &mut line));
-    for byte in &line.bytes[..line.size.into()] {
-        gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
-        assert_eq!(frame.id, MOTORLINK_NO_FRAME);
-    }
-    gives!(Ok, motorlink_rmd_host_request(&mut host, 0, 3, motorlink_rmd_set_torque(100)));
-    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut output));
-    gives!(Ok, motorlink_slcan_encode(&output.frame, &mut line));
-    let mut reply: motorlink_can_frame = zeroed();
-    for byte in &line.bytes[..line.size.into()] {
-        gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
-    }
-    gives!(Ok, motorlink_rmd_drive_receive(&mut drive, 0, &frame, &mut reply));
-    gives!(Ok, motorlink_slcan_device_deliver(&mut adapter, 0, &reply, &mut line));
-    for byte in &line.bytes[..line.size.into()] {
-        gives!(Ok, motorlink_slcan_host_receive(&mut codec, *byte, &mut said, &mut frame));
-    }
-    assert_eq!(said, motorlink_slcan_answer::Frame);
-    gives!(Ok, motorlink_rmd_host_receive(&mut host, 0, &frame));
-    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut output));
-    assert_eq!((output.kind, output.motor, output.result), (motorlink_output::Done, 3, OK));
-    assert_eq!(motorlink_rmd_decode_motion_status(output.reply).temperature_celsius, 25);
-    let mut motion: motorlink_rmd_motion = zeroed();
-    gives!(Ok, motorlink_rmd_drive_motion(&mut drive, &mut motion));
-    assert_eq!((motion.kind, motion.iq_16ma), (motorlink_rmd_mode::Torque, 100));
-}
-
-#[test]
-fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
-    let mut host: motorlink_rmd_host = zeroed();
-    let mut output: motorlink_rmd_output = zeroed();
-    let host: *mut motorlink_rmd_host = &mut host;
-    gives!(Ok, motorlink_rmd_host_init(host, size_of::<motorlink_rmd_host>()));
-    gives!(Ok, motorlink_rmd_host_trust(host, !(1 << 2)));
-    for (motor, code) in [(1, 0xA1), (3, 0x9A), (32, 0xA1)] {
-        gives!(Ok, motorlink_rmd_host_request(host, 0, motor, motorlink_rmd_set_torque(100)));
-        gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
-        assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, code));
-    }
-    gives!(Ok, motorlink_rmd_host_reopened(host, 0));
-    gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_set_torque(100)));
-    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
-    assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, 0x9A));
-    // The host receives its own frame.
-    gives!(Ok, motorlink_rmd_host_receive(host, 0, &output.frame));
-    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
-    assert_eq!((output.kind, output.result), (motorlink_output::Done, Error::Echo));
-}
-
-#[test]
-fn two_threads_do_not_enter_one_object() {
-    let mut host: Box<motorlink_rmd_host> = Box::new(zeroed());
-    gives!(Ok, motorlink_rmd_host_init(&mut *host, size_of_val(&*host)));
-    let address = std::ptr::from_mut(&mut *host).expose_provenance();
-    let threads = [(); 2].map(|()| {
-        std::thread::spawn(move || {
-            let host = std::ptr::with_exposed_provenance_mut(address);
-            let mut busy = 0;
-            let calls = (0..200).map(|_| unsafe { motorlink_rmd_host_busy(host, &mut busy) });
-            calls.filter(|result| *result == OK).count() > 0
-        })
-    });
-    assert!(threads.map(|thread| thread.join().expect("it ends")).contains(&true));
-    drop(host);
 }
