@@ -34,7 +34,7 @@ class DriveError(Exception):
 
 
 class LineError(Exception):
-    """There is no reply to trust."""
+    """No reply can be trusted."""
 
 
 #: Number, size in bytes and sign of registers.

@@ -116,6 +116,9 @@ pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
         Error::NotArrived { motor, .. } => {
             (Kind::NotArrived, Facts { motor: Some(motor.number()), ..Facts::default() })
         }
+        Error::NotStarted { motor, .. } => {
+            (Kind::Refused, Facts { motor: named(motor.0), ..Facts::default() })
+        }
         Error::Differs { motor, .. } => {
             (Kind::Refused, Facts { motor: Some(motor.number()), ..Facts::default() })
         }

@@ -4,6 +4,7 @@
 //! [`rmd::RmdRequest`]). Clients, blocking or not, send them. The typed and documented classes for
 //! users are in the Python files.
 
+mod arrival;
 mod can;
 mod error;
 mod event;
@@ -30,20 +31,23 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
+    use super::arrival::Arrival;
+    #[pymodule_export]
     use super::can::CanPort;
     #[pymodule_export]
     use super::event::{RmdEventClient, StEventClient};
     #[pymodule_export]
     use super::rmd::{
-        RmdArrival, RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_encode,
-        rmd_errors_text, rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
+        RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_arrival, rmd_decode, rmd_encode,
+        rmd_encoder_degrees, rmd_errors_text, rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
     };
     #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
-        StArrival, StClient, StOptions, StRequest, StSampling, StVerifiedWrite, st_flags_text,
-        st_motor, st_register, st_register_name, st_registers, st_scan_baud, st_scan_rates,
+        StClient, StOptions, StRequest, StSampling, StStarting, StVerifiedWrite, st_arrival,
+        st_flags_text, st_motor, st_register, st_register_name, st_registers, st_scan_baud,
+        st_scan_rates,
     };
 
     #[pymodule_init]
@@ -55,12 +59,11 @@ mod _core {
         module.add("ST_SCAN_TIMEOUT", motorlink::st::SCAN_TIMEOUT.as_secs_f64())?;
         module.add("ST_ATTEMPTS", motorlink_proto::st::VERIFY_ATTEMPTS)?;
         module.add("RMD_TIMEOUT", seconds(motorlink_proto::rmd::DEFAULT_TIMEOUT))?;
+        module.add("RMD_STOP_ATTEMPTS", motorlink::rmd::STOP_ATTEMPTS)?;
+        module.add("RMD_STOP_TIME", seconds(motorlink::rmd::STOP_TIME))?;
         module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;
         let tolerance = motorlink::rmd::FullTurn::TOLERANCE;
         module.add("RMD_FULL_TURN_TOLERANCE", TurnCentiDegrees::UNIT.value(tolerance.digits()))?;
-        let tolerance = motorlink::rmd::ARRIVAL_TOLERANCE;
-        module.add("RMD_ARRIVAL_TOLERANCE", tolerance.degrees())?;
-        module.add("ST_ARRIVAL_TOLERANCE", motorlink::st::ARRIVAL_TOLERANCE_RAD)?;
         module.add("RMD_SCAN_WIDTH", motorlink::rmd::SCAN_WIDTH)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

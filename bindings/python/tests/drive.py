@@ -16,6 +16,8 @@ REGISTERS = {"SPEED_REF": 0x04, "SPEED_MEAS": 0x1E, "RAMP_FINAL_SPEED": 0x5B}
 SET_REG, GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x01, 0x02, 0x03, 0x06, 0x08
 START, STOP = 0x01, 0x02
 
+#: Firmware drops a header with a greater length, and expects a header next.
+MAX_LENGTH = 127
 #: Sizes of the registers that a client reads first on a new line: FLAGS and STATUS.
 QUESTIONS = {0x01: 4, 0x02: 1}
 
@@ -79,7 +81,12 @@ class Drive:
             received = os.read(self._line, 4096)
             heard += received
             self.heard += received
-            while len(heard) >= 2 and len(heard) >= heard[1] + 3:
+            while len(heard) >= 2:
+                if heard[1] > MAX_LENGTH:
+                    heard = heard[2:]
+                    continue
+                if len(heard) < heard[1] + 3:
+                    break
                 request, heard = heard[: heard[1] + 3], heard[heard[1] + 3 :]
                 if request[0] & 0x1F == GET_REG and request[2] == self.is_deaf_to:
                     self.unanswered += 1

@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from motorlink import _core
-from motorlink._apis import Exchanges, both_apis, one
+from motorlink._apis import Exchanges, both_apis, fields, one
 from motorlink._values import Errors
 "#;
 
@@ -47,7 +47,9 @@ fn module() -> Result<String, std::fmt::Error> {
     writeln!(out, "\n\nclass Request(_core.RmdRequest):")?;
     writeln!(
         out,
-        "    \"\"\"A request to an RMD motor. It checks its arguments and reads its reply.\"\"\""
+        "    \"\"\"A request to an RMD motor. It checks its arguments and reads its reply.\n\n    \
+         With ``gear_ratio`` angles, speeds and accelerations are those of the output shaft, in the request\n    \
+         and in the reply. Otherwise they are those of the motor shaft.\n    \"\"\""
     )?;
     writeln!(out, "\n    __slots__ = ()")?;
     for row in &COMMANDS {
@@ -57,7 +59,7 @@ fn module() -> Result<String, std::fmt::Error> {
     COMMANDS.iter().try_for_each(|row| writeln!(out, "{0} = Request.{0}", row.stem))?;
     writeln!(out, "\n\nclass MotorCommands:")?;
     writeln!(out, "    \"\"\"The commands of a motor, one exchange each, for both APIs.\"\"\"")?;
-    writeln!(out, "\n    __slots__ = ()\n\n    _exchange: Any")?;
+    writeln!(out, "\n    __slots__ = ()\n\n    _exchange: Any\n    _gear_ratio: float | None")?;
     for row in COMMANDS.iter().filter(|row| !has_limited(row)) {
         method(&mut out, row)?;
     }
@@ -106,7 +108,8 @@ fn kind(field: &Field) -> &'static str {
     match field.meaning {
         Meaning::Bits(_) => "Errors",
         Meaning::Words(_) => "str",
-        Meaning::Number if field.scale.decimals == 0 => "int",
+        // Behind a gear it has decimals.
+        Meaning::Number if field.scale.decimals == 0 && !field.scale.is_motion() => "int",
         Meaning::Number => "float",
     }
 }
@@ -128,10 +131,23 @@ fn arguments(row: &CommandInfo) -> String {
     if each.len() > 1 { format!("*, {}", each.join(", ")) } else { each.concat() }
 }
 
+/// Whether the request or its reply has values that a gear converts.
+fn has_motion(row: &CommandInfo) -> bool {
+    row.request.iter().chain(row.reply).any(|field| field.scale.is_motion())
+}
+
 fn request(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
     let code = row.code.number();
     let values = row.request.iter().map(|field| format!(", {}", field.name_with_unit()));
-    let (stem, arguments) = (row.stem, arguments(row));
+    let (stem, mut arguments) = (row.stem, arguments(row));
+    if has_motion(row) {
+        let star = match row.request.len() {
+            0 => "*, ",
+            1 => ", *, ",
+            _ => ", ",
+        };
+        arguments += &format!("{star}gear_ratio: float | None = None");
+    }
     writeln!(out, "\n    @staticmethod")?;
     if stem.len() + arguments.len() < 70 {
         writeln!(out, "    def {stem}({arguments}) -> Request:")?;
@@ -140,7 +156,17 @@ fn request(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
         writeln!(out, "    def {stem}(\n        {arguments},\n    ) -> Request:")?;
     }
     documentation(out, row)?;
-    let call = format!("_core.rmd_encode(0x{code:02X}{})", values.collect::<String>());
+    let values = values.collect::<String>();
+    if has_motion(row) {
+        let call = format!("0x{code:02X}{values}, gear_ratio=gear_ratio");
+        if call.len() < 60 {
+            writeln!(out, "        data = _core.rmd_encode({call})")?;
+        } else {
+            writeln!(out, "        data = _core.rmd_encode(\n            {call}\n        )")?;
+        }
+        return writeln!(out, "        return Request(data, gear_ratio=gear_ratio)");
+    }
+    let call = format!("_core.rmd_encode(0x{code:02X}{values})");
     if call.len() < 75 {
         return writeln!(out, "        return Request({call})");
     }
@@ -163,7 +189,10 @@ fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
         (_, []) => (String::new(), String::new()),
         (Some(read), _) => {
             let noun = read.stem.strip_prefix("read_").unwrap_or(read.stem);
-            (format!(", {noun}: {}", read.reply_name), format!("**{noun}._asdict()"))
+            (
+                format!(", {noun}: {}", read.reply_name),
+                format!("**fields({noun}, {}, \"{noun}\")", read.reply_name),
+            )
         }
         (None, [one]) => (format!(", {}", self::arguments(row)), one.name_with_unit().to_string()),
         (None, several) => {
@@ -175,6 +204,15 @@ fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
     writeln!(out, "\n    @both_apis")?;
     writeln!(out, "    def {name}(self{arguments}) -> Exchanges[{gives}]:")?;
     documentation(out, row)?;
+    if has_motion(row) {
+        let comma = if values.is_empty() { "" } else { ", " };
+        writeln!(
+            out,
+            "        request = Request.{}({values}{comma}gear_ratio=self._gear_ratio)",
+            row.stem
+        )?;
+        return writeln!(out, "        return one(self._exchange(request))");
+    }
     writeln!(out, "        return one(self._exchange(Request.{}({values})))", row.stem)
 }
 

@@ -14,6 +14,7 @@ import pytest
 from drive import REGISTERS, START, STOP, Drive, value
 
 import motorlink
+from conftest import Served
 from motorlink import aio
 
 T = TypeVar("T")
@@ -32,6 +33,19 @@ def drives(tmp_path: Path) -> Iterator[list[Drive]]:
 @pytest.fixture
 def drive(drives: list[Drive]) -> Drive:
     return drives[3]
+
+
+def test_a_start_with_a_fault_raises(served: Served) -> None:
+    async def main() -> None:
+        async with aio.st.open(served.st) as bus:
+            motor = bus.motor(1)
+            served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
+            while not await motor.flags():
+                pass
+            with pytest.raises(motorlink.RefusedError, match="OVER_TEMP"):
+                await motor.start()
+
+    asyncio.run(main())
 
 
 async def within(seconds: float, awaitable: Awaitable[T]) -> T:
@@ -334,7 +348,7 @@ def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
                 lambda: motor.execute("START_STOP"),
                 lambda: bus.raw(0x03, b"\x01", motor=1),
             ):
-                with pytest.raises(motorlink.InvalidValueError, match="first set a ramp"):
+                with pytest.raises(motorlink.InvalidValueError, match="needs a speed ramp"):
                     await start()
             assert bus.moving == []
             await motor.set_ramp(100, 0)

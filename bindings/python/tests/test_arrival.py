@@ -32,12 +32,66 @@ def test_a_move_within_the_turn_returns_when_the_motor_is_there() -> None:
         assert motor.multi_turn_angle() == pytest.approx(-10, abs=0.15)
 
 
+def test_a_full_turn_that_begins_slowly_is_waited_for() -> None:
+    with motorlink.rmd.open(Bench()) as client:
+        motor = client.motor(1)
+        motor.set_position(0.1, wait=True, arrival_tolerance_degrees=0.03)
+        motor.write_acceleration_ram(20)
+        before = motor.multi_turn_angle()
+        motor.set_single_turn_position(0, 360, full_turn=True, wait=True)
+        assert motor.multi_turn_angle() - before > 359
+
+
+def test_a_motor_that_lost_its_turns_raises() -> None:
+    bench = Bench()
+    with motorlink.rmd.open(bench) as client:
+        client.motor(1).set_position(720, wait=True)
+
+    async def main(port: str) -> None:
+        async with motorlink.aio.rmd.open(port) as client:
+            task = asyncio.create_task(client.motor(1).set_position(0, 10, wait=True))
+            while client.moving != [1]:
+                await asyncio.sleep(0)
+            bench.power_cycle("rmd1")
+            with pytest.raises(NotArrivedError, match="lost its counted turns"):
+                await task
+
+    with bench.serve() as serving:
+        asyncio.run(main(serving.rmd))
+
+
 def test_a_motor_that_needs_longer_raises() -> None:
     with motorlink.rmd.open(Bench()) as client:
         with pytest.raises(NotArrivedError, match="the time is over and the motor is moving") as caught:
             client.motor(1).set_position(36000, max_speed_dps=360, wait=True, timeout=0.5)
         assert caught.value.motor == 1
         assert client.moving == [1]
+
+
+def test_the_error_says_what_happened_and_what_the_motor_does_now() -> None:
+    bench = Bench()
+    with motorlink.rmd.open(bench) as client, pytest.raises(NotArrivedError) as caught:
+        client.motor(1).set_position(36000, max_speed_dps=360, wait=True, timeout=0.5)
+    assert "° from its target; the motor still has its command and may still be turning" in str(caught.value)
+    bench = Bench(SERVO)
+    with motorlink.st.open(bench, profile="mcsdk-5.4") as client_st, pytest.raises(NotArrivedError) as caught:
+        client_st.motor(1).set_position(3.0, 0.5, wait=True)
+    message = "motor 1 did not arrive: the motor is in IDLE, not in RUN; the move was not sent"
+    assert str(caught.value) == message
+
+
+def test_arguments_of_the_wait_are_refused_without_it() -> None:
+    with motorlink.rmd.open(Bench()) as client:
+        motor = client.motor(1)
+        with pytest.raises(InvalidValueError, match="^timeout without wait=True"):
+            motor.set_position(90, timeout=1.0)
+        with pytest.raises(InvalidValueError, match="^arrival_tolerance_degrees and timeout without"):
+            motor.set_single_turn_position(90, arrival_tolerance_degrees=0.1, timeout=1.0)
+        assert client.moving == []
+    with motorlink.st.open(Bench(SERVO), profile="mcsdk-5.4") as client_st:
+        with pytest.raises(InvalidValueError, match="^arrival_tolerance_rad without wait=True"):
+            client_st.motor(1).set_position(3.0, 0.5, arrival_tolerance_rad=0.1)
+        assert client_st.motor(1).get("MOVE_DURATION") == 0
 
 
 def test_a_motor_that_is_held_raises() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -183,12 +184,68 @@ def test_limits_hold() -> None:
         ):
             with pytest.raises(motorlink.InvalidValueError, match="limit"):
                 beyond()
-        assert isinstance(bus.cycle({1: rmd.set_torque(2)})[1], motorlink.InvalidValueError)
+        with pytest.raises(motorlink.InvalidValueError, match=r"motor 1: .*limit.*nothing was sent"):
+            bus.cycle({5: rmd.set_speed(90), 1: rmd.set_torque(2)})
+        assert 5 not in bus.moving
         motor.set_limits(current_limit_amps=3)
         motor.set_torque(2.5)
         bus.motor(2).set_torque(0.9)
         with pytest.raises(motorlink.InvalidValueError):
             bus.motor(2).set_torque(2.5)
+
+
+def test_a_limit_that_is_not_given_stays() -> None:
+    with rmd.open("sim:", timeout=PATIENT) as bus:
+        motor = bus.motor(1)
+        motor.set_limits(speed_limit_dps=100)
+        motor.set_limits(current_limit_amps=1)
+        motor.set_limits()
+        calls: list[Callable[[], object]] = [lambda: motor.set_speed(101), lambda: motor.set_torque(1.1)]
+        for beyond in calls:
+            with pytest.raises(motorlink.InvalidValueError, match="limit"):
+                beyond()
+        motor.set_limits(speed_limit_dps=None)
+        motor.set_speed(101)
+        with pytest.raises(motorlink.InvalidValueError, match="limit"):
+            motor.set_torque(1.1)
+        with pytest.raises(TypeError, match="torque_limit"):
+            motor.set_limits(torque_limit=1)  # type: ignore[call-arg]
+
+
+def test_a_cycle_needs_a_mapping(rmd_bus: rmd.Client) -> None:
+    with pytest.raises(TypeError, match=r"by motor ID, such as `\{1: rmd.read_status\(\)\}`"):
+        rmd_bus.cycle([rmd.read_status()])  # type: ignore[arg-type]
+
+
+TWO = """
+[[rmd.motor]]
+id = 1
+[[rmd.motor]]
+id = 2
+"""
+
+
+def test_the_end_stops_motors_that_four_torques_reached_unexpectedly(served: Served) -> None:
+    with rmd.open(served.can, timeout=PATIENT) as bus:
+        bus.set_torque4([0.2, 0.2, 0.2, 0.2], expect=[1])
+        assert bus.moving == [1]
+        assert served.motor("rmd", 3)["mode"] == "torque"
+    assert [served.motor("rmd", id)["mode"] for id in (1, 2, 3, 4)] == ["stopped"] * 4
+
+
+def test_a_motor_that_four_torques_reach_unexpectedly_may_be_absent() -> None:
+    with rmd.open(sim.Bench(TWO)) as bus:
+        assert list(bus.set_torque4([0.2, 0.2, 0, 0], expect=[1, 2])) == [1, 2]
+
+
+def test_a_stop_is_repeated_until_it_is_confirmed(served: Served) -> None:
+    with rmd.open(served.can, timeout=0.05) as bus:
+        missing = bus.motor(9)
+        for stop in (missing.stop, missing.off):
+            before = time.monotonic()
+            with pytest.raises(motorlink.ReplyTimeoutError):
+                stop()
+            assert time.monotonic() - before >= 2
 
 
 def test_limits_and_max_speeds_round_towards_0() -> None:
@@ -324,3 +381,19 @@ def test_values_and_requests_are_values(rmd_bus: rmd.Client) -> None:
 def test_a_motor_that_cannot_exist_is_refused_at_once(brief_bus: rmd.Client, id: int) -> None:
     with pytest.raises(motorlink.InvalidValueError, match="1 to 32"):
         brief_bus.motor(id)
+
+
+def test_a_dict_of_currents_is_not_taken_for_its_keys() -> None:
+    with rmd.open("sim:") as client:
+        with pytest.raises(TypeError, match="as a list"):
+            client.set_torque4({1: 0.1, 2: 0.1, 3: 0.1, 4: 0.1})  # type: ignore[arg-type]
+        assert client.moving == []
+
+
+def test_gains_and_ids_of_another_type_are_named() -> None:
+    with rmd.open("sim:") as client:
+        motor = client.motor(1)
+        with pytest.raises(TypeError, match=r"`Pid`, such as `motor\.pid\(\)\._replace\(position_kp"):
+            motor.write_pid_ram({"speed_kp": 50})  # type: ignore[arg-type]
+        with pytest.raises(TypeError, match=r"as a list: \[4\]"):
+            client.scan(4)  # type: ignore[arg-type]

@@ -171,7 +171,7 @@ def test_one_row_at_a_time(st_bus: st.Client) -> None:
 
 LOOP = """\
 import sys, motorlink
-with motorlink.{protocol}.open(sys.argv[1]) as client:
+with motorlink.{protocol}.open(sys.argv[1], timeout=2) as client:
     client.motor(1).{start}
     for row in client.samples({names}, rate=50):
         print(row, flush=True)

@@ -331,3 +331,5 @@ def test_names_of_registers_in_asyncio() -> None:
 def test_one_name_is_not_taken_for_a_list(st_bus: st.Client) -> None:
     with pytest.raises(motorlink.InvalidValueError, match="list of names"):
         st_bus.sample("SPEED_MEAS", rate=10, seconds=0.1)
+    with pytest.raises(motorlink.InvalidValueError, match="'SPEED_MEAS' is one name"):
+        st_bus.sample({1: "SPEED_MEAS"}, rate=10, seconds=0.1)

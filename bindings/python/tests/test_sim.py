@@ -486,7 +486,7 @@ def test_failed_expectations_are_reported() -> None:
     assert (refusal.at, refusal.motor, refusal.reply) == (0.1, "st1", "SET_READ_ONLY")
     assert run.marks == [(0.1, "nonsense")]
     assert run.failures == [
-        "it turns: st1.speed_rpm 0 rpm at 0 s, 1 rpm outside at least 1 rpm",
+        "it turns: st1.speed_rpm 0 rpm at 0 s, expected at least 1 rpm: off by 1 rpm",
         "at 0.1 s st1 refused `SPEED_MEAS 3` with SET_READ_ONLY",
     ]
     with pytest.raises(motorlink.InvalidValueError, match="duration"):

@@ -61,6 +61,9 @@ def test_faults_are_named(served: Served) -> None:
         assert faults.present == ("OVER_TEMP",) == faults.occurred
         assert str(faults) == "OVER_TEMP (present)"
         assert motor.status() == "FAULT_NOW"
+        with pytest.raises(motorlink.RefusedError, match=r"motor 1 did not start: .*heatsink too hot") as refused:
+            motor.start()
+        assert (refused.value.motor, refused.value.code) == (1, None)
         served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=False)
         eventually(lambda: not motor.flags().present, "the end of the cause")
         motor.fault_ack()
@@ -215,10 +218,10 @@ def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
                 start(bus)
             assert error.value.motor == 1
         assert bus.moving == []
-        with pytest.raises(motorlink.InvalidValueError, match="first set a ramp within the limit"):
+        with pytest.raises(motorlink.InvalidValueError, match="needs a speed ramp within the limit"):
             bus.motor(1).start()
         bus.motor(1).set_ramp(100, 0)
-        with pytest.raises(motorlink.InvalidValueError, match="first"):
+        with pytest.raises(motorlink.InvalidValueError, match="same motor number"):
             bus.motor(2).start()
         bus.motor(1).start()
         assert bus.moving == [1]
@@ -263,6 +266,14 @@ def test_a_limit_of_current_rounds_towards_0() -> None:
             bus.motor(1).set_ramp(999.9, 0)
 
 
+def test_a_speed_that_no_drive_can_hold_is_refused(st_bus: st.Client) -> None:
+    motor = st_bus.motor(1)
+    for rpm in (196_603, -1_000_000):
+        with pytest.raises(motorlink.InvalidValueError, match="196602 rpm"):
+            motor.set_ramp(rpm, 1.0)
+    motor.set_ramp(196_602, 1.0)
+
+
 def test_a_write_is_verified(st_bus: st.Client) -> None:
     motor = st_bus.motor(1)
     assert motor.set_verified("SPEED_KP", 321) == 1
@@ -278,6 +289,24 @@ def test_data_segments_read_many_registers_at_once(st_bus: st.Client) -> None:
     assert list(values) == ["STATUS", "BUS_VOLTAGE", "I_Q"]
     assert values["BUS_VOLTAGE"] == motor.get("BUS_VOLTAGE")
     assert motor.segment(1, [2, 0x19, 0x27]) == values
+
+
+def test_a_segment_that_was_not_configured_is_not_read(tmp_path: Path) -> None:
+    # This firmware reads the request as a torque ramp.
+    config = tmp_path / "bench.toml"
+    config.write_text('profile = "mcsdk-5.4"\n')
+    with st.open(f"sim:{config}") as bus:
+        motor = bus.motor(1)
+        assert motor.control_mode() == "SPEED"
+        with pytest.raises(motorlink.InvalidValueError, match="are unknown"):
+            motor.segment(0)
+        with pytest.raises(motorlink.InvalidValueError, match="not configured"):
+            motor.segment(0, ["STATUS"])
+        with pytest.raises(motorlink.RefusedError):
+            motor.configure_segment(0, ["STATUS"])
+        with pytest.raises(motorlink.InvalidValueError, match="not configured"):
+            motor.segment(0, ["STATUS"])
+        assert motor.control_mode() == "SPEED"
 
 
 def test_the_other_profile_has_moves_and_no_segments(tmp_path: Path) -> None:
@@ -401,7 +430,7 @@ def test_a_motor_that_cannot_exist_is_refused_at_once(st_bus: st.Client, number:
 
 def test_a_scan_has_a_result_for_each_rate(served: Served, tmp_path: Path) -> None:
     found = st.scan(served.st, [115200, 9600], timeout=PATIENT)
-    assert [(one.baud, one.kind) for one in found] == [(115200, "drive"), (9600, "drive")]
+    assert [(one.baud, one.kind) for one in found] == [(115200, "drive")]
     assert found[0].board_info is not None and "ST MC SDK" in found[0].board_info.name
     assert asyncio.run(aio.st.scan(served.st, [115200, 9600], timeout=PATIENT)) == found
     silent = Drive(tmp_path / "silent", 0)

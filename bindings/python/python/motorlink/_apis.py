@@ -247,6 +247,16 @@ class _Uncalled:
 _Uncalled.__name__ = _Uncalled.__qualname__ = "method"
 
 
+def fields(value: Any, kind: type, read: str) -> dict[str, Any]:
+    """The fields of a named tuple by name; raises for anything else. A motor's method `read` reads one."""
+    if isinstance(value, kind):
+        return dict(value._asdict())  # type: ignore[attr-defined]
+    first = kind._fields[0]  # type: ignore[attr-defined]
+    raise TypeError(
+        f"give a `{kind.__name__}`, such as `motor.{read}()._replace({first}=...)`; {value!r} is none"
+    )
+
+
 def check_request(request: object, kind: type, example: str) -> None:
     """Raises for anything but a request; the error has an example of one."""
     if isinstance(request, kind):

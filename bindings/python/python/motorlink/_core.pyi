@@ -1,6 +1,6 @@
 """The extension module. Its users are ``motorlink.st`` and ``motorlink.rmd``."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 from typing_extensions import Self, disjoint_base
@@ -12,13 +12,14 @@ from motorlink._values import Frame, RegisterInfo
 from motorlink.errors import MotorlinkError
 
 __all__ = [
+    "Arrival",
     "CanPort",
-    "RMD_ARRIVAL_TOLERANCE",
     "RMD_FULL_TURN_TOLERANCE",
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
+    "RMD_STOP_ATTEMPTS",
+    "RMD_STOP_TIME",
     "RMD_TIMEOUT",
-    "RmdArrival",
     "RmdClient",
     "RmdEventClient",
     "RmdOptions",
@@ -28,30 +29,32 @@ __all__ = [
     "SimPort",
     "SimRecording",
     "SimServing",
-    "ST_ARRIVAL_TOLERANCE",
     "ST_ATTEMPTS",
     "ST_BAUD_RATES",
     "ST_SCAN_TIMEOUT",
     "ST_SEGMENTS",
     "ST_TIMEOUT",
-    "StArrival",
     "StClient",
     "StEventClient",
     "StOptions",
     "StRequest",
     "StSampling",
+    "StStarting",
     "StVerifiedWrite",
     "__version__",
     "cli",
     "open_descriptors",
+    "rmd_arrival",
     "rmd_decode",
     "rmd_encode",
+    "rmd_encoder_degrees",
     "rmd_errors_text",
     "rmd_full_turn_tolerance",
     "rmd_motor",
     "rmd_quantities",
     "sim_presets",
     "sim_run",
+    "st_arrival",
     "st_flags_text",
     "st_motor",
     "st_register",
@@ -62,8 +65,6 @@ __all__ = [
 ]
 
 __version__: str
-#: Maximum distance from the target of a motor that has arrived, °.
-RMD_ARRIVAL_TOLERANCE: float
 #: How far past its target a motor is taken to be at it, °.
 RMD_FULL_TURN_TOLERANCE: float
 #: How long a late reply is awaited, s.
@@ -71,9 +72,9 @@ RMD_QUARANTINE: float
 #: IDs that a scan asks at once.
 RMD_SCAN_WIDTH: int
 #: How long a reply is awaited, s.
+RMD_STOP_ATTEMPTS: int
+RMD_STOP_TIME: float
 RMD_TIMEOUT: float
-#: Maximum distance from the target of a motor that has arrived, rad.
-ST_ARRIVAL_TOLERANCE: float
 #: How often a verified write is tried.
 ST_ATTEMPTS: int
 #: The rates that drives are built with, the most frequent first.
@@ -96,8 +97,23 @@ def st_registers(profile: str = "spec") -> list[str]: ...
 def st_scan_baud(port: str, baud: int, timeout: float) -> ScanResult: ...
 def st_scan_rates(port: str, rates: Sequence[int]) -> list[int]: ...
 def st_flags_text(bits: int) -> str: ...
+def st_arrival(
+    motor: int,
+    angle_rad: float,
+    duration_s: float,
+    tolerance_rad: float | None,
+    timeout: float | None,
+) -> Arrival: ...
+def rmd_arrival(
+    motor: int, request: RmdRequest, tolerance_degrees: float | None, timeout: float | None
+) -> Arrival: ...
 def rmd_decode(can_id: int, data: bytes, *, reply: bool) -> Frame: ...
-def rmd_encode(code: int, *values: float | str) -> bytes: ...
+def rmd_encode(
+    code: int, *values: float | str, gear_ratio: float | None = None
+) -> bytes: ...
+def rmd_encoder_degrees(
+    counts: int, *, encoder_bits: int, gear_ratio: float | None = None
+) -> float: ...
 def rmd_errors_text(bits: int) -> str: ...
 def rmd_full_turn_tolerance(tolerance_degrees: float) -> None: ...
 def rmd_motor(id: int) -> int: ...
@@ -199,22 +215,22 @@ class StOptions:
     ) -> StOptions: ...
 
 @final
-class StArrival:
-    """Says which registers to read until a motor has arrived."""
+class Arrival:
+    """What to ask a motor until it has arrived."""
 
-    def __new__(
-        cls,
-        motor: int,
-        angle_rad: float,
-        duration_s: float,
-        tolerance_rad: float,
-        timeout: float | None,
-    ) -> StArrival: ...
-    def check(self, data: bytes) -> None: ...
     def next(self, now: float) -> tuple[str, Any]: ...
     def replied(self, now: float, data: bytes) -> None: ...
     def confirmed(self, now: float) -> None: ...
+    def commanded(self, now: float) -> None: ...
     def lost(self, now: float) -> None: ...
+
+@final
+class StStarting:
+    """Says which registers to read after an acknowledged START_MOTOR."""
+
+    def __new__(cls, motor: int) -> StStarting: ...
+    def register(self) -> int | None: ...
+    def replied(self, data: bytes) -> None: ...
 
 @final
 class StClient:
@@ -244,7 +260,9 @@ class StClient:
 class RmdRequest:
     """A request to an RMD motor. It checks its arguments and reads its reply."""
 
-    def __new__(cls, data: bytes, *, raw: bool = False) -> Self: ...
+    def __new__(
+        cls, data: bytes, *, raw: bool = False, gear_ratio: float | None = None
+    ) -> Self: ...
     @classmethod
     def raw(cls, data: bytes, *, rom: bool = False) -> Self: ...
     @classmethod
@@ -258,6 +276,8 @@ class RmdRequest:
     def code(self) -> int: ...
     @property
     def stem(self) -> str | None: ...
+    @property
+    def gear_ratio(self) -> float | None: ...
     @property
     def is_rom(self) -> bool: ...
 
@@ -273,19 +293,8 @@ class RmdOptions:
         current_limit_amps: float | None,
         speed_limit_dps: float | None,
         angle_limit_degrees: float | None,
+        gear_ratio: float | Mapping[int, float] | None,
     ) -> RmdOptions: ...
-
-@final
-class RmdArrival:
-    """Says what to ask a motor until it has arrived."""
-
-    def __new__(
-        cls, motor: int, request: RmdRequest, tolerance_degrees: float, timeout: float | None
-    ) -> RmdArrival: ...
-    def next(self, now: float) -> tuple[str, Any]: ...
-    def replied(self, now: float, data: bytes) -> None: ...
-    def confirmed(self, now: float) -> None: ...
-    def lost(self, now: float) -> None: ...
 
 @final
 class RmdClient:
@@ -306,13 +315,9 @@ class RmdClient:
     def sample(
         self, sampling: RmdSampling, skip: bool, most: int | None
     ) -> tuple[bytearray, int, BaseException | None]: ...
-    def set_limits(
-        self,
-        id: int,
-        current_limit_amps: float | None,
-        speed_limit_dps: float | None,
-        angle_limit_degrees: float | None,
-    ) -> None: ...
+    def set_limits(self, id: int, **limits: float | None) -> None: ...
+    def check_gear(self, id: int, request: RmdRequest) -> None: ...
+    def gear_ratio(self, id: int) -> float | None: ...
     @property
     def moving(self) -> list[int]: ...
     def close(self, *, stop: bool, off: bool) -> list[tuple[int, MotorlinkError]]: ...
@@ -432,7 +437,7 @@ class RmdSampling:
 
     def __new__(
         cls,
-        motors: Sequence[tuple[int, Sequence[str]]],
+        motors: Sequence[tuple[int, Sequence[str], float | None]],
         rate: float,
         seconds: float | None,
         raw: bool,
@@ -462,13 +467,10 @@ class RmdEventClient:
     ) -> None: ...
     def advance(self) -> tuple[float | None, list[tuple[int, Any]]]: ...
     def cancel(self, id: int) -> None: ...
-    def set_limits(
-        self,
-        id: int,
-        current_limit_amps: float | None,
-        speed_limit_dps: float | None,
-        angle_limit_degrees: float | None,
-    ) -> None: ...
+    def check_limits(self, id: int, request: RmdRequest) -> None: ...
+    def set_limits(self, id: int, **limits: float | None) -> None: ...
+    def check_gear(self, id: int, request: RmdRequest) -> None: ...
+    def gear_ratio(self, id: int) -> float | None: ...
     @property
     def moving(self) -> list[int]: ...
     def close(self, *, stop: bool, off: bool) -> list[tuple[int, MotorlinkError]]: ...

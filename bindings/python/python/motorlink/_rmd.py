@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, check_request, one
-from motorlink._arrival import arrived
+from motorlink._arrival import moved, needs_wait
 from motorlink._client import AnyClient
 from motorlink._core import CanPort
 from motorlink._rmd_table import MotionStatus, MotorCommands, Request, Status
 from motorlink._sampling import AnySampling, Samples, by_motor, skips
-from motorlink.errors import MotorlinkError
+from motorlink.errors import LinkError, MotorlinkError, PortError, ReplyTimeoutError
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -69,6 +69,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         current_limit_amps: float | None = None,
         speed_limit_dps: float | None = None,
         angle_limit_degrees: float | None = None,
+        gear_ratio: float | Mapping[int, float] | None = None,
         on_close: str = "stop",
         stop_on_signals: bool = True,
     ) -> Callable[[], Exchanges[Self]]:
@@ -90,8 +91,15 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
             carry: 1.0 A becomes 0.992 A, as a digit is 0.016 A. Torque currents are rounded in the same way, so
             a current equal to the limit is allowed.
             With a speed limit, a move needs ``max_speed_dps``. The limit does not hold under a torque command,
-            where the load decides the speed. The angle limit holds for ``set_position``. It does not hold for
-            ``set_single_turn_position``, whose angle is within the turn.
+            where the load decides the speed. The angle limit is checked for ``set_position`` only. Speed and
+            torque commands can turn the motor beyond it. It does not hold for ``set_single_turn_position``,
+            whose angle is within the turn.
+        ``gear_ratio``
+            Turns of the motor shaft for one turn of the output shaft: 6 for a gear of 6:1. All angles, speeds
+            and accelerations of this client are then those of the output shaft: arguments, replies, samples
+            and limits. A dict has the ratio by ID; its other motors have none. Requests for ``exchange`` and
+            ``cycle`` need the same ``gear_ratio``. The motor shaft is still that of raw frames, of encoder
+            counts, and of angles in messages of errors. ``set_single_turn_position`` is refused.
         ``on_close``
             What the end of ``with`` and ``close()`` do with the motors that this client moved. ``stop``: they
             hold still (0x81). ``off``: they are switched off (0x80). ``nothing``: they continue.
@@ -109,6 +117,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
             current_limit_amps=current_limit_amps,
             speed_limit_dps=speed_limit_dps,
             angle_limit_degrees=angle_limit_degrees,
+            gear_ratio=gear_ratio,
         )
         name = port if isinstance(port, CanPort) else cls._named(port)
         return cls._opening(
@@ -141,6 +150,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         0.0
         """
         check_request(request, Request, "rmd.read_status()")
+        self._core.check_gear(motor, request)
         return one(self._exchange(motor, request))
 
     @both_apis
@@ -169,9 +179,16 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         ('MotionStatus', 'ReplyTimeoutError')
 
         If one motor fails, its value is the exception, which is not raised. An error of the line is raised.
+
+        Raises ``InvalidValueError`` if a request is beyond a limit; then nothing is sent to any motor.
         """
-        for request in requests.values():
+        if not isinstance(requests, Mapping):
+            raise TypeError(
+                f"give the requests by motor ID, such as `{{1: rmd.read_status()}}`, not {requests!r}"
+            )
+        for motor, request in requests.items():
             check_request(request, Request, "rmd.read_status()")
+            self._core.check_gear(motor, request)
         return one(self._cycle(list(requests.items())))
 
     @both_apis
@@ -181,10 +198,13 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         """Sends torque currents to motors 1 to 4 in one frame (0x280, chapter 4). Returns the replies by ID.
 
         ``iq_amps`` has four values. ``expect`` has the motors that must reply. If a motor fails, its value is
-        the exception, which is not raised.
+        the exception, which is not raised. The frame reaches the other motors, too. They are not in
+        :attr:`moving`. The end of ``with`` stops them, and does not raise if they do not answer.
 
         Raises ``InvalidValueError`` beyond ±32 A or a limit; then nothing is sent.
         """
+        if isinstance(iq_amps, Mapping):
+            raise TypeError("give the currents as a list: motor 1 first, 0 for no torque")
         return one(self._torque4(list(iq_amps), list(expect)))
 
     @both_apis
@@ -192,6 +212,8 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         """Asks each ID for its status. Returns the replies in the order of arrival; for asyncio in the order of
         the IDs.
         """
+        if isinstance(ids, int):
+            raise TypeError(f"give the IDs as a list: [{ids}]")
         return one(self._scan(list(ids)))
 
     @both_apis
@@ -270,7 +292,8 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         on_error: str,
     ) -> SamplingT:
         skip = skips(on_error)
-        motors, names = by_motor(quantities, motor, str)
+        wanted, names = by_motor(quantities, motor, str)
+        motors = [(id, some, self._core.gear_ratio(id)) for id, some in wanted]
         rows = _core.RmdSampling(motors, rate, seconds, raw)
         take = functools.partial(self._sample, rows, skip)
         return self._Sampling(self, take, names, raw=raw, release=lambda: None)
@@ -282,11 +305,12 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 class RmdMotor(MotorCommands, Generic[ClientT]):
     """What the motors of both APIs have in common."""
 
-    __slots__ = ("__weakref__", "_client", "_id")
+    __slots__ = ("__weakref__", "_client", "_gear_ratio", "_id")
 
     def __init__(self, client: ClientT, id: int):
         self._client = client
         self._id = _core.rmd_motor(id)
+        self._gear_ratio: float | None = client._core.gear_ratio(id)
 
     @property
     def client(self) -> ClientT:
@@ -298,29 +322,99 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         """The motor's ID."""
         return self._id
 
+    @property
+    def gear_ratio(self) -> float | None:
+        """The gear ratio of this motor. ``None``: angles and speeds are those of the motor shaft."""
+        return self._gear_ratio
+
     def _exchange(self, request: Request) -> Exchanges[Any]:
         given: Exchanges[Any] = self._client._exchange(self._id, request)
         return given
 
-    def _arrived(self, watch: _core.RmdArrival) -> Exchanges[MotionStatus]:
-        return arrived(
-            self._client, watch, self._exchange, lambda: self._client._confirm(self._id)
-        )
+    def _moved(
+        self,
+        request: Request,
+        move: Exchanges[MotionStatus],
+        wait: bool,
+        tolerance_degrees: float | None,
+        timeout: float | None,
+    ) -> Exchanges[MotionStatus]:
+        needs_wait(wait, arrival_tolerance_degrees=tolerance_degrees, timeout=timeout)
+        if wait:
+            watch = _core.rmd_arrival(self._id, request, tolerance_degrees, timeout)
+            confirm = functools.partial(self._client._confirm, self._id)
+            move = moved(self._client, watch, self._exchange, confirm, move)
+        motion: MotionStatus = yield from move
+        return motion
+
+    def _sent(self, request: Request) -> Exchanges[MotionStatus]:
+        motion: MotionStatus = yield self._exchange(request)
+        return motion
+
+    def _sent_if_short(
+        self, request: Request, tolerance_degrees: float, full_turn: bool
+    ) -> Exchanges[MotionStatus]:
+        if not full_turn:
+            angle = yield self._exchange(Request.read_single_turn_angle())
+            request.check_full_turn(self._id, angle, tolerance_degrees)
+        motion: MotionStatus = yield self._exchange(request)
+        return motion
 
     def set_limits(
         self,
         *,
-        current_limit_amps: float | None = None,
-        speed_limit_dps: float | None = None,
-        angle_limit_degrees: float | None = None,
+        current_limit_amps: float | None | Literal["unchanged"] = "unchanged",
+        speed_limit_dps: float | None | Literal["unchanged"] = "unchanged",
+        angle_limit_degrees: float | None | Literal["unchanged"] = "unchanged",
     ) -> None:
-        """Sets the limits of this motor. Sends nothing. ``None`` removes a limit.
+        """Changes the limits of this motor that are given. Sends nothing. ``None`` removes a limit.
 
-        They replace all three limits of :func:`open` for this motor. They are rounded in the same way.
+        A limit that is not given stays as it is. Before the first call the limits of :func:`open` hold. They
+        are rounded in the same way.
         """
-        self._client._core.set_limits(
-            self._id, current_limit_amps, speed_limit_dps, angle_limit_degrees
-        )
+        limits = {
+            "current_limit_amps": current_limit_amps,
+            "speed_limit_dps": speed_limit_dps,
+            "angle_limit_degrees": angle_limit_degrees,
+        }
+        given = {name: limit for name, limit in limits.items() if limit != "unchanged"}
+        self._client._core.set_limits(self._id, **given)
+
+    @both_apis
+    def off(self) -> Exchanges[None]:
+        """Switches the motor off (0x80): it forgets its command, and a load that it holds falls.
+
+        Repeats the request until the motor confirms it, at least 4 times and for 2 s. An exception means that
+        the motor may still turn.
+        """
+        yield from self._halted(Request.off())
+
+    @both_apis
+    def stop(self) -> Exchanges[None]:
+        """Stops the motor (0x81): it holds still and keeps its command for :meth:`run`.
+
+        Repeats the request until the motor confirms it, at least 4 times and for 2 s. An exception means that
+        the motor may still turn. A motor with a blocked rotor may still push after a stop; :meth:`off` removes
+        the torque. With an acceleration limit a (°/s²) the stop takes v/a seconds from the speed v (°/s), and
+        v²/(2a) degrees.
+        """
+        yield from self._halted(Request.stop())
+
+    def _halted(self, request: Request) -> Exchanges[None]:
+        client: Any = self._client
+        give_up = client._now() + _core.RMD_STOP_TIME
+        attempts = 0
+        while True:
+            attempts += 1
+            try:
+                yield self._exchange(request)
+            except PortError:
+                raise
+            except (LinkError, ReplyTimeoutError):
+                if attempts >= _core.RMD_STOP_ATTEMPTS and client._now() >= give_up:
+                    raise
+            else:
+                return
 
     @both_apis
     def set_position(
@@ -329,7 +423,7 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         max_speed_dps: float | None = None,
         *,
         wait: bool = False,
-        arrival_tolerance_degrees: float = _core.RMD_ARRIVAL_TOLERANCE,
+        arrival_tolerance_degrees: float | None = None,
         timeout: float | None = None,
     ) -> Exchanges[MotionStatus]:
         """Turns to an angle over all turns, ° (0xA3; with ``max_speed_dps`` 0xA4). Returns the motion before it.
@@ -337,27 +431,27 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         ``max_speed_dps`` is at least 1 and is rounded down to whole °/s.
 
         ``wait=True`` returns when the motor has arrived: it is at most ``arrival_tolerance_degrees`` from
-        the target and its angle does not change for 0.25 s. The result is the motion then. Otherwise
-        ``NotArrivedError`` is raised, and the motor still has its command. ``timeout``, s, is by default
-        twice the time of the distance at ``max_speed_dps`` and 10 s; 60 s without ``max_speed_dps``.
+        the target (by default 0.1° at the motor shaft) and its angle does not change for 0.25 s. The result is
+        the motion then. Otherwise ``NotArrivedError`` is raised, and the motor still has its command.
+        ``timeout``, s, is by default twice the time of the distance at ``max_speed_dps`` and 10 s; 60 s
+        without ``max_speed_dps``.
+        Without ``wait=True`` both arguments are refused.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
         ...     status = client.motor(1).set_position(90, max_speed_dps=500, wait=True)
         """
         if max_speed_dps is None:
-            request = Request.set_position(angle_degrees)
+            request = Request.set_position(angle_degrees, gear_ratio=self._gear_ratio)
         else:
             request = Request.set_position_limited(
-                angle_degrees=angle_degrees, max_speed_dps=max_speed_dps
+                angle_degrees=angle_degrees,
+                max_speed_dps=max_speed_dps,
+                gear_ratio=self._gear_ratio,
             )
-        status: MotionStatus
-        if not wait:
-            status = yield self._exchange(request)
-            return status
-        watch = _core.RmdArrival(self._id, request, arrival_tolerance_degrees, timeout)
-        yield self._exchange(request)
-        status = yield from self._arrived(watch)
+        move = self._sent(request)
+        move = self._moved(request, move, wait, arrival_tolerance_degrees, timeout)
+        status: MotionStatus = yield from move
         return status
 
     @both_apis
@@ -370,7 +464,7 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         full_turn: bool = False,
         tolerance_degrees: float = _core.RMD_FULL_TURN_TOLERANCE,
         wait: bool = False,
-        arrival_tolerance_degrees: float = _core.RMD_ARRIVAL_TOLERANCE,
+        arrival_tolerance_degrees: float | None = None,
         timeout: float | None = None,
     ) -> Exchanges[MotionStatus]:
         """Turns to an angle within the turn (0xA5; with ``max_speed_dps`` 0xA6). Returns the motion before it.
@@ -390,20 +484,19 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         """
         if max_speed_dps is None:
             request = Request.set_single_turn_position(
-                angle_degrees=angle_degrees, direction=direction
+                angle_degrees=angle_degrees, direction=direction, gear_ratio=self._gear_ratio
             )
         else:
             request = Request.set_single_turn_position_limited(
-                angle_degrees=angle_degrees, direction=direction, max_speed_dps=max_speed_dps
+                angle_degrees=angle_degrees,
+                direction=direction,
+                max_speed_dps=max_speed_dps,
+                gear_ratio=self._gear_ratio,
             )
         _core.rmd_full_turn_tolerance(tolerance_degrees)
-        watch = _core.RmdArrival(self._id, request, arrival_tolerance_degrees, timeout)
-        if not full_turn:
-            angle = yield self._exchange(Request.read_single_turn_angle())
-            request.check_full_turn(self._id, angle, tolerance_degrees)
-        status: MotionStatus = yield self._exchange(request)
-        if wait:
-            status = yield from self._arrived(watch)
+        move = self._sent_if_short(request, tolerance_degrees, full_turn)
+        move = self._moved(request, move, wait, arrival_tolerance_degrees, timeout)
+        status: MotionStatus = yield from move
         return status
 
     @both_apis

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from motorlink import _core
-from motorlink._apis import Exchanges, both_apis, one
+from motorlink._apis import Exchanges, both_apis, fields, one
 from motorlink._values import Errors
 
 __all__ = [
@@ -78,7 +78,7 @@ class MotionStatus(NamedTuple):
     #: A digit is 0.01611328125 A.
     iq_amps: float
     #: A digit is 1 °/s.
-    speed_dps: int
+    speed_dps: float
     encoder: int
 
 
@@ -94,7 +94,11 @@ class PhaseCurrents(NamedTuple):
 
 
 class Request(_core.RmdRequest):
-    """A request to an RMD motor. It checks its arguments and reads its reply."""
+    """A request to an RMD motor. It checks its arguments and reads its reply.
+
+    With ``gear_ratio`` angles, speeds and accelerations are those of the output shaft, in the request
+    and in the reply. Otherwise they are those of the motor shaft.
+    """
 
     __slots__ = ()
 
@@ -160,24 +164,30 @@ class Request(_core.RmdRequest):
         )
 
     @staticmethod
-    def read_acceleration() -> Request:
+    def read_acceleration(*, gear_ratio: float | None = None) -> Request:
         """Reads the acceleration limit.
 
         0x33: Read acceleration data command.
         Gives the acceleration, °/s².
         0 means no limit.
         """
-        return Request(_core.rmd_encode(0x33))
+        data = _core.rmd_encode(0x33, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def write_acceleration_ram(acceleration_dps2: float) -> Request:
+    def write_acceleration_ram(
+        acceleration_dps2: float,
+        *,
+        gear_ratio: float | None = None,
+    ) -> Request:
         """Sets the acceleration limit until power-off.
 
         0x34: Write acceleration data to RAM command.
         ``acceleration_dps2`` is 0 to 2147483647.
         0 means no limit.
         """
-        return Request(_core.rmd_encode(0x34, acceleration_dps2))
+        data = _core.rmd_encode(0x34, acceleration_dps2, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
     def read_encoder() -> Request:
@@ -208,22 +218,24 @@ class Request(_core.RmdRequest):
         return Request(_core.rmd_encode(0x19))
 
     @staticmethod
-    def read_multi_turn_angle() -> Request:
+    def read_multi_turn_angle(*, gear_ratio: float | None = None) -> Request:
         """Reads the angle over all turns.
 
         0x92: Read multi turns angle command.
         Gives the angle, °.
         """
-        return Request(_core.rmd_encode(0x92))
+        data = _core.rmd_encode(0x92, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def read_single_turn_angle() -> Request:
+    def read_single_turn_angle(*, gear_ratio: float | None = None) -> Request:
         """Reads the angle within the turn.
 
         0x94: Read single circle angle command.
         Gives the angle, °.
         """
-        return Request(_core.rmd_encode(0x94))
+        data = _core.rmd_encode(0x94, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
     def read_status() -> Request:
@@ -242,12 +254,13 @@ class Request(_core.RmdRequest):
         return Request(_core.rmd_encode(0x9B))
 
     @staticmethod
-    def read_motion_status() -> Request:
+    def read_motion_status(*, gear_ratio: float | None = None) -> Request:
         """Reads temperature, torque current, speed and encoder position.
 
         0x9C: Read motor status 2.
         """
-        return Request(_core.rmd_encode(0x9C))
+        data = _core.rmd_encode(0x9C, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
     def read_phase_currents() -> Request:
@@ -282,48 +295,63 @@ class Request(_core.RmdRequest):
         return Request(_core.rmd_encode(0x88))
 
     @staticmethod
-    def set_torque(iq_amps: float) -> Request:
+    def set_torque(iq_amps: float, *, gear_ratio: float | None = None) -> Request:
         """Holds a torque current.
 
         0xA1: Torque current control command.
         ``iq_amps`` is -32 to 32.
         """
-        return Request(_core.rmd_encode(0xA1, iq_amps))
+        data = _core.rmd_encode(0xA1, iq_amps, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def set_speed(speed_dps: float) -> Request:
+    def set_speed(speed_dps: float, *, gear_ratio: float | None = None) -> Request:
         """Holds a speed.
 
         0xA2: Speed control command.
         """
-        return Request(_core.rmd_encode(0xA2, speed_dps))
+        data = _core.rmd_encode(0xA2, speed_dps, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def set_position(angle_degrees: float) -> Request:
+    def set_position(angle_degrees: float, *, gear_ratio: float | None = None) -> Request:
         """Turns to a multi-turn angle.
 
         0xA3: Position control command 1.
         """
-        return Request(_core.rmd_encode(0xA3, angle_degrees))
+        data = _core.rmd_encode(0xA3, angle_degrees, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def set_position_limited(*, max_speed_dps: float, angle_degrees: float) -> Request:
+    def set_position_limited(
+        *,
+        max_speed_dps: float,
+        angle_degrees: float,
+        gear_ratio: float | None = None,
+    ) -> Request:
         """Turns to a multi-turn angle no faster than a limit.
 
         0xA4: Position control command 2.
         ``max_speed_dps`` is 1 to 65535.
         """
-        return Request(_core.rmd_encode(0xA4, max_speed_dps, angle_degrees))
+        data = _core.rmd_encode(0xA4, max_speed_dps, angle_degrees, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
-    def set_single_turn_position(*, direction: str, angle_degrees: float) -> Request:
+    def set_single_turn_position(
+        *,
+        direction: str,
+        angle_degrees: float,
+        gear_ratio: float | None = None,
+    ) -> Request:
         """Turns to an angle within the turn, in a given direction.
 
         0xA5: Position control command 3.
         ``angle_degrees`` is 0 to 359.99.
         ``direction`` is ``clockwise`` or ``counterclockwise``.
         """
-        return Request(_core.rmd_encode(0xA5, direction, angle_degrees))
+        data = _core.rmd_encode(0xA5, direction, angle_degrees, gear_ratio=gear_ratio)
+        return Request(data, gear_ratio=gear_ratio)
 
     @staticmethod
     def set_single_turn_position_limited(
@@ -331,6 +359,7 @@ class Request(_core.RmdRequest):
         direction: str,
         max_speed_dps: float,
         angle_degrees: float,
+        gear_ratio: float | None = None,
     ) -> Request:
         """Turns to an angle within the turn, in a given direction, no faster than a limit.
 
@@ -339,7 +368,10 @@ class Request(_core.RmdRequest):
         ``angle_degrees`` is 0 to 359.99.
         ``direction`` is ``clockwise`` or ``counterclockwise``.
         """
-        return Request(_core.rmd_encode(0xA6, direction, max_speed_dps, angle_degrees))
+        data = _core.rmd_encode(
+            0xA6, direction, max_speed_dps, angle_degrees, gear_ratio=gear_ratio
+        )
+        return Request(data, gear_ratio=gear_ratio)
 
 
 # Requests for ``Client.cycle``, without the check for a full turn.
@@ -374,6 +406,7 @@ class MotorCommands:
     __slots__ = ()
 
     _exchange: Any
+    _gear_ratio: float | None
 
     @both_apis
     def pid(self) -> Exchanges[Pid]:
@@ -389,7 +422,7 @@ class MotorCommands:
 
         0x31: Write PID to RAM parameter command.
         """
-        return one(self._exchange(Request.write_pid_ram(**pid._asdict())))
+        return one(self._exchange(Request.write_pid_ram(**fields(pid, Pid, "pid"))))
 
     @both_apis
     def write_pid_rom(self, pid: Pid) -> Exchanges[None]:
@@ -398,17 +431,18 @@ class MotorCommands:
         0x32: Write PID to ROM parameter command.
         Wears the ROM.
         """
-        return one(self._exchange(Request.write_pid_rom(**pid._asdict())))
+        return one(self._exchange(Request.write_pid_rom(**fields(pid, Pid, "pid"))))
 
     @both_apis
-    def acceleration(self) -> Exchanges[int]:
+    def acceleration(self) -> Exchanges[float]:
         """Reads the acceleration limit.
 
         0x33: Read acceleration data command.
         Gives the acceleration, °/s².
         0 means no limit.
         """
-        return one(self._exchange(Request.read_acceleration()))
+        request = Request.read_acceleration(gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def write_acceleration_ram(self, acceleration_dps2: float) -> Exchanges[None]:
@@ -418,7 +452,8 @@ class MotorCommands:
         ``acceleration_dps2`` is 0 to 2147483647.
         0 means no limit.
         """
-        return one(self._exchange(Request.write_acceleration_ram(acceleration_dps2)))
+        request = Request.write_acceleration_ram(acceleration_dps2, gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def encoder(self) -> Exchanges[Encoder]:
@@ -455,7 +490,8 @@ class MotorCommands:
         0x92: Read multi turns angle command.
         Gives the angle, °.
         """
-        return one(self._exchange(Request.read_multi_turn_angle()))
+        request = Request.read_multi_turn_angle(gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def single_turn_angle(self) -> Exchanges[float]:
@@ -464,7 +500,8 @@ class MotorCommands:
         0x94: Read single circle angle command.
         Gives the angle, °.
         """
-        return one(self._exchange(Request.read_single_turn_angle()))
+        request = Request.read_single_turn_angle(gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def status(self) -> Exchanges[Status]:
@@ -488,7 +525,8 @@ class MotorCommands:
 
         0x9C: Read motor status 2.
         """
-        return one(self._exchange(Request.read_motion_status()))
+        request = Request.read_motion_status(gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def phase_currents(self) -> Exchanges[PhaseCurrents]:
@@ -529,7 +567,8 @@ class MotorCommands:
         0xA1: Torque current control command.
         ``iq_amps`` is -32 to 32.
         """
-        return one(self._exchange(Request.set_torque(iq_amps)))
+        request = Request.set_torque(iq_amps, gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))
 
     @both_apis
     def set_speed(self, speed_dps: float) -> Exchanges[MotionStatus]:
@@ -537,4 +576,5 @@ class MotorCommands:
 
         0xA2: Speed control command.
         """
-        return one(self._exchange(Request.set_speed(speed_dps)))
+        request = Request.set_speed(speed_dps, gear_ratio=self._gear_ratio)
+        return one(self._exchange(request))

@@ -27,8 +27,9 @@ def by_motor(
 
     The names have the motor's number if motors are named.
     """
-    if isinstance(wanted, str):
-        raise InvalidValueError(f"{wanted!r} is one name: give a list of names")
+    for some in wanted.values() if isinstance(wanted, Mapping) else [wanted]:
+        if isinstance(some, str):
+            raise InvalidValueError(f"{some!r} is one name: give a list of names")
     if isinstance(wanted, Mapping):
         motors = [(number, list(some)) for number, some in wanted.items()]
         names = [f"{called(one)}_{number}" for number, some in motors for one in some]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, check_request, one
-from motorlink._arrival import arrived
+from motorlink._arrival import moved, needs_wait
 from motorlink._client import AnyClient
 from motorlink._core import StRequest as Request
 from motorlink._sampling import AnySampling, Samples, by_motor, skips
@@ -133,7 +133,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         return moving
 
     def motor(self, number: int = 1, *, full_scale_amps: float | None = None) -> MotorT:
-        """A motor of the drive, 1 to 7. Motor 0 is the one that the drive has selected (TARGET_MOTOR).
+        """A motor of the drive, 1 to 7.
 
         ``full_scale_amps`` is the current of digit 32767, A, if it differs from that of :func:`open`.
 
@@ -406,11 +406,19 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def start(self) -> Exchanges[None]:
-        """Starts the motor (4.6). If a fault is pending, the drive acknowledges and does nothing.
+        """Starts the motor (4.6), then reads its state: two exchanges, three with a fault.
 
+        A drive acknowledges a start in any case. Raises ``RefusedError`` without a code if a fault is pending,
+        or if the motor is still stopping. The message names the faults.
+
+        The drive acts in its control mode, also after a stop: in ``TORQUE`` mode the motor starts with the
+        last current reference, and the load decides the speed. :meth:`set_ramp` returns to speed control.
         With a ``speed_limit_rpm``, call :meth:`set_ramp` first: the drive may keep an older target.
         """
-        return self._exchange(Request.execute_command("START_MOTOR"))
+        yield self._exchange(Request.execute_command("START_MOTOR"))
+        starting = _core.StStarting(self._number)
+        while (register := starting.register()) is not None:
+            starting.replied((yield self._read(register)))
 
     @both_apis
     def stop(self) -> Exchanges[None]:
@@ -498,7 +506,7 @@ class StMotor(Generic[ClientT]):
         duration_s: float,
         *,
         wait: bool = False,
-        arrival_tolerance_rad: float = _core.ST_ARRIVAL_TOLERANCE,
+        arrival_tolerance_rad: float | None = None,
         timeout: float | None = None,
     ) -> Exchanges[None]:
         """Turns to ``angle_rad`` in ``duration_s`` (0x12 of profile ``mcsdk-5.4``, with position control).
@@ -506,19 +514,24 @@ class StMotor(Generic[ClientT]):
         Raises ``InvalidValueError`` if there is a ``speed_limit_rpm``: the command has no speed.
 
         ``wait=True`` returns when the motor has arrived: ``duration_s`` is over, it is at most
-        ``arrival_tolerance_rad`` from the target and its position does not change for 0.25 s. Otherwise
-        ``NotArrivedError`` is raised, and the motor still has its command. A motor that is not in RUN, nor
-        on its way there, gets no command. ``timeout``, s, is by default ``duration_s`` and 10 s.
+        ``arrival_tolerance_rad`` from the target (by default 0.01) and its position does not change for
+        0.25 s. Otherwise ``NotArrivedError`` is raised, and the motor still has its command. A motor that is
+        not in RUN, nor on its way there, gets no command. ``timeout``, s, is by default ``duration_s`` and
+        10 s. Without ``wait=True`` both arguments are refused.
         """
         self._only("mcsdk-5.4", "moves")
         request = Request.set_position(angle_rad, duration_s)
-        if not wait:
-            yield self._exchange(request)
-            return
-        watch = _core.StArrival(self._number, angle_rad, duration_s, arrival_tolerance_rad, timeout)
-        watch.check((yield self._read(_core.st_register("STATUS").id)))
+        needs_wait(wait, arrival_tolerance_rad=arrival_tolerance_rad, timeout=timeout)
+        move = self._sent(request)
+        if wait:
+            watch = _core.st_arrival(
+                self._number, angle_rad, duration_s, arrival_tolerance_rad, timeout
+            )
+            move = moved(self._client, watch, self._read, self._client._confirm, move)
+        yield from move
+
+    def _sent(self, request: Request) -> Exchanges[None]:
         yield self._exchange(request)
-        yield from arrived(self._client, watch, self._read, self._client._confirm)
 
     def _read(self, register: int) -> Any:
         return self._client._exchange_raw(self._number, 0x02, bytes([register]))
@@ -569,7 +582,9 @@ class StMotor(Generic[ClientT]):
     ) -> Exchanges[dict[str, float]]:
         """Reads a data segment (0x0D, profile ``spec``). Returns the values of its registers by name.
 
-        ``registers`` are those that it was configured with. Leave them out if this client configured it.
+        Call :meth:`configure_segment` first, also after the port was opened again. Otherwise
+        ``InvalidValueError`` is raised and nothing is sent: shipped firmware reads this request as a torque
+        ramp. ``registers`` are those that the segment was configured with, and may be left out.
         """
         self._only("spec", "data segments")
         if registers is None:

@@ -7,7 +7,8 @@
 ...     motor.status().voltage_volts
 24.0
 
-Units are °, °/s, °/s² and A, all at the motor shaft. Positive is clockwise. Each method of a motor is one
+Units are °, °/s, °/s² and A, all at the motor shaft, or at the output shaft with ``open(gear_ratio=6)``.
+Positive is clockwise. Each method of a motor is one
 exchange and raises
 
 * ``ReplyTimeoutError`` if the motor does not reply. It is unknown whether it executed the request. A
@@ -47,6 +48,7 @@ __all__ = [
     "Motor",
     "ScanResult",
     "decode",
+    "encoder_degrees",
     "open",
 ]
 __all__ += _rmd_table.__all__
@@ -71,6 +73,19 @@ def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
     Raises ``InvalidValueError`` for a frame of another protocol.
     """
     return _core.rmd_decode(can_id, data, reply=reply)
+
+
+def encoder_degrees(counts: int, *, encoder_bits: int, gear_ratio: float | None = None) -> float:
+    """The angle of encoder counts, °. ``encoder_bits`` is the width of the encoder, 12 to 18.
+
+    >>> encoder_degrees(8192, encoder_bits=14)
+    180.0
+
+    Counts are within one turn of the motor shaft. With ``gear_ratio`` the angle is that of the output shaft.
+
+    Raises ``InvalidValueError`` for counts beyond the encoder.
+    """
+    return _core.rmd_encoder_degrees(counts, encoder_bits=encoder_bits, gear_ratio=gear_ratio)
 
 
 class Motor(Blocking, RmdMotor["Client"]):

@@ -118,7 +118,7 @@ def scan(
     """Asks a drive for its board information at each baud rate. Returns one result for each rate.
 
     ``port`` is a serial line. ``timeout`` is the time to wait for each of two replies, s. A port without a
-    baud rate, such as ``tcp:``, is asked once. No motor starts or stops.
+    baud rate, such as ``tcp:`` or a pty, is asked once. No motor starts or stops.
 
     Raises ``PortError`` if the port cannot be opened, ``InvalidValueError`` for a port that is not a serial
     line, or that exists only in this process.

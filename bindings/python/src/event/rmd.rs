@@ -5,12 +5,14 @@ use motorlink::port::PortName;
 use motorlink::rmd::{EventClient, MotorId, ScanResult, StopAction};
 use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use super::{Driven, fileno, outcome, seconds};
 use crate::can::{CanPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::rmd::{
-    RmdOptions, RmdRequest, four_currents, limits, motor_id, motor_ids, not_stopped, scan_result,
+    Gears, LimitChange, RmdOptions, RmdRequest, four_currents, motor_id, motor_ids, not_stopped,
+    scan_result,
 };
 
 /// A CAN bus with one exchange per motor at a time. Call `ask`. Then call `advance` when the
@@ -18,6 +20,7 @@ use crate::rmd::{
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdEventClient {
     driven: Driven<Motors>,
+    gears: Gears,
     /// The threads of a bus of python-can.
     threads: Option<Threads>,
 }
@@ -47,9 +50,15 @@ enum ReplyKind {
 }
 
 impl RmdEventClient {
-    fn new(bus: EventClient, port: String, threads: Option<Threads>) -> Self {
+    fn new(
+        mut bus: EventClient,
+        port: String,
+        options: &RmdOptions,
+        threads: Option<Threads>,
+    ) -> Self {
+        options.geared.iter().for_each(|(id, limits)| bus.set_limits(*id, *limits));
         let motors = Motors { bus, asked: [const { ReplyKind::ScanResult }; MotorId::COUNT] };
-        RmdEventClient { driven: Driven::new(motors, port), threads }
+        RmdEventClient { driven: Driven::new(motors, port), gears: options.gears, threads }
     }
 }
 
@@ -58,22 +67,22 @@ impl RmdEventClient {
     /// Opens a port by its name, or a bus of python-can. This may wait. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: CanBus, options: &RmdOptions) -> PyResult<Self> {
-        let options = options.0;
         match port {
             CanBus::Port(port) => {
                 let port = port.get();
                 let threads = port.start()?;
                 let mut links = threads.links();
                 let open = Box::new(move || Ok(Box::new(links()) as _));
-                let bus = EventClient::open_with(port.name(), open, options);
+                let bus = EventClient::open_with(port.name(), open, options.options);
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                Ok(Self::new(bus, port.name().to_owned(), Some(threads)))
+                Ok(Self::new(bus, port.name().to_owned(), options, Some(threads)))
             }
             CanBus::Name(port) => {
                 let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
-                let bus = py.detach(|| EventClient::open(&name, options));
+                let wanted = options.options;
+                let bus = py.detach(|| EventClient::open(&name, wanted));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                Ok(Self::new(bus, name.to_string(), None))
+                Ok(Self::new(bus, name.to_string(), options, None))
             }
         }
     }
@@ -140,7 +149,8 @@ impl RmdEventClient {
         let begun = self.driven.step(py, |motors| {
             motors.bus.set_torque4(torques, expect)?;
             for id in expect {
-                motors.expect(id, ReplyKind::Value(RmdRequest::of(SetTorque::default())));
+                let request = RmdRequest::of(SetTorque::default(), self.gears.of(id));
+                motors.expect(id, ReplyKind::Value(request));
             }
             Ok(())
         })?;
@@ -179,20 +189,36 @@ impl RmdEventClient {
         })
     }
 
-    /// Sets the limits of a motor. `None` removes a limit.
+    /// Changes the limits that are given. `None` removes a limit.
+    #[pyo3(signature = (id, **limits))]
     fn set_limits(
         &self,
         py: Python<'_>,
         id: i64,
-        current_limit_amps: Option<f64>,
-        speed_limit_dps: Option<f64>,
-        angle_limit_degrees: Option<f64>,
+        limits: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
         let id = motor_id(py, id)?;
-        let limits = limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees)?;
+        let change = LimitChange::new(py, limits, self.gears.of(id))?;
         self.driven.step(py, |motors| {
-            motors.bus.set_limits(id, limits);
+            motors.bus.change_limits(id, |limits| change.of(limits));
         })
+    }
+
+    /// Refuses a request with angles or speeds of another shaft than those of its motor.
+    fn check_gear(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<()> {
+        self.gears.check(py, motor_id(py, id)?, request)
+    }
+
+    /// The gear ratio of a motor.
+    fn gear_ratio(&self, py: Python<'_>, id: i64) -> PyResult<Option<f64>> {
+        self.gears.ratio(py, id)
+    }
+
+    /// Checks a request against the limits of a motor. Sends nothing.
+    fn check_limits(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<()> {
+        let (id, data) = (motor_id(py, id)?, request.data());
+        let checked = self.driven.step(py, |motors| motors.bus.check_limits(id, &data))?;
+        checked.map_err(|error| rmd_error(py, &error))
     }
 
     /// Motors that were commanded and neither stopped nor switched off.

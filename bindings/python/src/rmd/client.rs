@@ -11,7 +11,8 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
 
-use super::options::{RmdOptions, limits};
+use super::gears::Gears;
+use super::options::{LimitChange, RmdOptions};
 use super::request::{RmdRequest, motor_id, said};
 use super::sample::RmdSampling;
 use crate::can::{AnyPort, Threads};
@@ -28,6 +29,7 @@ use crate::values;
 pub(crate) struct RmdClient {
     bus: Shared<Client>,
     clock: Clock,
+    gears: Gears,
     deafness: Deafness,
     /// The threads of a bus of python-can.
     threads: Option<Threads>,
@@ -38,7 +40,7 @@ impl RmdClient {
     /// Opens a port. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: AnyPort<'_>, options: &RmdOptions) -> PyResult<Self> {
-        let options = options.0;
+        let RmdOptions { options, gears, ref geared } = *options;
         let deafness = Deafness::default();
         let mut threads = None;
         let (bus, port) = match port {
@@ -61,8 +63,9 @@ impl RmdClient {
                 (bus.looking(deafness.look()), port.name().to_owned())
             }
         };
+        geared.iter().for_each(|(id, limits)| bus.set_limits(*id, *limits));
         let clock = bus.clock();
-        Ok(RmdClient { bus: Shared::new(bus, port), clock, deafness, threads })
+        Ok(RmdClient { bus: Shared::new(bus, port), clock, gears, deafness, threads })
     }
 
     /// One exchange. Returns the value of the reply.
@@ -127,10 +130,14 @@ impl RmdClient {
         let (torques, expect) = (four_currents(py, iq_amps)?, motor_ids(py, expect)?);
         let replies = self.bus.exchange(py, |bus| bus.set_torque4(torques, expect))?;
         let by_id = PyDict::new(py);
-        for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
+        let replies = replies.map_err(|error| rmd_error(py, &error))?;
+        for (reply, id) in replies.into_iter().zip(MotorSet::TORQUE4) {
+            let (number, gear) = (id.number(), self.gears.of(id));
             match reply {
-                Some(Ok(status)) => by_id.set_item(id, said(py, "MotionStatus", &status)?)?,
-                Some(Err(error)) => by_id.set_item(id, rmd_error(py, &error))?,
+                Some(Ok(status)) => {
+                    by_id.set_item(number, said(py, "MotionStatus", &status, gear)?)?;
+                }
+                Some(Err(error)) => by_id.set_item(number, rmd_error(py, &error))?,
                 None => {}
             }
         }
@@ -169,19 +176,28 @@ impl RmdClient {
         Ok((rows, skipped, outcome.err()))
     }
 
-    /// Sets the limits of a motor. `None` removes a limit.
+    /// Changes the limits that are given. `None` removes a limit.
+    #[pyo3(signature = (id, **limits))]
     fn set_limits(
         &self,
         py: Python<'_>,
         id: i64,
-        current_limit_amps: Option<f64>,
-        speed_limit_dps: Option<f64>,
-        angle_limit_degrees: Option<f64>,
+        limits: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
         let (bus, id) = (self.bus.get(py)?, motor_id(py, id)?);
-        let limits = limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees)?;
-        py.detach(|| bus.set_limits(id, limits));
+        let change = LimitChange::new(py, limits, self.gears.of(id))?;
+        py.detach(|| bus.change_limits(id, |limits| change.of(limits)));
         Ok(())
+    }
+
+    /// Refuses a request with angles or speeds of another shaft than those of its motor.
+    fn check_gear(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<()> {
+        self.gears.check(py, motor_id(py, id)?, request)
+    }
+
+    /// The gear ratio of a motor.
+    fn gear_ratio(&self, py: Python<'_>, id: i64) -> PyResult<Option<f64>> {
+        self.gears.ratio(py, id)
     }
 
     /// Motors that were commanded and neither stopped nor switched off.
@@ -246,7 +262,7 @@ pub(crate) fn scan_result(py: Python<'_>, found: ScanResult) -> PyResult<Py<PyAn
     let nothing = || py.None();
     let row = match found {
         ScanResult::Motor(id, status) => {
-            let status = said(py, "Status", &status)?;
+            let status = said(py, "Status", &status, None)?;
             (id.number(), "motor", status, nothing())
         }
         ScanResult::Foreign(id, dialect) => {

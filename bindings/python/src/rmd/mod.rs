@@ -2,14 +2,18 @@
 
 mod arrival;
 mod client;
+mod gear;
+mod gears;
 mod options;
 mod quantity;
 mod request;
 mod sample;
 
-pub(crate) use arrival::RmdArrival;
+pub(crate) use arrival::rmd_arrival;
 pub(crate) use client::{RmdClient, four_currents, motor_ids, not_stopped, scan_result};
-pub(crate) use options::{RmdOptions, limits};
+pub(crate) use gear::rmd_encoder_degrees;
+pub(crate) use gears::Gears;
+pub(crate) use options::{LimitChange, RmdOptions};
 pub(crate) use quantity::rmd_quantities;
 pub(crate) use request::{RmdRequest, motor_id, rmd_encode, rmd_full_turn_tolerance};
 pub(crate) use sample::RmdSampling;

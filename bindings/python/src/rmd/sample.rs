@@ -5,11 +5,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
 use motorlink::port::PortError;
-use motorlink::rmd::{Client, Error, MotorId};
+use motorlink::rmd::{Client, Error, GearRatio, MotorId};
 use motorlink_proto::rmd::Code;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
+use super::gear::{behind, gear};
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motor_id};
 use crate::error::rmd_error;
@@ -18,6 +19,7 @@ use crate::sampling::{Plan, Rows, Taken, cell};
 /// The quantities of one motor.
 struct Lane {
     id: MotorId,
+    gear: Option<GearRatio>,
     quantities: Vec<Quantity>,
 }
 
@@ -29,17 +31,21 @@ struct Questions {
     raw: bool,
 }
 
+/// A motor's ID, its quantities and its gear ratio.
+type Wanted = (i64, Vec<String>, Option<f64>);
+
 /// The replies of a row: motor, command, reply.
 type Replies = Vec<(MotorId, Code, [u8; 8])>;
 
 impl Questions {
-    /// The requests for the quantities of motors `(id, names)`.
-    fn new(py: Python<'_>, motors: Vec<(i64, Vec<String>)>, raw: bool) -> PyResult<Self> {
+    /// The requests for the quantities of motors.
+    fn new(py: Python<'_>, motors: Vec<Wanted>, raw: bool) -> PyResult<Self> {
         let mut lanes = Vec::with_capacity(motors.len());
-        for (id, names) in motors {
+        for (id, names, gear_ratio) in motors {
             let quantities: PyResult<_> =
                 names.iter().map(|name| Quantity::named(py, name)).collect();
-            lanes.push(Lane { id: motor_id(py, id)?, quantities: quantities? });
+            let (id, gear) = (motor_id(py, id)?, gear(py, gear_ratio)?);
+            lanes.push(Lane { id, gear, quantities: quantities? });
         }
         let mut cycles: Vec<Vec<(MotorId, [u8; 8])>> = Vec::new();
         for lane in &lanes {
@@ -65,7 +71,8 @@ impl Questions {
                 let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
                 // Each request has a reply, otherwise the row has failed.
                 let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
-                values.push(cell(self.raw, digits, field.scale.value(digits)));
+                let value = behind(lane.gear, field.scale).value(digits);
+                values.push(cell(self.raw, digits, value));
             }
         }
         values
@@ -130,11 +137,11 @@ impl RmdSampling {
 
 #[pymethods]
 impl RmdSampling {
-    /// Quantities of motors `(id, names)`.
+    /// Quantities of motors.
     #[new]
     fn new(
         py: Python<'_>,
-        motors: Vec<(i64, Vec<String>)>,
+        motors: Vec<Wanted>,
         rate: f64,
         seconds: Option<f64>,
         raw: bool,

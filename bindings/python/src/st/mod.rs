@@ -10,9 +10,10 @@ mod request;
 mod sample;
 mod scale;
 mod scan;
+mod starting;
 mod verified;
 
-pub(crate) use arrival::StArrival;
+pub(crate) use arrival::st_arrival;
 pub(crate) use client::{StClient, frame_code, not_stopped};
 pub(crate) use options::StOptions;
 pub(crate) use reply::Answer;
@@ -20,13 +21,14 @@ pub(crate) use request::{StRequest, motor_number};
 pub(crate) use sample::StSampling;
 pub(crate) use scale::Scale;
 pub(crate) use scan::{st_scan_baud, st_scan_rates};
+pub(crate) use starting::StStarting;
 pub(crate) use verified::StVerifiedWrite;
 
 use motorlink::st::register::{Feature, Features, Writing};
 use motorlink::st::{Flags, RegisterId};
 use pyo3::prelude::*;
 
-use crate::error::unknown_register;
+use crate::error::{invalid_value, unknown_register};
 use crate::values;
 use scale::register;
 
@@ -62,10 +64,17 @@ pub(crate) fn st_register(
     )
 }
 
-/// The number of a motor, 1 to 7, or 0 for the one that the drive has selected.
+/// The number of a motor, 1 to 7.
 #[pyfunction]
 pub(crate) fn st_motor(py: Python<'_>, number: i64) -> PyResult<u8> {
-    motor_number(py, number)
+    match motor_number(py, number)? {
+        0 => Err(invalid_value(
+            py,
+            "motor 0 does not exist: motor numbers are 1 to 7. In a frame, 0 means the motor of the \
+             previous request; give 1 for a drive with one motor",
+        )),
+        number => Ok(number),
+    }
 }
 
 /// The name of a register, or its hexadecimal number if it has none.

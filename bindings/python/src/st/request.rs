@@ -184,6 +184,13 @@ impl StRequest {
     fn set_ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
         let speed_rpm = rpm(py, speed_rpm)?;
         let ramp = Ramp { speed_rpm, duration_ms: milliseconds(py, duration_s)? };
+        if !ramp.is_possible() {
+            let most = Ramp::MAX_SPEED_RPM;
+            let why = format_args!(
+                "a drive can hold -{most} to {most} rpm, not {speed_rpm} rpm; nothing was sent"
+            );
+            return Err(invalid_value(py, why));
+        }
         Ok(Self::told(Scale::plain(), Request::SetRamp(ramp)))
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use motorlink::Clock;
 use motorlink::port::PortError;
 use motorlink::st::register::Access;
-use motorlink::st::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
+use motorlink::st::{Client, Error, LimitError, Profile, RegisterId, SEGMENT_REGISTERS};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 
@@ -150,12 +150,19 @@ impl Reading {
             let read = |payload: &[u8]| request.cells(request.understand(payload)?);
             match client.exchange(motor, &request.request(), read) {
                 Ok(values) => self.answered(values),
-                Err(error) if error.is_refusal() && self.refused() => {}
+                Err(error) if may_lack_segment(&error) && self.refused() => {}
                 Err(error) => return Err(error),
             }
         }
         Ok(())
     }
+}
+
+/// Whether a drive that lost its segment or has none, or a port that was opened again, causes this error.
+fn may_lack_segment(error: &Error) -> bool {
+    let is_not_configured =
+        matches!(error, Error::Limit { exceeded: LimitError::NotConfigured { .. }, .. });
+    error.is_refusal() || is_not_configured
 }
 
 /// Whether these registers need a segment, and can have one.

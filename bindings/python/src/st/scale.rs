@@ -1,7 +1,7 @@
 //! Register values between digits and units.
 
 use motorlink::st::register::{Type, Unit};
-use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink::st::{FullScale, Profile, Reading, RegisterId, find_register, parse_value};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -10,15 +10,12 @@ use super::profile;
 use crate::error::{invalid_value, unknown_register};
 use crate::number::inward_digits;
 
-/// Digits of a drive's full scale of current.
-const FULL_SCALE: f64 = 32767.0;
-
 /// The value of a digit of a motor's registers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     pub(crate) profile: Profile,
-    /// One s16A digit, A; `None` if the full scale is unknown. Currents are in digits then.
-    ampere: Option<f64>,
+    /// `None` if the full scale is unknown. Currents are in digits then.
+    full_scale: Option<FullScale>,
 }
 
 impl Scale {
@@ -28,12 +25,12 @@ impl Scale {
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
         let profile = profile::named(py, profile)?;
-        Scale { profile, ampere: None }.with_full_scale(py, full_scale_amps)
+        Scale { profile, full_scale: None }.with_full_scale(py, full_scale_amps)
     }
 
     /// For a request that neither profile nor full scale affects.
     pub(crate) fn plain() -> Self {
-        Scale { profile: Profile::default(), ampere: None }
+        Scale { profile: Profile::default(), full_scale: None }
     }
 
     /// The same with currents in A.
@@ -42,18 +39,17 @@ impl Scale {
         py: Python<'_>,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
-        match full_scale_amps {
-            Some(amps) if !(amps.is_finite() && amps > 0.0) => {
-                let why = "give the current of digit 32767, in A";
-                Err(invalid_value(py, format_args!("{amps} A is not a full scale: {why}")))
-            }
-            amps => Ok(Scale { profile: self.profile, ampere: amps.map(|amps| amps / FULL_SCALE) }),
-        }
+        let full_scale = full_scale_amps.map(FullScale::from_amps).transpose();
+        let full_scale = full_scale.map_err(|error| invalid_value(py, error))?;
+        Ok(Scale { profile: self.profile, full_scale })
     }
 
     /// One digit of a current, and the unit it is in.
     pub(crate) fn current(&self) -> (f64, &'static str) {
-        self.ampere.map_or((1.0, Unit::S16A.symbol()), |ampere| (ampere, Unit::Ampere.symbol()))
+        self.full_scale.map_or((1.0, Unit::S16A.symbol()), |full_scale| {
+            let scale = full_scale.scale();
+            (scale.digit, scale.symbol)
+        })
     }
 
     /// A current as digits, rounded towards 0.
@@ -64,8 +60,8 @@ impl Scale {
 
     /// Digits as a current: a float in A, an integer in s16A.
     pub(crate) fn amps(&self, py: Python<'_>, digits: i32) -> PyResult<Py<PyAny>> {
-        match self.ampere {
-            Some(ampere) => (f64::from(digits) * ampere).into_py_any(py),
+        match self.full_scale {
+            Some(full_scale) => full_scale.scale().value(digits.into()).into_py_any(py),
             None => digits.into_py_any(py),
         }
     }
@@ -77,8 +73,8 @@ impl Scale {
 
     /// A read value, in [`unit`](Self::unit)s.
     pub(crate) fn physical(&self, register: RegisterId, bits: i32) -> f64 {
-        match self.ampere {
-            Some(ampere) if is_current(register) => f64::from(bits) * ampere,
+        match self.full_scale {
+            Some(full_scale) if is_current(register) => full_scale.scale().value(bits.into()),
             _ => self.reading(register, bits).value(),
         }
     }
@@ -112,7 +108,7 @@ impl Scale {
         raw: bool,
     ) -> PyResult<i32> {
         let py = value.py();
-        if !raw && self.ampere.is_some() && is_current(register) {
+        if !raw && self.full_scale.is_some() && is_current(register) {
             return self.digits::<i16>(py, value.extract()?).map(i32::from);
         }
         let text = if let Ok(text) = value.cast::<PyString>() {
@@ -135,7 +131,7 @@ impl Scale {
 }
 
 fn is_current(register: RegisterId) -> bool {
-    register.shape().is_some_and(|shape| shape.unit == Unit::S16A)
+    Reading { register, bits: 0, profile: Profile::default() }.is_current()
 }
 
 /// A register by name or number.

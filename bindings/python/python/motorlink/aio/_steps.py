@@ -234,6 +234,14 @@ class Opening(Generic[Entered]):
     def __await__(self) -> Generator[Any, None, Entered]:
         return self._open().__await__()
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise AttributeError(
+                f"the client is not open, so `{name}` is not available: write "
+                "`async with ... as client`, or `client = await ...`"
+            )
+
     async def __aenter__(self) -> Entered:
         self._client = await self._open()
         return self._client

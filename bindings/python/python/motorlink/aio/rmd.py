@@ -79,6 +79,8 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
 
     async def _cycle(self, requests: list[tuple[int, RmdRequest]]) -> Any:
         asked = dict(requests)
+        for id, request in requests:
+            self._core.check_limits(id, request)
         return await self._gather(asked, lambda id: self._core.ask(id, asked[id], patient=False))
 
     async def _torque4(self, iq_amps: list[float], expect: list[int]) -> Any:

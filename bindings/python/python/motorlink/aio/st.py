@@ -26,7 +26,13 @@ from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient, StMotor
 from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
-from motorlink.errors import LinkError, MotorlinkError, RefusedError, ReplyTimeoutError
+from motorlink.errors import (
+    InvalidValueError,
+    LinkError,
+    MotorlinkError,
+    RefusedError,
+    ReplyTimeoutError,
+)
 
 __all__ = ["Client", "Motor", "Opening", "RegisterNames", "open", "scan"]
 
@@ -89,7 +95,8 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Samp
             while (asked := sampling.request()) is not None:
                 try:
                     value = await self._exchange(*asked)
-                except RefusedError:
+                except (RefusedError, InvalidValueError):
+                    # A segment that the drive lost, or that was configured before the port was opened again.
                     if not sampling.refused():
                         raise
                 else:
