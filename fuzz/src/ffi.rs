@@ -80,6 +80,9 @@ extern "C" fn write(_: *mut c_void, _: u8, _: u8, value: i32) -> u8 {
     call_back();
     value as u8 & 7
 }
+extern "C" fn execute(_: *mut c_void, _: u8, _: motorlink_st_command) {
+    call_back();
+}
 extern "C" fn revup(_: *mut c_void, _: u8, phase: u8, data: *mut motorlink_st_revup_phase) {
     assert!(phase < 5);
     // SAFETY: it points to a phase.
@@ -115,6 +118,7 @@ pub fn ffi(data: &[u8]) {
     st.features = Some(features);
     st.get_register = Some(read);
     st.set_register = Some(write);
+    st.execute = Some(execute);
     st.get_revup_data = Some(revup);
     st.profiler_step = Some(profiler_step);
     let mut motor: motorlink_rmd_motor_control = zeroed();
@@ -284,7 +288,8 @@ impl Objects {
                 17 if one & 2 == 0 => motorlink_st_master_reopened(master),
                 17 => motorlink_st_master_trust_line(master),
                 18 if one & 1 == 0 => motorlink_st_master_set_limits(master, &limits),
-                18 => motorlink_st_master_is_lost(master, &mut lost),
+                18 if one & 2 == 0 => motorlink_st_master_is_lost(master, &mut lost),
+                18 => motorlink_st_master_confirm(master),
                 19 | 20 => {
                     let heard = &self.heard.bytes;
                     motorlink_st_master_receive(master, now, heard.as_ptr(), heard.len())
@@ -386,6 +391,7 @@ impl Objects {
                     motorlink_rmd_host_trust(host, u32::from_le_bytes(input.array()))
                 }
                 5 if one & 3 == 2 => motorlink_rmd_host_reopened(host, now),
+                5 if one & 3 == 3 => motorlink_rmd_host_confirm(host, now, one >> 2),
                 5 => motorlink_rmd_host_retry(host, &mut at),
                 6 => motorlink_rmd_host_cancel(host, now, one),
                 7 => motorlink_rmd_host_busy(host, &mut motors),

@@ -194,8 +194,8 @@ impl MasterFixture {
                     let frame = self.open.as_deref().expect("nothing is sent unasked");
                     assert!(!bytes.is_empty() && bytes.len() <= MAX_FRAME + 1);
                     self.sent |= bytes == frame;
-                    // On a line that does not answer, only questions and STOP_MOTORs are sent.
-                    let stop = matches!(bytes, [header, 1, 2, _] if header & 0x1F == 3);
+                    // On a line that does not answer, only questions, STOP_MOTOR and SC_STOP are sent.
+                    let stop = matches!(bytes, [header, 1, 2 | 0x0E, _] if header & 0x1F == 3);
                     let harmless = stop || bytes[0] == 0xFF || QUESTIONS.contains(&bytes);
                     assert!(!self.lost || self.recovery != Recovery::None, "sent into a lost line");
                     assert!(!self.lost || self.heard || harmless, "{bytes:02x?} is sent unheard");

@@ -125,6 +125,22 @@ def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
     rmd("-i", 3, "off").ended(0)
 
 
+@pytest.mark.parametrize(
+    "command, first",
+    [
+        ("torque 0.1", "turns with 0.096 A"),
+        ("speed 20.5", "turns at 20.50 °/s"),
+        ("--raw speed 2050", "turns at 2050"),
+        ("--gear-ratio 6 speed 20.5", "turns at 20.500 °/s"),
+        ("position -10.25", "turns to -10.25 °"),
+        ("single-turn-position 45.5 cw --full-turn", "turns to 45.50 ° clockwise"),
+    ],
+)
+def test_a_motion_command_is_printed_before_the_state(run, command, first):
+    done = run("rmd", "-p", "sim:", "-i", 3, *command.split()).ended(0)
+    assert done.out.splitlines()[0] == f"motor 3 {first}; its state at the reply:"
+
+
 @pytest.mark.parametrize("move", [("position", 10), ("single-turn-position", 10, "cw", "--full-turn")])
 def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, move):
     def most(value, *options):
@@ -173,7 +189,7 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused(near):
 
     rmd("single-turn-position", 90, "ccw", "--max-speed", 100).ended(0)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 90) < 0.022, "motor 1 is at 90°")
-    rmd("off").ended(0)
+    rmd("--id", 1, "off").ended(0)
     for direction in ("cw", "ccw"):
         refused = rmd("single-turn-position", 90.02, direction, "--tolerance", 359.99).ended(2).err
         assert "`--full-turn`" in refused
@@ -236,13 +252,13 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
 
     rmd("speed", 360)
     eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns")
-    rmd("stop")
+    rmd("--id", 1, "stop")
     eventually(lambda: abs(bus.motor(1)["speed_dps"]) < 1, "motor 1 stands")
     rmd("run")
     eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns again")
     rmd("single-turn-position", 45, "cw", "--full-turn", "--max-speed", 1000)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] % 360 - 45) < 0.5, "motor 1 is at 45°")
-    rmd("off")
+    rmd("--id", 1, "off")
     assert bus.motor(1)["mode"] == "off"
 
 
@@ -276,6 +292,13 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
         ("single-turn-position -1 cw", "nothing was sent"),
         ("speed 1e9", "nothing was sent"),
         ("torque4 0 0 0 99", "±32 A"),
+        ("torque4 0 0 0 0 --expect 1,5", "motors 1 to 4"),
+        ("torque4 0 0 0 0 --expect 0", "1 to 32"),
+        ("acceleration -5", "negative, and a motor may treat it as no limit"),
+        ("--speed-limit 0.9 speed 1", "--speed-limit: 0.9 °/s is outside 1 to 65535 °/s"),
+        ("--speed-limit=-1 speed 1", "give a number without a unit, 0 or more"),
+        ("--current-limit 32.1 torque 1", "--current-limit: 32.1 A is beyond ±32 A"),
+        ("--current-limit nan torque 1", "give a number without a unit, 0 or more"),
         ("pid 1 2", "a motor has six"),
         ("pid 1 2 3 4 5 256", "256"),
         ("raw 1 2 3 4 5 6 7 8 9", "8 bytes"),
@@ -285,6 +308,49 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
 def test_what_does_not_fit_is_not_sent(rmd, command, message):
     refused = rmd("--trace", *command.split()).ended(2)
     assert message in refused.err and "->" not in refused.err
+
+
+@on_every_port
+@pytest.mark.parametrize(
+    "limit, command, message",
+    [
+        ("--current-limit 1", "torque -1.01", "-1.008 A is beyond the limit of 0.992 A"),
+        ("--current-limit 1", "torque4 0 0 0 1.01", "motor 4: torque current 1.008 A"),
+        ("--current-limit 1", "raw a1 0 0 0 3f", "1.008 A is beyond the limit"),
+        ("--current-limit 1", "raw a0", "0xa0 may move the motor"),
+        ("--current-limit 62 --raw", "torque 63", "1.008 A is beyond the limit"),
+        ("--speed-limit 360", "speed 360.01", "360.01 °/s is beyond the limit of 360 °/s"),
+        ("--speed-limit 360.9", "position 90 --max-speed 361", "361.00 °/s is beyond the limit of 360 °/s"),
+        ("--speed-limit 360", "position 90 --max-speed 361 --wait", "beyond the limit"),
+        ("--speed-limit 360", "position 90", "add --max-speed"),
+        ("--speed-limit 360", "single-turn-position 90 cw", "add --max-speed"),
+        ("--speed-limit 360", "single-turn-position 90 cw --max-speed 361 --wait", "beyond the limit"),
+        ("--speed-limit 360", "raw a4", "carries no speed"),
+        ("--speed-limit 360", "run", "resumes the motion before the stop"),
+        ("--current-limit 1", "raw 88", "resumes the motion before the stop"),
+        ("--speed-limit 360 --id 1-3", "speed 361", "beyond the limit"),
+    ],
+)
+def test_what_exceeds_a_limit_is_not_sent(rmd, limit, command, message):
+    refused = rmd("--trace", *limit.split(), *command.split()).ended(2)
+    assert message in refused.err and "nothing was sent" in refused.err and "->" not in refused.err
+
+
+@pytest.mark.parametrize(
+    "limit, command",
+    [
+        ("--current-limit 1", "torque 1"),
+        ("--current-limit 1", "torque -1"),
+        ("--current-limit 1", "torque4 1 -1 0 0"),
+        ("--current-limit 62 --raw", "torque 62"),
+        ("--speed-limit 360", "speed -360"),
+        ("--speed-limit 360.9", "position 0 --max-speed 360.9"),
+        ("--speed-limit 360 --current-limit 1", "--id 1 off"),
+        ("--speed-limit 360 --current-limit 1", "raw 9a"),
+    ],
+)
+def test_a_value_equal_to_its_limit_is_sent(rmd, limit, command):
+    rmd(*limit.split(), *command.split()).ended(0)
 
 
 def test_a_serial_line_is_not_a_can_bus(run, drives):
@@ -301,7 +367,7 @@ def test_a_bare_interface_name_is_met_with_the_right_one(run):
 
 def test_a_motor_that_is_not_there_is_told(rmd):
     message = rmd("-i", 9, "status").ended(3).err
-    assert "motor 9 does not answer" in message and "motorlink rmd scan" in message
+    assert "motor 9 does not answer" in message and " scan` lists" in message
     assert "no motor answered" in rmd("scan", 9, 10).ended(3).err
 
 
@@ -323,6 +389,22 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     assert [line.split()[1] for line in message.out.splitlines()] == ["1", "3"]
     two, four = message.err.splitlines()
     assert "motor 2 does not answer" in two and "motor 4 does not answer" in four
+
+
+def test_torque4_waits_only_for_the_expected_motors(run, sim, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 3\n")
+    bus = sim(config, st=())
+    rmd = on(run, bus.port("slcan"))
+    replies = rmd("--json", "torque4", 0, 0, 0.5, 0, "--expect", "1,3").ended(0).lines
+    assert [(reply["motor"], reply["ok"]) for reply in replies] == [(1, True), (3, True)]
+    partly = rmd("torque4", 0, 0, 0, 0, "--expect", 1, "--expect", 2).ended(3)
+    assert [line.split()[1] for line in partly.out.splitlines()] == ["1"]
+    assert "motor 2 does not answer" in partly.err and "motor 4" not in partly.err
+    # The frame reaches a motor that is not expected to answer.
+    rmd("torque4", 0, 0, 0.5, 0, "--expect", 1).ended(0)
+    eventually(lambda: bus.motor(3)["angle_degrees"] > 10, "motor 3 turns")
+    rmd("-i", 3, "off").ended(0)
 
 
 def test_a_can_interface_that_is_absent_is_told(run):
@@ -380,7 +462,7 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
 
 def test_an_adapter_that_echoes_its_own_frames_is_not_a_motor(run, tmp_path):
     with device(tmp_path / "can", slcan_adapter(lambda frame: [frame])) as link:
-        message = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", "50ms", "off").ended(3).err
+        message = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", "50ms", "--id", 1, "off").ended(3).err
     assert "does not answer" in message
 
 

@@ -132,7 +132,7 @@ def test_raw_sends_any_frame(st):
 def test_trace_shows_both_directions_on_stderr(st):
     traced = st("--trace", "get", "MIN_APP_SPEED").ended(0)
     *opening, sent, received, confirmed, _ = traced.err.splitlines()
-    # A line to a drive that may have been asked before is brought in step first, and what was read is confirmed.
+    # A line to a drive that may have been asked before is brought in sync first, and what was read is confirmed.
     questions = ["GET_BOARD_INFO", "GET_REG STATUS", "GET_REG FLAGS", "GET_BOARD_INFO"]
     asked = [line for line in [*opening, confirmed] if "->" in line]
     assert all(question in line for question, line in zip(questions, asked, strict=True))
@@ -180,8 +180,10 @@ def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
         return run("st", "-p", port, "--profile", "mcsdk-5.4", *arguments)
 
     assert st("--json", "torque-ramp", 100, 50).ended(0).json["ok"]
-    assert st("--json", "position", 1.5, 0.5).ended(0).json["ok"]
-    assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1: move to -1.5 rad")
+    assert st("--json", "position", "1.5rad", "0.5s").ended(0).json["ok"]
+    assert st("move", "-90deg", "500ms").ended(0).out.startswith("motor 1: move to -1.5707964 rad (-90.0°) in 0.5 s")
+    assert "write 90deg or 90rad" in st("--trace", "position", 90, "1s").ended(2).err
+    assert "write 2ms or 2s" in st("position", "90deg", 2).ended(2).err
     assert st("info").ended(0).out.count("5.4.4") == 2
 
 
@@ -286,7 +288,7 @@ def test_an_unknown_code_of_a_refusal_has_no_empty_brackets(run, tmp_path):
 
 def test_a_motor_that_the_drive_lacks_is_refused_and_one_beyond_7_not_even_sent(st):
     assert "BAD_MOTOR_SELECTED" in st("-m", 3, "start").ended(1).err
-    assert "1..=7" in st("-m", 8, "start").ended(2).err
+    assert "1 to 7" in st("-m", 8, "start").ended(2).err
 
 
 def test_hexadecimal_that_is_none_is_told(st):
@@ -336,7 +338,7 @@ def test_a_silent_device_is_given_up_in_time(run, tmp_path):
         begun = time.monotonic()
         message = run("st", "-p", port, "--timeout", "100ms", "info").ended(3).err
         assert time.monotonic() - begun < 4
-    assert "no reply in time" in message and "motorlink st scan" in message
+    assert "no reply in time" in message and f"`motorlink st -p {port} scan`" in message
 
 
 def test_scan_tells_silence_from_garbage(run, tmp_path):
@@ -355,7 +357,7 @@ def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
         message = run("st", "-p", port, "--timeout", "200ms", "info").ended(3).err
         assert time.monotonic() - begun < 5
     # Noise may begin as a reply does.
-    said = ("motorlink st scan", "something else is sending", "the line lost bytes")
+    said = (" scan` tries the usual rates", "something else is sending", "the line lost bytes")
     assert any(words in message for words in said), message
 
 
@@ -420,7 +422,7 @@ def test_ctrl_c_ends_an_exchange_that_has_long_to_wait(start, tmp_path):
         assert waiting.wait(5) == 130
 
 
-@pytest.mark.parametrize("command", ["torque-ramp 100 50", "position 1.5 0.5"])
+@pytest.mark.parametrize("command", ["torque-ramp 100 50", "position 1.5rad 0.5s"])
 def test_what_the_profile_lacks_is_not_sent(run, command):
     refused = run("st", "-p", "sim:", "--trace", *command.split()).ended(2)
     assert "--profile mcsdk-5.4" in refused.err and "->" not in refused.err

@@ -60,7 +60,7 @@ def test_our_client_reads_on_when_the_line_is_back(check, motorlink, only):
 def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
     angle = "rmd --timeout 400ms angle --every 5ms --count 4"
     echo = f"{motorlink} {angle} -p $MOTORLINK_PORT?echo=1"
-    off = f"{motorlink} rmd --timeout 400ms off"
+    off = f"{motorlink} rmd --timeout 400ms --id 1 off"
     message = ["--timeout", "400ms", "--field", 2, "--echo", echo, "--off", off]
     code, cases = check("rmd", *message, "--", motorlink, *angle.split())
     assert failed(cases) == {}

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -95,7 +96,7 @@ def test_suggestions_that_turn_no_motor_are_kept(run, words, suggested):
     assert f"'{suggested}'" in run(*words.split()).ended(2).err
 
 
-@pytest.mark.parametrize(
+COMPLETED = pytest.mark.parametrize(
     "typed, completed",
     [
         ("st get SPEED_M", {"SPEED_MEAS"}),
@@ -106,8 +107,12 @@ def test_suggestions_that_turn_no_motor_are_kept(run, words, suggested):
         ("rmd --id 3", {"3", "30", "31", "32"}),
         ("rmd single-turn-position 90 co", {"counterclockwise"}),
         ("st registers --feature pf", {"pfc"}),
+        ("sim --profile m", {"mcsdk-5.4"}),
     ],
 )
+
+
+@COMPLETED
 def test_bash_completes_registers_profiles_gains_and_ids(run, typed, completed):
     script = run("completions", "bash").ended(0).out
     words = ["motorlink", *typed.split()]
@@ -116,6 +121,28 @@ def test_bash_completes_registers_profiles_gains_and_ids(run, typed, completed):
         ["bash"], input=f'{script}\n{ask}; echo "${{COMPREPLY[@]}}"\n', capture_output=True, text=True, timeout=10
     )
     assert set(done.stdout.split()) == completed, done.stderr
+
+
+@COMPLETED
+@pytest.mark.skipif(not shutil.which("fish"), reason="fish is not installed")
+def test_fish_completes_the_same(run, tmp_path, typed, completed):
+    script = run("completions", "fish").ended(0).out
+    ask = f'complete -C "motorlink {typed}"'
+    done = subprocess.run(
+        ["fish", "--no-config"], input=f"{script}\n{ask}\n", capture_output=True, text=True, timeout=20,
+        env={**os.environ, "HOME": str(tmp_path)}, cwd=tmp_path,
+    )
+    offered = {line.split("\t")[0] for line in done.stdout.splitlines()}
+    # fish also offers words that contain what was typed.
+    last = typed.split()[-1]
+    assert {word for word in offered if word.startswith(last)} == completed, done.stderr
+
+
+def test_fish_offers_no_files_where_a_command_takes_none(run):
+    script = run("completions", "fish").ended(0).out
+    using = "__fish_motorlink_using_subcommand"
+    assert f'-n "{using} rmd; and __fish_seen_subcommand_from status" -f\n' in script
+    assert f'-n "{using} sim; and __fish_seen_subcommand_from run" -f' not in script
 
 
 def test_manual_pages_keep_their_tables(run, tmp_path):

@@ -21,16 +21,19 @@ ST = [
     *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start --ramp 900 100 --speed-limit 1000", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
     *("revup-data", "revup-data 1 500 200 250", "current-reference 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
     *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS", "--raw revup-data"),
+    *("get TORQUE_REF --full-scale 16.5", "set TORQUE_REF 0.1 --full-scale 16.5", "revup-data --full-scale 16.5"),
 ]
 #: What the other profile has.
-MCSDK = ["torque-ramp 100 50", "position 1.5 0.5", "get SPEED_MEAS SC_RS", "status"]
+MCSDK = ["torque-ramp 100 50", "position 1.5rad 0.5s", "get SPEED_MEAS SC_RS", "status"]
 RMD = [
     *("scan 1 2", "status", "angle", "angle --every 5ms --count 2", "--raw status", "pid", "pid 1 2 3 4 5 6"),
-    *("acceleration", "acceleration 9", "encoder", "encoder-offset 5 --write-rom", "zero --write-rom", "off", "stop", "run"),
+    *("acceleration", "acceleration 9", "encoder", "encoder-offset 5 --write-rom", "zero --write-rom"),
+    *("off --id 1", "stop --id 1", "run"),
     *("torque 0.1", "speed 20", "position 10", "single-turn-position 45.5 cw --full-turn", "clear-errors"),
-    *("torque4 0 0 0 0", "raw 9a"),
+    *("torque4 0 0 0 0", "torque4 0 0 0 0 --expect 1,2", "torque 1 --current-limit 1", "raw 9a"),
+    *("status --gear-ratio 6 --encoder-bits 14", "encoder --encoder-bits 14", "acceleration 9 --gear-ratio 6"),
 ]
-SCAN = "`motorlink rmd scan` lists the motors that answer"
+SCAN = "`motorlink rmd -p sim: scan` lists the motors that answer"
 
 
 def check(text):
@@ -106,7 +109,7 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
         ("st -p sim: set STATUS 1", 1, {"kind": "refused", "motor": 1, "name": "SET_READ_ONLY", "code": 2}),
         ("st -p sim: -m 5 status", 1, {"kind": "refused", "motor": 5, "name": "BAD_MOTOR_SELECTED"}),
         ("st -p sim: get SPEED_MES", 2, {"kind": "usage", "port": "sim:"}),
-        ("st -p sim: position 1 1", 2, {"kind": "usage"}),
+        ("st -p sim: position 1rad 1s", 2, {"kind": "usage"}),
         ("st info", 2, {"kind": "usage"}),
         ("st -p sim: fly", 2, {"kind": "usage"}),
         ("st -p sim: get", 2, {"kind": "usage"}),

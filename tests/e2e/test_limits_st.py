@@ -26,13 +26,13 @@ on_every_port = pytest.mark.parametrize("st", PORTS, indirect=True)
         ("--speed-limit 1000", "set RAMP_FINAL_SPEED 1001", "over the limit"),
         ("--speed-limit 1000", "set RAMP_FINAL_SPEED 1001 --verify", "over the limit"),
         ("--speed-limit 1000", "revup-data 0 1001 100 100", "over the limit"),
-        ("--speed-limit 1000", "start", "st start --ramp RPM MS"),
-        ("--speed-limit 1000", "start-stop", "st start --ramp RPM MS"),
+        ("--speed-limit 1000", "start", " start --ramp RPM MS`"),
+        ("--speed-limit 1000", "start-stop", " start --ramp RPM MS`"),
         ("--speed-limit 1000", "start --ramp 1001 100", "over the limit"),
-        ("--speed-limit 1000", "raw 03 01", "st start --ramp RPM MS"),
+        ("--speed-limit 1000", "raw 03 01", " start --ramp RPM MS`"),
         ("--speed-limit 1000", "raw 07 e9 03 00 00 00 00", "over the limit"),
-        ("--speed-limit 1000 --profile mcsdk-5.4", "position 1 1", "carries no speed"),
-        ("--speed-limit 1000 --profile mcsdk-5.4", "position 1 1 --wait", "carries no speed"),
+        ("--speed-limit 1000 --profile mcsdk-5.4", "position 1rad 1s", "carries no speed"),
+        ("--speed-limit 1000 --profile mcsdk-5.4", "position 1rad 1s --wait", "carries no speed"),
         ("--current-limit 100", "current-reference 0 -101", "-101 s16A is over the limit of 100 s16A"),
         ("--current-limit 100", "revup-data 0 100 101 100", "over the limit"),
         ("--current-limit 100.9", "set TORQUE_REF 101", "over the limit"),
@@ -47,7 +47,7 @@ def test_what_exceeds_a_limit_is_not_sent(st, limit, command, message):
 
 @pytest.mark.parametrize("limit", ["--speed-limit=-1", "--speed-limit=nan", "--current-limit=-1", "--current-limit=x"])
 def test_a_limit_is_a_number_that_is_not_negative(st, limit):
-    assert "give a number, 0 or more" in st(limit, "status").ended(2).err
+    assert "give a number without a unit, 0 or more" in st(limit, "status").ended(2).err
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def test_no_line_of_an_event_crosses_a_text(picture):
             assert k < n and hidden, f"a line crosses `{text}`"
 
 
-# What is told.
+# Messages.
 
 
 def test_a_failed_expectation_says_by_how_much_and_when(run, write):
@@ -137,7 +137,7 @@ def test_a_failed_expectation_says_by_how_much_and_when(run, write):
         is = "IDLE"
     """)
     text = run("sim", "run", scenario).ended(1)
-    found = "0 rpm at 0.25 s, 300 rpm outside at least 300 rpm"
+    found = "0 rpm at 0.25 s, expected at least 300 rpm: off by 300 rpm"
     assert f"it turns by itself: st1.speed_rpm {found}" in text.err
     assert "1 of 2 expectations hold" in text.out and "it stays at rest" not in text.err
     told = run("sim", "run", scenario, "--json").ended(1).json

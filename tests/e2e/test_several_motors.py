@@ -24,7 +24,7 @@ def test_all_motors_come_to_rest(bench, rmd, command, mode):
     assert modes(bench) == ["speed"] * 4
     done = rmd("--json", command, "--all").ended(0)
     assert [(line["motor"], line["ok"]) for line in done.lines] == [(n, True) for n in (1, 2, 3, 4)]
-    assert "28 IDs do not answer" in done.err
+    assert "28 IDs did not answer 4 requests: no motor, or no supply" in done.err
     assert modes(bench) == [mode] * 4
 
 
@@ -34,6 +34,14 @@ def test_ids_without_a_motor_are_no_failure_at_the_default_timeout(run, command)
     assert [line["motor"] for line in done.lines] == [1, 2, 3, 4]
     done = run("rmd", "-p", "sim:", "--id", "1,9", command).ended(3)
     assert "motor 9 does not answer" in done.err
+
+
+@pytest.mark.parametrize("command", ["off", "stop"])
+def test_a_stop_without_ids_is_refused(bench, rmd, command):
+    rmd("--id", "1-4", "speed", 100).ended(0)
+    refused = rmd("--trace", command).ended(2).err
+    assert "name the motors: --id 1, or --all" in refused and "->" not in refused
+    assert modes(bench) == ["speed"] * 4
 
 
 @pytest.mark.parametrize("ids", [["--id", "1,3"], ["--id", "1", "--id", "3"], ["-i", "1,3-3"]])
@@ -66,12 +74,20 @@ def test_without_any_motor_all_is_a_failure(bench, run):
     assert "may still be turning" in run(*lost, "off", "--all").ended(3).err
 
 
-def test_motors_stop_on_a_bad_line(bench, rmd):
-    for seed in range(4):
+@pytest.mark.parametrize("loss", [0.05, 0.4])
+@pytest.mark.parametrize(("command", "mode"), [("off", "off"), ("stop", "stopped")])
+@pytest.mark.parametrize("ids", [["--all"], ["--id", "1-4"], ["--id", "1"]])
+def test_motors_stop_on_a_line_that_loses_frames(bench, run, rmd, loss, command, mode, ids):
+    for seed in range(3):
         rmd("--id", "1-4", "speed", 100).ended(0)
-        done = rmd("--fault", f"drop=0.01,seed={seed}", "stop", "--all")
-        if done.code == 0:
-            assert modes(bench) == ["stopped"] * 4
+        bad = ("--fault", f"drop={loss},seed={seed}")
+        done = run("rmd", "-p", bench.port("slcan"), *bad, command, *ids)
+        meant = modes(bench)[:1] if ids == ["--id", "1"] else modes(bench)
+        assert meant == [mode] * len(meant), done.err
+        # A motor without a confirmation is an error.
+        confirmed = len(done.out.splitlines())
+        assert (done.code == 0) == (confirmed == len(meant)) or "may still be turning" in done.err
+        assert done.code in (0, 3)
 
 
 def test_what_is_for_one_motor_refuses_several(rmd):

@@ -125,13 +125,13 @@ def test_rmd_programs_in_turn_read_their_own_values(pairs):
     rmd = pairs("rmd")
     for fate in fates(rmd):
         value = rmd.chance.randrange(1, 200)
-        rmd.first(["pid"], ["status"], ["off"], ["speed", 100], ["status", "--every", "20ms", "--count", 20])
+        rmd.first(["pid"], ["status"], ["--id", 1, "off"], ["speed", 100], ["status", "--every", "20ms", "--count", 20])
         rmd.line.fate, bad = Fate(), rmd.line.fate
         eventually(lambda: rmd.run("pid", *6 * [value])[0] == 0, "new gains")
         rmd.line.fate = bad
-        rmd.first(["pid"], ["status"], ["off"], ["speed", 100])
+        rmd.first(["pid"], ["status"], ["--id", 1, "off"], ["speed", 100])
         if rmd.chance.random() < 0.3:
-            code, _, (requests, _) = rmd.run("--timeout", "1s", "off")
+            code, _, (requests, _) = rmd.run("--timeout", "1s", "--id", 1, "off")
             rmd.judge(fate, code, OFF in rmd.line.requests[requests:])
             continue
         code, out, _ = rmd.run("--timeout", "1s", "pid")

@@ -1,4 +1,4 @@
-"""Both UARTs at once. Prints the exchange rates; there is no goal for them."""
+"""Both UARTs at once. Prints the exchange rates; no limit applies to them."""
 
 import threading
 import time

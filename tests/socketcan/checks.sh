@@ -169,7 +169,7 @@ check_cansend_makes_the_simulated_motors_answer() {
     await recorded_lines RX 1
     # 25 degrees, 24.0 V, no error.
     same "$(recorded RX)" '142 9A 19 00 F0 00 00 00 00'
-    # There is no reply to an unknown command, to a missing motor, or to a frame of another kind.
+    # No reply to an unknown command, to a missing motor, or to a frame of another kind.
     cansend can0 142#FF00000000000000
     cansend can0 145#9A00000000000000
     cansend can0 142#9A000000000000

@@ -1,7 +1,7 @@
 """Turns a motor and stays: turning.py PROTOCOL PORT MODE. What it is given on stdin ends it.
 
-PROTOCOL: st, rmd (slcan). PORT: a path of a pty, unix:PATH, or HOST:PORT. MODE: hold is silent after that; poll goes
-on asking; flood writes faster than the line carries.
+PROTOCOL: st, rmd (slcan). PORT: a path of a pty, unix:PATH, or HOST:PORT. MODE: hold is silent after
+that; poll reads again and again; flood writes faster than the line carries; command repeats the motion command.
 """
 
 import os
@@ -35,7 +35,10 @@ def answered(line, beginning):
     came = b""
     while beginning not in came:
         assert select.select([line], [], [], 20)[0], came
-        came += os.read(line, 4096)
+        received = os.read(line, 4096)
+        if not received:
+            raise OSError("the end of the line")
+        came += received
 
 
 protocol, port, mode = sys.argv[1:]
@@ -50,6 +53,8 @@ else:
     answered(line, b"t1418A2")
     question, reply = RMD_QUESTION, b"t1418"
 print("turns", flush=True)
+if mode == "command":
+    question = START if protocol == "st" else SPEED
 if mode == "hold":
     sys.stdin.read()
 try:

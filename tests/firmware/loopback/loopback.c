@@ -38,6 +38,19 @@ static int32_t get_register(void *context, uint8_t motor, motorlink_st_reg reg)
     return reg == MOTORLINK_ST_REG_SPEED_MEAS ? -1500 * motor : 0;
 }
 
+static void execute(void *context, uint8_t motor, motorlink_st_command command)
+{
+    (void)context;
+    (void)motor;
+    (void)command;
+}
+
+static void set_mode(void *context, const motorlink_rmd_motion *motion)
+{
+    (void)context;
+    (void)motion;
+}
+
 static void sense(void *context, motorlink_rmd_sense *out)
 {
     (void)context;
@@ -71,13 +84,15 @@ static int64_t angle(uint8_t motor)
 {
     motorlink_rmd_output todo;
     motorlink_can_frame reply;
+    int64_t centidegrees;
 
     OK(motorlink_rmd_host_request(&host, 1000, motor, motorlink_rmd_read_multi_turn_angle()));
     for (;;) {
         OK(motorlink_rmd_host_poll(&host, 1000, &todo));
         if (todo.kind == MOTORLINK_OUTPUT_DONE) {
             OK(todo.result);
-            return motorlink_rmd_decode_multi_turn_angle(todo.reply);
+            OK(motorlink_rmd_decode_multi_turn_angle(todo.reply, &centidegrees));
+            return centidegrees;
         }
         CHECK(todo.kind == MOTORLINK_OUTPUT_TRANSMIT);
         OK(motorlink_rmd_drive_receive(&drive, 1000, &todo.frame, &reply));
@@ -93,12 +108,14 @@ int main(void)
     static motorlink_rmd_drive_config config;
 
     st_motor.get_register = get_register;
+    st_motor.execute = execute;
     OK(motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 2, &st_motor));
     OK(motorlink_st_master_init(&master, sizeof master, NULL));
     OK(motorlink_st_master_trust_line(&master));
     CHECK(speed(1) == -1500);
     CHECK(speed(2) == -3000);
 
+    rmd_motor.set_mode = set_mode;
     rmd_motor.sense = sense;
     config.id = 7;
     OK(motorlink_rmd_drive_init(&drive, sizeof drive, &config, NULL, &rmd_motor));
