@@ -78,6 +78,7 @@ python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, exa
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 e2e: $(VENV)/ready ## 2 min: the program against independent clients
+	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
 
@@ -245,7 +246,7 @@ packages:
 	$(WHOLE)
 	-@$(if $(filter e2e python pages firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
 		tests/install python3-venv)
-	-@tests/install $(filter ffi-test firmware-test test-socketcan,$(PARTS))
+	-@tests/install $(filter e2e ffi-test firmware-test test-socketcan,$(PARTS))
 
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(BOARD) || rustup target add $(BOARD)
