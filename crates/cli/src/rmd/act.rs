@@ -52,6 +52,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::Run => {
             motor.run()?;
+            session.check_errors(id)?;
             session.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
         Act::Torque { amps } => {
@@ -185,22 +186,22 @@ fn set_torque4(session: &Session, amps: &[f64], expect: MotorSet) -> Result<(), 
     }
     let replies = session.bus.set_torque4(SetTorque4(torques), expect)?;
     let mut failures = Vec::new();
-    for (reply, id) in replies.into_iter().zip(1..) {
-        let object = session.line(id);
-        match reply {
-            Some(Ok(status)) => {
+    for (reply, id) in replies.into_iter().zip(MotorSet::TORQUE4) {
+        let Some(reply) = reply else { continue };
+        let taken = reply.map_err(Failure::from);
+        match taken.and_then(|status| session.check_errors(id).map(|()| status)) {
+            Ok(status) => {
                 let rows = session.rows(&status);
                 let rows = rows.map_err(|failure| failure.then("the motors took the torques"))?;
                 let texts: Vec<&str> = rows.iter().map(|row| row.text.as_str()).collect();
                 let text = format!("motor {id}  {}", texts.join("   "));
-                session.output.result(text, object.ok(true).values(&rows))?;
+                let object = session.line(id.number()).ok(true);
+                session.output.result(text, object.values(&rows))?;
             }
-            Some(Err(error)) => {
-                let id = error.motor().unwrap_or(session.motor()?.id());
-                let failure = session.of_motion(error.into(), id.number());
+            Err(failure) => {
+                let failure = session.of_motion(failure, id.number());
                 session.failed(id, failure, &mut failures)?;
             }
-            None => {}
         }
     }
     session.output.report_all(failures)

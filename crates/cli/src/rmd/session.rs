@@ -4,6 +4,7 @@ use motorlink::port::PortName;
 use motorlink::rmd::{Client, Limits, MotionStatus, Motor, MotorId, Options, Payload, Quantity};
 
 use super::args::MotorArgs;
+use crate::advice;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::{Line, RmdUnits, Row};
@@ -97,8 +98,27 @@ impl Session {
         self.output.rows(self.line(self.id).ok(true), &rows)
     }
 
-    /// Prints what the motor was commanded to do, and the state that it replied with.
+    /// Fails if the motor has an error. With one it answers motion commands and is off (docs/SPEC-NOTES.md
+    /// R18).
+    pub fn check_errors(&self, id: MotorId) -> Result<(), Failure> {
+        let status = self.bus.motor(id.number())?.status().map_err(|error| {
+            Failure::from(error).with_fact("the motor took the command, and its errors are unknown")
+        })?;
+        if status.errors.is_empty() {
+            return Ok(());
+        }
+        let (errors, volts) = (status.errors, self.shown(status.voltage));
+        Err(Failure::refused(format!(
+            "motor {id} answered and does not turn: it reports {errors} (supply {volts}, {})",
+            self.shown(status.temperature)
+        ))
+        .trying(advice::CLEAR_AND_REPEAT))
+    }
+
+    /// Prints what the motor was commanded to do, and the state that it replied with. Fails as
+    /// [`check_errors`](Self::check_errors).
     pub fn commanded(&self, what: String, status: &MotionStatus) -> Result<(), Failure> {
+        self.check_errors(self.motor()?.id())?;
         if !self.output.json {
             let text = format!("motor {} {what}; its state at the reply:", self.id);
             self.output.result(text, self.line(self.id))?;

@@ -6,6 +6,10 @@ use motorlink_proto::units::*;
 use super::{Client, Error, FullTurn};
 
 /// One motor on the bus. Every call is one exchange; its errors are those of [`Client::ask`].
+///
+/// A motor with an error answers motion commands and does not turn (docs/SPEC-NOTES.md R18).
+/// [`status`](Self::status) has the errors. The methods that move do not read them, because a control
+/// loop has one exchange for each cycle. Those that wait for the arrival do.
 #[derive(Clone, Copy)]
 pub struct Motor<'a> {
     bus: &'a Client,
