@@ -254,9 +254,14 @@ impl RmdMotor {
 
 impl MotorControl for RmdMotor {
     fn set_mode(&mut self, mode: Mode) {
+        let speed = self.speedometer.speed();
         if self.mode == Mode::Off {
             self.current.reset();
-            self.current.command(0.0, self.speedometer.speed(), self.plant.bus_voltage());
+            self.current.command(0.0, speed, self.plant.bus_voltage());
+        }
+        if mode == Mode::Stopped && self.mode != Mode::Stopped {
+            // The integral of a rotor that was held would turn it after its release.
+            self.cascade.follow(speed, 0.0);
         }
         self.mode = mode;
     }

@@ -367,3 +367,32 @@ fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
         }
     }
 }
+
+/// What a held rotor does after `command`, Stop and its release: the current while it is held (A), and
+/// how far it turns (°).
+fn released_after_stop(command: impl FnOnce(&mut NodeFixture)) -> (f32, f64) {
+    let mut bench = NodeFixture::new([RmdConfig::x8()]);
+    bench.world().plant_mut().lock(true);
+    command(&mut bench);
+    bench.wait(1000);
+    assert!(bench.truth().plant.iq > 5.0, "the rotor is held against the command");
+    bench.ask(Stop);
+    bench.wait(100);
+    let (held, angle) = (bench.truth().plant.iq, bench.truth().plant.angle_degrees);
+    bench.world().plant_mut().lock(false);
+    let seen = bench.watch(500);
+    (held, (seen.greatest - angle).max(angle - seen.least))
+}
+
+#[test]
+fn a_held_rotor_does_not_turn_after_a_stop_when_it_is_released() {
+    let after_speed = released_after_stop(|bench| _ = bench.ask(speed(360.0)));
+    let after_position = released_after_stop(|bench| _ = bench.ask(position(90.0)));
+    let after_torque = released_after_stop(|bench| {
+        bench.ask(SetTorque { iq: IqCommand::from_amps(10.0) });
+    });
+    for (held, turned) in [after_speed, after_position, after_torque] {
+        assert!(held.abs() < 0.3, "{held} A after the stop");
+        assert!(turned < 0.5, "{turned}° after the release");
+    }
+}

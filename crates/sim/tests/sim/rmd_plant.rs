@@ -132,6 +132,23 @@ fn a_weight_is_lifted_and_held() {
 }
 
 #[test]
+fn a_stop_holds_a_weight() {
+    let mut config = RmdConfig::x8();
+    config.plant.load.pendulum.mass = 1.0;
+    config.plant.load.pendulum.length = 0.2;
+    let mut bench = NodeFixture::new([config]);
+    bench.ask(output(&config, 90.0));
+    bench.wait(3000);
+    let before = bench.truth().plant.output_degrees;
+    bench.ask(Stop);
+    bench.wait(1000);
+    let truth = bench.truth().plant;
+    // It sinks until the integral of the speed loop has grown.
+    assert!((truth.output_degrees - before).abs() < 0.5, "{before}° -> {}°", truth.output_degrees);
+    assert!((0.1..0.35).contains(&truth.torque), "{} Nm", truth.torque);
+}
+
+#[test]
 fn an_end_stop_ends_a_move_and_the_way_back_is_free() {
     let mut config = RmdConfig::x8();
     let (stiffness, damping) = (200.0, 0.5);
