@@ -203,6 +203,28 @@ def test_a_motor_starts_turns_and_stops(run, sim):
     assert drive.motor(1)["status"] == "IDLE"
 
 
+def test_a_ramp_to_a_drive_with_a_fault_names_the_fault(run, sim):
+    drive = sim(rmd=())
+
+    def st(*arguments):
+        return run("st", "-p", drive.st, *arguments)
+
+    assert "executes while the motor runs" in st("ramp", 900, 100).ended(0).out
+    drive.do("fault", motor=1, fault="BREAK_IN", hold=True)
+    eventually(lambda: drive.motor(1)["status"] == "FAULT_NOW", "the fault")
+    text = st("ramp", 800, 100).ended(0).out
+    assert "ramp to 800 rpm in 100 ms acknowledged" in text and "executes" not in text
+    assert "its state is FAULT_NOW: BREAK_IN (" in text and ", present)" in text
+    assert "remove the cause, then `fault-ack`, then `start`" in text
+    values = st("--json", "ramp", 700, 100).ended(0).json["values"]
+    assert values["RAMP_FINAL_SPEED"]["value"] == 700 and values["STATUS"]["name"] == "FAULT_NOW"
+    assert "BREAK_IN" in str(values["FLAGS"])
+    # The cause is gone, and the fault still keeps the motor from starting.
+    drive.do("fault", motor=1, fault="BREAK_IN", hold=False)
+    eventually(lambda: drive.motor(1)["status"] == "FAULT_OVER", "the cause is gone")
+    assert "its state is FAULT_OVER: BREAK_IN (" in st("ramp", 800, 100).ended(0).out
+
+
 def test_a_fault_keeps_the_motor_from_starting_until_it_is_acknowledged(run, sim):
     drive = sim(rmd=())
 

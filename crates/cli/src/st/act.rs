@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use motorlink::st::{
     ArrivalOptions, Command as Execute, CurrentReference, Flags, PositionMove, Profile,
-    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, TorqueRamp, VERIFY_ATTEMPTS,
+    REVUP_PHASES, Ramp, Reading, RegisterId, Request, RevupPhase, TorqueRamp, VERIFY_ATTEMPTS,
     register::Unit,
 };
 use motorlink::time;
@@ -57,14 +57,25 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
             let held = mode::set_ramp(session, Ramp { speed_rpm: rpm, duration_ms: ms })?;
+            let fault = mode::fault(session)?;
+            let when = match &fault {
+                None => "it executes while the motor runs".to_owned(),
+                Some(fault) => format!(
+                    "the motor does not start: {}; remove the cause, then `fault-ack`, then `start`",
+                    fault.why
+                ),
+            };
             let text = format!(
-                "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs{}",
+                "{}: ramp to {rpm} rpm in {ms} ms acknowledged; {when}{}",
                 motor.number(),
                 held.note
             );
-            match held.bits {
-                Some(bits) => session.done_with(text, RegisterId::RAMP_FINAL_SPEED, bits),
-                None => session.done(text),
+            let held = held.bits.map(|bits| session.reading(RegisterId::RAMP_FINAL_SPEED, bits));
+            let fault = fault.into_iter().flat_map(|fault| fault.readings);
+            let readings: Vec<Reading> = held.into_iter().chain(fault).collect();
+            match readings.is_empty() {
+                true => session.done(text),
+                false => session.done_with(text, &readings),
             }
         }
         Act::TorqueRamp { iq, ms } => {
@@ -131,7 +142,8 @@ fn move_and_wait(session: &Session, target: PositionMove, wait: &Wait) -> Result
         " and holds no load",
     )?;
     let text = format!("{} arrived at {position_rad:.4} rad", motor.number());
-    session.done_with(text, RegisterId::CURRENT_POSITION, position_rad.to_bits() as i32)
+    let position = session.reading(RegisterId::CURRENT_POSITION, position_rad.to_bits() as i32);
+    session.done_with(text, &[position])
 }
 
 fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
@@ -186,7 +198,7 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
                 true => format!("{}: there were no faults", motor.number()),
                 false => format!("{}: {before} acknowledged, no faults left", motor.number()),
             };
-            return session.done_with(text, RegisterId::FLAGS, 0);
+            return session.done_with(text, &[session.reading(RegisterId::FLAGS, 0)]);
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);

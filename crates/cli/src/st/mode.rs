@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use motorlink::st::{
-    ControlMode, Effect, Error, Frame, MAX_FRAME, Profile, Ramp, Reading, RegisterId, Transcript,
+    ControlMode, Effect, Error, Flags, Frame, MAX_FRAME, NotStarted, Profile, Ramp, Reading,
+    RegisterId, Status, Transcript,
 };
 
 use super::session::Session;
@@ -61,6 +62,25 @@ fn readable(session: &Session, register: RegisterId) -> Result<Option<i32>, Fail
         Err(Error::Refused { .. }) => Ok(None),
         Err(error) => Err(error.into()),
     }
+}
+
+/// Why a start has no effect, with the values of STATUS and FLAGS.
+pub struct Fault {
+    pub why: NotStarted,
+    pub readings: [Reading; 2],
+}
+
+/// The faults of the drive; `None` if it has none, or refuses to read the two registers.
+pub fn fault(session: &Session) -> Result<Option<Fault>, Failure> {
+    let Some(state) = readable(session, RegisterId::STATUS)? else { return Ok(None) };
+    let status = Status::from(state as u8);
+    if !matches!(status, Status::FaultNow | Status::FaultOver) {
+        return Ok(None);
+    }
+    let Some(bits) = readable(session, RegisterId::FLAGS)? else { return Ok(None) };
+    let readings = [(RegisterId::STATUS, state), (RegisterId::FLAGS, bits)]
+        .map(|(id, bits)| session.reading(id, bits));
+    Ok(Some(Fault { why: NotStarted::Faults { status, flags: Flags(bits as u32) }, readings }))
 }
 
 /// The control mode that a start acts in.

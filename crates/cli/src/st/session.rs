@@ -100,10 +100,10 @@ impl Session {
         self.output.result(text, self.line().ok(true))
     }
 
-    /// As [`done`](Self::done), with the new value of a register.
-    pub fn done_with(&self, text: String, register: RegisterId, bits: i32) -> Result<(), Failure> {
-        let value = self.row(&self.reading(register, bits));
-        self.confirmed()?.result(text, self.line().ok(true).values(&[value]))
+    /// As [`done`](Self::done), with values of registers.
+    pub fn done_with(&self, text: String, readings: &[Reading]) -> Result<(), Failure> {
+        let rows: Vec<Row> = readings.iter().map(|reading| self.row(reading)).collect();
+        self.confirmed()?.result(text, self.line().ok(true).values(&rows))
     }
 
     /// Where results go, after a check that replies belong to their requests.
