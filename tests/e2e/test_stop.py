@@ -7,9 +7,9 @@ import pytest
 
 from peers import device, slcan_adapter
 from program import environment, eventually
-from st_wire import EXECUTE, Line, frame
+from st_wire import ACK, EXECUTE, TIMEOUT, Line, frame, nack
 
-STOP_MOTOR = 0x02
+GET_BOARD_INFO, STOP_MOTOR = 0x06, 0x02
 STOP_AGAIN = "repeat the stop; end other programs that use the port; if the motor still turns"
 #: GET_REG for motor 1 with 127 bytes that never come.
 CUT_OFF = b"\x22\x7f"
@@ -73,6 +73,27 @@ def test_a_failed_stop_says_that_the_motor_may_be_turning(run, tmp_path, form):
         assert STOP_AGAIN in error["try"]
     else:
         assert message.startswith("error: motor 1 may still be turning: ") and STOP_AGAIN in message
+
+
+@pytest.mark.parametrize("answers_info", [False, True])
+def test_a_stop_that_the_drive_does_not_receive_in_time_says_so(run, tmp_path, answers_info):
+    """A line that is too slow for the drive's time limit of a frame, or that loses bytes."""
+    heard = []
+    info = frame(GET_BOARD_INFO)
+
+    def answer(received):
+        heard.append(received)
+        return frame(ACK, b"ST MC SDK".ljust(32, b"\0")) if answers_info and received == info else nack(TIMEOUT)
+
+    stop = frame(1 << 5 | EXECUTE, [STOP_MOTOR])
+    with device(tmp_path / "slow", answer) as port:
+        message = run("st", "-p", port, "stop").ended(3).err
+        eventually(lambda: b"".join(heard).endswith(stop), "a stop as the last bytes")
+    assert message.startswith("error: motor 1 may still be turning: ") and STOP_AGAIN in message
+    assert "the drive did not understand what it received (TIMEOUT: " in message
+    assert "the line loses bytes, or its baud rate is too low for the drive's time limit of a frame" in message
+    assert b"".join(heard).count(stop) >= 5
+    assert b"".join(heard).count(b"\xff" * 130 + b"\x00\xff") == 3, "each repetition is padded"
 
 
 def test_a_stop_on_a_port_in_use_says_that_the_motor_may_be_turning(run, start, drives):

@@ -158,6 +158,8 @@ fn bytes_instead_of_an_answer_are_reported() {
         (vec![0xF0, 0x90], Failure::Damaged(Bad::Length(0x90))),
         (vec![0xF0, 0x00, 0x01], Failure::Damaged(Bad::Checksum { expected: 0xF0, received: 1 })),
         (vec![0xF0, 0x20, 0x00], Failure::Incomplete { received: 3 }),
+        (vec![0xFF, 0x01, 0x09, 0x0A], Failure::NotUnderstood(ErrorCode::Timeout)),
+        (vec![0xFF, 0x01, 0x0A, 0x0B], Failure::NotUnderstood(ErrorCode::BadCrc)),
         (vec![], Failure::Timeout),
     ];
     for (came, failure) in cases {

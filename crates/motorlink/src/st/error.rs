@@ -197,6 +197,9 @@ pub(super) fn advice(failure: Failure) -> &'static str {
         Failure::Size { fits: None, .. } => {
             "the line is damaged, or this is another's reply; try again"
         }
+        Failure::NotUnderstood(ErrorCode::Timeout) => {
+            "the line loses bytes, or its baud rate is too low for the drive's time limit of a frame; try again"
+        }
         Failure::NotUnderstood(_) => "the line to the drive loses or damages bytes; try again",
         Failure::Lost => "the next call tries again",
         Failure::Noise => "something else is sending on this line",

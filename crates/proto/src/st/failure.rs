@@ -36,7 +36,8 @@ pub enum Failure {
         fits: Option<Profile>,
     },
     /// The drive did not understand what it received. The cause may be an earlier stray byte
-    /// instead of this request (SPEC-NOTES S16).
+    /// instead of this request (SPEC-NOTES S16). On a line that was just opened, also: the drive
+    /// did not understand the question before the request.
     NotUnderstood(ErrorCode),
     /// Two different replies were received at once. It is unknown which one is the answer.
     Ambiguous,

@@ -67,7 +67,8 @@ pub(super) struct Question {
     /// Whether exactly one frame was received, the answer, and nothing else.
     is_alone: bool,
     received: Replies,
-    /// The failure of the first bytes outside a frame.
+    /// The failure of the first bytes outside a frame, or of the first frame that the drive did not
+    /// receive whole.
     trouble: Option<Failure>,
 }
 
@@ -130,21 +131,24 @@ impl Question {
             }
             match scanned {
                 Scanned::More | Scanned::Frame(HEADER_ATR, ..) => {}
-                Scanned::Frame(HEADER_NACK, 1, code) if !ErrorCode::from(code).is_damage() => {
-                    count(&mut self.received.refusals);
-                }
+                Scanned::Frame(HEADER_NACK, 1, code) => match ErrorCode::from(code) {
+                    code if code.is_damage() => self.fails(Failure::NotUnderstood(code)),
+                    _ => count(&mut self.received.refusals),
+                },
                 Scanned::Frame(HEADER_ACK, length, _) if length == self.answer_size() => {
                     count(&mut self.received.answers);
                 }
                 Scanned::Frame(HEADER_ACK, ..) => count(&mut self.received.others),
                 Scanned::Frame(..) => self.is_alone = false,
-                Scanned::Stray(failure) => {
-                    self.is_alone = false;
-                    self.trouble = self.trouble.or(Some(failure));
-                }
+                Scanned::Stray(failure) => self.fails(failure),
             }
         }
         self.received
+    }
+
+    fn fails(&mut self, failure: Failure) {
+        self.is_alone = false;
+        self.trouble = self.trouble.or(Some(failure));
     }
 
     /// Whether the answer was received, and nothing else.
