@@ -43,6 +43,19 @@ def test_a_stop_reaches_a_drive_that_waits_for_the_rest_of_a_frame(run, drive, p
         eventually(lambda: status(drive) == "IDLE", "the motor stops")
 
 
+def test_a_raw_stop_that_fails_names_the_command_that_completes_a_frame(run, drive):
+    words = ("st", "-p", drive.st, "--profile", "mcsdk-5.4")
+    run(*words, "start").ended(0)
+    write_cut_off(drive)
+    message = run(*words, "--timeout", "200ms", "raw", "03", "02").ended(3).err
+    assert message.startswith("error: motor 1 may still be turning: ")
+    assert "stop` repeats the stop and completes a cut-off frame" in message and STOP_AGAIN in message
+    assert status(drive) != "IDLE"
+    run(*words, "stop").ended(0)
+    eventually(lambda: status(drive) == "IDLE", "the motor stops")
+    assert "turning" not in run(*words, "raw", "02", "7f").ended(1).err
+
+
 def test_a_stop_after_wait_reaches_a_drive_that_waits_for_the_rest_of_a_frame(start, run, drive):
     words = ("st", "-p", drive.st, "--profile", "mcsdk-5.4", "--timeout", "200ms")
     run(*words, "start").ended(0)

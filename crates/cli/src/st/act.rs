@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use motorlink::st::{
-    ArrivalOptions, Command as Execute, CurrentReference, Flags, PositionMove, Profile,
-    REVUP_PHASES, Ramp, Reading, RegisterId, Request, RevupPhase, TorqueRamp, VERIFY_ATTEMPTS,
-    register::Unit,
+    ArrivalOptions, Command as Execute, CurrentReference, Effect, Flags, Frame, PositionMove,
+    Profile, REVUP_PHASES, Ramp, Reading, RegisterId, Request, RevupPhase, TorqueRamp,
+    VERIFY_ATTEMPTS, register::Unit,
 };
 use motorlink::time;
 
@@ -13,6 +13,7 @@ use super::args::{Act, Pfc, Wait};
 use super::read::explain;
 use super::session::Session;
 use super::{mode, set};
+use crate::advice;
 use crate::arrival;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -245,8 +246,19 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
             ));
         }
     };
-    let meaning = mode::meaning(session, code, payload);
-    let reply = session.client.raw(session.motor, code, payload)?;
+    let frame = Frame { header: Frame::header(code, session.motor), payload };
+    send(session, &frame).map_err(|failure| match Effect::of_frame(&frame) {
+        Effect::Stops => {
+            failure.trying_also(advice::STOP_PADS).of_stop(format!("motor {}", session.motor))
+        }
+        _ => failure,
+    })
+}
+
+/// Sends a raw frame and prints its reply.
+fn send(session: &Session, frame: &Frame<'_>) -> Result<(), Failure> {
+    let meaning = mode::meaning(session, frame);
+    let reply = session.client.raw(session.motor, frame.code(), frame.payload)?;
     let acknowledge =
         if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
     let text = match meaning {

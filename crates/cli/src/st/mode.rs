@@ -130,9 +130,8 @@ pub fn is_torque_command(register: RegisterId, bits: i32) -> bool {
 }
 
 /// What an acknowledged frame means, if it is not a read.
-pub fn meaning(session: &Session, code: u8, payload: &[u8]) -> Option<String> {
+pub fn meaning(session: &Session, frame: &Frame<'_>) -> Option<String> {
     let profile = session.client.profile();
-    let frame = Frame { header: Frame::header(code, session.motor), payload };
     let is_read = |profile| frame.request(profile).is_ok_and(|request| request.is_read());
     if Profile::ALL.into_iter().all(is_read) {
         return None;
@@ -140,7 +139,7 @@ pub fn meaning(session: &Session, code: u8, payload: &[u8]) -> Option<String> {
     let mut out = [0; MAX_FRAME];
     let bytes = frame.encode(&mut out)?;
     let mut text = format!("sent {}", Transcript::new(profile).note(true, bytes).trim());
-    if matches!(Effect::of_frame(&frame), Effect::Starts | Effect::Ramps | Effect::Supersedes) {
+    if matches!(Effect::of_frame(frame), Effect::Starts | Effect::Ramps | Effect::Supersedes) {
         text += "; the motor may turn now";
     }
     Some(text)
