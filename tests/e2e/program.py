@@ -54,6 +54,11 @@ def plain(line):
     }
 
 
+def halted(part):
+    """What a guard says of a part that has accepted its stop: it is stopped, or it is stopping."""
+    return f"{part} is stop"
+
+
 @dataclass
 class Outcome:
     """How a run of the program ended."""

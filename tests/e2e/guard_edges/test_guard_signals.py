@@ -7,7 +7,7 @@ import time
 import pytest
 
 from guarded import ENDING, PORT, SUSPENDING, rests, turns
-from program import environment
+from program import environment, halted
 
 
 @pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
@@ -25,7 +25,7 @@ def test_a_second_signal_does_not_keep_the_motors_from_being_stopped(
         for _ in range(3):
             process.process.send_signal(second)
         assert process.wait() == 0
-        assert any("the guard ends: motor 1 is stopped" in text for text in process.err), process.err
+        assert any("the guard ends: " + halted("motor 1") in text for text in process.err), process.err
         rests(drives, protocol)
         drives.end()
 
@@ -51,7 +51,7 @@ def test_a_guard_is_not_suspended(bench, guard, client, number):
     process.says("not suspended")
     program.kill()
     rests(drives, "st")
-    process.says("motor 1 is stopped")
+    process.says(halted("motor 1"))
 
 
 def test_what_a_guard_was_told_to_ignore_does_not_end_it(bench, guard, client, motorlink, tmp_path):

@@ -89,6 +89,9 @@ fn in_words(halt: &Halt, again: &str) -> String {
     let part = halt.part;
     match &halt.outcome {
         Outcome::Stopped(state) => format!("{part} is stopped ({state})"),
+        Outcome::Stopping(state) => {
+            format!("{part} is stopping ({state}): its rotor may still coast")
+        }
         Outcome::Unproven(state) => {
             format!("{part} acknowledged its stop, but its state is {state}{again}")
         }
@@ -106,7 +109,9 @@ fn as_json(halt: &Halt) -> Value {
     };
     object["stopped"] = halt.is_stopped().into();
     match &halt.outcome {
-        Outcome::Stopped(state) | Outcome::Unproven(state) => object["state"] = json!(state),
+        Outcome::Stopped(state) | Outcome::Stopping(state) | Outcome::Unproven(state) => {
+            object["state"] = json!(state);
+        }
         Outcome::Failed(error) => object["error"] = Failure::link(error).object(),
     }
     object

@@ -97,8 +97,10 @@ pub struct Halt {
 /// How a stop went.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
-    /// It rests, or is about to: the state in which it was seen, or what it acknowledged.
+    /// It rests: the state in which it was seen, or what it acknowledged.
     Stopped(String),
+    /// It acknowledged its stop and was seen in this state, in which the rotor may still coast.
+    Stopping(String),
     /// It acknowledged its stop and was seen in this state afterwards.
     Unproven(String),
     /// Whether it rests is not known, for this reason.
@@ -108,6 +110,6 @@ pub enum Outcome {
 impl Halt {
     /// Whether the part rests, or is about to.
     pub fn is_stopped(&self) -> bool {
-        matches!(self.outcome, Outcome::Stopped(_))
+        matches!(self.outcome, Outcome::Stopped(_) | Outcome::Stopping(_))
     }
 }

@@ -184,22 +184,22 @@ fn seen_to_stop(client: &Client, Stopped { motor, result }: Stopped) -> Option<H
             Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => return None,
             Err(error) => return Some(failed(error)),
         };
-        if rests(status) {
-            return Some(Halt { part, outcome: Outcome::Stopped(status.to_string()) });
+        let halt =
+            |outcome: fn(String) -> Outcome| Halt { part, outcome: outcome(status.to_string()) };
+        match status {
+            Status::Idle => return Some(halt(Outcome::Stopped)),
+            status if is_stopping(status) => return Some(halt(Outcome::Stopping)),
+            _ if std::time::Instant::now() > give_up => return Some(halt(Outcome::Unproven)),
+            _ => std::thread::sleep(STATUS_PERIOD),
         }
-        if std::time::Instant::now() > give_up {
-            return Some(Halt { part, outcome: Outcome::Unproven(status.to_string()) });
-        }
-        std::thread::sleep(STATUS_PERIOD);
     }
 }
 
-/// Whether a motor in this state turns no more, or is about to end.
-fn rests(status: Status) -> bool {
+/// Whether a motor in this state is about to rest: its rotor may coast.
+fn is_stopping(status: Status) -> bool {
     matches!(
         status,
-        Status::Idle
-            | Status::AnyStop
+        Status::AnyStop
             | Status::Stop
             | Status::StopIdle
             | Status::WaitStopMotor
