@@ -44,7 +44,8 @@ from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Sampling
 from motorlink._scan import Path, ScanResult, scanning
-from motorlink._st import StClient, StMotor
+from motorlink._st import StClient
+from motorlink._st_motor import StMotor
 from motorlink._values import (
     BoardInfo,
     ControlMode,

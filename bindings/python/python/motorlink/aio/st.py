@@ -23,7 +23,8 @@ from motorlink._core import StEventClient, StSampling, StVerifiedWrite
 from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
 from motorlink._scan import Path, ScanResult, scanning
-from motorlink._st import StClient, StMotor
+from motorlink._st import StClient
+from motorlink._st_motor import StMotor
 from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import (
