@@ -17,6 +17,7 @@ pub const STOP_PADS: &str = "`motorlink st stop` repeats the stop and completes 
 pub const CLEAR_AND_REPEAT: &str =
     "remove the cause, then `motorlink rmd clear-errors`, and repeat the command";
 const TRY_RATES: &str = "`motorlink st scan` tries the usual rates";
+const ACKNOWLEDGE: &str = "remove the cause, then `motorlink st fault-ack`";
 
 pub fn port(error: &PortError) -> Option<&'static str> {
     match error {
@@ -100,13 +101,11 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
              spec or --profile mcsdk-5.4",
         ),
         st::Error::NotArrived { why, .. } => not_arrived(why, |reason| match reason {
-            st::AbortReason::Faults(_) => Some("remove the cause, then `motorlink st fault-ack`"),
+            st::AbortReason::Faults(_) => Some(ACKNOWLEDGE),
             st::AbortReason::NotRunning(_) => Some("start the motor first: `motorlink st start`"),
             _ => None,
         }),
-        st::Error::NotStarted { why: st::NotStarted::Faults { .. }, .. } => {
-            Some("remove the cause, then `motorlink st fault-ack`")
-        }
+        st::Error::NotStarted { why: st::NotStarted::Faults { .. }, .. } => Some(ACKNOWLEDGE),
         st::Error::Limit { exceeded: st::LimitError::NoRamp { .. }, .. } => {
             Some("give the ramp with the start: `motorlink st start --ramp RPM MS`")
         }
