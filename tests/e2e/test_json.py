@@ -250,7 +250,7 @@ def test_a_guard_tells_what_it_proved(sim, checked):
 
 
 def test_simulated_drives_answer(sim):
-    drives = sim()
+    drives = sim("--json")
     drives.command("supply", motor=99, volts=3)
     drives.do("fault", port=drives.ports[0]["port"], motor=1, fault="BREAK_IN", hold=True)
     eventually(lambda: drives.motor(1, drives.ports[0]["port"])["faults"]["present"], "the fault")
