@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Iterator
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -145,6 +146,17 @@ def test_a_ratio_that_is_none_is_refused(ratio: Any) -> None:
             rmd.set_speed(1, gear_ratio=ratio)
 
 
+@pytest.mark.parametrize("ratio", ["6", [6], {1: "6"}, {1.5: 6}, {"1": 6}])
+def test_a_ratio_of_another_type_is_named(ratio: Any) -> None:
+    with pytest.raises(TypeError, match="gear_ratio is a number, or a dict of numbers by ID, not"):
+        rmd.open(Bench(), gear_ratio=ratio)
+
+
+def test_any_mapping_has_ratios_by_id() -> None:
+    with rmd.open(Bench(), gear_ratio=MappingProxyType({2: 9})) as client:
+        assert [client.motor(id).gear_ratio for id in (1, 2)] == [None, 9]
+
+
 def test_the_gear_is_in_asyncio_too() -> None:
     async def main(port: str) -> None:
         opened = motorlink.aio.rmd.open(
@@ -181,10 +193,3 @@ def test_encoder_counts_have_an_angle() -> None:
     for bits in (11, 19, 0, -14):
         with pytest.raises(motorlink.InvalidValueError, match="12 to 18 bits"):
             rmd.encoder_degrees(0, encoder_bits=bits)
-
-
-def test_motor_0_of_an_st_drive_is_refused() -> None:
-    with motorlink.st.open(Bench()) as client:
-        with pytest.raises(motorlink.InvalidValueError, match="give 1 for a drive with one motor"):
-            client.motor(0)
-        assert client.motor(1).number == 1

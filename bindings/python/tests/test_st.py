@@ -428,6 +428,11 @@ def test_a_motor_that_cannot_exist_is_refused_at_once(st_bus: st.Client, number:
         st_bus.motor(number)
 
 
+def test_motor_0_is_refused_with_the_number_to_give(st_bus: st.Client) -> None:
+    with pytest.raises(motorlink.InvalidValueError, match="give 1 for a drive with one motor"):
+        st_bus.motor(0)
+
+
 def test_a_scan_has_a_result_for_each_rate(served: Served, tmp_path: Path) -> None:
     found = st.scan(served.st, [115200, 9600], timeout=PATIENT)
     assert [(one.baud, one.kind) for one in found] == [(115200, "drive")]

@@ -1,36 +1,29 @@
 //! Gear ratios of the motors on a bus.
 
-use std::collections::BTreeMap;
-
 use motorlink::rmd::{GearRatio, MotorId, MotorSet};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyMapping;
 
 use super::gear::gear;
 use super::request::{RmdRequest, motor_id};
 use crate::error::invalid_value;
-
-/// The argument `gear_ratio` of `open`: of all motors, or by ID.
-#[derive(FromPyObject)]
-pub(crate) enum GearArgument {
-    All(f64),
-    Each(BTreeMap<i64, f64>),
-}
 
 /// The gear of each motor. A motor without one has values of the motor shaft.
 #[derive(Clone, Copy)]
 pub(crate) struct Gears([Option<GearRatio>; MotorId::COUNT]);
 
 impl Gears {
-    pub(super) fn new(py: Python<'_>, given: Option<GearArgument>) -> PyResult<Self> {
+    /// From the argument `gear_ratio` of `open`: of all motors, or by ID.
+    pub(super) fn new(py: Python<'_>, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut gears = [None; MotorId::COUNT];
-        match given {
-            None => {}
-            Some(GearArgument::All(ratio)) => gears.fill(gear(py, Some(ratio))?),
-            Some(GearArgument::Each(ratios)) => {
-                for (id, ratio) in ratios {
-                    gears[motor_id(py, id)?.index()] = gear(py, Some(ratio))?;
-                }
-            }
+        let Some(given) = given else { return Ok(Gears(gears)) };
+        if let Ok(ratio) = given.extract() {
+            gears.fill(gear(py, Some(ratio))?);
+            return Ok(Gears(gears));
+        }
+        for (id, ratio) in by_id(given).map_err(|_| wrong_type(given))? {
+            gears[motor_id(py, id)?.index()] = gear(py, Some(ratio))?;
         }
         Ok(Gears(gears))
     }
@@ -64,4 +57,14 @@ impl Gears {
             ),
         ))
     }
+}
+
+fn by_id(given: &Bound<'_, PyAny>) -> PyResult<Vec<(i64, f64)>> {
+    given.cast::<PyMapping>()?.items()?.extract()
+}
+
+fn wrong_type(given: &Bound<'_, PyAny>) -> PyErr {
+    PyTypeError::new_err(format!(
+        "gear_ratio is a number, or a dict of numbers by ID, not {given:?}"
+    ))
 }

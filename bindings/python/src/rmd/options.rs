@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::gear::behind;
-use super::gears::{GearArgument, Gears};
+use super::gears::Gears;
 use crate::number::{limit, span};
 
 /// The checked arguments of `open`.
@@ -33,7 +33,7 @@ impl RmdOptions {
         current_limit_amps: Option<f64>,
         speed_limit_dps: Option<f64>,
         angle_limit_degrees: Option<f64>,
-        gear_ratio: Option<GearArgument>,
+        gear_ratio: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let limits =
             |gear| limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees, gear);
