@@ -406,9 +406,23 @@ impl Harness {
             [] => "nothing".to_owned(),
             bytes => format!("{}  {words}", Hex(bytes)),
         };
-        let sent = said(&self.sent, words.note(true, &self.sent));
+        let mut sent = said(&self.sent, words.note(true, &self.sent));
+        if let Some(register) = self.register_sent().filter(|id| id.shape().is_some()) {
+            sent += &format!("; {register} has the id {:#04x}", register.0);
+        }
         let received = said(&self.received, words.note(false, &self.received));
         Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received, reading: None }))
+    }
+
+    /// The register that the sent frame reads or writes.
+    fn register_sent(&self) -> Option<RegisterId> {
+        let Parse::Frame(frame, _) = Frame::parse(&self.sent) else { return None };
+        match frame.request(self.profile()) {
+            Ok(Request::GetRegister(register) | Request::SetRegister { register, .. }) => {
+                Some(register)
+            }
+            _ => None,
+        }
     }
 
     /// Number of bytes that the line transmits within the reception timeout, with a margin.

@@ -8,3 +8,4 @@ mod readings;
 mod shared;
 mod slow;
 mod suite;
+mod words;

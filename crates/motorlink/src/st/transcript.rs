@@ -83,6 +83,11 @@ impl Transcript {
             Request::GetRevupData(phase) | Request::SetRevupData(phase, _) => {
                 format!("{code} phase {phase}{motor}")
             }
+            Request::GetSegment(segment) => format!("{code} segment {segment}{motor}"),
+            Request::ConfigureSegment { segment, registers } => {
+                let names = registers.iter().map(|&id| format!(" {}", RegisterId(id)));
+                format!("{code} segment {segment}:{}{motor}", names.collect::<String>())
+            }
             _ => format!("{code}{motor}"),
         }
     }
@@ -144,6 +149,15 @@ mod tests {
         assert_eq!(transcript.note(true, &[0x02, 0x01, 0x1E, 0x00]), "not a frame");
         let refusal = transcript.note(false, &[0xFF, 0x01, 0x0B, 0x0C]);
         assert!(refusal.starts_with("NACK BAD_MOTOR_SELECTED"), "{refusal}");
+    }
+
+    #[test]
+    fn a_data_segment_has_the_names_of_its_registers() {
+        let mut transcript = Transcript::new(Profile::Spec);
+        let configure = transcript.note(true, &[0x2E, 0x03, 0x00, 0x02, 0xEE, 0x22]);
+        assert_eq!(configure, "CONFIG_DYN_STRUCT segment 0: STATUS 0xee, motor 1");
+        let read = transcript.note(true, &[0x2D, 0x01, 0x03, 0x31]);
+        assert_eq!(read, "GET_DATA_ELEMENT segment 3, motor 1");
     }
 
     #[test]
