@@ -149,8 +149,7 @@ def test_a_start_that_was_not_sent_does_not_say_that_the_motor_turns(run, tmp_pa
 def into_a_full_disk(motorlink, *words):
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [motorlink, *words],
-            **{"stdout": full, "stderr": subprocess.PIPE, "text": True, "env": environment()},
+            [motorlink, *words], stdout=full, stderr=subprocess.PIPE, text=True, env=environment()
         )
     assert done.returncode == 3
     return done.stderr

@@ -35,19 +35,6 @@ def drive(drives: list[Drive]) -> Drive:
     return drives[3]
 
 
-def test_a_start_with_a_fault_raises(served: Served) -> None:
-    async def main() -> None:
-        async with aio.st.open(served.st) as bus:
-            motor = bus.motor(1)
-            served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
-            while not await motor.flags():
-                pass
-            with pytest.raises(motorlink.RefusedError, match="OVER_TEMP"):
-                await motor.start()
-
-    asyncio.run(main())
-
-
 async def within(seconds: float, awaitable: Awaitable[T]) -> T:
     """A test that hangs fails."""
     return await asyncio.wait_for(awaitable, seconds)
@@ -337,6 +324,19 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
         return told
 
     assert asyncio.run(awaited()) == blocking()
+
+
+def test_a_start_with_a_fault_raises(served: Served) -> None:
+    async def main() -> None:
+        async with aio.st.open(served.st) as bus:
+            motor = bus.motor(1)
+            served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
+            while not await motor.flags():
+                pass
+            with pytest.raises(motorlink.RefusedError, match="OVER_TEMP"):
+                await motor.start()
+
+    asyncio.run(within(20, main()))
 
 
 def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:

@@ -71,9 +71,11 @@ RMD_FULL_TURN_TOLERANCE: float
 RMD_QUARANTINE: float
 #: IDs that a scan asks at once.
 RMD_SCAN_WIDTH: int
-#: How long a reply is awaited, s.
+#: How often a stop is sent at least, before it has failed.
 RMD_STOP_ATTEMPTS: int
+#: How long a stop is repeated at least, s.
 RMD_STOP_TIME: float
+#: How long a reply is awaited, s.
 RMD_TIMEOUT: float
 #: How often a verified write is tried.
 ST_ATTEMPTS: int

@@ -277,7 +277,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
 
         ``break`` ends the sampling and does not stop a motor. An error or Ctrl-C is raised in the loop, after
-        the rows that were read before. The end of ``with`` then stops the motors that this client moved.
+        the rows that were read before. The end of ``with`` then stops motors, as ``on_close`` says.
         After an error the iterator has no more rows: call ``samples`` again.
         """
         return self._sampling(quantities, rate, seconds, motor, raw, on_error)

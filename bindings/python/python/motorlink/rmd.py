@@ -8,8 +8,7 @@
 24.0
 
 Units are °, °/s, °/s² and A, all at the motor shaft, or at the output shaft with ``open(gear_ratio=6)``.
-Positive is clockwise. Each method of a motor is one
-exchange and raises
+Positive is clockwise. Each method of a motor is one exchange, unless its docstring says otherwise, and raises
 
 * ``ReplyTimeoutError`` if the motor does not reply. It is unknown whether it executed the request. A
   motor that does not know a command does not reply either,
