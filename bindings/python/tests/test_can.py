@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import builtins
 import contextlib
+import queue
 import signal
 import subprocess
 import sys
@@ -152,6 +153,38 @@ def test_an_exception_of_the_bus_is_the_cause_of_a_lost_line() -> None:
         with pytest.raises(motorlink.LinkError) as lost:
             motors.motor(1).motion_status()
         check(lost.value)
+    bus.shutdown()
+
+
+class Altering(can.bus.BusABC):
+    """A motor that answers at once, with other content than it has to repeat."""
+
+    def __init__(self) -> None:
+        super().__init__(channel="altering")
+        self.channel_info = "altering"
+        self.stops = 0
+        self._replies: queue.Queue[can.Message] = queue.Queue()
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.stops += msg.data[0] == 0x81
+        data = bytes([msg.data[0], *range(1, 8)])
+        reply = can.Message(arbitration_id=msg.arbitration_id, data=data, is_extended_id=False)
+        self._replies.put(reply)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        try:
+            return self._replies.get(timeout=timeout), False
+        except queue.Empty:
+            return None, False
+
+
+def test_stops_that_fail_at_once_are_repeated_with_a_pause() -> None:
+    bus = Altering()
+    with rmd.open(from_python_can(bus), on_close="nothing") as motors:
+        with pytest.raises(motorlink.LinkError, match="another content"):
+            motors.motor(1).stop()
+    # One in 10 ms.
+    assert 4 <= bus.stops <= 210
     bus.shutdown()
 
 

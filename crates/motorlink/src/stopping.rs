@@ -14,13 +14,13 @@ pub const STOP_TIME: Micros = Micros::from_millis(2_000);
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// The pause before the next attempt on an open port. A reply that is still on its way arrives in it.
-const PAUSE: Micros = Micros::from_millis(10);
+pub const STOP_PAUSE: Micros = Micros::from_millis(10);
 
 /// Waits before the next attempt. If the port is closed: until it may be opened again, though not
 /// for long.
 pub(crate) fn await_retry(state: LinkState, clock: &Clock) {
     match state {
         LinkState::Closed { retry_in } => std::thread::sleep(retry_in.min(PATIENCE)),
-        LinkState::Open => clock.wait(clock.now() + PAUSE),
+        LinkState::Open => clock.wait(clock.now() + STOP_PAUSE),
     }
 }

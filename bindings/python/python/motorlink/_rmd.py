@@ -413,6 +413,7 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
             except (LinkError, ReplyTimeoutError):
                 if attempts >= _core.RMD_STOP_ATTEMPTS and client._now() >= give_up:
                     raise
+                yield client._pause(_core.RMD_STOP_PAUSE)
             else:
                 return
 

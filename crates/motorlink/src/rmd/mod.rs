@@ -37,4 +37,4 @@ pub use options::Options;
 pub use stop_on_drop::{StopOnDrop, Stopped};
 pub use stopping::{StopAction, Stopping};
 
-pub use crate::stopping::{STOP_ATTEMPTS, STOP_TIME};
+pub use crate::stopping::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
