@@ -111,7 +111,8 @@ def test_cancelled_exchanges_do_not_affect_others(
             assert descriptor is not None
             await bus.close()
             assert not loop.remove_reader(descriptor), "nothing watches it any more"
-        assert sorted(os.listdir("/proc/self/fd")) == sorted(before)
+        # Those of earlier tests may be closed meanwhile.
+        assert set(os.listdir("/proc/self/fd")) <= set(before)
 
     asyncio.run(within(60, main()))
     assert cancelled and answered
