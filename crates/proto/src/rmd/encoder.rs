@@ -49,13 +49,14 @@ impl EncoderBits {
     /// Multi-turn counts as a frame carries them: within the turn, at most 16 bits.
     pub(super) fn narrow(self, counts: i64) -> u16 {
         let unused = 16u32.saturating_sub(self.width());
-        let wire = counts.wrapping_shr(self.dropped()) as u16;
+        // The result is within the lower 32 bits, whose shift is one instruction.
+        let wire = (counts as u32).wrapping_shr(self.dropped()) as u16;
         wire.wrapping_shl(unused).wrapping_shr(unused)
     }
 
     /// Encoder counts of a value from a frame.
     pub(super) fn widen(self, counts: u16) -> i64 {
-        i64::from(counts).wrapping_shl(self.dropped())
+        i64::from(u32::from(counts).wrapping_shl(self.dropped()))
     }
 
     /// Counts from zero as an angle, rounded down to a digit.
@@ -75,16 +76,23 @@ impl EncoderBits {
         // 36000 is 1125 << 5, so 18 bits of encoder fit into 32-bit arithmetic.
         let scaled = rest.wrapping_shl(self.width().saturating_sub(5));
         let within = scaled.wrapping_add(1125 / 2) / 1125;
-        i64::from(turns).wrapping_shl(self.width()).wrapping_add(i64::from(within))
+        i64::from(turns).wrapping_mul(self.turn()).wrapping_add(i64::from(within))
     }
 
     /// Counts reduced to one turn.
     pub(super) fn within_turn(self, counts: i64) -> i64 {
-        counts & 1i64.wrapping_shl(self.width()).wrapping_sub(1)
+        counts & self.turn().wrapping_sub(1)
+    }
+
+    /// Counts of a turn.
+    fn turn(self) -> i64 {
+        // Not a shift of 64 bits, which is a call on a Cortex-M.
+        i64::from(1u32.wrapping_shl(self.width()))
     }
 
     fn width(self) -> u32 {
-        u32::from(self.0)
+        // `& 31` tells the compiler that no shift by the width is longer than a word.
+        u32::from(self.0) & 31
     }
 
     /// Low bits that a frame does not carry.
