@@ -5,16 +5,19 @@
 macro_rules! named_numbers {
     (
         $(#[$meta:meta])*
-        pub enum $name:ident: $repr:ty {
+        pub enum $name:ident: $repr:ident {
             $( $value:literal $variant:ident $text:literal $doc:literal; )+
         }
     ) => {
         $(#[$meta])*
+        // The discriminants are the numbers, so that conversions need no tables.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[repr($repr)]
         pub enum $name {
-            $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)] $variant, )+
+            $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)]
+               $variant = $value, )+
             /// A number without a name in the document.
-            Unknown($repr),
+            Unknown($repr) = $repr::MAX,
         }
 
         impl $name {
