@@ -1,7 +1,7 @@
 //! The slave: takes bytes, returns replies (4.1).
 
 use super::payload::Payload;
-use super::register::{Shape, Type, Unit, Writing};
+use super::register::{Conversion, Row, Type, Writing};
 use super::{
     BoardInfo, Command, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
     HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, MotorControl, MotorNumber, Parse, Profile,
@@ -171,9 +171,10 @@ impl Slave {
                 return Ok(0);
             }
             Request::GetRegister(register) => {
-                let size = register.read_size(self.profile, features);
+                let row = register.row().ok_or(ErrorCode::GetWriteOnly)?;
+                let size = row.read_size(self.profile, features);
                 let size = size.ok_or(ErrorCode::GetWriteOnly)?;
-                out.value(read(self.profile, motor, register, drive), size);
+                out.value(read(self.profile, motor, register, row, drive), size);
             }
             Request::ExecuteCommand(command) => {
                 execute(self.profile, motor, command, features, drive)?
@@ -209,13 +210,16 @@ impl Slave {
             Request::GetSegment(segment) => {
                 let segment = self.segments.get(usize::from(segment)).ok_or(ErrorCode::WrongSet)?;
                 for register in segment.registers() {
-                    let size = register.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
-                    out.value(read(self.profile, motor, register, drive), size);
+                    let row = register.row().ok_or(ErrorCode::GetWriteOnly)?;
+                    let size = row.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
+                    out.value(read(self.profile, motor, register, row, drive), size);
                 }
             }
             Request::ConfigureSegment { segment, registers } => {
                 let slot = self.segments.get_mut(usize::from(segment));
-                let fits = |&id: &u8| RegisterId(id).segment_size(features).is_some();
+                let fits = |&id: &u8| {
+                    RegisterId(id).row().is_some_and(|row| row.segment_size(features).is_some())
+                };
                 let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
             }
@@ -241,9 +245,9 @@ impl Slave {
         value: &[u8],
         drive: &mut impl MotorControl,
     ) -> Result<(), ErrorCode> {
-        let shape = register.shape().ok_or(ErrorCode::SetReadOnly)?;
+        let row = register.row().ok_or(ErrorCode::SetReadOnly)?;
         let features = drive.features(motor);
-        let size = match shape.writing(self.profile, features) {
+        let size = match row.writing(self.profile, features) {
             Writing::Takes(size) => usize::from(size),
             Writing::ReadOnly => return Err(ErrorCode::SetReadOnly),
             Writing::Refused => return Err(ErrorCode::WrongSet),
@@ -253,19 +257,20 @@ impl Slave {
             if self.profile == Profile::Mcsdk54 {
                 return Err(ErrorCode::WrongSet);
             }
-            bytes = read(self.profile, motor, register, drive).to_le_bytes();
+            bytes = read(self.profile, motor, register, row, drive).to_le_bytes();
         }
         for (slot, byte) in bytes.iter_mut().zip(value.iter().take(size)) {
             *slot = *byte;
         }
-        let bits = shape.ty.fit(i32::from_le_bytes(bytes));
+        let bits = row.table_type().fit(i32::from_le_bytes(bytes));
         match register {
             RegisterId::TARGET_MOTOR => {
                 let number = (bits as u8).saturating_add(1);
                 self.select(number).ok_or(ErrorCode::WrongSet)
             }
             RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
-                if RegisterId(bits as u8).shows_on_dac(features) {
+                let shown = RegisterId(bits as u8).row();
+                if shown.is_some_and(|row| row.shows_on_dac(features)) {
                     return drive.set_register(motor, register, bits);
                 }
                 // Firmware acknowledges registers that it cannot show; a slave of profile `spec`
@@ -275,7 +280,7 @@ impl Slave {
                     Profile::Mcsdk54 => Ok(()),
                 }
             }
-            _ => drive.set_register(motor, register, to_drive(self.profile, &shape, bits)),
+            _ => drive.set_register(motor, register, to_drive(self.profile, row, bits)),
         }
     }
 
@@ -323,27 +328,27 @@ fn read(
     profile: Profile,
     motor: MotorNumber,
     register: RegisterId,
+    row: Row,
     drive: &mut impl MotorControl,
 ) -> i32 {
     if register == RegisterId::TARGET_MOTOR {
         return i32::from(motor.number() - 1);
     }
     let bits = drive.get_register(motor, register);
-    let Some(shape) = register.shape() else { return bits };
-    match (profile, shape.unit) {
-        (Profile::Spec, Unit::Percent) => bits / 10,
+    match (profile, row.conversion()) {
+        (Profile::Spec, Conversion::Percent) => bits / 10,
         // Table 3 has no sign for some values that can be negative (SPEC-NOTES S23).
-        (Profile::Spec, _) if shape.ty == Type::U16 => bits.max(0),
-        (Profile::Mcsdk54, Unit::Rpm) if shape.ty != Type::F32 => speed(profile, bits),
+        (Profile::Spec, _) if row.table_type() == Type::U16 => bits.max(0),
+        (Profile::Mcsdk54, Conversion::Speed) => speed(profile, bits),
         _ => bits,
     }
 }
 
 /// A received value as the drive gets it.
-fn to_drive(profile: Profile, shape: &Shape, bits: i32) -> i32 {
-    match shape.unit {
-        Unit::Rpm if shape.ty != Type::F32 => speed(profile, bits),
-        Unit::Percent if profile == Profile::Spec => bits.saturating_mul(10),
+fn to_drive(profile: Profile, row: Row, bits: i32) -> i32 {
+    match row.conversion() {
+        Conversion::Speed => speed(profile, bits),
+        Conversion::Percent if profile == Profile::Spec => bits.saturating_mul(10),
         _ => bits,
     }
 }

@@ -2,8 +2,9 @@
 
 use super::feature::Features;
 use super::id::RegisterId;
+use super::row::Row;
 use super::shape::{Shape, Text, Writing};
-use super::table::{IDS, INDEX, SHAPES, TEXTS};
+use super::table::{IDS, INDEX, ROWS, TEXTS, UNITS};
 use crate::st::Profile;
 use core::fmt;
 
@@ -16,32 +17,22 @@ impl RegisterId {
 
     /// Type, unit, access and feature; `None` for an unknown id.
     pub fn shape(self) -> Option<Shape> {
-        SHAPES.get(self.row()?).map(|packed| packed.shape())
+        let unit = *UNITS.get(self.place()?)?;
+        Some(Shape::new(self.row()?, unit))
     }
 
-    // For slaves: a call of one of these is smaller than a shape by value.
-
+    // One function for all calls takes less flash.
     #[inline(never)]
-    pub(in crate::st) fn read_size(self, profile: Profile, features: Features) -> Option<u8> {
-        self.shape()?.read_size(profile, features)
-    }
-
-    #[inline(never)]
-    pub(in crate::st) fn segment_size(self, features: Features) -> Option<u8> {
-        self.shape()?.segment_size(features)
-    }
-
-    #[inline(never)]
-    pub(in crate::st) fn shows_on_dac(self, features: Features) -> bool {
-        self.shape().is_some_and(|shape| shape.shows_on_dac(features))
+    pub(in crate::st) fn row(self) -> Option<Row> {
+        ROWS.get(self.place()?)
     }
 
     /// Name and description; `None` for an unknown id.
     pub fn text(self) -> Option<&'static Text> {
-        TEXTS.get(self.row()?)
+        TEXTS.get(self.place()?)
     }
 
-    fn row(self) -> Option<usize> {
+    fn place(self) -> Option<usize> {
         INDEX.row(u16::from(self.0))
     }
 

@@ -10,6 +10,7 @@ mod feature;
 mod id;
 mod index;
 mod lookup;
+mod row;
 mod shape;
 mod table;
 mod typed;
@@ -18,6 +19,7 @@ mod value;
 
 pub use feature::{Feature, Features};
 pub use id::RegisterId;
+pub(in crate::st) use row::{Conversion, Row};
 pub use shape::{Access, Origin, Shape, Text, Writing};
 pub use table::*;
 pub use typed::{Dac, Never, ReadOnly, ReadWrite, Readable, Register, Writable, WriteOnly};

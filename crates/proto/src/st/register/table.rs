@@ -8,7 +8,8 @@
 use super::feature::Feature;
 use super::id::RegisterId;
 use super::index::{Index, runs};
-use super::shape::{Access, Origin, Packed, REFUSED, Shape, Text};
+use super::row::{REFUSED, Row, Rows, distinct};
+use super::shape::{Access, Origin, Text};
 use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;
@@ -34,15 +35,20 @@ macro_rules! registers {
         /// The row of every id.
         pub(super) const INDEX: Index<{ runs(&[$($id),+]) }> = Index::new(&[$($id),+]);
 
-        /// Every register, in the order of the ids.
-        pub(super) static SHAPES: [Packed; IDS.len()] = [
-            $( Packed::new(Shape::new(
+        const COLUMNS: [Row; IDS.len()] = [
+            $( Row::new(
                 (<$ty as Value>::TYPE, Unit::$unit, Access::$access, Feature::$feature,
                  Origin::$origin),
                 <mcsdk_type!($ty $($mcsdk)?) as Value>::TYPE,
                 optional_pair!($($get, $set)?),
-            )), )+
+            ), )+
         ];
+
+        /// What a slave needs of every register, in the order of the ids.
+        pub(super) static ROWS: Rows<{ IDS.len() }, { distinct(&COLUMNS) }> = Rows::new(&COLUMNS);
+
+        /// The unit of every register, in the order of the ids.
+        pub(super) static UNITS: [Unit; IDS.len()] = [$( Unit::$unit, )+];
 
         /// The texts of every register, in the order of the ids.
         pub static TEXTS: [Text; IDS.len()] = [$( Text { name: stringify!($name), doc: $doc }, )+];

@@ -17,14 +17,6 @@ macro_rules! units {
             pub const fn symbol(self) -> &'static str {
                 match self { $( Unit::$name => $symbol, )+ }
             }
-
-            /// The unit with this discriminant.
-            pub(super) const fn from_number(number: u8) -> Self {
-                match number {
-                    $( n if n == Unit::$name as u8 => Unit::$name, )+
-                    _ => Unit::None,
-                }
-            }
         }
     };
 }
