@@ -72,6 +72,11 @@ pub enum motorlink_error {
 pub const MOTORLINK_OK: i32 = 0;
 
 impl motorlink_error {
+    /// For `?`.
+    pub(crate) fn check(self) -> Result<(), Self> {
+        if self == Self::Ok { Ok(()) } else { Err(self) }
+    }
+
     const fn text(self) -> &'static CStr {
         match self {
             Self::Ok => c"done",

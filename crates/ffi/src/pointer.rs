@@ -60,19 +60,20 @@ macro_rules! promised {
 pub(crate) use promised;
 
 fn check<T>(pointer: *const T) -> Result<()> {
-    check_address(pointer.addr(), align_of::<T>())
+    check_address(pointer.addr(), align_of::<T>()).check()
 }
 
-// One function for pointers of all types takes less flash.
+// One function for pointers of all types takes less flash. It gives the number that C gets, so that
+// a caller only has to pass it on.
 #[inline(never)]
-fn check_address(address: usize, alignment: usize) -> Result<()> {
+fn check_address(address: usize, alignment: usize) -> motorlink_error {
     if address == 0 {
-        return Err(motorlink_error::NullPointer);
+        return motorlink_error::NullPointer;
     }
     if address & alignment.wrapping_sub(1) != 0 {
-        return Err(motorlink_error::Misaligned);
+        return motorlink_error::Misaligned;
     }
-    Ok(())
+    motorlink_error::Ok
 }
 
 /// As many `T` as one object may have.
@@ -202,11 +203,16 @@ pub(crate) unsafe trait Storage {
     const TAG: u32;
 }
 
+/// What C declares storage as.
+pub(crate) type Words = u64;
+
+type Tag = AtomicU32;
+
 /// The tag is that of the state's kind, and its complement during a call. Any other value: not
 /// initialised.
 #[repr(C)]
 pub(crate) struct Stored<S> {
-    tag: AtomicU32,
+    tag: Tag,
     state: S,
 }
 
@@ -218,6 +224,7 @@ macro_rules! storage {
             use $crate::pointer::Stored;
             assert!(size_of::<Stored<$state>>() <= size_of::<$type>(), "storage too small");
             assert!(align_of::<Stored<$state>>() <= align_of::<$type>());
+            assert!(align_of::<$type>() == align_of::<$crate::pointer::Words>());
         };
 
         // SAFETY: asserted above.
@@ -244,37 +251,52 @@ impl<K: Storage> Out<K> {
         // SAFETY: neither NULL nor misaligned, promised to be writable and not in use, and large
         // enough for a `Stored`.
         let stored = unsafe { &mut *stored.cast::<MaybeUninit<Stored<K::State>>>() };
-        stored.write(Stored { tag: AtomicU32::new(K::TAG), state });
+        stored.write(Stored { tag: Tag::new(K::TAG), state });
         Ok(())
     }
 
     /// The object, for one call.
     pub(crate) fn enter<'a>(&self) -> Result<Entered<'a, K>> {
-        let stored = self.stored()?;
-        // SAFETY: neither NULL nor misaligned, promised to be storage of some kind, each of which
-        // begins with a tag; any bits are one.
-        let tag = unsafe { &(*stored).tag };
-        if let Err(found) = take(tag, K::TAG) {
-            return Err(match found {
-                busy if busy == !K::TAG => motorlink_error::InUse,
-                other if tag::is_of_any_kind(other) => motorlink_error::WrongKind,
-                _ => motorlink_error::Uninitialised,
-            });
-        }
-        Ok(Entered { stored, call: PhantomData })
+        enter(self.0.cast(), K::TAG).check()?;
+        Ok(Entered { stored: self.0.cast(), call: PhantomData })
     }
+}
+
+/// Begins a call for an object of the kind of `idle`.
+// One function for objects of all kinds takes less flash.
+#[inline(never)]
+fn enter(object: *const Tag, idle: u32) -> motorlink_error {
+    let checked = check_address(object.addr(), align_of::<Words>());
+    if checked != motorlink_error::Ok {
+        return checked;
+    }
+    // SAFETY: neither NULL nor misaligned, promised to be storage of some kind, each of which
+    // begins with a tag; any bits are one.
+    let tag = unsafe { &*object };
+    match take(tag, idle) {
+        Ok(()) => motorlink_error::Ok,
+        Err(busy) if busy == !idle => motorlink_error::InUse,
+        Err(other) if tag::is_of_any_kind(other) => motorlink_error::WrongKind,
+        Err(_) => motorlink_error::Uninitialised,
+    }
+}
+
+/// Ends a call: the tag was the complement of the idle one.
+#[inline(never)]
+fn leave(tag: &Tag) {
+    tag.store(!tag.load(Ordering::Relaxed), Ordering::Release);
 }
 
 /// Complements the tag if it is `idle`, and gives it if it is not.
 #[cfg(target_has_atomic = "32")]
-fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
+fn take(tag: &Tag, idle: u32) -> core::result::Result<(), u32> {
     tag.compare_exchange(idle, !idle, Ordering::Acquire, Ordering::Relaxed).map(drop)
 }
 
 /// Complements the tag if it is `idle`, and gives it if it is not. For processors without
 /// compare-and-exchange: an interrupt between load and store ends before the store.
 #[cfg(not(target_has_atomic = "32"))]
-fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
+fn take(tag: &Tag, idle: u32) -> core::result::Result<(), u32> {
     let found = tag.load(Ordering::Acquire);
     if found != idle {
         return Err(found);
@@ -309,6 +331,6 @@ impl<K: Storage> Drop for Entered<'_, K> {
     fn drop(&mut self) {
         // SAFETY: the storage was entered, so there is a tag.
         let tag = unsafe { &(*self.stored).tag };
-        tag.store(K::TAG, Ordering::Release);
+        leave(tag);
     }
 }
