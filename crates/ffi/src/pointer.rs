@@ -7,7 +7,7 @@ use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::motorlink_error;
-use crate::tag;
+use crate::tag::{self, Kind};
 
 type Result<T> = core::result::Result<T, motorlink_error>;
 
@@ -199,8 +199,7 @@ impl<T> OutParam<T> {
 /// Size and alignment of `Stored<State>` are at most those of the type.
 pub(crate) unsafe trait Storage {
     type State;
-    /// Not that of another kind, nor its complement.
-    const TAG: u32;
+    const KIND: Kind;
 }
 
 /// What C declares storage as.
@@ -218,7 +217,7 @@ pub(crate) struct Stored<S> {
 
 /// Declares what the storage of an object holds.
 macro_rules! storage {
-    ($type:ident: $state:ty, $tag:expr) => {
+    ($type:ident: $state:ty, $kind:expr) => {
         const _: () = {
             use core::mem::{align_of, size_of};
             use $crate::pointer::Stored;
@@ -230,42 +229,37 @@ macro_rules! storage {
         // SAFETY: asserted above.
         unsafe impl $crate::pointer::Storage for $type {
             type State = $state;
-            const TAG: u32 = $tag;
+            const KIND: $crate::tag::Kind = $kind;
         }
     };
 }
 pub(crate) use storage;
 
 impl<K: Storage> Out<K> {
-    fn stored(&self) -> Result<*mut Stored<K::State>> {
-        check(self.0)?;
-        Ok(self.0.cast())
-    }
-
     /// Begins an object in a storage of `size` bytes, whatever was there.
     pub(crate) fn init(&self, size: usize, state: K::State) -> Result<()> {
-        let stored = self.stored()?;
+        check(self.0)?;
         if size < size_of::<K>() {
             return Err(motorlink_error::StorageTooSmall);
         }
         // SAFETY: neither NULL nor misaligned, promised to be writable and not in use, and large
         // enough for a `Stored`.
-        let stored = unsafe { &mut *stored.cast::<MaybeUninit<Stored<K::State>>>() };
-        stored.write(Stored { tag: Tag::new(K::TAG), state });
+        let stored = unsafe { &mut *self.0.cast::<MaybeUninit<Stored<K::State>>>() };
+        stored.write(Stored { tag: Tag::new(K::KIND.tag()), state });
         Ok(())
     }
 
     /// The object, for one call.
     pub(crate) fn enter<'a>(&self) -> Result<Entered<'a, K>> {
-        enter(self.0.cast(), K::TAG).check()?;
+        enter(self.0.cast(), K::KIND).check()?;
         Ok(Entered { stored: self.0.cast(), call: PhantomData })
     }
 }
 
-/// Begins a call for an object of the kind of `idle`.
+/// Begins a call for an object of this kind.
 // One function for objects of all kinds takes less flash.
 #[inline(never)]
-fn enter(object: *const Tag, idle: u32) -> motorlink_error {
+fn enter(object: *const Tag, kind: Kind) -> motorlink_error {
     let checked = check_address(object.addr(), align_of::<Words>());
     if checked != motorlink_error::Ok {
         return checked;
@@ -273,6 +267,7 @@ fn enter(object: *const Tag, idle: u32) -> motorlink_error {
     // SAFETY: neither NULL nor misaligned, promised to be storage of some kind, each of which
     // begins with a tag; any bits are one.
     let tag = unsafe { &*object };
+    let idle = kind.tag();
     match take(tag, idle) {
         Ok(()) => motorlink_error::Ok,
         Err(busy) if busy == !idle => motorlink_error::InUse,

@@ -8,10 +8,10 @@ use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::pointer::{promised, storage};
 pub use crate::storage::{motorlink_slcan_device, motorlink_slcan_host};
-use crate::tag;
+use crate::tag::Kind;
 
-storage!(motorlink_slcan_host: AnswerParser, tag::SLCAN_HOST);
-storage!(motorlink_slcan_device: Device, tag::SLCAN_DEVICE);
+storage!(motorlink_slcan_host: AnswerParser, Kind::SlcanHost);
+storage!(motorlink_slcan_device: Device, Kind::SlcanDevice);
 
 /// The longest line: a frame of 8 bytes with 29 bits of identifier and a timestamp.
 pub const MOTORLINK_SLCAN_LINE_SIZE: usize = 31;

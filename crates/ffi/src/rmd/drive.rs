@@ -15,7 +15,7 @@ use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::pointer::{Kept, plain, promised, storage};
-use crate::tag;
+use crate::tag::Kind;
 
 /// What a motor does.
 #[repr(u8)]
@@ -142,7 +142,7 @@ pub(crate) struct State {
     motor: Kept<motorlink_rmd_motor_control>,
 }
 
-storage!(motorlink_rmd_drive: State, tag::RMD_DRIVE);
+storage!(motorlink_rmd_drive: State, Kind::RmdDrive);
 
 impl From<Mode> for motorlink_rmd_motion {
     fn from(mode: Mode) -> Self {
@@ -225,14 +225,20 @@ impl MotorControl for Kept<motorlink_rmd_motor_control> {
         if let Some(call) = motor.sense {
             call(motor.context, &raw mut sense);
         }
-        let [phase_a, phase_b, phase_c] = sense.phase_digits.map(PhaseCurrent);
+        // Without `map`, which copies the array in a loop.
+        let [a, b, c] = sense.phase_digits;
+        let phase_currents = PhaseCurrents {
+            phase_a: PhaseCurrent(a),
+            phase_b: PhaseCurrent(b),
+            phase_c: PhaseCurrent(c),
+        };
         Sense {
             temperature: Celsius(sense.temperature_celsius),
             voltage: DeciVolts(sense.voltage_decivolts),
             iq: IqFeedback(sense.iq_digits),
             speed: Dps(sense.speed_dps),
             encoder: sense.encoder_counts,
-            phase_currents: PhaseCurrents { phase_a, phase_b, phase_c },
+            phase_currents,
             faults: Errors(sense.faults),
         }
     }

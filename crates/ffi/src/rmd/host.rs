@@ -13,7 +13,7 @@ use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::number::limit;
 use crate::pointer::{plain, promised, storage};
-use crate::tag;
+use crate::tag::Kind;
 
 /// Limits of requests to a motor, in addition to the document's ranges. Each holds in both directions.
 #[repr(C)]
@@ -58,7 +58,7 @@ pub(crate) struct State {
     confirming: MotorSet,
 }
 
-storage!(motorlink_rmd_host: State, tag::RMD_HOST);
+storage!(motorlink_rmd_host: State, Kind::RmdHost);
 
 fn id(motor: u8) -> Result<MotorId, motorlink_error> {
     MotorId::new(motor).ok_or(motorlink_error::BadArgument)

@@ -8,7 +8,7 @@ use motorlink_proto::st::{
 use super::motorlink_st_master;
 use crate::error::motorlink_error;
 use crate::pointer::storage;
-use crate::tag;
+use crate::tag::Kind;
 
 /// What the storage of a master holds.
 pub(crate) struct State {
@@ -22,7 +22,7 @@ pub(crate) struct State {
     pub(super) confirmation: Option<Confirmation>,
 }
 
-storage!(motorlink_st_master: State, tag::ST_MASTER);
+storage!(motorlink_st_master: State, Kind::StMaster);
 
 impl State {
     /// Begins any request. A refused request changes nothing.

@@ -16,7 +16,7 @@ use crate::number::{
     motorlink_st_command, motorlink_st_error_code, motorlink_st_profile, motorlink_st_reg, one_of,
 };
 use crate::pointer::{Kept, ascii, plain, promised, storage};
-use crate::tag;
+use crate::tag::Kind;
 
 /// The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
 #[repr(C)]
@@ -148,7 +148,7 @@ pub(crate) struct State {
     slave: Slave,
 }
 
-storage!(motorlink_st_slave: State, tag::ST_SLAVE);
+storage!(motorlink_st_slave: State, Kind::StSlave);
 
 impl MotorControl for Kept<motorlink_st_motor_control> {
     fn features(&self, motor: MotorNumber) -> Features {

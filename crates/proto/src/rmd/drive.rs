@@ -53,36 +53,40 @@ pub enum Mode {
 }
 
 /// Sensor values.
+// The layout of C's struct, so that the C interface needs no conversion.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sense {
-    /// Motor temperature.
-    pub temperature: Celsius,
-    /// Supply voltage.
-    pub voltage: DeciVolts,
+    /// Encoder counts in the encoder's own width. They grow clockwise and do not wrap at the ends
+    /// of the turn. At power-on they are within the turn: 0 to 2^width - 1.
+    pub encoder: i64,
     /// Torque current.
     pub iq: IqFeedback,
     /// Speed, positive is clockwise.
     pub speed: Dps,
-    /// Encoder counts in the encoder's own width. They grow clockwise and do not wrap at the ends
-    /// of the turn. At power-on they are within the turn: 0 to 2^width - 1.
-    pub encoder: i64,
+    /// Supply voltage.
+    pub voltage: DeciVolts,
     /// Currents of the three phases.
     pub phase_currents: PhaseCurrents,
+    /// Motor temperature.
+    pub temperature: Celsius,
     /// Faults that are present now. The drive latches them.
     pub faults: Errors,
 }
 
 /// The settings of a host. There are two copies: RAM, which commands use, and ROM, which power-on
 /// copies to RAM.
+// The layout of C's struct, so that the C interface needs no conversion.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
-    /// Gains of the three loops (0x30 to 0x32).
-    pub gains: Pid,
     /// Acceleration limit (0x33, 0x34), 1 °/s² a digit. No command writes it to ROM. 0 and negative
     /// values mean no limit, as in the vendor's tool.
     pub acceleration: DpsPerSecond,
     /// Encoder value of the zero point (0x90, 0x91, 0x19), as in the frame: at most 16 bits.
     pub encoder_offset: u16,
+    /// Gains of the three loops (0x30 to 0x32).
+    pub gains: Pid,
 }
 
 /// Configuration by the vendor's tool or by a switch. No command changes it.
