@@ -150,6 +150,19 @@ pub(crate) fn ascii<'a>(text: In<u8>, most: usize) -> &'a str {
     unsafe { str::from_utf8_unchecked(bytes) }
 }
 
+/// Asserts that a struct of C and one of Rust have the same fields at the same places.
+macro_rules! same_layout {
+    ($c:ty = $rust:ty { $($($of_c:ident).+ = $($of_rust:ident).+),+ $(,)? }) => {
+        const _: () = {
+            use core::mem::{align_of, offset_of, size_of};
+            assert!(size_of::<$c>() == size_of::<$rust>());
+            assert!(align_of::<$c>() == align_of::<$rust>());
+            $( assert!(offset_of!($c, $($of_c).+) == offset_of!($rust, $($of_rust).+)); )+
+        };
+    };
+}
+pub(crate) use same_layout;
+
 /// What a caller keeps in place as long as an object is used. The caller may change its content.
 pub(crate) struct Kept<T>(*const T);
 

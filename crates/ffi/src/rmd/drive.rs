@@ -1,20 +1,19 @@
 //! The drive's end: frames in, replies out, a table of callbacks to the motor.
 
 use core::ffi::c_void;
+use core::ptr;
 
 use motorlink_proto::rmd::{
-    Drive, DriveConfig, EncoderBits, Errors, Mode, MotorControl, MotorId, PhaseCurrents, Sense,
-    Settings,
+    Drive, DriveConfig, EncoderBits, Mode, MotorControl, MotorId, Sense, Settings,
 };
 use motorlink_proto::time::{Instant, Micros};
-use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent};
 
 use super::message::motorlink_rmd_pid;
 use super::motorlink_rmd_drive;
 use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
-use crate::pointer::{Kept, plain, promised, storage};
+use crate::pointer::{Kept, plain, promised, same_layout, storage};
 use crate::tag::Kind;
 
 /// What a motor does.
@@ -134,7 +133,28 @@ pub struct motorlink_rmd_motor_control {
     pub save: Option<extern "C" fn(context: *mut c_void, rom: *const motorlink_rmd_settings)>,
 }
 
-plain!(motorlink_rmd_settings, motorlink_rmd_drive_config, motorlink_rmd_motor_control);
+plain!(motorlink_rmd_drive_config, motorlink_rmd_motor_control, Settings);
+
+// Pointers to the structs of C are cast to these, and back.
+same_layout!(motorlink_rmd_settings = Settings {
+    acceleration_dps2 = acceleration,
+    encoder_offset = encoder_offset,
+    pid.position_kp = gains.position_kp,
+    pid.position_ki = gains.position_ki,
+    pid.speed_kp = gains.speed_kp,
+    pid.speed_ki = gains.speed_ki,
+    pid.torque_kp = gains.torque_kp,
+    pid.torque_ki = gains.torque_ki,
+});
+same_layout!(motorlink_rmd_sense = Sense {
+    encoder_counts = encoder,
+    iq_digits = iq,
+    speed_dps = speed,
+    voltage_decivolts = voltage,
+    phase_digits = phase_currents.phase_a,
+    temperature_celsius = temperature,
+    faults = faults,
+});
 
 /// What the storage of a drive holds.
 pub(crate) struct State {
@@ -176,26 +196,6 @@ impl From<Mode> for motorlink_rmd_motion {
     }
 }
 
-impl From<&Settings> for motorlink_rmd_settings {
-    fn from(settings: &Settings) -> Self {
-        motorlink_rmd_settings {
-            acceleration_dps2: settings.acceleration.0,
-            encoder_offset: settings.encoder_offset,
-            pid: settings.gains.into(),
-        }
-    }
-}
-
-impl From<motorlink_rmd_settings> for Settings {
-    fn from(settings: motorlink_rmd_settings) -> Self {
-        Settings {
-            gains: settings.pid.into(),
-            acceleration: DpsPerSecond(settings.acceleration_dps2),
-            encoder_offset: settings.encoder_offset,
-        }
-    }
-}
-
 impl MotorControl for Kept<motorlink_rmd_motor_control> {
     fn set_mode(&mut self, mode: Mode) {
         let motor = self.now();
@@ -207,46 +207,23 @@ impl MotorControl for Kept<motorlink_rmd_motor_control> {
     fn configure(&mut self, settings: &Settings) {
         let motor = self.now();
         if let Some(call) = motor.configure {
-            call(motor.context, &motorlink_rmd_settings::from(settings));
+            call(motor.context, ptr::from_ref(settings).cast());
         }
     }
 
     fn sense(&mut self) -> Sense {
         let motor = self.now();
-        let mut sense = motorlink_rmd_sense {
-            encoder_counts: 0,
-            iq_digits: 0,
-            speed_dps: 0,
-            voltage_decivolts: 0,
-            phase_digits: [0; 3],
-            temperature_celsius: 0,
-            faults: 0,
-        };
+        let mut sense = Sense::default();
         if let Some(call) = motor.sense {
-            call(motor.context, &raw mut sense);
+            call(motor.context, (&raw mut sense).cast());
         }
-        // Without `map`, which copies the array in a loop.
-        let [a, b, c] = sense.phase_digits;
-        let phase_currents = PhaseCurrents {
-            phase_a: PhaseCurrent(a),
-            phase_b: PhaseCurrent(b),
-            phase_c: PhaseCurrent(c),
-        };
-        Sense {
-            temperature: Celsius(sense.temperature_celsius),
-            voltage: DeciVolts(sense.voltage_decivolts),
-            iq: IqFeedback(sense.iq_digits),
-            speed: Dps(sense.speed_dps),
-            encoder: sense.encoder_counts,
-            phase_currents,
-            faults: Errors(sense.faults),
-        }
+        sense
     }
 
     fn save(&mut self, rom: &Settings) {
         let motor = self.now();
         if let Some(call) = motor.save {
-            call(motor.context, &motorlink_rmd_settings::from(rom));
+            call(motor.context, ptr::from_ref(rom).cast());
         }
     }
 }
@@ -268,6 +245,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
     rom: *const motorlink_rmd_settings,
     motor: *const motorlink_rmd_motor_control,
 ) -> motorlink_error {
+    let rom = rom.cast::<Settings>();
     promised!(drive, config, rom, motor);
     answer(|| {
         let motor = motor.keep()?;
@@ -275,7 +253,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
             return Err(motorlink_error::NullPointer);
         }
         let config = config.read()?;
-        let rom = rom.read_optional()?.map_or_else(Settings::default, Settings::from);
+        let rom = rom.read_optional()?.unwrap_or_default();
         let bits = match config.encoder_bits {
             0 => EncoderBits::default().bits(),
             bits => bits,
@@ -396,10 +374,12 @@ pub unsafe extern "C" fn motorlink_rmd_drive_settings(
     drive: *mut motorlink_rmd_drive,
     settings: *mut motorlink_rmd_settings,
 ) -> motorlink_error {
+    let settings = settings.cast::<Settings>();
     promised!(drive, settings);
     answer(|| {
         let place = settings.place()?;
-        place.set(drive.enter()?.drive.settings().into());
+        let settings = *drive.enter()?.drive.settings();
+        place.set(settings);
         Ok(())
     })
 }
