@@ -130,11 +130,31 @@ pub struct Drive {
     mode: Mode,
     stopped: bool,
     /// The single-turn command from which `mode` was derived.
-    circle: Option<SetSingleTurnPosition>,
+    circle: Option<Circle>,
     errors: Errors,
     last_command: Instant,
     ignored: Ignored,
     is_on: bool,
+}
+
+/// A single-turn command that the drive executes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Circle {
+    clockwise: bool,
+    angle: TurnCentiDegrees,
+}
+
+impl Circle {
+    /// `None` if a value is outside the document's range.
+    fn of(command: SetSingleTurnPosition) -> Option<Self> {
+        let SetSingleTurnPosition { direction, angle } = command;
+        let clockwise = match direction {
+            SpinDirection::Clockwise => true,
+            SpinDirection::Counterclockwise => false,
+            SpinDirection::Unknown(_) => return None,
+        };
+        (angle.0 < FULL_TURN).then_some(Circle { clockwise, angle })
+    }
 }
 
 impl Drive {
@@ -236,11 +256,11 @@ impl Drive {
         sense: &Sense,
         motor: &mut impl MotorControl,
     ) -> Option<[u8; 8]> {
-        let [code, ..] = *data;
-        let code = Code::from(code);
+        let [number, ..] = *data;
+        let code = Code::from(number);
         let position = sense.encoder.wrapping_sub(self.zero());
         Some(match code {
-            Code::ReadPid => self.ram.gains.encode_as(code),
+            Code::ReadPid => self.ram.gains.encode_as(number),
             Code::WritePidRam | Code::WritePidRom => {
                 self.ram.gains = Pid::decode(data);
                 motor.configure(&self.ram);
@@ -251,7 +271,7 @@ impl Drive {
                 *data
             }
             Code::ReadAcceleration => {
-                Acceleration { acceleration: self.ram.acceleration }.encode_as(code)
+                Acceleration { acceleration: self.ram.acceleration }.encode_as(number)
             }
             Code::WriteAccelerationRam => {
                 self.ram.acceleration = Acceleration::decode(data).acceleration;
@@ -261,32 +281,32 @@ impl Drive {
             Code::ReadEncoder => {
                 let bits = self.config.encoder;
                 let (position, raw) = (bits.narrow(position), bits.narrow(sense.encoder));
-                Encoder { position, raw, offset: self.ram.encoder_offset }.encode_as(code)
+                Encoder { position, raw, offset: self.ram.encoder_offset }.encode_as(number)
             }
             Code::WriteEncoderOffsetRom => {
                 let offset = self.config.encoder.cut(EncoderOffset::decode(data).offset);
                 self.ram.encoder_offset = offset;
                 self.circle = None;
-                self.store_offset(code, offset, motor)
+                self.store_offset(number, offset, motor)
             }
             Code::WriteZeroRom => {
                 let offset = self.config.encoder.narrow(sense.encoder);
-                self.store_offset(code, offset, motor)
+                self.store_offset(number, offset, motor)
             }
             Code::ReadMultiTurnAngle => {
-                MultiTurnAngle { angle: self.config.encoder.multi_turn(position) }.encode_as(code)
+                MultiTurnAngle { angle: self.config.encoder.multi_turn(position) }.encode_as(number)
             }
             Code::ReadSingleTurnAngle => {
-                SingleTurnAngle { angle: self.config.encoder.circle(position) }.encode_as(code)
+                SingleTurnAngle { angle: self.config.encoder.circle(position) }.encode_as(number)
             }
-            Code::ReadStatus => self.status1(code, sense),
+            Code::ReadStatus => self.status1(number, sense),
             Code::ClearErrors => {
                 self.errors = self.errors.intersection(sense.faults);
-                let printed = if self.config.clear_reply_0x9b { code } else { Code::ReadStatus };
-                self.status1(printed, sense)
+                let own = self.config.clear_reply_0x9b;
+                self.status1(if own { number } else { Code::ReadStatus.into() }, sense)
             }
-            Code::ReadMotionStatus => self.motion_status(code, sense),
-            Code::ReadPhaseCurrents => sense.phase_currents.encode_as(code),
+            Code::ReadMotionStatus => self.motion_status(number, sense),
+            Code::ReadPhaseCurrents => sense.phase_currents.encode_as(number),
             Code::Off => {
                 self.off(motor);
                 *data
@@ -315,7 +335,7 @@ impl Drive {
                     self.circle = circle;
                     self.go(mode, motor);
                 }
-                self.motion_status(code, sense)
+                self.motion_status(number, sense)
             }
             Code::Unknown(_) => {
                 count(&mut self.ignored.unknown);
@@ -332,7 +352,7 @@ impl Drive {
         code: Code,
         data: &[u8; 8],
         sense: &Sense,
-    ) -> Option<(Mode, Option<SetSingleTurnPosition>)> {
+    ) -> Option<(Mode, Option<Circle>)> {
         let max_speed = match code {
             Code::SetPositionLimited | Code::SetSingleTurnPositionLimited => {
                 Some(SetPositionLimited::decode(data).max_speed)
@@ -347,31 +367,27 @@ impl Drive {
                 (Mode::Position { target, max_speed, within_max_angle: true }, None)
             }
             _ => {
-                let command = SetSingleTurnPosition::decode(data);
+                let circle = Circle::of(SetSingleTurnPosition::decode(data))?;
                 let target = match self.mode {
                     // Repeating the command does not start another turn (R16).
-                    Mode::Position { target, .. } if self.circle == Some(command) => target,
-                    _ => self.circle_target(command, sense)?,
+                    Mode::Position { target, .. } if self.circle == Some(circle) => target,
+                    _ => self.circle_target(circle, sense),
                 };
-                (Mode::Position { target, max_speed, within_max_angle: false }, Some(command))
+                (Mode::Position { target, max_speed, within_max_angle: false }, Some(circle))
             }
         })
     }
 
-    fn circle_target(&self, command: SetSingleTurnPosition, sense: &Sense) -> Option<i64> {
-        let SetSingleTurnPosition { direction, angle } = command;
-        if angle.0 >= FULL_TURN {
-            return None;
-        }
-        let way = self.counts(CentiDegrees(i32::from(angle.0))).wrapping_sub(sense.encoder);
+    fn circle_target(&self, circle: Circle, sense: &Sense) -> i64 {
+        let angle = CentiDegrees(circle.angle.0.into());
         let bits = self.config.encoder;
-        match direction {
-            SpinDirection::Clockwise => Some(sense.encoder.wrapping_add(bits.within_turn(way))),
-            SpinDirection::Counterclockwise => {
-                Some(sense.encoder.wrapping_sub(bits.within_turn(way.wrapping_neg())))
-            }
-            SpinDirection::Unknown(_) => None,
-        }
+        let clockwise = bits.within_turn(self.counts(angle).wrapping_sub(sense.encoder));
+        let way = if circle.clockwise || clockwise == 0 {
+            clockwise
+        } else {
+            clockwise.wrapping_sub(bits.turn().into())
+        };
+        sense.encoder.wrapping_add(way)
     }
 
     /// Starts a mode, also when the motor is stopped (docs/SPEC-NOTES.md R17). Does nothing while
@@ -406,22 +422,22 @@ impl Drive {
         sense
     }
 
-    fn store_offset(&mut self, code: Code, offset: u16, motor: &mut impl MotorControl) -> [u8; 8] {
+    fn store_offset(&mut self, number: u8, offset: u16, motor: &mut impl MotorControl) -> [u8; 8] {
         self.rom.encoder_offset = offset;
         motor.save(&self.rom);
-        EncoderOffset { offset }.encode_as(code)
+        EncoderOffset { offset }.encode_as(number)
     }
 
-    fn status1(&self, code: Code, sense: &Sense) -> [u8; 8] {
+    fn status1(&self, number: u8, sense: &Sense) -> [u8; 8] {
         let Sense { temperature, voltage, .. } = *sense;
-        Status { temperature, voltage, errors: self.errors }.encode_as(code)
+        Status { temperature, voltage, errors: self.errors }.encode_as(number)
     }
 
-    fn motion_status(&self, code: Code, sense: &Sense) -> [u8; 8] {
+    fn motion_status(&self, number: u8, sense: &Sense) -> [u8; 8] {
         let Sense { temperature, iq, speed, .. } = *sense;
         let position = sense.encoder.wrapping_sub(self.zero());
         let encoder = self.config.encoder.narrow(position);
-        MotionStatus { temperature, iq, speed, encoder }.encode_as(code)
+        MotionStatus { temperature, iq, speed, encoder }.encode_as(number)
     }
 
     /// Encoder counts at an angle from zero.

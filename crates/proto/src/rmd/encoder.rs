@@ -48,9 +48,15 @@ impl EncoderBits {
 
     /// Multi-turn counts as a frame carries them: within the turn, at most 16 bits.
     pub(super) fn narrow(self, counts: i64) -> u16 {
+        self.narrow_word(counts as u32)
+    }
+
+    /// The lower 32 bits have all that a frame carries.
+    // A call takes less flash than the inlined code.
+    #[inline(never)]
+    fn narrow_word(self, counts: u32) -> u16 {
         let unused = 16u32.saturating_sub(self.width());
-        // The result is within the lower 32 bits, whose shift is one instruction.
-        let wire = (counts as u32).wrapping_shr(self.dropped()) as u16;
+        let wire = counts.wrapping_shr(self.dropped()) as u16;
         wire.wrapping_shl(unused).wrapping_shr(unused)
     }
 
@@ -76,18 +82,18 @@ impl EncoderBits {
         // 36000 is 1125 << 5, so 18 bits of encoder fit into 32-bit arithmetic.
         let scaled = rest.wrapping_shl(self.width().saturating_sub(5));
         let within = scaled.wrapping_add(1125 / 2) / 1125;
-        i64::from(turns).wrapping_mul(self.turn()).wrapping_add(i64::from(within))
+        i64::from(turns).wrapping_mul(self.turn().into()).wrapping_add(i64::from(within))
     }
 
     /// Counts reduced to one turn.
     pub(super) fn within_turn(self, counts: i64) -> i64 {
-        counts & self.turn().wrapping_sub(1)
+        i64::from(counts as u32 & self.turn().wrapping_sub(1))
     }
 
     /// Counts of a turn.
-    fn turn(self) -> i64 {
-        // Not a shift of 64 bits, which is a call on a Cortex-M.
-        i64::from(1u32.wrapping_shl(self.width()))
+    // Not 64 bits, whose shift is a call on a Cortex-M.
+    pub(super) fn turn(self) -> u32 {
+        1u32.wrapping_shl(self.width())
     }
 
     fn width(self) -> u32 {
