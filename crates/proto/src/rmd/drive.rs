@@ -91,16 +91,18 @@ pub struct Settings {
 
 /// Configuration by the vendor's tool or by a switch. No command changes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+// Bytes come first: offsets below 32 make shorter instructions on a Cortex-M.
+#[repr(C)]
 pub struct DriveConfig {
     /// The ID of the drive.
     pub id: MotorId,
     /// Width of the encoder (docs/SPEC-NOTES.md R6).
     pub encoder: EncoderBits,
-    /// Switches the motor off after this time without a command (docs/SPEC-NOTES.md R12).
-    pub shutdown: Option<Micros>,
     /// Answers 0x9B with 0x9B, as related drives do, instead of 0x9A as printed (3, Clear motor
     /// error flag command; docs/SPEC-NOTES.md R1).
     pub clear_reply_0x9b: bool,
+    /// Switches the motor off after this time without a command (docs/SPEC-NOTES.md R12).
+    pub shutdown: Option<Micros>,
 }
 
 impl DriveConfig {
@@ -122,19 +124,21 @@ pub struct Ignored {
 
 /// The drive's side of the protocol, for one motor.
 #[derive(Debug, Clone)]
+// Bytes come first: offsets below 32 make shorter instructions on a Cortex-M.
+#[repr(C)]
 pub struct Drive {
     /// The vendor's configuration. It may change at any time.
     pub config: DriveConfig,
-    ram: Settings,
-    rom: Settings,
-    mode: Mode,
     stopped: bool,
+    is_on: bool,
+    errors: Errors,
     /// The single-turn command from which `mode` was derived.
     circle: Option<Circle>,
-    errors: Errors,
+    ram: Settings,
+    rom: Settings,
     last_command: Instant,
+    mode: Mode,
     ignored: Ignored,
-    is_on: bool,
 }
 
 /// A single-turn command that the drive executes.
