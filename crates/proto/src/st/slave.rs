@@ -26,7 +26,8 @@ pub const SEGMENT_REGISTERS: usize = 32;
 // What is used most comes first: offsets below 32 make shorter instructions on a Cortex-M.
 #[repr(C)]
 pub struct Slave {
-    deadline: Option<Instant>,
+    /// While a command is under way. Profile `mcsdk-5.4` does not use it.
+    deadline: Instant,
     profile: Profile,
     motors: u8,
     current: MotorNumber,
@@ -48,8 +49,8 @@ impl Slave {
             buffer: [0; MAX_FRAME],
             received: 0,
             skipping: false,
-            deadline: None,
-            segments: [Segment::EMPTY; SEGMENTS],
+            deadline: Instant(0),
+            segments: Segment::NONE,
         }
     }
 
@@ -70,13 +71,15 @@ impl Slave {
 
     /// When to call [`poll`](Self::poll). `None` between frames, and always in profile `mcsdk-5.4`,
     /// whose firmware has no reception timeout (SPEC-NOTES S11).
-    pub const fn deadline(&self) -> Option<Instant> {
-        self.deadline
+    pub fn deadline(&self) -> Option<Instant> {
+        let timed = self.profile == Profile::Spec && (self.is_receiving() || self.skipping);
+        timed.then_some(self.deadline)
     }
 
     /// Returns the NACK TIMEOUT for a command that was not complete in time (4.1).
+    #[inline(never)]
     pub fn poll(&mut self, now: Instant) -> Option<&[u8]> {
-        if self.deadline.is_none_or(|deadline| !deadline.is_over(RECEPTION_TIMEOUT, now)) {
+        if !self.deadline()?.is_over(RECEPTION_TIMEOUT, now) {
             return None;
         }
         self.restart();
@@ -100,7 +103,7 @@ impl Slave {
         let command = self.buffer;
         let answer = match Frame::parse(command.get(..size)?) {
             Parse::Frame(frame, _) => self.process(&frame, drive),
-            _ => Err(ErrorCode::BadCrc),
+            _ => Err(ErrorCode::BadCrc.into()),
         };
         self.restart();
         Some(self.reply(answer))
@@ -110,14 +113,15 @@ impl Slave {
     /// (table 2).
     pub fn overrun(&mut self) -> &[u8] {
         self.restart();
-        self.reply(Err(ErrorCode::Overrun))
+        self.reply(Err(ErrorCode::Overrun.into()))
     }
 
     /// Stores a byte. Returns the command's size when it is complete.
+    #[inline(never)]
     fn take(&mut self, now: Instant, byte: u8) -> Option<usize> {
         let timed = self.profile == Profile::Spec;
-        if timed && (self.received == 0 || self.skipping) {
-            self.deadline = Some(now + RECEPTION_TIMEOUT);
+        if self.received == 0 || self.skipping {
+            self.deadline = now + RECEPTION_TIMEOUT;
         }
         if self.skipping {
             return None;
@@ -130,7 +134,7 @@ impl Slave {
         if self.received == 2 && usize::from(length) > most {
             if timed {
                 self.skipping = true;
-                self.deadline = Some(now + RECEPTION_TIMEOUT);
+                self.deadline = now + RECEPTION_TIMEOUT;
             } else {
                 self.received = 0;
             }
@@ -143,7 +147,6 @@ impl Slave {
     fn restart(&mut self) {
         self.received = 0;
         self.skipping = false;
-        self.deadline = None;
     }
 
     /// Checks motor and frame code, then executes, in this order (4.1). Returns the size of the
@@ -152,7 +155,7 @@ impl Slave {
         &mut self,
         frame: &Frame<'_>,
         drive: &mut impl MotorControl,
-    ) -> Result<usize, ErrorCode> {
+    ) -> Result<usize, Nack> {
         if frame.motor() != 0 {
             self.select(frame.motor()).ok_or(ErrorCode::BadMotorSelected)?;
         }
@@ -160,7 +163,7 @@ impl Slave {
         let features = drive.features(motor);
         let code = FrameCode::from_number(frame.code(), self.profile);
         if code == Some(FrameCode::SetPositionCmd) && !features.has(Feature::PositionControl) {
-            return Err(ErrorCode::BadFrameId);
+            return Err(ErrorCode::BadFrameId.into());
         }
         let request = frame.request(self.profile)?;
         let [_, _, room @ .., _] = &mut self.buffer;
@@ -200,7 +203,7 @@ impl Slave {
             }
             Request::GetProfilerInfo(steps) => {
                 if !features.has(Feature::Profiler) {
-                    return Err(ErrorCode::MpNotEnabled);
+                    return Err(ErrorCode::MpNotEnabled.into());
                 }
                 for &step in steps {
                     let registers = drive.profiler_step(motor, step);
@@ -216,17 +219,17 @@ impl Slave {
                 }
             }
             Request::ConfigureSegment { segment, registers } => {
-                let slot = self.segments.get_mut(usize::from(segment));
                 let fits = |&id: &u8| {
                     RegisterId(id).row().is_some_and(|row| row.segment_size(features).is_some())
                 };
-                let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
-                *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
+                let slot = self.segments.get_mut(usize::from(segment));
+                let slot = slot.filter(|_| registers.iter().all(fits));
+                slot.and_then(|slot| slot.set(registers)).ok_or(ErrorCode::WrongSet)?;
             }
             Request::SetTorqueRamp(ramp) => drive.set_torque_ramp(motor, ramp),
             Request::SetPosition(target) => drive.set_position(motor, target),
         }
-        out.finish().ok_or(ErrorCode::WrongSet)
+        Ok(out.finish().ok_or(ErrorCode::WrongSet)?)
     }
 
     /// Makes a motor the current one; `None` if it does not exist (3.2).
@@ -244,18 +247,18 @@ impl Slave {
         register: RegisterId,
         value: &[u8],
         drive: &mut impl MotorControl,
-    ) -> Result<(), ErrorCode> {
+    ) -> Result<(), Nack> {
         let row = register.row().ok_or(ErrorCode::SetReadOnly)?;
         let features = drive.features(motor);
         let size = match row.writing(self.profile, features) {
             Writing::Takes(size) => usize::from(size),
-            Writing::ReadOnly => return Err(ErrorCode::SetReadOnly),
-            Writing::Refused => return Err(ErrorCode::WrongSet),
+            Writing::ReadOnly => return Err(ErrorCode::SetReadOnly.into()),
+            Writing::Refused => return Err(ErrorCode::WrongSet.into()),
         };
         let mut bytes = [0; 4];
         if value.len() < size {
             if self.profile == Profile::Mcsdk54 {
-                return Err(ErrorCode::WrongSet);
+                return Err(ErrorCode::WrongSet.into());
             }
             bytes = read(self.profile, motor, register, row, drive).to_le_bytes();
         }
@@ -266,34 +269,43 @@ impl Slave {
         match register {
             RegisterId::TARGET_MOTOR => {
                 let number = (bits as u8).saturating_add(1);
-                self.select(number).ok_or(ErrorCode::WrongSet)
+                Ok(self.select(number).ok_or(ErrorCode::WrongSet)?)
             }
             RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
                 let shown = RegisterId(bits as u8).row();
                 if shown.is_some_and(|row| row.shows_on_dac(features)) {
-                    return drive.set_register(motor, register, bits);
+                    return Ok(drive.set_register(motor, register, bits)?);
                 }
                 // Firmware acknowledges registers that it cannot show; a slave of profile `spec`
                 // refuses them.
                 match self.profile {
-                    Profile::Spec => Err(ErrorCode::WrongSet),
+                    Profile::Spec => Err(ErrorCode::WrongSet.into()),
                     Profile::Mcsdk54 => Ok(()),
                 }
             }
-            _ => drive.set_register(motor, register, to_drive(self.profile, row, bits)),
+            _ => Ok(drive.set_register(motor, register, to_drive(self.profile, row, bits))?),
         }
     }
 
-    fn reply(&mut self, answer: Result<usize, ErrorCode>) -> &[u8] {
+    fn reply(&mut self, answer: Result<usize, Nack>) -> &[u8] {
         let (header, size) = match answer {
             Ok(size) => (HEADER_ACK, size),
-            Err(code) => {
+            Err(Nack(code)) => {
                 let [_, _, slot, ..] = &mut self.buffer;
-                *slot = code.into();
+                *slot = code;
                 (HEADER_NACK, 1)
             }
         };
         frame::seal(&mut self.buffer, header, size).unwrap_or(&[])
+    }
+}
+
+/// The error code that is sent. A number takes less flash than an [`ErrorCode`].
+struct Nack(u8);
+
+impl From<ErrorCode> for Nack {
+    fn from(code: ErrorCode) -> Self {
+        Nack(code.number())
     }
 }
 
@@ -304,7 +316,7 @@ fn execute(
     command: Command,
     features: Features,
     drive: &mut impl MotorControl,
-) -> Result<(), ErrorCode> {
+) -> Result<(), Nack> {
     let firmware = profile == Profile::Mcsdk54;
     let (possible, command) = match command {
         Command::PfcEnable | Command::PfcDisable | Command::PfcFaultAck => {
@@ -317,7 +329,7 @@ fn execute(
         _ => (true, command),
     };
     if !possible {
-        return Err(ErrorCode::WrongCmd);
+        return Err(ErrorCode::WrongCmd.into());
     }
     drive.execute(motor, command);
     Ok(())
@@ -382,12 +394,14 @@ struct Segment {
 
 impl Segment {
     const EMPTY: Segment = Segment { len: 0, registers: [0; SEGMENT_REGISTERS] };
+    // A constant is cleared at once, an expression segment by segment.
+    const NONE: [Segment; SEGMENTS] = [Segment::EMPTY; SEGMENTS];
 
-    fn of(registers: &[u8]) -> Option<Self> {
-        let mut segment = Segment::EMPTY;
-        segment.registers.get_mut(..registers.len())?.copy_from_slice(registers);
-        segment.len = u8::try_from(registers.len()).ok()?;
-        Some(segment)
+    /// `None` if there are too many.
+    fn set(&mut self, registers: &[u8]) -> Option<()> {
+        self.registers.get_mut(..registers.len())?.copy_from_slice(registers);
+        self.len = u8::try_from(registers.len()).ok()?;
+        Some(())
     }
 
     fn registers(&self) -> impl Iterator<Item = RegisterId> {
