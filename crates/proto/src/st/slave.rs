@@ -4,8 +4,8 @@ use super::payload::Payload;
 use super::register::{Conversion, Row, Type, Writing};
 use super::{
     BoardInfo, Command, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
-    HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, MotorControl, MotorNumber, Parse, Profile,
-    REVUP_PHASES, RegisterId, Request, frame,
+    HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, MotorControl, MotorNumber, Profile,
+    REVUP_PHASES, RegisterId, Request, checksum, frame,
 };
 use crate::time::{Instant, Micros};
 
@@ -99,11 +99,13 @@ impl Slave {
         if expired {
             return Some(&TIMEOUT_REPLY);
         }
-        let size = size?;
         let command = self.buffer;
-        let answer = match Frame::parse(command.get(..size)?) {
-            Parse::Frame(frame, _) => self.process(&frame, drive),
-            _ => Err(ErrorCode::BadCrc.into()),
+        let (&received, body) = command.get(..size?)?.split_last()?;
+        let &[header, _, ref payload @ ..] = body else { return None };
+        let answer = if checksum(body) == received {
+            self.process(&Frame { header, payload }, drive)
+        } else {
+            Err(ErrorCode::BadCrc.into())
         };
         self.restart();
         Some(self.reply(answer))
@@ -121,7 +123,7 @@ impl Slave {
     fn take(&mut self, now: Instant, byte: u8) -> Option<usize> {
         let timed = self.profile == Profile::Spec;
         if self.received == 0 || self.skipping {
-            self.deadline = now + RECEPTION_TIMEOUT;
+            self.wait(now);
         }
         if self.skipping {
             return None;
@@ -134,7 +136,7 @@ impl Slave {
         if self.received == 2 && usize::from(length) > most {
             if timed {
                 self.skipping = true;
-                self.deadline = now + RECEPTION_TIMEOUT;
+                self.wait(now);
             } else {
                 self.received = 0;
             }
@@ -142,6 +144,11 @@ impl Slave {
         }
         let size = usize::from(length) + super::OVERHEAD;
         (self.received >= 2 && usize::from(self.received) == size).then_some(size)
+    }
+
+    #[inline(never)]
+    fn wait(&mut self, now: Instant) {
+        self.deadline = now + RECEPTION_TIMEOUT;
     }
 
     fn restart(&mut self) {
@@ -170,14 +177,16 @@ impl Slave {
         let mut out = Payload::new(room);
         match request {
             Request::SetRegister { register, value } => {
-                self.write(motor, register, value, drive)?;
+                self.write(motor, register, value, features, drive)?;
                 return Ok(0);
             }
             Request::GetRegister(register) => {
-                let row = register.row().ok_or(ErrorCode::GetWriteOnly)?;
-                let size = row.read_size(self.profile, features);
-                let size = size.ok_or(ErrorCode::GetWriteOnly)?;
-                out.value(read(self.profile, motor, register, row, drive), size);
+                let refused = Nack::from(ErrorCode::GetWriteOnly);
+                let Some(row) = register.row() else { return Err(refused) };
+                let Some(size) = row.read_size(self.profile, features) else {
+                    return Err(refused);
+                };
+                out.value(read(self.profile, motor, register, row, drive), size.get());
             }
             Request::ExecuteCommand(command) => {
                 execute(self.profile, motor, command, features, drive)?
@@ -213,9 +222,10 @@ impl Slave {
             Request::GetSegment(segment) => {
                 let segment = self.segments.get(usize::from(segment)).ok_or(ErrorCode::WrongSet)?;
                 for register in segment.registers() {
-                    let row = register.row().ok_or(ErrorCode::GetWriteOnly)?;
-                    let size = row.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
-                    out.value(read(self.profile, motor, register, row, drive), size);
+                    let refused = Nack::from(ErrorCode::GetWriteOnly);
+                    let Some(row) = register.row() else { return Err(refused) };
+                    let Some(size) = row.segment_size(features) else { return Err(refused) };
+                    out.value(read(self.profile, motor, register, row, drive), size.get());
                 }
             }
             Request::ConfigureSegment { segment, registers } => {
@@ -246,10 +256,10 @@ impl Slave {
         motor: MotorNumber,
         register: RegisterId,
         value: &[u8],
+        features: Features,
         drive: &mut impl MotorControl,
     ) -> Result<(), Nack> {
         let row = register.row().ok_or(ErrorCode::SetReadOnly)?;
-        let features = drive.features(motor);
         let size = match row.writing(self.profile, features) {
             Writing::Takes(size) => usize::from(size),
             Writing::ReadOnly => return Err(ErrorCode::SetReadOnly.into()),
@@ -266,25 +276,26 @@ impl Slave {
             *slot = *byte;
         }
         let bits = row.table_type().fit(i32::from_le_bytes(bytes));
-        match register {
+        let bits = match register {
             RegisterId::TARGET_MOTOR => {
                 let number = (bits as u8).saturating_add(1);
-                Ok(self.select(number).ok_or(ErrorCode::WrongSet)?)
+                return Ok(self.select(number).ok_or(ErrorCode::WrongSet)?);
             }
             RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
                 let shown = RegisterId(bits as u8).row();
-                if shown.is_some_and(|row| row.shows_on_dac(features)) {
-                    return Ok(drive.set_register(motor, register, bits)?);
+                if shown.is_none_or(|row| !row.shows_on_dac(features)) {
+                    // Firmware acknowledges registers that it cannot show; a slave of profile
+                    // `spec` refuses them.
+                    return match self.profile {
+                        Profile::Spec => Err(ErrorCode::WrongSet.into()),
+                        Profile::Mcsdk54 => Ok(()),
+                    };
                 }
-                // Firmware acknowledges registers that it cannot show; a slave of profile `spec`
-                // refuses them.
-                match self.profile {
-                    Profile::Spec => Err(ErrorCode::WrongSet.into()),
-                    Profile::Mcsdk54 => Ok(()),
-                }
+                bits
             }
-            _ => Ok(drive.set_register(motor, register, to_drive(self.profile, row, bits))?),
-        }
+            _ => to_drive(self.profile, row, bits),
+        };
+        Ok(drive.set_register(motor, register, bits)?)
     }
 
     fn reply(&mut self, answer: Result<usize, Nack>) -> &[u8] {
@@ -366,6 +377,7 @@ fn to_drive(profile: Profile, row: Row, bits: i32) -> i32 {
 }
 
 /// Shipped firmware stores speeds in tenths of a hertz, 6 rpm each (SPEC-NOTES S12).
+#[inline(never)]
 pub(super) fn speed(profile: Profile, rpm: i32) -> i32 {
     match profile {
         Profile::Spec => rpm,

@@ -56,6 +56,11 @@ impl Features {
 
     /// Whether the drive has `feature`.
     pub const fn has(self, feature: Feature) -> bool {
-        self.0 & (1 << feature as u16) != 0
+        self.has_number(feature as u8)
+    }
+
+    /// Whether the drive has the feature with this discriminant.
+    pub(super) const fn has_number(self, number: u8) -> bool {
+        self.0.wrapping_shr(number as u32) & 1 != 0
     }
 }

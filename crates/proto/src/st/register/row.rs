@@ -5,6 +5,7 @@ use super::shape::{Access, Origin, Writing};
 use super::unit::Unit;
 use super::value::Type;
 use crate::st::Profile;
+use core::num::NonZeroU8;
 
 /// The columns that decide how a slave answers. They are in one number, which functions pass in a
 /// register of the processor.
@@ -85,6 +86,10 @@ impl Row {
         Feature::from_number(self.byte(1) >> 3 & 0xF)
     }
 
+    const fn is_there(self, features: Features) -> bool {
+        features.has_number(self.byte(1) >> 3 & 0xF)
+    }
+
     pub(super) const fn origin(self) -> Origin {
         if self.byte(1) >> 7 == 0 { Origin::Table3 } else { Origin::Firmware }
     }
@@ -110,19 +115,19 @@ impl Row {
         self,
         profile: Profile,
         features: Features,
-    ) -> Option<u8> {
+    ) -> Option<NonZeroU8> {
         let size = match profile {
             Profile::Spec if matches!(self.origin(), Origin::Firmware) => 0,
             Profile::Spec if self.access().reads() => self.table_type().size(),
             Profile::Spec => 0,
             Profile::Mcsdk54 => self.mcsdk_reads(),
         };
-        if size == 0 || !features.has(self.feature()) { None } else { Some(size) }
+        if self.is_there(features) { NonZeroU8::new(size) } else { None }
     }
 
     /// See [`Shape::writing`](super::Shape::writing).
     pub(in crate::st) const fn writing(self, profile: Profile, features: Features) -> Writing {
-        let there = features.has(self.feature());
+        let there = self.is_there(features);
         match profile {
             Profile::Spec => {
                 let known = matches!(self.origin(), Origin::Table3);
@@ -144,13 +149,13 @@ impl Row {
 
     /// See [`Shape::shows_on_dac`](super::Shape::shows_on_dac).
     pub(in crate::st) const fn shows_on_dac(self, features: Features) -> bool {
-        matches!(self.access(), Access::Dac) && features.has(self.feature())
+        matches!(self.access(), Access::Dac) && self.is_there(features)
     }
 
     /// See [`Shape::segment_size`](super::Shape::segment_size).
-    pub(in crate::st) const fn segment_size(self, features: Features) -> Option<u8> {
+    pub(in crate::st) const fn segment_size(self, features: Features) -> Option<NonZeroU8> {
         if self.shows_on_dac(features) {
-            return Some(self.table_type().size());
+            return NonZeroU8::new(self.table_type().size());
         }
         self.read_size(Profile::Spec, features)
     }

@@ -5,6 +5,7 @@ use super::row::Row;
 use super::unit::Unit;
 use super::value::Type;
 use crate::st::Profile;
+use core::num::NonZeroU8;
 
 /// The access that table 3 allows to a master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -118,7 +119,7 @@ impl Shape {
 
     /// Size of the reply to a GET_REG from a drive with `features`, in bytes; `None` if it refuses.
     pub const fn read_size(&self, profile: Profile, features: Features) -> Option<u8> {
-        self.row.read_size(profile, features)
+        optional(self.row.read_size(profile, features))
     }
 
     /// How a drive with `features` handles a SET_REG.
@@ -133,7 +134,14 @@ impl Shape {
 
     /// Size of the register in a data segment, in bytes; `None` if it is not allowed there.
     pub const fn segment_size(&self, features: Features) -> Option<u8> {
-        self.row.segment_size(features)
+        optional(self.row.segment_size(features))
+    }
+}
+
+const fn optional(size: Option<NonZeroU8>) -> Option<u8> {
+    match size {
+        Some(size) => Some(size.get()),
+        None => None,
     }
 }
 
