@@ -1,6 +1,7 @@
 //! The slave: takes bytes, calls a table of callbacks, gives replies.
 
 use core::ffi::{c_char, c_void};
+use core::ptr;
 
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Feature, Features, MotorControl, MotorNumber,
@@ -15,7 +16,7 @@ use crate::error::{answer, motorlink_error};
 use crate::number::{
     motorlink_st_command, motorlink_st_error_code, motorlink_st_profile, motorlink_st_reg, one_of,
 };
-use crate::pointer::{Kept, ascii, plain, promised, storage};
+use crate::pointer::{Kept, ascii, plain, promised, same_layout, storage};
 use crate::tag::Kind;
 
 /// The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
@@ -141,6 +142,13 @@ pub struct motorlink_st_motor_control {
 
 plain!(motorlink_st_motor_control);
 
+// Pointers to the struct of C are cast to this one, and back.
+same_layout!(motorlink_st_revup_phase = RevupPhase {
+    speed_rpm = speed_rpm,
+    torque_s16a = torque_s16a,
+    duration_ms = duration_ms,
+});
+
 /// What the storage of a slave holds.
 #[repr(C)]
 pub(crate) struct State {
@@ -202,17 +210,17 @@ impl MotorControl for Kept<motorlink_st_motor_control> {
 
     fn get_revup_data(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let drive = self.now();
-        let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
+        let mut data = RevupPhase::default();
         if let Some(call) = drive.get_revup_data {
-            call(drive.context, motor.number(), phase, &raw mut data);
+            call(drive.context, motor.number(), phase, (&raw mut data).cast());
         }
-        data.into()
+        data
     }
 
     fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let drive = self.now();
         if let Some(call) = drive.set_revup_data {
-            call(drive.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
+            call(drive.context, motor.number(), phase, ptr::from_ref(&data).cast());
         }
     }
 

@@ -36,6 +36,8 @@ pub struct CurrentReference {
 }
 
 /// A rev-up phase (4.9).
+// The layout of C's struct, so that the C interface needs no conversion.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RevupPhase {
     /// Mechanical speed at the end of the phase, rpm.
@@ -374,11 +376,12 @@ impl<'a> BoardInfo<'a> {
 
     /// Encodes the reply of a drive of `profile`: version bytes as integers or as ASCII digits.
     pub(super) fn encode(profile: Profile, version: &Version<'_>, out: &mut Payload<'_>) {
-        let digit = |n: u8| match profile {
-            Profile::Spec => n,
-            Profile::Mcsdk54 => b'0' | n & 0x0F,
-        };
-        out.byte(digit(version.major)).byte(digit(version.minor)).byte(digit(version.patch));
+        for part in [version.major, version.minor, version.patch] {
+            out.byte(match profile {
+                Profile::Spec => part,
+                Profile::Mcsdk54 => b'0' | part & 0x0F,
+            });
+        }
         out.text(version.name, VERSION_SIZE);
     }
 }

@@ -32,6 +32,7 @@ impl<'o> Payload<'o> {
     }
 
     /// The low `size` bytes of a register's value.
+    #[inline(never)]
     pub(super) fn value(&mut self, bits: i32, size: u8) -> &mut Self {
         let bytes = bits.to_le_bytes();
         self.bytes(bytes.get(..usize::from(size)).unwrap_or(&bytes))
