@@ -11,7 +11,7 @@ PROGRAMS = {
     "rmd_drive": "RMD drive",
     "rmd_host": "RMD host, 32 motors",
 }
-LIMITS = {"st_slave": (4864, 350), "rmd_drive": (3840, 200)}
+LIMITS = {"st_slave": (4096, 350), "rmd_drive": (3072, 200)}
 """Less than this of flash, memory functions and all, and of RAM."""
 
 TARGET = "thumbv7em-none-eabihf"

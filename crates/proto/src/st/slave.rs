@@ -158,11 +158,7 @@ impl Slave {
 
     /// Checks motor and frame code, then executes, in this order (4.1). Returns the size of the
     /// ACK's payload, which is then in the buffer.
-    fn process(
-        &mut self,
-        frame: &Frame<'_>,
-        drive: &mut impl MotorControl,
-    ) -> Result<usize, Nack> {
+    fn process(&mut self, frame: &Frame<'_>, drive: &mut impl MotorControl) -> Result<usize, Nack> {
         if frame.motor() != 0 {
             self.select(frame.motor()).ok_or(ErrorCode::BadMotorSelected)?;
         }
