@@ -346,3 +346,19 @@ fn a_reply_that_came_twice_is_found_before_its_values_are_relied_on() {
         }
     }
 }
+
+#[test]
+fn a_confirmation_finds_a_wrong_value_behind_a_line_that_recovered_since() {
+    let line = Twice { is_doubling: true, is_talking: true, ..Twice::default() };
+    let client = st::Client::over("line", Box::new(line), st::Options::default());
+    let motor = client.motor(1).unwrap();
+    let kp = motor.get(register::SPEED_KP).unwrap();
+    assert_eq!(motor.get(register::SPEED_KI).unwrap(), kp, "nothing tells so far");
+    // The reply for SPEED_KI comes now. The next read finds it and recovers the line.
+    std::thread::sleep(Duration::from_millis(1));
+    assert_ne!(motor.get(register::SPEED_KD).unwrap(), kp);
+    assert!(matches!(client.confirm(), Err(st::Error::Unconfirmed { why: None, .. })));
+
+    motor.get(register::SPEED_KI).unwrap();
+    client.confirm().expect("the replies since then are right");
+}

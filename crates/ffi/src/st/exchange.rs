@@ -31,6 +31,12 @@ impl State {
         motor: u8,
         request: &Request<'_>,
     ) -> Result<(), motorlink_error> {
+        self.send(motor, request)?;
+        self.last.requested(self.master.counters());
+        Ok(())
+    }
+
+    fn send(&mut self, motor: u8, request: &Request<'_>) -> Result<(), motorlink_error> {
         check_motor(motor)?;
         let seen = self.master.counters();
         let effect = self.account.check(seen, motor, request).map_err(limited)?;
@@ -40,7 +46,7 @@ impl State {
             Request::GetRegister(register) => Some(*register),
             _ => None,
         };
-        self.begun();
+        self.confirmation = None;
         Ok(())
     }
 
@@ -61,21 +67,17 @@ impl State {
         self.master.request_raw(frame.header, payload).map_err(refused)?;
         self.account.sent_frame(&frame, effect);
         self.asked = None;
-        self.begun();
+        self.confirmation = None;
+        self.last.requested(self.master.counters());
         Ok(())
     }
 
     /// Begins the question of a confirmation.
     pub(super) fn ask(&mut self, confirmation: Confirmation) -> Result<(), motorlink_error> {
-        self.begin(0, &confirmation.request())?;
+        self.send(0, &confirmation.request())?;
         self.asked = None;
         self.confirmation = Some(confirmation);
         Ok(())
-    }
-
-    fn begun(&mut self) {
-        self.last.requested(self.master.counters());
-        self.confirmation = None;
     }
 }
 

@@ -228,6 +228,9 @@ impl State {
         }
         let outcome = result.map(<[u8]>::len);
         self.last.finished(outcome.ok());
+        if matches!(outcome, Err(ExchangeError::Failed(_))) {
+            self.last.restart();
+        }
         (output, Some(outcome))
     }
 
@@ -236,6 +239,7 @@ impl State {
         confirmation: &Confirmation,
         outcome: Result<usize, ExchangeError>,
     ) -> motorlink_error {
+        self.last.restart();
         match outcome {
             Ok(size) if confirmation.accepts(size) => {
                 match confirmation.is_the_same(self.master.counters()) {
@@ -298,7 +302,9 @@ pub unsafe extern "C" fn motorlink_st_master_abandon(
 ) -> motorlink_error {
     promised!(master);
     answer(|| {
-        master.enter()?.master.abandon();
+        let mut state = master.enter()?;
+        state.master.abandon();
+        state.last.restart();
         Ok(())
     })
 }
@@ -311,7 +317,9 @@ pub unsafe extern "C" fn motorlink_st_master_lost(
 ) -> motorlink_error {
     promised!(master);
     answer(|| {
-        master.enter()?.master.lost();
+        let mut state = master.enter()?;
+        state.master.lost();
+        state.last.restart();
         Ok(())
     })
 }
@@ -328,6 +336,7 @@ pub unsafe extern "C" fn motorlink_st_master_reopened(
         let mut state = master.enter()?;
         state.account.reopened();
         state.master.reopened();
+        state.last.restart();
         Ok(())
     })
 }

@@ -239,9 +239,11 @@ impl Client {
         self.conclude(driven, |payload| Some(payload.to_vec()))
     }
 
-    /// Makes sure that the replies so far went to their own requests: asks for STATUS, FLAGS or the board
-    /// information, whichever has another size than the last reply. A reply that came twice, or late, has put each one behind it off
-    /// by one, which no single exchange can tell.
+    /// Makes sure that the replies since the last confirmation or failed exchange went to their own
+    /// requests: asks for STATUS, FLAGS or the board information, whichever has another size than the
+    /// last reply. A reply that came twice, or late, has put each one behind it off by one, which no
+    /// single exchange can tell. The values before a failed exchange stay
+    /// unconfirmed.
     ///
     /// # Errors
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
@@ -408,7 +410,7 @@ impl<L: ByteLink> Driven<L> {
 
     /// The port failed in the middle of an exchange, or did not want to wait for its end.
     pub(super) fn lost(&mut self, error: PortError) -> Error {
-        self.session.abandon();
+        self.session.failed();
         if !error.is_interruption() {
             self.port.close();
         }

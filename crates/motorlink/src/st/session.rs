@@ -121,7 +121,9 @@ impl Session {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         addressable(motor)?;
         self.check_retired(Effect::of(request))?;
-        self.begin(motor, request)
+        self.begin(motor, request)?;
+        self.last.requested(self.master.counters());
+        Ok(())
     }
 
     /// Begins the exchange of a confirmation. A retired session does so, too, to confirm its stops.
@@ -150,6 +152,7 @@ impl Session {
         let begun = self.master.request_raw(frame.header, payload);
         self.begun(begun, motor, What::Raw(code))?;
         self.account.sent_frame(&frame, effect);
+        self.last.requested(self.master.counters());
         Ok(())
     }
 
@@ -174,7 +177,6 @@ impl Session {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
-        self.last.requested(self.master.counters());
         self.pending = PendingRequest { motor, what };
         Ok(())
     }
@@ -203,7 +205,7 @@ impl Session {
             }
             Ok((None, size)) => {
                 // A reply that fits no request: somebody else's, perhaps.
-                self.master.lost();
+                self.lost();
                 Err(Error::Reply { port, motor: target, request: what.to_string(), size })
             }
             Err(proto::ExchangeError::Refused(code)) => {
@@ -211,20 +213,22 @@ impl Session {
                 Err(Error::Refused { port, motor: target, request: what, code, hint: hint(code) })
             }
             Err(proto::ExchangeError::Failed(failure)) => {
+                self.last.restart();
                 let (what, hint) = (what.to_string(), advice(failure));
                 Err(Error::Failed { port, motor: target, request: what, failure, hint })
             }
         }
     }
 
-    /// Whether the answer shows that the replies so far match their requests. A line that was lost
-    /// meanwhile has been recovered, which says nothing about the replies before.
+    /// Whether the answer shows that the replies since the last confirmation match their requests. A
+    /// line that was lost meanwhile has been recovered, which says nothing about the replies before.
     pub(super) fn confirmed(
         &mut self,
         confirmation: &Confirmation,
         answer: Result<(), Error>,
     ) -> Result<(), Error> {
         let is_same_line = confirmation.is_the_same(self.master.counters());
+        self.last.restart();
         let port = Arc::clone(&self.port);
         match answer {
             Ok(()) if is_same_line => Ok(()),
@@ -237,7 +241,7 @@ impl Session {
         }
     }
 
-    /// Starts a confirmation of the replies so far.
+    /// Starts a confirmation of the replies since the last one, or since a failure.
     pub(super) fn confirmation(&mut self) -> Confirmation {
         self.last.confirm()
     }
@@ -253,8 +257,20 @@ impl Session {
         self.master.abandon();
     }
 
+    /// Tells that the exchange under way failed with the port. Its reply may still come.
+    pub(super) fn failed(&mut self) {
+        self.master.abandon();
+        self.last.restart();
+    }
+
+    fn lost(&mut self) {
+        self.master.lost();
+        self.last.restart();
+    }
+
     /// Tells that the line was closed and opened again.
     pub(super) fn reopened(&mut self) {
+        self.last.restart();
         self.account.reopened();
         self.master.reopened();
     }
@@ -270,7 +286,7 @@ impl Session {
         motor: MotorNumber,
         frame: &'a mut [u8; MAX_FRAME],
     ) -> &'a [u8] {
-        self.master.lost();
+        self.lost();
         let stop = Request::ExecuteCommand(Command::StopMotor);
         Frame::command(motor.number(), &stop, frame).unwrap_or(&[])
     }

@@ -6,21 +6,26 @@
 use super::master::{question_with_answer, size_behind};
 use super::{Counters, MAX_PAYLOAD, Request};
 
-/// The last exchange, which determines the question of a confirmation.
+/// The exchanges that a confirmation is about. The last one determines its question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LastExchange {
     /// Payload size of the acknowledge; `None` after a refusal or a failure.
     size: Option<u8>,
-    /// How often the line had been lost when the request was made.
+    /// How often the line had been lost at the first request that is not confirmed.
     losses: u32,
+    /// Whether there is such a request.
+    has_requests: bool,
     /// Alternates between questions.
     turn: bool,
 }
 
 impl LastExchange {
-    /// Records the start of an exchange.
+    /// Records the start of an exchange that is not the question of a confirmation.
     pub const fn requested(&mut self, seen: Counters) {
-        self.losses = seen.losses;
+        if !self.has_requests {
+            self.has_requests = true;
+            self.losses = seen.losses;
+        }
     }
 
     /// Records the end of an exchange: the payload size of the acknowledge, if there is one.
@@ -32,9 +37,16 @@ impl LastExchange {
         };
     }
 
-    /// Starts a confirmation of the replies so far.
+    /// Makes the next confirmation one of later exchanges: a confirmation ended, or the caller knows
+    /// that the line was lost, such as from a failed exchange.
+    pub const fn restart(&mut self) {
+        self.has_requests = false;
+    }
+
+    /// Starts a confirmation of the replies since the [`restart`](Self::restart).
     pub const fn confirm(&mut self) -> Confirmation {
-        Confirmation { losses: self.losses, size: self.next(), is_repeated: false }
+        let LastExchange { losses, has_requests, .. } = *self;
+        Confirmation { losses, has_requests, size: self.next(), is_repeated: false }
     }
 
     /// The answer size of the next question.
@@ -51,6 +63,7 @@ impl LastExchange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Confirmation {
     losses: u32,
+    has_requests: bool,
     /// Payload size of the answer.
     size: u8,
     is_repeated: bool,
@@ -78,10 +91,10 @@ impl Confirmation {
         self.size as usize == size
     }
 
-    /// Whether the line was not lost since the last request before the confirmation. If it was
-    /// lost, its recovery says nothing about the replies before.
+    /// Whether the line was not lost since the first request that is confirmed. If it was lost, its
+    /// recovery says nothing about the replies before.
     pub const fn is_the_same(&self, seen: Counters) -> bool {
-        self.losses == seen.losses
+        !self.has_requests || self.losses == seen.losses
     }
 }
 
@@ -122,9 +135,19 @@ mod tests {
     #[test]
     fn a_line_that_was_lost_is_another_one() {
         let mut last = LastExchange::default();
+        let lost = Counters { losses: 1, ..SEEN };
         last.requested(SEEN);
         let confirmation = last.confirm();
         assert!(confirmation.is_the_same(SEEN));
-        assert!(!confirmation.is_the_same(Counters { losses: 1, ..SEEN }));
+        assert!(!confirmation.is_the_same(lost));
+        // Each request since the last confirmation counts, not only the last one.
+        last.requested(SEEN);
+        last.requested(lost);
+        assert!(!last.confirm().is_the_same(lost));
+        last.restart();
+        last.requested(lost);
+        assert!(last.confirm().is_the_same(lost));
+        last.restart();
+        assert!(last.confirm().is_the_same(SEEN), "nothing was requested");
     }
 }
