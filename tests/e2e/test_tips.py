@@ -81,6 +81,22 @@ def test_a_temperature_that_is_plausible_in_the_other_profile_only_is_an_error(r
     assert "65526" in run("st", "-p", cold, "--raw", "get", "HEATS_TEMP").ended(0).out
 
 
+def test_a_share_of_another_profile_is_neither_printed_nor_replaced(run, cold):
+    wrong = run("st", "-p", cold, "get", "FLUXWK_BUS").ended(1)
+    assert "FLUXWK_BUS is 985 % in profile spec" in wrong.err and "98.5 % in profile mcsdk-5.4" in wrong.err
+    set = run("st", "-p", cold, "set", "FLUXWK_BUS", 90).ended(1)
+    assert "FLUXWK_BUS was not written" in set.err and "add --profile mcsdk-5.4" in set.err
+    assert "it takes 0 to 100 %" in run("st", "-p", cold, "set", "FLUXWK_BUS", 985).ended(2).err
+    right = run("st", "-p", cold, "--profile", "mcsdk-5.4", "get", "FLUXWK_BUS").ended(0)
+    assert "98.5 %" in right.out
+    assert "985" in run("st", "-p", cold, "--raw", "get", "FLUXWK_BUS").ended(0).out
+
+
+def test_a_trace_says_that_a_value_may_be_of_the_other_profile(run, cold):
+    trace = run("st", "-p", cold, "--trace", "get", "HEATS_TEMP").ended(1).err
+    assert "ACK HEATS_TEMP is 65526 °C in profile spec" in trace
+
+
 def test_a_value_of_another_size_keeps_the_others(run, cold):
     done = run("st", "-p", cold, "get", "SPEED_MEAS", "CTRBID", "BUS_VOLTAGE").ended(3)
     assert [line.split()[0] for line in done.out.splitlines()] == ["SPEED_MEAS", "BUS_VOLTAGE"]

@@ -93,6 +93,14 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
             }
             _ => None,
         },
+        st::Error::Implausible { why, .. } => Some(match why.fits.profile {
+            Profile::Mcsdk54 => {
+                "if the drive has MCSDK firmware, add --profile mcsdk-5.4; --raw prints the digits"
+            }
+            Profile::Spec => {
+                "if the drive follows the document, add --profile spec; --raw prints the digits"
+            }
+        }),
         st::Error::Refused { code: ErrorCode::BadMotorSelected, .. } => {
             Some("give another --motor")
         }

@@ -298,6 +298,7 @@ impl From<st::Error> for Failure {
         let kind = match &error {
             st::Error::Refused { .. }
             | st::Error::Differs { .. }
+            | st::Error::Implausible { .. }
             | st::Error::NotStarted { .. }
             | st::Error::NotArrived { .. } => Kind::Refused,
             st::Error::Port(error) => return error.into(),
@@ -312,7 +313,9 @@ impl From<st::Error> for Failure {
                 problem.fact("name", code.to_string());
             }
             st::Error::NotArrived { motor, .. } => problem.motor(motor.number()),
-            st::Error::NotStarted { motor, .. } => problem.motor(motor.0),
+            st::Error::NotStarted { motor, .. } | st::Error::Implausible { motor, .. } => {
+                problem.motor(motor.0);
+            }
             st::Error::Failed { motor, .. } | st::Error::Reply { motor, .. } => {
                 problem.motor(motor.0);
             }

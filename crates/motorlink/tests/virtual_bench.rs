@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant as Moment};
 
 use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, MotorSet, SetTorque4};
-use motorlink::st::{self, Failure, Ramp, Status, register};
+use motorlink::st::{self, Failure, Profile, Ramp, RegisterId, Status, register};
 use motorlink::time;
 use motorlink_link::fault::Faults;
 use motorlink_link::serve::ServeName;
@@ -36,6 +36,37 @@ fn value(bench: &Bench, signal: &str) -> f64 {
 
 fn command(text: &str) -> Command {
     serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn a_value_that_is_plausible_in_the_other_profile_only_is_an_error() {
+    let text = "profile = \"mcsdk-5.4\"\n[[st.motor]]\nplant.heat.ambient = -10.0\n";
+    let bench = Bench::new(&BenchConfig::parse(text).unwrap()).unwrap();
+    let client = st(&bench, "", Duration::from_secs(1));
+    let motor = client.motor(1).unwrap();
+    let error = motor.get(register::HEATS_TEMP).unwrap_err();
+    let st::Error::Implausible { port, motor: target, why } = &error else { panic!("{error}") };
+    assert_eq!((&**port, target.0), ("bench", 1));
+    assert_eq!((why.read.register, why.read.digits()), (RegisterId::HEATS_TEMP, 65526));
+    assert_eq!((why.fits.profile, why.fits.value()), (Profile::Mcsdk54, -10.0));
+    assert!(!error.is_refusal() && !error.is_line_failure());
+    assert_eq!(
+        error.to_string(),
+        "bench: motor 1: HEATS_TEMP is 65526 °C in profile spec, which is not plausible, and -10 °C \
+         in profile mcsdk-5.4; is the profile right?"
+    );
+    let share = motor.get(register::FLUXWK_BUS).unwrap_err();
+    assert!(matches!(share, st::Error::Implausible { .. }), "{share}");
+    assert_eq!(motor.get(register::BUS_VOLTAGE).unwrap(), 325);
+
+    let digits = motor.get_raw(RegisterId::HEATS_TEMP).unwrap();
+    assert_eq!(digits, 65526);
+    assert!(motor.reading(RegisterId::HEATS_TEMP, digits).is_err());
+    assert_eq!(motor.reading(RegisterId::HEATS_TEMP, 20).unwrap().to_string(), "20 °C");
+
+    let options = st::Options { profile: Profile::Mcsdk54, ..st::Options::default() };
+    let client = st::Client::over("bench", bench.bytes(&Faults::NONE), options);
+    assert_eq!(client.motor(1).unwrap().get(register::HEATS_TEMP).unwrap(), -10);
 }
 
 #[test]

@@ -152,12 +152,8 @@ fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Fa
 
 /// A register with its value as people read it, or why its value is not plausible.
 fn cell(session: &Session, register: RegisterId, bits: i32) -> Cell {
-    let reading = session.reading(register, bits);
-    match reading.more_plausible() {
-        Some(other) if !session.raw => {
-            let failure = refusal::of_value(&session.port, &reading, &other);
-            Cell::Refused(register.to_string(), session.about(failure))
-        }
-        _ => Cell::Read(session.row(&reading)),
+    match session.plausible(register, bits) {
+        Ok(reading) => Cell::Read(session.row(&reading)),
+        Err(failure) => Cell::Refused(register.to_string(), session.about(failure)),
     }
 }

@@ -2,7 +2,7 @@
 
 use motorlink::st::register::{Access, Origin, Writing};
 use motorlink::st::{
-    Error, ErrorCode, Failure as ExchangeFailure, Feature, Features, Profile, Reading, RegisterId,
+    Error, ErrorCode, Failure as ExchangeFailure, Feature, Features, Profile, RegisterId,
 };
 
 use crate::failure::Failure;
@@ -23,17 +23,6 @@ pub fn is_about_register(error: &Error) -> bool {
         }
         _ => false,
     }
-}
-
-/// A value that is plausible in another profile only.
-pub fn of_value(port: &str, reading: &Reading, other: &Reading) -> Failure {
-    let (register, fits) = (reading.register, other.profile);
-    Failure::refused(format!(
-        "{port}: {register} is {reading} in profile {}, which is not plausible, and {other} in profile {}",
-        reading.profile.name(),
-        fits.name()
-    ))
-    .trying(format!("{}; --raw prints the digits", advice_profile(fits)))
 }
 
 /// A refusal to read a register.

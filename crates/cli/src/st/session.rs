@@ -117,6 +117,14 @@ impl Session {
         Reading { register, bits, profile: self.client.profile() }
     }
 
+    /// A value that was read. With --raw it is not checked: people read its digits.
+    pub fn plausible(&self, register: RegisterId, bits: i32) -> Result<Reading, Failure> {
+        match self.raw {
+            true => Ok(self.reading(register, bits)),
+            false => Ok(self.motor()?.reading(register, bits)?),
+        }
+    }
+
     /// A register with its value as people and programs read it.
     pub fn row(&self, reading: &Reading) -> Row {
         json::register(reading, self.text(reading), self.raw, self.full_scale)

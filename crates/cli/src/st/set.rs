@@ -103,7 +103,7 @@ fn look(session: &Session, register: RegisterId, attempts: u8) -> Result<Look, F
         }
     }
     match read {
-        Ok(bits) => Ok(Look::Value(session.reading(register, bits))),
+        Ok(bits) => session.plausible(register, bits).map(Look::Value),
         Err(Error::Refused { code, .. }) => {
             Ok(Look::Unreadable(format!("the drive refuses to read it ({code})")))
         }

@@ -53,6 +53,7 @@ pub struct Client {
     turns: Turns<Driven<Box<dyn ByteLink>>>,
     sign: LinkSign,
     rules: Rules,
+    port: Arc<str>,
 }
 
 /// How an exchange ended: with what was made of the acknowledge's payload, and its size.
@@ -110,7 +111,8 @@ impl Client {
 
     pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
         let (sign, rules) = (driven.port.sign(), driven.session.rules());
-        Client { turns: Turns::new(driven), sign, rules }
+        let port = Arc::clone(&driven.port.name);
+        Client { turns: Turns::new(driven), sign, rules, port }
     }
 
     /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
@@ -131,6 +133,11 @@ impl Client {
     /// [looks](Self::looking); its reply may still come. Waits for exchanges of other threads.
     pub fn abandon(&self) {
         self.turns.take().abandon();
+    }
+
+    /// The port's name.
+    pub fn port(&self) -> &Arc<str> {
+        &self.port
     }
 
     /// The profile that the drive is expected to follow.

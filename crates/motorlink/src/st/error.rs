@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use motorlink_link::port::PortError;
 use motorlink_proto::st::{
-    ErrorCode, Failure, MotorNumber, NotArrived, NotStarted, RegisterId, Unverified,
+    ErrorCode, Failure, Implausible, MotorNumber, NotArrived, NotStarted, RegisterId, Unverified,
 };
 
 use super::LimitError;
@@ -55,6 +55,16 @@ pub enum Error {
         request: String,
         /// Bytes of the reply's payload.
         size: usize,
+    },
+    /// The value that was read is possible in another profile only.
+    #[error("{port}: {motor}: {why}; is the profile right?")]
+    Implausible {
+        /// The port.
+        port: Arc<str>,
+        /// The motor, for messages.
+        motor: Target,
+        /// The value in both profiles.
+        why: Implausible,
     },
     /// The line was not in sync behind the last reply: one came twice, or late. What was read or
     /// acknowledged before may have been the reply to something else.

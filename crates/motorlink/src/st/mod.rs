@@ -39,7 +39,9 @@ pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::{Error, Target, Unverifiable};
 pub use event::{EventClient, Progress};
 pub use motor::Motor;
-pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
+pub use motorlink_proto::st::{
+    Implausible, Reading, UnknownRegister, ValueError, find_register, parse_value,
+};
 pub use options::Options;
 pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan_baud};
 pub use stop_on_drop::{StopOnDrop, Stopped};

@@ -1,9 +1,11 @@
 //! One motor of a drive.
 
+use std::sync::Arc;
+
 use motorlink_proto::st::register::{Readable, Register, Value, Writable};
 use motorlink_proto::st::{
-    Command, CurrentReference, Flags, MotorNumber, PositionMove, Profile, Ramp, RegisterId,
-    Request, RevupPhase, Starting, Status, TorqueRamp, VerifiedWrite, register,
+    Command, CurrentReference, Flags, MotorNumber, PositionMove, Profile, Ramp, Reading,
+    RegisterId, Request, RevupPhase, Starting, Status, TorqueRamp, VerifiedWrite, register,
 };
 
 use super::{Client, Error, Target};
@@ -45,8 +47,27 @@ impl Motor<'_> {
     }
 
     /// Reads a register (4.5), in the unit of table 3.
+    ///
+    /// # Errors
+    /// [`Error::Implausible`] if the value is possible in the other profile only.
+    /// [`get_raw`](Self::get_raw) returns its digits. Those of [`Client::exchange`].
     pub fn get<T: Value>(&self, register: Register<T, impl Readable>) -> Result<T, Error> {
-        self.get_raw(register.id()).map(T::from_bits)
+        let bits = self.get_raw(register.id())?;
+        self.reading(register.id(), bits).map(|reading| T::from_bits(reading.bits))
+    }
+
+    /// The value of raw digits, as [`get_raw`](Self::get_raw) and [`segment`](Self::segment) return
+    /// them. Sends nothing.
+    ///
+    /// # Errors
+    /// [`Error::Implausible`] if the value is possible in the other profile only.
+    pub fn reading(&self, register: RegisterId, bits: i32) -> Result<Reading, Error> {
+        let reading = Reading { register, bits, profile: self.client.profile() };
+        reading.plausible().map_err(|why| Error::Implausible {
+            port: Arc::clone(self.client.port()),
+            motor: Target(self.motor.number()),
+            why,
+        })
     }
 
     /// Writes a register (4.4), in the unit of table 3.
@@ -59,8 +80,9 @@ impl Motor<'_> {
         self.set_raw(register.id(), value.bits(), size)
     }
 
-    /// Reads any register, known or not. The value's size is the reply's, its sign that of the
-    /// register's type in the client's profile.
+    /// Reads the raw digits of any register, known or not. The value's size is the reply's, its sign
+    /// that of the register's type in the client's profile. Whether the profile may be right is not
+    /// checked: see [`reading`](Self::reading).
     pub fn get_raw(&self, register: RegisterId) -> Result<i32, Error> {
         let profile = self.client.profile();
         self.ask(&Request::GetRegister(register), |payload| register.decode(profile, payload))
@@ -189,7 +211,8 @@ impl Motor<'_> {
     }
 
     /// Samples a data segment in one exchange. `registers` are those that it was configured with;
-    /// `values` receives theirs, in this order, as many as fit.
+    /// `values` receives their raw digits, in this order, as many as fit
+    /// ([`reading`](Self::reading) converts them).
     pub fn segment(
         &self,
         segment: u8,

@@ -114,7 +114,8 @@ impl Transcript {
             ReplyKind::Nothing => None,
             ReplyKind::Register(register) => {
                 let bits = register.decode(self.profile, payload)?;
-                Some(Reading { register, bits, profile: self.profile }.to_string())
+                let reading = Reading { register, bits, profile: self.profile }.plausible();
+                Some(reading.map_or_else(|why| why.to_string(), |reading| reading.to_string()))
             }
             ReplyKind::BoardInfo => {
                 let BoardInfo { version: [major, minor, patch], name, .. } =

@@ -111,5 +111,5 @@ pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
 pub use started::{Effect, Started};
 pub use starting::{NotStarted, Starting};
 #[cfg(feature = "std")]
-pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};
+pub use value::{Implausible, Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

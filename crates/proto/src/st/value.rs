@@ -18,6 +18,19 @@ pub struct Reading {
     pub profile: Profile,
 }
 
+/// A value that is possible in another profile only. The drive may follow that profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{} is {read} in profile {}, which is not plausible, and {fits} in profile {}",
+    .read.register, .read.profile.name(), .fits.profile.name()
+)]
+pub struct Implausible {
+    /// The value in the profile that it was read with. [`Reading::digits`] has its raw digits.
+    pub read: Reading,
+    /// The same value in the profile to try.
+    pub fits: Reading,
+}
+
 /// An unknown register name or number.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no register `{text}`{}", suggestion(.nearest))]
@@ -54,7 +67,7 @@ pub enum ValueError {
         /// A space and the unit, or nothing.
         unit: String,
     },
-    /// Outside the range of the register's type.
+    /// Outside the range of the register.
     #[error("{text} does not fit {register}: it takes {least} to {most}{unit}")]
     OutOfRange {
         /// The given text.
@@ -117,14 +130,19 @@ impl Reading {
         }
     }
 
-    /// The same bits read in the other profile, if the value is not plausible in this one: the
-    /// document has a temperature or a power without a sign, shipped firmware sends it with one.
-    pub fn more_plausible(&self) -> Option<Reading> {
-        let shape = self.register.shape()?;
-        let profile = self.profile.other();
-        let is_signed_there = (shape.ty(self.profile), shape.ty(profile)) == (Type::U16, Type::I16);
-        let bits = (self.bits as u16).cast_signed();
-        (is_signed_there && bits < 0).then_some(Reading { bits: bits.into(), profile, ..*self })
+    /// Checks that the profile may be right.
+    ///
+    /// # Errors
+    /// [`Implausible`]: the value is possible in the other profile only
+    /// ([`RegisterId::value_of_other_profile`]).
+    pub fn plausible(self) -> Result<Self, Implausible> {
+        match self.register.value_of_other_profile(self.profile, self.bits) {
+            None => Ok(self),
+            Some(bits) => {
+                let fits = Reading { bits, profile: self.profile.other(), ..self };
+                Err(Implausible { read: self, fits })
+            }
+        }
     }
 
     /// Number of decimal places that show every value exactly; `None` for a float.
@@ -214,6 +232,10 @@ pub fn parse_value(
     let scale = if raw { 1.0 } else { unit(register).scale(profile) };
     let digits = value / scale;
     let (least, most) = range(ty);
+    let most = match unit(register).most(profile) {
+        Some(possible) if !raw => most.min(possible.into()),
+        _ => most,
+    };
     if digits < least as f64 || digits > most as f64 {
         let (least, most) = (least as f64 * scale, most as f64 * scale);
         return Err(ValueError::OutOfRange { text, register, least, most, unit: symbol });
@@ -292,6 +314,63 @@ mod tests {
             assert_eq!(shown(RegisterId::SC_RS, ohms.to_bits() as i32, spec), text);
         }
         assert_eq!(shown(RegisterId(0xC0), -1, spec), "-1");
+    }
+
+    #[test]
+    fn a_value_that_is_plausible_in_the_other_profile_only_is_an_error() {
+        let (spec, mcsdk) = (Profile::Spec, Profile::Mcsdk54);
+        let plausible =
+            |register, bits, profile| Reading { register, bits, profile }.plausible().map(|_| ());
+        for (register, bits, text) in [
+            (
+                RegisterId::HEATS_TEMP,
+                65526,
+                "HEATS_TEMP is 65526 °C in profile spec, which is not plausible, and -10 °C in profile mcsdk-5.4",
+            ),
+            (
+                RegisterId::MOTOR_POWER,
+                65534,
+                "MOTOR_POWER is 65534 W in profile spec, which is not plausible, and -2 W in profile mcsdk-5.4",
+            ),
+            (
+                RegisterId::FLUXWK_BUS,
+                985,
+                "FLUXWK_BUS is 985 % in profile spec, which is not plausible, and 98.5 % in profile mcsdk-5.4",
+            ),
+        ] {
+            let why = plausible(register, bits, spec).unwrap_err();
+            assert_eq!((why.read.digits(), why.fits.profile), (bits.into(), mcsdk));
+            assert_eq!(why.to_string(), text);
+            assert_eq!(plausible(register, why.fits.bits, mcsdk), Ok(()));
+        }
+        for (register, bits) in [
+            (RegisterId::HEATS_TEMP, 32767),
+            (RegisterId::FLUXWK_BUS_MEAS, 100),
+            // Not plausible in either profile.
+            (RegisterId::FLUXWK_BUS_MEAS, 1001),
+            (RegisterId::BUS_VOLTAGE, 65526),
+            (RegisterId::CTRBID, -1),
+            (RegisterId(0xC0), -1),
+        ] {
+            assert_eq!(plausible(register, bits, spec), Ok(()), "{register}");
+        }
+        for register in RegisterId::all() {
+            for bits in [i32::MIN, -1, 0, 985, 65526, i32::MAX] {
+                assert_eq!(plausible(register, bits, mcsdk), Ok(()), "{register}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_share_above_100_percent_is_written_only_as_digits() {
+        let parse = |text, profile, raw| parse_value(RegisterId::FLUXWK_BUS, text, profile, raw);
+        for profile in [Profile::Spec, Profile::Mcsdk54] {
+            let refused = parse("985", profile, false).unwrap_err();
+            assert_eq!(refused.to_string(), "985 does not fit FLUXWK_BUS: it takes 0 to 100 %");
+            assert_eq!(parse("985", profile, true), Ok(985));
+        }
+        assert_eq!(parse("100", Profile::Spec, false), Ok(100));
+        assert_eq!(parse("100", Profile::Mcsdk54, false), Ok(1000));
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod feature;
 mod id;
 mod index;
 mod lookup;
+mod plausible;
 mod row;
 mod shape;
 mod table;

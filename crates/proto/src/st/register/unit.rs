@@ -64,6 +64,15 @@ impl Unit {
         }
     }
 
+    /// The largest possible value, in digits; `None` if only the type limits it.
+    pub const fn most(self, profile: Profile) -> Option<i32> {
+        match (self, profile) {
+            (Unit::Percent, Profile::Spec) => Some(100),
+            (Unit::Percent, Profile::Mcsdk54) => Some(1000),
+            _ => None,
+        }
+    }
+
     /// The symbol of the unit of one digit.
     pub const fn symbol_in(self, profile: Profile) -> &'static str {
         match (self, profile) {
