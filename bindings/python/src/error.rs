@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use motorlink::port::PortError;
-use motorlink::st::{ErrorCode, Failure};
+use motorlink::st::{ErrorCode, Failure, Implausible, Target};
 use motorlink::{rmd, st};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -14,6 +14,7 @@ use pyo3::types::{PyDict, PyType};
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Refused,
+    Implausible,
     Link,
     ReplyTimeout,
     Port,
@@ -30,13 +31,15 @@ struct Facts<'a> {
     port: Option<&'a str>,
     motor: Option<u8>,
     code: Option<ErrorCode>,
+    misread: Option<&'a Implausible>,
 }
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 9] = [const { PyOnceLock::new() }; 9];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 10] = [const { PyOnceLock::new() }; 10];
         let name = match self {
             Kind::Refused => "RefusedError",
+            Kind::Implausible => "ImplausibleValueError",
             Kind::Link => "LinkError",
             Kind::ReplyTimeout => "ReplyTimeoutError",
             Kind::Port => "PortError",
@@ -57,6 +60,11 @@ impl Kind {
             if let Some(code) = facts.code {
                 named.set_item("code", code.number())?;
                 named.set_item("name", code.name())?;
+            }
+            if let Some(Implausible { read, fits }) = facts.misread {
+                named.set_item("register", read.register.to_string())?;
+                named.set_item("digits", read.digits())?;
+                named.set_item("profile", fits.profile.name())?;
             }
             self.class(py)?.call((message.to_string(),), Some(&named))
         };
@@ -92,20 +100,26 @@ pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
     use st::Error;
     // Motor number 0 is the motor that the drive has selected.
     let named = |number: u8| Some(number).filter(|number| *number != 0);
+    let about = |port, motor: &Target| Facts {
+        port: Some(port),
+        motor: named(motor.0),
+        ..Facts::default()
+    };
     let (kind, facts) = match error {
         Error::Refused { port, motor, code, .. } => {
-            let facts = Facts { port: Some(port), motor: named(motor.0), code: Some(*code) };
-            (Kind::Refused, facts)
+            let code = Some(*code);
+            (Kind::Refused, Facts { code, ..about(port, motor) })
         }
         Error::Failed { port, motor, failure, .. } => {
             let kind = match failure {
                 Failure::Timeout => Kind::ReplyTimeout,
                 _ => Kind::Link,
             };
-            (kind, Facts { port: Some(port), motor: named(motor.0), code: None })
+            (kind, about(port, motor))
         }
-        Error::Reply { port, motor, .. } => {
-            (Kind::Link, Facts { port: Some(port), motor: named(motor.0), code: None })
+        Error::Reply { port, motor, .. } => (Kind::Link, about(port, motor)),
+        Error::Implausible { port, motor, why } => {
+            (Kind::Implausible, Facts { misread: Some(why), ..about(port, motor) })
         }
         Error::Unconfirmed { port, .. } => {
             (Kind::Link, Facts { port: Some(port), ..Facts::default() })
@@ -134,11 +148,16 @@ pub(crate) fn refusal(py: Python<'_>, code: ErrorCode) -> PyErr {
     Kind::Refused.raise(py, format_args!("the drive refused: {code} ({})", code.doc()), facts)
 }
 
+/// A value of another profile, without a port.
+pub(crate) fn implausible(py: Python<'_>, why: &Implausible) -> PyErr {
+    Kind::Implausible.raise(py, why, Facts { misread: Some(why), ..Facts::default() })
+}
+
 /// An error of an RMD client.
 pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     use rmd::Error;
     let motor = error.motor().map(rmd::MotorId::number);
-    let facts = |port| Facts { port, motor, code: None };
+    let facts = |port| Facts { port, motor, ..Facts::default() };
     let (kind, facts) = match error {
         Error::Timeout { port, .. }
         | Error::Adapter { port, .. }

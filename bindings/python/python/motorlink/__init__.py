@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 __all__ = [
     "ClosedError",
     "FullTurnError",
+    "ImplausibleValueError",
     "InvalidValueError",
     "LinkError",
     "MotorlinkError",
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from motorlink.errors import (
         ClosedError,
         FullTurnError,
+        ImplausibleValueError,
         InvalidValueError,
         LinkError,
         MotorlinkError,

@@ -55,7 +55,8 @@ class StMotor(Generic[ClientT]):
         Returns an integer if one digit is one unit, otherwise a float. States and flags are numbers here:
         :meth:`status` and :meth:`flags` return them as text.
 
-        Raises ``RefusedError`` if the drive cannot read it, ``UnknownRegisterError`` for an unknown name.
+        Raises ``RefusedError`` if the drive cannot read it, ``UnknownRegisterError`` for an unknown name,
+        ``ImplausibleValueError`` for a value that is possible in another profile only.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:

@@ -11,6 +11,7 @@ from typing import Any
 __all__ = [
     "ClosedError",
     "FullTurnError",
+    "ImplausibleValueError",
     "InvalidValueError",
     "LinkError",
     "MotorlinkError",
@@ -67,6 +68,35 @@ class RefusedError(MotorlinkError):
         super().__init__(message, port=port, motor=motor)
         self.code = code
         self.name = name
+
+
+class ImplausibleValueError(MotorlinkError):
+    """The value of a register is not possible in this profile, but in another one. The line works.
+
+    The drive may follow that profile. The message has the value in both. ``raw=True`` returns the digits.
+    """
+
+    #: The register's name.
+    register: str
+    #: The raw digits.
+    digits: int
+    #: The profile to try.
+    profile: str
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        port: str | None = None,
+        motor: int | None = None,
+        register: str = "",
+        digits: int = 0,
+        profile: str = "",
+    ):
+        super().__init__(message, port=port, motor=motor)
+        self.register = register
+        self.digits = digits
+        self.profile = profile
 
 
 class NotArrivedError(MotorlinkError):

@@ -13,6 +13,7 @@ Speeds are in rpm, times in s. Currents are in digits of the drive (s16A; 32767 
 Each method of a motor is one exchange, unless its docstring says otherwise, and raises
 
 * ``RefusedError`` if the drive refuses (table 2 of the document),
+* ``ImplausibleValueError`` if a value is possible in another profile only,
 * ``ReplyTimeoutError`` and ``LinkError`` without a valid reply. It is unknown whether the drive
   executed the request,
 * ``InvalidValueError`` if nothing was sent: a motor number, a range or a limit. For an unknown register

@@ -25,7 +25,8 @@ struct InFlight {
 
 /// The request of the exchange under way.
 enum Asked {
-    Request(Py<StRequest>),
+    /// With its motor.
+    Request(u8, Py<StRequest>),
     /// A request for bytes, or for nothing.
     Raw,
     Confirmation(Confirmation),
@@ -33,7 +34,7 @@ enum Asked {
 
 /// A reply that fits its request.
 enum Read {
-    Answer(Py<StRequest>, Answer),
+    Answer(u8, Py<StRequest>, Answer),
     Bytes(Vec<u8>),
     Confirmed,
 }
@@ -42,8 +43,9 @@ impl InFlight {
     fn advance(&mut self, py: Python<'_>) -> Progress<Read> {
         let InFlight { client, asked } = self;
         let progress = match asked {
-            Asked::Request(request) => client.advance(|payload| {
-                Some(Read::Answer(request.clone_ref(py), request.get().understand(payload)?))
+            Asked::Request(motor, request) => client.advance(|payload| {
+                let answer = request.get().understand(payload)?;
+                Some(Read::Answer(*motor, request.clone_ref(py), answer))
             }),
             Asked::Raw => client.advance(|payload| Some(Read::Bytes(payload.to_vec()))),
             Asked::Confirmation(confirmation) => match client.advance_confirmation(confirmation) {
@@ -93,7 +95,7 @@ impl StEventClient {
         let begun = self.driven.step(py, |line| {
             line.asked = Asked::Raw;
             line.client.begin(motor, &request.get().request())?;
-            line.asked = Asked::Request(request);
+            line.asked = Asked::Request(motor, request);
             Ok(())
         })?;
         begun.map_err(|error| st_error(py, &error))
@@ -132,7 +134,12 @@ impl StEventClient {
             Progress::Done(result) => result.map_err(|error| st_error(py, &error)),
         };
         let value = result.and_then(|reply| match reply {
-            Read::Answer(request, answer) => request.get().value(py, answer),
+            Read::Answer(motor, request, answer) => {
+                let (request, port) = (request.get(), self.port());
+                let plausible = request.plausible(port, motor, &answer);
+                plausible.map_err(|error| st_error(py, &error))?;
+                request.value(py, answer)
+            }
             Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
             Read::Confirmed => Ok(py.None()),
         });

@@ -54,6 +54,9 @@ impl StClient {
         let answer = self.client.exchange(py, |client| {
             client.exchange(motor, &request.request(), |payload| request.understand(payload))
         })?;
+        let answer = answer.and_then(|answer| {
+            request.plausible(self.client.port(), motor, &answer).map(|()| answer)
+        });
         request.value(py, answer.map_err(|error| st_error(py, &error))?)
     }
 

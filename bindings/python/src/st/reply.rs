@@ -1,7 +1,8 @@
 //! Reads the reply to a request in two steps. The first one needs no interpreter.
 
 use motorlink_proto::st::{
-    BoardInfo, ControlMode, FirmwareVersion, Flags, Profile, RegisterId, RevupPhase, Status,
+    BoardInfo, ControlMode, FirmwareVersion, Flags, Implausible, Profile, RegisterId, RevupPhase,
+    Status,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -58,6 +59,20 @@ impl Reply {
             Reply::Segment { registers, .. } => Answer::Values(segment(registers, payload)?),
             Reply::Bytes => Answer::Bytes(payload.to_vec()),
         })
+    }
+
+    /// Checks that the profile may be right for the values, unless they are digits.
+    pub(super) fn plausible(&self, scale: &Scale, answer: &Answer) -> Result<(), Implausible> {
+        match (answer, self) {
+            (Answer::Bits(bits), Reply::Number { register, raw: false }) => {
+                scale.plausible(*register, *bits)
+            }
+            (Answer::Values(values), Reply::Segment { registers, raw: false }) => {
+                let mut values = registers.iter().zip(values);
+                values.try_for_each(|(register, bits)| scale.plausible(*register, *bits))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The numbers of a reply as a sample has them; `None` if it has others.

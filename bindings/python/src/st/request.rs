@@ -1,5 +1,6 @@
 //! One request to an ST drive: it checks its arguments and reads its reply.
 
+use motorlink::st::{Error, Target};
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber,
     PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
@@ -10,7 +11,7 @@ use pyo3::types::{PyBytes, PyDict, PyString};
 use super::frame;
 use super::reply::{Answer, Reply};
 use super::scale::{Scale, register};
-use crate::error::{invalid_value, refusal};
+use crate::error::{implausible, invalid_value, refusal};
 use crate::number::{digits, milliseconds};
 
 /// A request to an ST drive, in the units of one motor. It checks its arguments and reads its
@@ -52,6 +53,13 @@ impl StRequest {
     /// Reads the payload of a positive acknowledge; `None` if it does not fit the request.
     pub(crate) fn understand(&self, payload: &[u8]) -> Option<Answer> {
         self.reply.understand(self.scale.profile, payload)
+    }
+
+    /// Checks that the profile may be right for the values of a reply.
+    pub(crate) fn plausible(&self, port: &str, motor: u8, answer: &Answer) -> Result<(), Error> {
+        let (port, motor) = (port.into(), Target(motor));
+        let plausible = self.reply.plausible(&self.scale, answer);
+        plausible.map_err(|why| Error::Implausible { port, motor, why })
     }
 
     /// Reads a register.
@@ -331,7 +339,8 @@ impl StRequest {
 
     /// The value of a reply frame to this request.
     ///
-    /// Raises `RefusedError` for a negative acknowledge, `InvalidValueError` for another frame.
+    /// Raises `RefusedError` for a negative acknowledge, `ImplausibleValueError` for a value of
+    /// another profile, `InvalidValueError` for another frame.
     fn decode_reply(&self, py: Python<'_>, frame: &[u8]) -> PyResult<Py<PyAny>> {
         let parsed = frame::parse(py, frame)?;
         let answer = match (parsed.header, parsed.payload) {
@@ -341,7 +350,11 @@ impl StRequest {
         };
         let code = self.code();
         match answer {
-            Some(answer) => self.value(py, answer),
+            Some(answer) => {
+                let plausible = self.reply.plausible(&self.scale, &answer);
+                plausible.map_err(|why| implausible(py, &why))?;
+                self.value(py, answer)
+            }
             None => Err(invalid_value(py, format_args!("these bytes are not a reply to {code}"))),
         }
     }

@@ -147,8 +147,13 @@ impl Reading {
     /// Sends the requests and takes their replies.
     fn carry_out(&mut self, client: &Client) -> Result<(), Error> {
         while let Some((motor, request)) = self.request() {
-            let read = |payload: &[u8]| request.cells(request.understand(payload)?);
-            match client.exchange(motor, &request.request(), read) {
+            let read = |payload: &[u8]| {
+                let answer = request.understand(payload)?;
+                let plausible = request.plausible(client.port(), motor, &answer);
+                Some((plausible, request.cells(answer)?))
+            };
+            let read = client.exchange(motor, &request.request(), read);
+            match read.and_then(|(plausible, values)| plausible.map(|()| values)) {
                 Ok(values) => self.answered(values),
                 Err(error) if may_lack_segment(&error) && self.refused() => {}
                 Err(error) => return Err(error),

@@ -1,7 +1,9 @@
 //! Register values between digits and units.
 
 use motorlink::st::register::{Type, Unit};
-use motorlink::st::{FullScale, Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink::st::{
+    FullScale, Implausible, Profile, Reading, RegisterId, find_register, parse_value,
+};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -77,6 +79,11 @@ impl Scale {
             Some(full_scale) if is_current(register) => full_scale.scale().value(bits.into()),
             _ => self.reading(register, bits).value(),
         }
+    }
+
+    /// Checks that the profile may be right for a read value.
+    pub(crate) fn plausible(&self, register: RegisterId, bits: i32) -> Result<(), Implausible> {
+        self.reading(register, bits).plausible().map(drop)
     }
 
     /// A read value as an integer; the bits of a float.
