@@ -320,6 +320,10 @@ impl Objects {
             let mut values = vec![0; size];
             // SAFETY: as above, and there are as many values as registers.
             unsafe { motorlink_st_decode_segment(at, size, at, size, values.as_mut_ptr()) };
+            for value in values {
+                let checked = motorlink_st_check_value(value as u8, (value >> 8) as u8, value);
+                assert!(matches!(checked, Error::Ok | Error::Implausible | Error::BadArgument));
+            }
         }
         result
     }

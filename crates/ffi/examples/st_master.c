@@ -4,9 +4,9 @@
  *
  * Shows what the drive is, ramps motor 1 to RPM (1000 without it) within a second, waits until it
  * turns so fast, and stops it, also after a failure, Ctrl-C or SIGTERM. Prints nothing while the motor
- * turns: output that is not read blocks. Ends with 0, with 1 if the drive refused, with 2 for a wrong call,
- * with 3 if the line failed or the drive did not acknowledge the stop, and with 128 and its number after
- * a signal.
+ * turns: output that is not read blocks. Ends with 0, with 1 if the drive refused or the profile may be
+ * wrong, with 2 for a wrong call, with 3 if the line failed or the drive did not acknowledge the stop,
+ * and with 128 and its number after a signal.
  */
 #include "posix.h"
 
@@ -15,6 +15,7 @@
 enum { MOTOR = 1, STOP_ATTEMPTS = 3 };
 
 static motorlink_st_master master;
+static motorlink_st_master_config config;
 /* From before START_MOTOR is sent until STOP_MOTOR is acknowledged. */
 static int started;
 
@@ -101,16 +102,18 @@ static motorlink_st_output done(int fd, const char *what, motorlink_error begun)
 }
 
 static int32_t read_register(int fd, motorlink_st_reg reg) {
-  return done(fd, "read", motorlink_st_master_get_register(&master, MOTOR, reg)).value;
+  int32_t value =
+      done(fd, "read", motorlink_st_master_get_register(&master, MOTOR, reg)).value;
+  check(fd, "read", motorlink_st_check_value(config.profile, reg, value), 1);
+  return value;
 }
 
 int main(int argc, char **argv) {
   int32_t rpm = argc > 2 ? (int32_t)strtol(argv[2], NULL, 10) : 1000;
-  int32_t speed = 0, state, faults;
+  int32_t speed = 0, state, faults, celsius;
   uint64_t give_up;
   motorlink_st_output output;
   motorlink_st_board_info info;
-  motorlink_st_master_config config = motorlink_st_master_defaults();
   motorlink_st_limits limits;
   int fd;
 
@@ -121,6 +124,7 @@ int main(int argc, char **argv) {
   catch_signals();
   atexit(warn);
   fd = open_line(argv[1]);
+  config = motorlink_st_master_defaults();
   config.baud = 115200; /* as open_line sets it */
   check(fd, "master", motorlink_st_master_init(&master, sizeof master, &config), 2);
   /* Nothing faster is sent, and no start without a ramp before it. */
@@ -145,11 +149,12 @@ int main(int argc, char **argv) {
   } while (labs((long)speed - rpm) > labs((long)rpm) / 20 && now_us() < give_up);
   state = read_register(fd, MOTORLINK_ST_REG_STATUS);
   faults = read_register(fd, MOTORLINK_ST_REG_FLAGS);
+  celsius = read_register(fd, MOTORLINK_ST_REG_HEATS_TEMP);
   done(fd, "stop", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR));
   done(fd, "confirm", motorlink_st_master_confirm(&master));
   started = 0;
-  printf("%ld rpm, state %ld, faults 0x%08lx\n", (long)speed, (long)state,
-         (unsigned long)(uint32_t)faults);
+  printf("%ld rpm, state %ld, faults 0x%08lx, heatsink %ld degrees Celsius\n", (long)speed,
+         (long)state, (unsigned long)(uint32_t)faults, (long)celsius);
 
   /* What is read-only is refused, and the line stays in sync. */
   output = exchange(fd, "write", motorlink_st_master_set_register(&master, MOTOR,

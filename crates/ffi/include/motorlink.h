@@ -654,6 +654,10 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_WRONG_REPLY = 29,
   /**
+   * The value of a register is possible in the other profile only: the profile may be wrong (ST).
+   */
+  MOTORLINK_ERROR_IMPLAUSIBLE = 30,
+  /**
    * A late reply of this motor may still come: the last request had no reply, or this is the first
    * request to the motor. Only a read was sent, unless the request was Off or Stop. Ask again (RMD).
    */
@@ -945,7 +949,7 @@ typedef struct motorlink_st_output {
   /**
    * `DONE` of a register read: the register's value, the sign extended as its type has it; the
    * bits of a floating-point register; of a register of type u32 the cast to `uint32_t` is the
-   * value. 0 for anything else.
+   * value. `motorlink_st_check_value` checks the profile. 0 for anything else.
    */
   int32_t value;
   /**
@@ -1544,6 +1548,18 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
 motorlink_error motorlink_st_decode_revup_data(const uint8_t *payload,
                                                size_t size,
                                                struct motorlink_st_revup_phase *phase);
+
+/**
+ * Checks whether `profile` may be right for a register's value that was read, from
+ * `motorlink_st_output` or from `motorlink_st_decode_segment`. Call it for values that you show or
+ * compute with: without it a wrong profile gives wrong values.
+ *
+ * `IMPLAUSIBLE`: the value is possible in the other profile only. For example, HEATS_TEMP of -10 °C in
+ * MCSDK54 is 65526 °C in SPEC. `BAD_ARGUMENT`: `profile` is not one of its enum's.
+ */
+motorlink_error motorlink_st_check_value(motorlink_st_profile profile,
+                                         motorlink_st_reg reg,
+                                         int32_t value);
 
 /**
  * Reads the payload of an answer to `motorlink_st_master_get_segment`: the values of the `count`

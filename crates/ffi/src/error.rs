@@ -50,6 +50,8 @@ pub enum motorlink_error {
     Noise = 28,
     /// The drive acknowledged, but the reply does not contain a value of the register (ST).
     WrongReply = 29,
+    /// The value of a register is possible in the other profile only: the profile may be wrong (ST).
+    Implausible = 30,
     /// A late reply of this motor may still come: the last request had no reply, or this is the first
     /// request to the motor. Only a read was sent, unless the request was Off or Stop. Ask again (RMD).
     Quarantined = 40,
@@ -99,6 +101,7 @@ impl motorlink_error {
             Self::Lost => c"the line is lost and the drive does not answer",
             Self::Noise => c"the line does not fall silent",
             Self::WrongReply => c"the reply has no value of a register",
+            Self::Implausible => c"the value is possible in the other profile only",
             Self::Quarantined => c"a late reply of the motor may still come: ask again after motorlink_rmd_host_retry",
             Self::Limit => c"beyond a limit",
             Self::Foreign => c"the motor answers in another protocol",
@@ -108,7 +111,7 @@ impl motorlink_error {
         }
     }
 
-    const ALL: [Self; 26] = [
+    const ALL: [Self; 27] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -129,6 +132,7 @@ impl motorlink_error {
         Self::Lost,
         Self::Noise,
         Self::WrongReply,
+        Self::Implausible,
         Self::Quarantined,
         Self::Limit,
         Self::Foreign,

@@ -8,7 +8,7 @@ use std::slice;
 
 use motorlink_ffi::motorlink_error as Error;
 use motorlink_ffi::rmd::{drive::*, host::*, message::*, *};
-use motorlink_ffi::st::{master::*, names::*, request::*, slave::*, *};
+use motorlink_ffi::st::{master::*, message::*, names::*, request::*, slave::*, *};
 use motorlink_ffi::*;
 use motorlink_proto::st::{Profile, Recovery, RegisterId};
 
@@ -102,6 +102,25 @@ fn the_unit_of_a_register_is_that_of_the_profile() {
     assert_eq!(unit(mcsdk, RegisterId::FLUXWK_BUS_MEAS), "0.1 %");
     assert_eq!(unit(mcsdk, RegisterId::SPEED_MEAS), "rpm");
     assert_eq!(unit(2, RegisterId::SPEED_MEAS), "");
+}
+
+#[test]
+fn a_value_that_is_possible_in_the_other_profile_only_is_an_error() {
+    let (spec, mcsdk) = (Profile::Spec as u8, Profile::Mcsdk54 as u8);
+    let check =
+        |profile, register: RegisterId, value| motorlink_st_check_value(profile, register.0, value);
+    for (register, value) in [
+        (RegisterId::HEATS_TEMP, 65_526),
+        (RegisterId::MOTOR_POWER, 65_534),
+        (RegisterId::FLUXWK_BUS, 985),
+    ] {
+        assert_eq!(check(spec, register, value), Error::Implausible, "{register}");
+    }
+    assert_eq!(check(spec, RegisterId::HEATS_TEMP, 25), Error::Ok);
+    assert_eq!(check(mcsdk, RegisterId::HEATS_TEMP, -10), Error::Ok);
+    assert_eq!(check(mcsdk, RegisterId::FLUXWK_BUS, 985), Error::Ok);
+    assert_eq!(check(spec, RegisterId(0xC0), i32::MIN), Error::Ok);
+    assert_eq!(check(2, RegisterId::HEATS_TEMP, 25), Error::BadArgument);
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub struct motorlink_st_output {
     pub result: motorlink_error,
     /// `DONE` of a register read: the register's value, the sign extended as its type has it; the
     /// bits of a floating-point register; of a register of type u32 the cast to `uint32_t` is the
-    /// value. 0 for anything else.
+    /// value. `motorlink_st_check_value` checks the profile. 0 for anything else.
     pub value: i32,
     /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
     pub kind: motorlink_output,

@@ -5,7 +5,7 @@ use core::ffi::c_char;
 use motorlink_proto::st::{BoardInfo, FirmwareVersion, Profile, RegisterId, RevupPhase};
 
 use crate::error::{answer, motorlink_error};
-use crate::number::motorlink_st_reg;
+use crate::number::{motorlink_st_profile, motorlink_st_reg, one_of};
 use crate::pointer::{In, plain, promised};
 
 /// A phase of the rev-up (4.9).
@@ -127,6 +127,27 @@ pub unsafe extern "C" fn motorlink_st_decode_revup_data(
         let phase = RevupPhase::decode(payload).ok_or(motorlink_error::BadArgument)?;
         place.set(phase.into());
         Ok(())
+    })
+}
+
+/// Checks whether `profile` may be right for a register's value that was read, from
+/// `motorlink_st_output` or from `motorlink_st_decode_segment`. Call it for values that you show or
+/// compute with: without it a wrong profile gives wrong values.
+///
+/// `IMPLAUSIBLE`: the value is possible in the other profile only. For example, HEATS_TEMP of -10 °C in
+/// MCSDK54 is 65526 °C in SPEC. `BAD_ARGUMENT`: `profile` is not one of its enum's.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_st_check_value(
+    profile: motorlink_st_profile,
+    reg: motorlink_st_reg,
+    value: i32,
+) -> motorlink_error {
+    answer(|| {
+        let profile = one_of(&Profile::ALL, profile)?;
+        match RegisterId(reg).value_of_other_profile(profile, value) {
+            None => Ok(()),
+            Some(_) => Err(motorlink_error::Implausible),
+        }
     })
 }
 

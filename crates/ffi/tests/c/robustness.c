@@ -254,6 +254,10 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 2, registers, 1, &value));
   GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 1, unnamed, 1, &value));
   GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 8, registers, SIZE_MAX, &value));
+  GIVES(BAD_ARGUMENT, motorlink_st_check_value((motorlink_st_profile)2, MOTORLINK_ST_REG_HEATS_TEMP, 25));
+  GIVES(IMPLAUSIBLE, motorlink_st_check_value(MOTORLINK_ST_PROFILE_SPEC, MOTORLINK_ST_REG_HEATS_TEMP, 65526));
+  OK(motorlink_st_check_value(MOTORLINK_ST_PROFILE_MCSDK54, MOTORLINK_ST_REG_HEATS_TEMP, -10));
+  OK(motorlink_st_check_value(MOTORLINK_ST_PROFILE_SPEC, unnamed[0], INT32_MIN));
   CHECK(motorlink_st_reg_name(unnamed[0]).size == 0 && motorlink_st_reg_name(unnamed[0]).data != NULL);
   CHECK(named(motorlink_st_reg_name(MOTORLINK_ST_REG_SPEED_MEAS), "SPEED_MEAS"));
   CHECK(named(motorlink_st_reg_unit(MOTORLINK_ST_PROFILE_SPEC, MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
