@@ -23,4 +23,5 @@ mod turn;
 pub use motorlink_link::reopening::{BackOff, LinkState, Opener};
 pub use motorlink_link::{Clock, can, list, port, slcan, time};
 pub use motorlink_proto::Hex;
+pub use stopping::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
 pub use turn::LOOK;

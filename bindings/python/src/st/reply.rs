@@ -2,7 +2,7 @@
 
 use motorlink_proto::st::{
     BoardInfo, ControlMode, FirmwareVersion, Flags, Implausible, Profile, RegisterId, RevupPhase,
-    Status,
+    Status, segment_values,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -56,7 +56,9 @@ impl Reply {
                 Answer::FirmwareVersion(version.name.to_owned(), version.version.to_owned())
             }
             Reply::Revup => Answer::Revup(RevupPhase::decode(payload)?),
-            Reply::Segment { registers, .. } => Answer::Values(segment(registers, payload)?),
+            Reply::Segment { registers, .. } => {
+                Answer::Values(segment_values(registers, payload)?.collect())
+            }
             Reply::Bytes => Answer::Bytes(payload.to_vec()),
         })
     }
@@ -141,17 +143,6 @@ impl Reply {
             (Answer::Bytes(bytes), _) => PyBytes::new(py, &bytes).into_py_any(py),
         }
     }
-}
-
-/// Values of the registers of a segment; `None` if the payload has another size.
-pub(super) fn segment(registers: &[RegisterId], mut payload: &[u8]) -> Option<Vec<i32>> {
-    let next = |register: &RegisterId| {
-        let size = usize::from(register.shape()?.ty(Profile::Spec).size());
-        let (bytes, rest) = payload.split_at_checked(size)?;
-        payload = rest;
-        register.decode(Profile::Spec, bytes)
-    };
-    registers.iter().map(next).collect()
 }
 
 /// Names of the faults in one half of FLAGS; the number for a bit without a name.

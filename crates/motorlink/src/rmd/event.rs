@@ -3,6 +3,7 @@
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
+use motorlink_link::Clock;
 use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
@@ -66,6 +67,11 @@ impl EventClient {
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// The clock of the port.
+    pub fn clock(&self) -> Clock {
+        self.driven.port.clock()
     }
 
     /// Why frames may not get to the bus, as far as its adapter tells.

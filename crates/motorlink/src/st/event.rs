@@ -3,6 +3,7 @@
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
+use motorlink_link::Clock;
 use motorlink_link::port::{ByteLink, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::st::{
@@ -70,6 +71,11 @@ impl EventClient {
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// The clock of the port.
+    pub fn clock(&self) -> Clock {
+        self.driven.port.clock()
     }
 
     /// The profile that the drive is expected to follow.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use motorlink_proto::st::register::{Readable, Register, Value, Writable};
 use motorlink_proto::st::{
-    Command, CurrentReference, Flags, MotorNumber, PositionMove, Profile, Ramp, Reading,
-    RegisterId, Request, RevupPhase, Starting, Status, TorqueRamp, VerifiedWrite, register,
+    Command, CurrentReference, Flags, MotorNumber, PositionMove, Ramp, Reading, RegisterId,
+    Request, RevupPhase, Starting, Status, TorqueRamp, VerifiedWrite, register, segment_values,
 };
 
 use super::{Client, Error, Target};
@@ -219,13 +219,9 @@ impl Motor<'_> {
         registers: &[RegisterId],
         values: &mut [i32],
     ) -> Result<(), Error> {
-        self.ask(&Request::GetSegment(segment), |mut payload| {
-            for (register, value) in registers.iter().zip(values.iter_mut()) {
-                let size = register.shape()?.ty(Profile::Spec).size();
-                let (bytes, rest) = payload.split_at_checked(usize::from(size))?;
-                *value = register.decode(Profile::Spec, bytes)?;
-                payload = rest;
-            }
+        self.ask(&Request::GetSegment(segment), |payload| {
+            let read = segment_values(registers, payload)?;
+            values.iter_mut().zip(read).for_each(|(value, bits)| *value = bits);
             Some(())
         })
     }

@@ -74,6 +74,8 @@ mod full_scale;
 mod limits;
 mod master;
 pub mod message;
+#[cfg(feature = "std")]
+mod owned;
 mod payload;
 pub mod register;
 mod slave;
@@ -106,7 +108,9 @@ pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Reply,
     ReplySize, Request, RevupPhase, TorqueRamp, Version,
 };
-pub use register::{Feature, Features, RegisterId};
+#[cfg(feature = "std")]
+pub use owned::OwnedRequest;
+pub use register::{Feature, Features, RegisterId, segment_values};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
 pub use started::{Effect, Started};
 pub use starting::{NotStarted, Starting};

@@ -76,6 +76,25 @@ impl RegisterId {
     }
 }
 
+/// The values in the reply to a data segment with these registers, in their order (SPEC-NOTES S7).
+/// `None` if a register is unknown, or if the size of the reply differs.
+pub fn segment_values<'a>(
+    registers: &'a [RegisterId],
+    payload: &'a [u8],
+) -> Option<impl Iterator<Item = i32> + 'a> {
+    let size = |register: &RegisterId| Some(register.shape()?.ty(Profile::Spec).size());
+    let mut all = 0usize;
+    for register in registers {
+        all = all.saturating_add(usize::from(size(register)?));
+    }
+    let mut left = (all == payload.len()).then_some(payload)?;
+    Some(registers.iter().map_while(move |register| {
+        let (bytes, rest) = left.split_at_checked(size(register)?.into())?;
+        left = rest;
+        register.decode(Profile::Spec, bytes)
+    }))
+}
+
 impl fmt::Display for RegisterId {
     /// The name, or the id in hexadecimal.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

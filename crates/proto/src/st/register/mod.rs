@@ -20,6 +20,7 @@ mod value;
 
 pub use feature::{Feature, Features};
 pub use id::RegisterId;
+pub use lookup::segment_values;
 pub(in crate::st) use row::{Conversion, Row};
 pub use shape::{Access, Origin, Shape, Text, Writing};
 pub use table::*;

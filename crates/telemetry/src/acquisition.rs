@@ -1,0 +1,455 @@
+//! The engine of one line: signals for its consumers, commands in between, stops before all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::os::fd::BorrowedFd;
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink::{Clock, LinkState};
+use motorlink_proto::time::{Instant, Micros};
+
+use crate::event::{CommandError, Event, What};
+use crate::line::{Line, LineError, Reply, Request, may_move};
+use crate::plan::{Poll, Read, Wants};
+use crate::sample::Values;
+use crate::schedule::{
+    CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Schedule, Verdict,
+};
+use crate::signal::{Motor, Signal};
+use crate::subscription::{Consumer, Record, Subscription};
+
+/// The longest time between two confirmations of a motor's values, if they are read more often.
+const CONFIRMATION: Micros = Micros::from_millis(100);
+
+/// A consumer of values and events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ConsumerId(u64);
+
+/// How often a signal is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    /// The signal.
+    pub signal: Signal,
+    /// The shortest period that is asked for.
+    pub asked: Micros,
+    /// The period that the line carries, from measured exchanges.
+    pub predicted: Micros,
+    /// Values a second, in the last second.
+    pub achieved: f64,
+}
+
+/// Receives the end of each command and stop.
+pub type Ended<'a> = dyn FnMut(CommandId, Result<Reply, CommandError>) + 'a;
+
+#[derive(Debug)]
+struct Command {
+    by: Arc<str>,
+    request: Request,
+    is_stop: bool,
+}
+
+/// The engine of one line. Nothing in it waits, except for the opening of the port: call
+/// [`advance`](Self::advance) when its descriptor is readable and after the time that it gives.
+///
+/// It stops no motor by itself. At the end, stop what was started with the client of the line
+/// ([`into_line`](Self::into_line)).
+pub struct Acquisition {
+    line: Box<dyn Line>,
+    clock: Clock,
+    schedule: Schedule<Arc<Command>>,
+    polls: BTreeMap<PollId, Arc<Poll>>,
+    last_poll: u32,
+    consumers: BTreeMap<ConsumerId, Consumer>,
+    last_consumer: u64,
+    /// Who stopped the motors.
+    latch: Option<Arc<str>>,
+    is_open: bool,
+    /// The instant of the poll that a lane has under way.
+    instants: BTreeMap<Lane, Instant>,
+    /// Until when the values of a lane are confirmed.
+    confirmed: BTreeMap<Lane, Instant>,
+    /// Polls that the drive refused.
+    refused: BTreeSet<PollId>,
+    /// Failures in a row of each lane.
+    failures: BTreeMap<Lane, u32>,
+}
+
+impl Acquisition {
+    /// The engine of an open line.
+    pub fn new(line: Box<dyn Line>) -> Self {
+        Acquisition {
+            clock: line.clock(),
+            schedule: Schedule::new(line.rules()),
+            line,
+            polls: BTreeMap::new(),
+            last_poll: 0,
+            consumers: BTreeMap::new(),
+            last_consumer: 0,
+            latch: None,
+            is_open: true,
+            instants: BTreeMap::new(),
+            confirmed: BTreeMap::new(),
+            refused: BTreeSet::new(),
+            failures: BTreeMap::new(),
+        }
+    }
+
+    /// The line, to stop what was started.
+    pub fn into_line(self) -> Box<dyn Line> {
+        self.line
+    }
+
+    /// The clock of the line.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// What is readable when there is something to receive.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.line.descriptor()
+    }
+
+    /// The measured load of the line.
+    pub fn load(&self) -> &Load {
+        self.schedule.load()
+    }
+
+    /// Sends these signals, and all events, to a subscription.
+    pub fn subscribe(&mut self, subscription: Subscription, wants: Wants) -> ConsumerId {
+        self.last_consumer += 1;
+        let id = ConsumerId(self.last_consumer);
+        self.consumers.insert(id, Consumer::new(subscription, wants));
+        self.replan();
+        id
+    }
+
+    /// Sends nothing more to a consumer, and closes its subscription.
+    pub fn unsubscribe(&mut self, id: ConsumerId) {
+        if let Some(consumer) = self.consumers.remove(&id) {
+            consumer.subscription.close();
+            self.replan();
+        }
+    }
+
+    /// Queues a command of a sender, to be sent within its time to live. It goes ahead of polls.
+    ///
+    /// # Errors
+    /// It is refused at once; nothing is sent.
+    pub fn command(
+        &mut self,
+        by: &Arc<str>,
+        request: Request,
+        time_to_live: Micros,
+    ) -> Result<CommandId, CommandError> {
+        if let Some(latch) = self.latch.as_ref().filter(|_| may_move(&request)) {
+            return Err(CommandError::Latched(Arc::clone(latch)));
+        }
+        let lane = self.line.lane(&request);
+        let deadline = self.clock.now() + time_to_live;
+        let command = Command { by: Arc::clone(by), request, is_stop: false };
+        self.schedule.command(lane, Arc::new(command), deadline).map_err(|_| CommandError::TooMany)
+    }
+
+    /// Stops a motor with this request, ahead of all commands and polls, and repeats it until the
+    /// motor confirms it. Commands of the motor that wait and would move it are not sent any more.
+    pub fn stop(&mut self, by: &Arc<str>, request: Request, ended: &mut Ended<'_>) -> CommandId {
+        let now = self.clock.now();
+        let lane = self.line.lane(&request);
+        let command = Command { by: Arc::clone(by), request: request.clone(), is_stop: true };
+        let keep = |queued: &Arc<Command>| !may_move(&queued.request);
+        let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), keep);
+        for (id, _) in overtaken {
+            ended(id, Err(CommandError::Overtaken));
+        }
+        self.tell(What::Stopping(id, Arc::clone(by), request));
+        id
+    }
+
+    /// Refuses all motion from now on, whoever asks, until it is released.
+    pub fn latch(&mut self, by: &Arc<str>) {
+        self.latch = Some(Arc::clone(by));
+        self.tell(What::Latched(Arc::clone(by)));
+    }
+
+    /// Allows motion again.
+    pub fn release(&mut self, by: &Arc<str>) {
+        if self.latch.take().is_some() {
+            self.tell(What::Released(Arc::clone(by)));
+        }
+    }
+
+    /// Who stopped the motors, if motion is refused.
+    pub fn latched(&self) -> Option<&Arc<str>> {
+        self.latch.as_ref()
+    }
+
+    /// The rates of all signals.
+    pub fn rates(&self) -> impl Iterator<Item = Rate> {
+        self.polls.iter().flat_map(|(id, poll)| {
+            let asked = poll.period;
+            let predicted = self.schedule.predicted_period(asked);
+            let achieved = self.schedule.load().rate(*id);
+            poll.signals.iter().map(move |&signal| Rate { signal, asked, predicted, achieved })
+        })
+    }
+
+    /// Whether each poll was answered once, so that the rates are predicted.
+    pub fn is_predicted(&self) -> bool {
+        self.schedule.load().is_known(self.polls.keys())
+    }
+
+    /// Sends and receives what can be sent and received without waiting. `ended` receives the
+    /// commands that are over. Gives the time after which to call again if the descriptor is not
+    /// readable before; `None`: nothing is planned.
+    pub fn advance(&mut self, ended: &mut Ended<'_>) -> Option<Duration> {
+        loop {
+            self.reopen_if_due();
+            let until = self.begin_all(ended);
+            let mut over = Vec::new();
+            let moved = match self.is_open {
+                true => self.line.advance(&mut |lane, result| over.push((lane, result))),
+                false => Ok(None),
+            };
+            let is_over = !over.is_empty();
+            for (lane, result) in over {
+                self.over(lane, result, ended);
+            }
+            let wait = match moved {
+                Ok(wait) if self.line.link_state() == LinkState::Open => wait,
+                Ok(_) if !self.is_open => None,
+                Ok(_) => self.closed("the port was closed".into(), ended),
+                Err(error) => self.closed(error.to_string().into(), ended),
+            };
+            if !is_over {
+                let now = self.clock.now();
+                let planned = until.map(|until| until.since(now).into());
+                return [wait, planned, self.retry_in()].into_iter().flatten().min();
+            }
+        }
+    }
+
+    fn reopen_if_due(&mut self) {
+        if self.is_open || self.retry_in() != Some(Duration::ZERO) || self.line.reopen().is_err() {
+            return;
+        }
+        self.is_open = true;
+        self.schedule.reopened(self.clock.now());
+        self.tell(What::Back);
+    }
+
+    fn retry_in(&self) -> Option<Duration> {
+        match self.line.link_state() {
+            LinkState::Closed { retry_in } if !self.is_open => Some(retry_in),
+            _ => None,
+        }
+    }
+
+    fn begin_all(&mut self, ended: &mut Ended<'_>) -> Option<Instant> {
+        loop {
+            let now = self.clock.now();
+            match self.schedule.next(now) {
+                Next::Begin(lane, job) => self.begin(lane, job, ended),
+                Next::Expired(id, command) if command.is_stop => {
+                    self.stop_failed(id, &CommandError::Closed);
+                    ended(id, Err(CommandError::Closed));
+                }
+                Next::Expired(id, _) => ended(id, Err(CommandError::Expired)),
+                Next::Wait(until) => return until,
+            }
+        }
+    }
+
+    fn begin(&mut self, lane: Lane, job: Job<Arc<Command>>, ended: &mut Ended<'_>) {
+        let request = match job {
+            Job::Poll(id, instant) => {
+                self.instants.insert(lane, instant);
+                self.polls.get(&id).map(|poll| poll.request())
+            }
+            Job::Command(id, command) => {
+                let what = What::Commanded(id, Arc::clone(&command.by), command.request.clone());
+                self.tell(what);
+                Some(command.request.clone())
+            }
+            Job::Stop { command, displaced, .. } => {
+                if displaced.is_some() {
+                    self.line.cancel(lane);
+                }
+                if let Some(Displaced::Command(id)) = displaced {
+                    ended(id, Err(CommandError::Displaced));
+                }
+                Some(command.request.clone())
+            }
+        };
+        let begun = request.map_or(Err(LineError::Protocol), |it| self.line.begin(lane, &it));
+        if let Err(error) = begun {
+            self.over(lane, Err(error), ended);
+        }
+    }
+
+    /// The exchange of a lane is over.
+    fn over(&mut self, lane: Lane, result: Result<Reply, LineError>, ended: &mut Ended<'_>) {
+        let now = self.clock.now();
+        let outcome = match &result {
+            Ok(_) => Outcome::Answered,
+            Err(error) if error.is_line_failure() => Outcome::Failed,
+            Err(_) => Outcome::Refused,
+        };
+        match self.schedule.ended(now, lane, outcome) {
+            Some(Verdict::Poll(id, began)) => self.polled(lane, id, began, result),
+            Some(Verdict::Command(id)) => ended(id, result.map_err(CommandError::Line)),
+            Some(Verdict::Stopped(id)) => {
+                self.tell(What::Stopped(id));
+                ended(id, result.map_err(CommandError::Line));
+            }
+            Some(Verdict::StopFailed(id)) => {
+                let result = result.map_err(CommandError::Line);
+                if let Err(error) = &result {
+                    self.stop_failed(id, error);
+                }
+                ended(id, result);
+            }
+            Some(Verdict::StopAgain(_)) | None => {}
+        }
+    }
+
+    fn stop_failed(&mut self, id: CommandId, why: &CommandError) {
+        self.tell(What::StopFailed(id, why.to_string().into()));
+    }
+
+    fn polled(
+        &mut self,
+        lane: Lane,
+        id: PollId,
+        requested: Instant,
+        result: Result<Reply, LineError>,
+    ) {
+        let Some(poll) = self.polls.get(&id).cloned() else { return };
+        if !result.as_ref().is_err_and(LineError::is_line_failure) {
+            self.answered(lane, poll.motor);
+        }
+        match result {
+            Ok(Reply::Confirmed) => {
+                self.confirmed.insert(lane, requested);
+                self.tell(What::Confirmed(poll.motor, requested));
+            }
+            Ok(reply) => match self.line.samples(&poll, &reply) {
+                Some(samples) => {
+                    self.refused.remove(&id);
+                    let instant = self.instants.get(&lane).copied().unwrap_or(requested);
+                    let replied = self.clock.now();
+                    let values = Arc::new(Values { poll, instant, requested, replied, samples });
+                    for consumer in self.consumers.values_mut() {
+                        consumer.values(id, &values);
+                    }
+                }
+                None => self.refuse(id, &poll, "the reply does not fit the request".into()),
+            },
+            Err(error) if poll.read == Read::Confirm && error.is_unconfirmed() => {
+                let since = self.confirmed.get(&lane).copied().unwrap_or_default();
+                self.tell(What::Doubtful(poll.motor, since));
+            }
+            Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, &error),
+            // The drive may have no data segments: then the plan is another.
+            Err(error) if !self.replan() => self.refuse(id, &poll, error.to_string().into()),
+            Err(_) => {}
+        }
+    }
+
+    fn refuse(&mut self, id: PollId, poll: &Poll, why: Arc<str>) {
+        if self.refused.insert(id) {
+            self.tell(What::Refused(poll.signals.clone(), why));
+        }
+    }
+
+    fn failed(&mut self, lane: Lane, motor: Motor, why: &LineError) {
+        let failures = self.failures.entry(lane).or_default();
+        *failures += 1;
+        if *failures == 2 {
+            self.tell(What::Silent(motor, why.to_string().into()));
+        }
+    }
+
+    fn answered(&mut self, lane: Lane, motor: Motor) {
+        if self.failures.remove(&lane).is_some_and(|failures| failures > 1) {
+            self.tell(What::Answers(motor));
+        }
+    }
+
+    /// The port is closed. Gives no time: its back-off is in [`retry_in`](Self::retry_in).
+    fn closed(&mut self, why: Arc<str>, ended: &mut Ended<'_>) -> Option<Duration> {
+        let now = self.clock.now();
+        self.is_open = false;
+        for (_, verdict) in self.schedule.closed(now) {
+            match verdict {
+                Verdict::Command(id) => ended(id, Err(CommandError::Closed)),
+                Verdict::StopFailed(id) => {
+                    self.stop_failed(id, &CommandError::Closed);
+                    ended(id, Err(CommandError::Closed));
+                }
+                Verdict::Poll(..) | Verdict::Stopped(_) | Verdict::StopAgain(_) => {}
+            }
+        }
+        self.tell(What::Lost(why));
+        None
+    }
+
+    fn tell(&mut self, what: What) {
+        let event = Arc::new(Event { time: self.clock.now(), what });
+        for consumer in self.consumers.values() {
+            consumer.subscription.push(Record::Event(Arc::clone(&event)));
+        }
+    }
+
+    /// Plans the polls anew. Returns whether they are others now.
+    fn replan(&mut self) -> bool {
+        let mut wants = Wants::new();
+        for (signal, period) in self.consumers.values().flat_map(|consumer| &consumer.wants) {
+            let shortest = wants.entry(*signal).or_insert(*period);
+            *shortest = (*shortest).min(*period);
+        }
+        let mut polls = self.line.polls(&wants);
+        polls.extend(self.confirmations(&polls));
+        let is_known = |poll: &Poll| self.polls.values().any(|known| **known == *poll);
+        if polls.len() == self.polls.len() && polls.iter().all(is_known) {
+            return false;
+        }
+        let old = std::mem::take(&mut self.polls);
+        for poll in polls {
+            let same =
+                old.iter().find(|(_, other)| other.read == poll.read && other.motor == poll.motor);
+            let id = same.map_or_else(
+                || {
+                    self.last_poll += 1;
+                    PollId(self.last_poll)
+                },
+                |(id, _)| *id,
+            );
+            self.polls.insert(id, Arc::new(poll));
+        }
+        self.refused.retain(|id| self.polls.contains_key(id));
+        let lanes: Vec<_> = self
+            .polls
+            .iter()
+            .map(|(id, poll)| (*id, self.line.lane(&poll.request()), poll.period))
+            .collect();
+        self.schedule.set_polls(self.clock.now(), &lanes);
+        true
+    }
+
+    /// A confirmation for each lane, at the rate of its fastest poll, but not too often.
+    fn confirmations(&self, polls: &[Poll]) -> Vec<Poll> {
+        let mut lanes: BTreeMap<Lane, Poll> = BTreeMap::new();
+        for poll in polls {
+            let period = poll.period.max(CONFIRMATION);
+            let lane = self.line.lane(&poll.request());
+            let confirmation = lanes.entry(lane).or_insert_with(|| Poll {
+                motor: poll.motor,
+                period,
+                read: Read::Confirm,
+                signals: Vec::new(),
+            });
+            confirmation.period = confirmation.period.min(period);
+        }
+        lanes.into_values().collect()
+    }
+}

@@ -1,0 +1,164 @@
+//! One open port with a client for either protocol: one exchange a lane at a time.
+
+mod rmd;
+mod st;
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink::{Clock, LinkState};
+use motorlink_proto::rmd::{Code, MotorId};
+use motorlink_proto::st as proto;
+use motorlink_proto::st::{Effect, OwnedRequest, RegisterId};
+
+use crate::plan::{Poll, Read, Wants};
+use crate::sample::Sample;
+use crate::schedule::{Lane, LineRules};
+use crate::signal::Motor;
+
+pub use rmd::RmdLine;
+pub use st::StLine;
+
+/// What is sent to a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Request {
+    /// A message to a motor of an ST drive.
+    St(u8, OwnedRequest),
+    /// Reads a data segment of an ST drive. It is configured with these registers before, if it is not.
+    Segment(u8, u8, Vec<RegisterId>),
+    /// Eight bytes for an RMD motor.
+    Rmd(MotorId, [u8; 8]),
+    /// Asks whether the replies of the lane so far belong to their requests.
+    Confirm(Motor),
+}
+
+/// The reply of a drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reply {
+    /// The payload of an acknowledge.
+    St(Vec<u8>),
+    /// The eight bytes of a frame.
+    Rmd([u8; 8]),
+    /// The replies so far belong to their requests.
+    Confirmed,
+}
+
+/// Why there is no reply.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum LineError {
+    /// Of an ST drive.
+    #[error(transparent)]
+    St(#[from] motorlink::st::Error),
+    /// Of an RMD motor.
+    #[error(transparent)]
+    Rmd(#[from] motorlink::rmd::Error),
+    /// The request is for a drive of the other protocol.
+    #[error("the line has drives of another protocol")]
+    Protocol,
+}
+
+impl LineError {
+    /// Whether nothing can be said about the motor, because it or the line was silent.
+    pub fn is_line_failure(&self) -> bool {
+        match self {
+            LineError::St(error) => error.is_line_failure(),
+            LineError::Rmd(error) => error.is_line_failure(),
+            LineError::Protocol => false,
+        }
+    }
+
+    /// Whether replies and requests did not go together.
+    pub(crate) fn is_unconfirmed(&self) -> bool {
+        use motorlink::{rmd, st};
+        matches!(
+            self,
+            LineError::St(st::Error::Unconfirmed { .. })
+                | LineError::Rmd(rmd::Error::Unconfirmed { .. })
+        )
+    }
+}
+
+/// What an exchange that is over calls.
+pub type Done<'a> = dyn FnMut(Lane, Result<Reply, LineError>) + 'a;
+
+/// A client of one port, driven in steps.
+pub trait Line: Send {
+    /// How many exchanges there may be, and whether a stop cancels one.
+    fn rules(&self) -> LineRules;
+
+    /// The lane of a request.
+    fn lane(&self, request: &Request) -> Lane;
+
+    /// The clock of the port.
+    fn clock(&self) -> Clock;
+
+    /// Whether the port is open.
+    fn link_state(&self) -> LinkState;
+
+    /// Opens the port if it is closed and its back-off is over. May wait.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    fn reopen(&mut self) -> Result<(), LineError>;
+
+    /// What is readable when there is something to receive.
+    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+
+    /// Begins an exchange in a lane that has none.
+    ///
+    /// # Errors
+    /// What forbids the request, or the port's. No exchange is under way then.
+    fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError>;
+
+    /// Gives up the exchange of a lane. Its reply is not taken for another's.
+    fn cancel(&mut self, lane: Lane);
+
+    /// Sends and receives without waiting. Gives the time after which to go on if the descriptor is
+    /// not readable before; `None`: no exchange is under way.
+    ///
+    /// # Errors
+    /// The port's. It is closed, and the exchanges under way are given up.
+    fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError>;
+
+    /// The fewest exchanges that read these signals. They change when the drive has refused to
+    /// configure a data segment.
+    fn polls(&self, wants: &Wants) -> Vec<Poll>;
+
+    /// The values of a poll's signals in its reply; `None` if the reply is none of its replies.
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>>;
+}
+
+impl Poll {
+    /// What the poll sends.
+    pub fn request(&self) -> Request {
+        match (self.motor, &self.read) {
+            (Motor::St(motor), Read::Register(register)) => {
+                Request::st(motor.number(), proto::Request::GetRegister(*register))
+            }
+            (Motor::St(motor), Read::Segment(number, registers)) => {
+                Request::Segment(motor.number(), *number, registers.clone())
+            }
+            (Motor::Rmd(id), Read::Command(code)) => {
+                Request::Rmd(id, [code.number(), 0, 0, 0, 0, 0, 0, 0])
+            }
+            (motor, _) => Request::Confirm(motor),
+        }
+    }
+}
+
+/// Whether a motor may turn after this request.
+pub(crate) fn may_move(request: &Request) -> bool {
+    match request {
+        Request::St(_, request) => {
+            let request = request.request();
+            let aligns = request == proto::Request::ExecuteCommand(proto::Command::EncoderAlign);
+            aligns
+                || matches!(
+                    Effect::of(&request),
+                    Effect::Starts | Effect::Ramps | Effect::Supersedes
+                )
+        }
+        Request::Rmd(_, [code, ..]) => Code::from(*code).may_move(),
+        Request::Segment(..) | Request::Confirm(_) => false,
+    }
+}

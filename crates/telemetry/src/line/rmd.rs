@@ -1,0 +1,141 @@
+//! A CAN bus with RMD motors: each motor is a lane.
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink::rmd::{Error, EventClient, Options};
+use motorlink::{Clock, LinkState, port::PortName};
+use motorlink_proto::rmd::{Command, MotorId, MotorSet};
+
+use super::{Done, Line, LineError, Reply, Request};
+use crate::plan::{Poll, Read, Wants, rmd_polls};
+use crate::sample::Sample;
+use crate::schedule::{Lane, LineRules};
+use crate::signal::{Motor, Signal, Source};
+
+/// A CAN bus with RMD motors.
+pub struct RmdLine {
+    client: EventClient,
+    /// Motors whose exchange is a confirmation.
+    confirming: MotorSet,
+}
+
+impl RmdLine {
+    /// Opens a port.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        EventClient::open(port, options).map(Self::new)
+    }
+
+    /// Uses a client that is open.
+    pub fn new(client: EventClient) -> Self {
+        RmdLine { client, confirming: MotorSet::EMPTY }
+    }
+
+    /// The client, to stop what is moving.
+    pub fn into_client(self) -> EventClient {
+        self.client
+    }
+}
+
+impl Line for RmdLine {
+    fn rules(&self) -> LineRules {
+        LineRules { window: MotorId::COUNT, stop_preempts: true }
+    }
+
+    fn lane(&self, request: &Request) -> Lane {
+        match request {
+            Request::Rmd(id, _) | Request::Confirm(Motor::Rmd(id)) => lane(*id),
+            Request::St(..) | Request::Segment(..) | Request::Confirm(_) => Lane(0),
+        }
+    }
+
+    fn clock(&self) -> Clock {
+        self.client.clock()
+    }
+
+    fn link_state(&self) -> LinkState {
+        self.client.link_state()
+    }
+
+    fn reopen(&mut self) -> Result<(), LineError> {
+        Ok(self.client.reopen()?)
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.client.descriptor()
+    }
+
+    fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
+        let id = MotorId::new(lane.0).ok_or(LineError::Protocol)?;
+        match request {
+            // A motor whose late reply is awaited gets what stops it at once, and nothing else.
+            Request::Rmd(_, request) => self.client.ask(id, *request)?,
+            Request::Confirm(_) => {
+                self.client.ask(id, self.client.question(id))?;
+                self.confirming.insert(id);
+            }
+            Request::St(..) | Request::Segment(..) => return Err(LineError::Protocol),
+        }
+        Ok(())
+    }
+
+    fn cancel(&mut self, lane: Lane) {
+        if let Some(id) = MotorId::new(lane.0) {
+            self.confirming.remove(id);
+            self.client.cancel(id);
+        }
+    }
+
+    fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
+        let mut confirmed = MotorSet::EMPTY;
+        let confirming = &mut self.confirming;
+        let wait = self.client.advance(|id, result| {
+            if confirming.contains(id) {
+                confirming.remove(id);
+                if result.is_ok() {
+                    return confirmed.insert(id);
+                }
+            }
+            done(lane(id), result.map(Reply::Rmd).map_err(LineError::from));
+        });
+        for id in confirmed {
+            let result = self.client.confirmed(id);
+            done(lane(id), result.map(|()| Reply::Confirmed).map_err(LineError::from));
+        }
+        if wait.is_err() {
+            self.confirming = MotorSet::EMPTY;
+        }
+        Ok(wait?)
+    }
+
+    fn polls(&self, wants: &Wants) -> Vec<Poll> {
+        rmd_polls(wants)
+    }
+
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>> {
+        let (Reply::Rmd(data), Read::Command(read)) = (reply, &poll.read) else { return None };
+        let sample = |signal: &Signal| match signal.source {
+            Source::Quantity(quantity) => {
+                let (_, field) = quantity.reads().find(|(code, _)| code == read)?;
+                Some(Sample { digits: field.raw(data), value: field.value(data) })
+            }
+            Source::Register(_) => None,
+        };
+        poll.signals.iter().map(sample).collect()
+    }
+}
+
+impl Request {
+    /// A command to an RMD motor.
+    pub fn rmd(id: MotorId, command: &impl Command) -> Self {
+        Request::Rmd(id, command.encode())
+    }
+}
+
+/// The lane of a motor.
+pub(crate) fn lane(id: MotorId) -> Lane {
+    Lane(id.number())
+}

@@ -1,0 +1,233 @@
+//! The line to an ST drive: one lane.
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink::st::{Error, EventClient, Options, Progress};
+use motorlink::{Clock, LinkState, port::PortName};
+use motorlink_proto::st as proto;
+use motorlink_proto::st::{
+    Confirmation, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
+};
+
+use super::{Done, Line, LineError, Reply, Request};
+use crate::plan::{Poll, Read, Wants, st_polls};
+use crate::sample::Sample;
+use crate::schedule::{Lane, LineRules};
+
+/// A serial line has one exchange at a time.
+const LANE: Lane = Lane(0);
+
+/// The line to an ST drive.
+pub struct StLine {
+    client: EventClient,
+    step: Step,
+    /// The registers of each data segment that this line configured.
+    configured: [Option<Vec<RegisterId>>; SEGMENTS],
+    segments: Vec<u8>,
+}
+
+/// How far the exchange is.
+#[derive(Debug, Clone)]
+enum Step {
+    Idle,
+    Once,
+    /// A data segment is configured before it is read.
+    Configuring(Segment),
+    Reading(Segment),
+    Confirming(Confirmation),
+}
+
+#[derive(Debug, Clone)]
+struct Segment {
+    motor: u8,
+    number: u8,
+    registers: Vec<RegisterId>,
+    /// It was configured for this exchange. The drive has just lost it otherwise.
+    is_fresh: bool,
+}
+
+impl StLine {
+    /// Opens a port. Data segments are used in profile `spec` only: in the other profile the same
+    /// frame codes command the motor.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        EventClient::open(port, options).map(Self::new)
+    }
+
+    /// Uses a client that is open. Other users of the client must not configure data segments.
+    pub fn new(client: EventClient) -> Self {
+        let segments = match client.profile() {
+            Profile::Spec => (0..SEGMENTS as u8).rev().collect(),
+            Profile::Mcsdk54 => Vec::new(),
+        };
+        StLine { client, step: Step::Idle, configured: Default::default(), segments }
+    }
+
+    /// The client, to stop what was started.
+    pub fn into_client(self) -> EventClient {
+        self.client
+    }
+
+    fn begin_segment(&mut self, segment: Segment) -> Result<Step, Error> {
+        let configured = &self.configured[usize::from(segment.number)];
+        if configured.as_ref() == Some(&segment.registers) {
+            self.client.begin(segment.motor, &proto::Request::GetSegment(segment.number))?;
+            return Ok(Step::Reading(segment));
+        }
+        self.configure(segment)
+    }
+
+    fn configure(&mut self, segment: Segment) -> Result<Step, Error> {
+        let ids: Vec<u8> = segment.registers.iter().map(|register| register.0).collect();
+        let configure =
+            proto::Request::ConfigureSegment { segment: segment.number, registers: &ids };
+        self.client.begin(segment.motor, &configure)?;
+        Ok(Step::Configuring(Segment { is_fresh: true, ..segment }))
+    }
+
+    /// The step after an exchange of a data segment; `Err` is the end.
+    fn after(
+        &mut self,
+        step: Step,
+        result: Result<Vec<u8>, Error>,
+    ) -> Result<Step, Result<Reply, Error>> {
+        match (step, result) {
+            (Step::Configuring(segment), Ok(_)) => {
+                self.configured[usize::from(segment.number)] = Some(segment.registers.clone());
+                self.begin_segment(segment).map_err(Err)
+            }
+            (Step::Configuring(_), Err(error)) => {
+                if matches!(error, Error::Refused { .. }) {
+                    self.segments.clear();
+                }
+                Err(Err(error))
+            }
+            // A drive that was restarted has forgotten its segments.
+            (Step::Reading(segment), Err(Error::Refused { .. })) if !segment.is_fresh => {
+                self.configure(segment).map_err(Err)
+            }
+            (Step::Reading(segment), Err(error)) => {
+                self.configured[usize::from(segment.number)] = None;
+                Err(Err(error))
+            }
+            (_, result) => Err(result.map(Reply::St)),
+        }
+    }
+}
+
+impl Line for StLine {
+    fn rules(&self) -> LineRules {
+        LineRules { window: 1, stop_preempts: false }
+    }
+
+    fn lane(&self, _: &Request) -> Lane {
+        LANE
+    }
+
+    fn clock(&self) -> Clock {
+        self.client.clock()
+    }
+
+    fn link_state(&self) -> LinkState {
+        self.client.link_state()
+    }
+
+    fn reopen(&mut self) -> Result<(), LineError> {
+        self.client.reopen()?;
+        self.configured = Default::default();
+        Ok(())
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.client.descriptor()
+    }
+
+    fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
+        self.step = match request {
+            Request::St(motor, request) => {
+                self.client.begin(*motor, &request.request())?;
+                Step::Once
+            }
+            Request::Segment(motor, number, registers) => {
+                let (motor, number, registers) = (*motor, *number, registers.clone());
+                self.begin_segment(Segment { motor, number, registers, is_fresh: false })?
+            }
+            Request::Confirm(_) => Step::Confirming(self.client.begin_confirmation()?),
+            Request::Rmd(..) => return Err(LineError::Protocol),
+        };
+        Ok(())
+    }
+
+    fn cancel(&mut self, _: Lane) {
+        self.step = Step::Idle;
+        self.client.abandon();
+    }
+
+    fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
+        loop {
+            let progress = match &mut self.step {
+                Step::Idle => return Ok(None),
+                Step::Confirming(confirmation) => {
+                    match self.client.advance_confirmation(confirmation) {
+                        Progress::Done(result) => Progress::Done(result.map(|()| Vec::new())),
+                        Progress::Wait(wait) => Progress::Wait(wait),
+                    }
+                }
+                Step::Reading(segment) => self.client.advance(|payload| {
+                    let values = segment_values(&segment.registers, payload)?;
+                    (values.count() == segment.registers.len()).then(|| payload.to_vec())
+                }),
+                Step::Once | Step::Configuring(_) => {
+                    self.client.advance(|payload| Some(payload.to_vec()))
+                }
+            };
+            let result = match progress {
+                Progress::Wait(wait) => return Ok(wait),
+                Progress::Done(Err(Error::Port(error))) => {
+                    self.step = Step::Idle;
+                    return Err(Error::Port(error).into());
+                }
+                Progress::Done(result) => result,
+            };
+            match std::mem::replace(&mut self.step, Step::Idle) {
+                Step::Confirming(_) => {
+                    done(LANE, result.map(|_| Reply::Confirmed).map_err(LineError::from));
+                }
+                step => match self.after(step, result) {
+                    Ok(step) => self.step = step,
+                    Err(result) => done(LANE, result.map_err(LineError::from)),
+                },
+            }
+        }
+    }
+
+    fn polls(&self, wants: &Wants) -> Vec<Poll> {
+        st_polls(wants, &self.segments)
+    }
+
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>> {
+        let Reply::St(payload) = reply else { return None };
+        let profile = self.client.profile();
+        let sample = |register, bits| Reading { register, bits, profile }.into();
+        match &poll.read {
+            Read::Register(register) => {
+                Some(vec![sample(*register, register.decode(profile, payload)?)])
+            }
+            Read::Segment(_, registers) => {
+                let values = segment_values(registers, payload)?;
+                Some(registers.iter().zip(values).map(|(it, bits)| sample(*it, bits)).collect())
+            }
+            Read::Command(_) | Read::Confirm => None,
+        }
+    }
+}
+
+impl Request {
+    /// A message to a motor of an ST drive.
+    pub fn st(motor: u8, request: proto::Request<'_>) -> Self {
+        Request::St(motor, OwnedRequest::from(request))
+    }
+}

@@ -1,0 +1,52 @@
+//! Values with the time at which they were read.
+
+use std::sync::Arc;
+
+use motorlink_proto::st::Reading;
+use motorlink_proto::time::Instant;
+
+use crate::plan::Poll;
+use crate::signal::Signal;
+
+/// A value of a signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The integer that was read; the bits of a float.
+    pub digits: i64,
+    /// The value in the unit of the signal.
+    pub value: f64,
+}
+
+impl From<Reading> for Sample {
+    fn from(reading: Reading) -> Self {
+        Sample { digits: reading.digits(), value: reading.value() }
+    }
+}
+
+/// The values of one reply.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Values {
+    /// The exchange, with the signals in the order of [`samples`](Self::samples).
+    pub poll: Arc<Poll>,
+    /// The instant that the exchange was planned for.
+    pub instant: Instant,
+    /// When the request was sent.
+    pub requested: Instant,
+    /// When the reply was complete.
+    pub replied: Instant,
+    /// The values.
+    pub samples: Vec<Sample>,
+}
+
+impl Values {
+    /// The time of the values: the middle of request and reply.
+    pub fn time(&self) -> Instant {
+        Instant(self.requested.0.midpoint(self.replied.0))
+    }
+
+    /// The value of a signal, if the reply has it.
+    pub fn get(&self, signal: Signal) -> Option<Sample> {
+        let at = self.poll.signals.iter().position(|it| *it == signal)?;
+        self.samples.get(at).copied()
+    }
+}

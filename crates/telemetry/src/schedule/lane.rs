@@ -1,0 +1,211 @@
+//! One lane: what is under way, what waits, and whether it answers.
+
+use std::collections::VecDeque;
+
+use motorlink::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
+use motorlink_proto::time::{Instant, Micros};
+
+use super::{CommandId, Displaced, PollId};
+
+/// The pause before the next poll after the second failure in a row. It doubles with each more.
+const FIRST_PAUSE: Micros = Micros::from_millis(100);
+/// The longest pause.
+const LONGEST_PAUSE: Micros = Micros::from_millis(2_000);
+
+/// How an exchange ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// With a reply.
+    Answered,
+    /// With a refusal of the drive, or with one of the client before anything was sent.
+    Refused,
+    /// Without a reply that could be read.
+    Failed,
+    /// The line was closed.
+    Closed,
+}
+
+/// What an exchange was that is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// A poll, begun at this moment.
+    Poll(PollId, Instant),
+    /// A command.
+    Command(CommandId),
+    /// A stop that the drive confirmed.
+    Stopped(CommandId),
+    /// A stop that is repeated.
+    StopAgain(CommandId),
+    /// A stop that is not repeated. The motor may still be turning.
+    StopFailed(CommandId),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Stop(CommandId),
+    Command(CommandId),
+    Poll(PollId),
+}
+
+/// The exchange of a lane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct UnderWay {
+    pub(super) kind: Kind,
+    pub(super) since: Instant,
+}
+
+impl UnderWay {
+    pub(super) fn displaced(self) -> Option<Displaced> {
+        match self.kind {
+            Kind::Poll(poll) => Some(Displaced::Poll(poll)),
+            Kind::Command(id) => Some(Displaced::Command(id)),
+            Kind::Stop(_) => None,
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Stop<C> {
+    id: CommandId,
+    command: C,
+    attempts: u32,
+    not_before: Instant,
+    give_up: Instant,
+}
+
+#[derive(Debug)]
+pub(super) struct LaneState<C> {
+    pub(super) under_way: Option<UnderWay>,
+    /// The first one is under way if [`under_way`](Self::under_way) is a stop.
+    stops: VecDeque<Stop<C>>,
+    pub(super) commands: VecDeque<(CommandId, C, Instant)>,
+    pub(super) commands_in_a_row: u32,
+    /// Polls in a row that failed.
+    failures: u32,
+    quiet_until: Instant,
+}
+
+impl<C> Default for LaneState<C> {
+    fn default() -> Self {
+        LaneState {
+            under_way: None,
+            stops: VecDeque::new(),
+            commands: VecDeque::new(),
+            commands_in_a_row: 0,
+            failures: 0,
+            quiet_until: Instant(0),
+        }
+    }
+}
+
+impl<C: Clone> LaneState<C> {
+    /// Takes out the commands that a stop overtakes.
+    pub(super) fn overtake(&mut self, keep: impl Fn(&C) -> bool) -> Vec<(CommandId, C)> {
+        let queued = std::mem::take(&mut self.commands);
+        let mut overtaken = Vec::new();
+        for (id, command, deadline) in queued {
+            match keep(&command) {
+                true => self.commands.push_back((id, command, deadline)),
+                false => overtaken.push((id, command)),
+            }
+        }
+        overtaken
+    }
+
+    pub(super) fn add_stop(&mut self, now: Instant, id: CommandId, command: C) {
+        let give_up = now + STOP_TIME;
+        self.stops.push_back(Stop { id, command, attempts: 0, not_before: now, give_up });
+    }
+
+    /// Takes out a command whose time is over, or on a closed line a stop.
+    pub(super) fn take_expired(&mut self, now: Instant, is_open: bool) -> Option<(CommandId, C)> {
+        if let Some(at) = self.commands.iter().position(|(_, _, deadline)| *deadline < now) {
+            return self.commands.remove(at).map(|(id, command, _)| (id, command));
+        }
+        let at = self.stops.iter().position(|stop| !is_open && stop.give_up <= now)?;
+        self.stops.remove(at).map(|stop| (stop.id, stop.command))
+    }
+
+    /// When the next command or stop expires.
+    pub(super) fn first_deadline(&self, is_open: bool) -> Option<Instant> {
+        let commands = self.commands.iter().map(|(_, _, deadline)| *deadline + Micros(1));
+        let stops = self.stops.iter().filter(|_| !is_open).map(|stop| stop.give_up);
+        commands.chain(stops).min()
+    }
+
+    /// The stop to begin now.
+    pub(super) fn next_stop(&mut self, now: Instant) -> Option<(CommandId, C)> {
+        let stop = self.stops.front_mut().filter(|stop| stop.not_before <= now)?;
+        stop.attempts += 1;
+        Some((stop.id, stop.command.clone()))
+    }
+
+    /// When a stop is repeated.
+    pub(super) fn next_retry(&self) -> Option<Instant> {
+        let stop = self.stops.front().filter(|_| self.under_way.is_none())?;
+        Some(stop.not_before)
+    }
+
+    /// Whether the exchange that is under way gives way to a stop.
+    pub(super) fn may_be_displaced(&self) -> bool {
+        self.under_way.is_some_and(|exchange| !matches!(exchange.kind, Kind::Stop(_)))
+    }
+
+    /// Whether a command or a poll may begin: nothing is under way, and no stop is due.
+    pub(super) fn is_free(&self) -> bool {
+        self.under_way.is_none() && self.stops.is_empty()
+    }
+
+    pub(super) fn may_poll(&self, now: Instant) -> bool {
+        self.is_free() && self.quiet_until <= now
+    }
+
+    pub(super) fn quiet_until(&self) -> Instant {
+        self.quiet_until
+    }
+
+    /// Whether the lane has failed to answer more than once.
+    pub(super) fn is_silent(&self) -> bool {
+        self.failures > 1
+    }
+
+    /// Expects answers again.
+    pub(super) fn trust(&mut self) {
+        (self.failures, self.quiet_until) = (0, Instant(0));
+    }
+
+    /// An exchange is over.
+    pub(super) fn judge(&mut self, now: Instant, exchange: UnderWay, outcome: Outcome) -> Verdict {
+        match outcome {
+            Outcome::Answered | Outcome::Refused => self.trust(),
+            Outcome::Failed => self.failed(now),
+            Outcome::Closed => {}
+        }
+        match exchange.kind {
+            Kind::Poll(poll) => Verdict::Poll(poll, exchange.since),
+            Kind::Command(id) => Verdict::Command(id),
+            Kind::Stop(id) => self.judge_stop(now, id, outcome),
+        }
+    }
+
+    fn failed(&mut self, now: Instant) {
+        self.failures = self.failures.saturating_add(1);
+        let Some(doublings) = self.failures.checked_sub(2) else { return };
+        let pause = FIRST_PAUSE.0.saturating_mul(1 << doublings.min(16));
+        self.quiet_until = now + Micros(pause).min(LONGEST_PAUSE);
+    }
+
+    fn judge_stop(&mut self, now: Instant, id: CommandId, outcome: Outcome) -> Verdict {
+        let Some(mut stop) = self.stops.pop_front() else { return Verdict::StopFailed(id) };
+        let is_given_up = stop.attempts >= STOP_ATTEMPTS && now >= stop.give_up;
+        match outcome {
+            Outcome::Answered => return Verdict::Stopped(id),
+            Outcome::Refused => return Verdict::StopFailed(id),
+            Outcome::Failed | Outcome::Closed if is_given_up => return Verdict::StopFailed(id),
+            Outcome::Failed | Outcome::Closed => {}
+        }
+        stop.not_before = now + STOP_PAUSE;
+        self.stops.push_front(stop);
+        Verdict::StopAgain(id)
+    }
+}

@@ -1,0 +1,409 @@
+//! What to do next on one line: stops first, then commands, then the polls that are due. Sans I/O.
+//!
+//! A line has lanes. A lane has one exchange at a time: a serial line is one lane, each motor on a CAN
+//! bus is a lane. The caller begins what [`Schedule::next`] gives, and reports its end with
+//! [`Schedule::ended`].
+//!
+//! **Instants.** Polls of a lane with the same period are a group. They are read one after the other
+//! at each instant of the group. The instants are multiples of the period after the first one, so they
+//! do not drift. A group that is late by a whole period or more skips instants.
+//!
+//! **Order.** Of the polls that are due, the one whose period ends first is next. A poll that was
+//! never answered goes first, so that the load of the line is known soon.
+//!
+//! **Overload.** If a line cannot carry what is asked, all its periods are multiplied by the same
+//! factor ([`Load`]).
+//!
+//! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
+//! ahead of it.
+//!
+//! **Silence.** A lane that does not answer is asked less and less often, with one poll at a time.
+
+mod lane;
+mod load;
+
+use std::collections::BTreeMap;
+
+use motorlink_proto::time::{Instant, Micros};
+
+use lane::{Kind, LaneState, UnderWay};
+pub use lane::{Outcome, Verdict};
+pub use load::Load;
+
+/// Commands of a lane that go ahead of a poll that is due. Then the poll goes first once, so that
+/// signals are read also while a program sends commands without a pause.
+const COMMANDS_IN_A_ROW: u32 = 8;
+/// Commands that may wait in a lane.
+const QUEUE: usize = 256;
+
+/// What has one exchange at a time: a serial line, or a motor on a CAN bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Lane(pub u8);
+
+/// A poll: one exchange that is repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PollId(pub u32);
+
+/// A command or a stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CommandId(pub u64);
+
+/// What to do next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Next<C> {
+    /// Begin this exchange.
+    Begin(Lane, Job<C>),
+    /// Tell the sender that the command was not sent: its time to live is over.
+    Expired(CommandId, C),
+    /// Nothing until then, or until an exchange ends. `None`: nothing is planned.
+    Wait(Option<Instant>),
+}
+
+/// An exchange to begin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Job<C> {
+    /// A stop. It replaces `displaced`, which is still under way: cancel it.
+    Stop {
+        /// The stop.
+        id: CommandId,
+        /// The request.
+        command: C,
+        /// The exchange that the stop replaces.
+        displaced: Option<Displaced>,
+    },
+    /// A command.
+    Command(CommandId, C),
+    /// A poll, for this instant of its group.
+    Poll(PollId, Instant),
+}
+
+/// An exchange that a stop replaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Displaced {
+    /// A poll.
+    Poll(PollId),
+    /// A command. The drive may have executed it.
+    Command(CommandId),
+}
+
+/// How a line is used.
+#[derive(Debug, Clone, Copy)]
+pub struct LineRules {
+    /// The number of exchanges at a time.
+    pub window: usize,
+    /// Whether a stop cancels an exchange of its lane. Else it waits for the end of the exchange.
+    pub stop_preempts: bool,
+}
+
+/// Why a command is not queued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{QUEUE} commands wait already")]
+pub struct QueueFull;
+
+/// Polls of a lane with the same period.
+#[derive(Debug)]
+struct Group {
+    lane: Lane,
+    period: Micros,
+    polls: Vec<PollId>,
+    /// The poll of this instant that is next.
+    position: usize,
+    /// This instant.
+    due: Instant,
+    /// Instants that were skipped.
+    skipped: u64,
+}
+
+/// The schedule of one line.
+#[derive(Debug)]
+pub struct Schedule<C> {
+    rules: LineRules,
+    lanes: BTreeMap<Lane, LaneState<C>>,
+    groups: Vec<Group>,
+    load: Load,
+    /// The first instant.
+    anchor: Option<Instant>,
+    under_way: usize,
+    is_open: bool,
+    last_id: u64,
+}
+
+impl<C: Clone> Schedule<C> {
+    /// Of an open line, without polls.
+    pub fn new(rules: LineRules) -> Self {
+        Schedule {
+            rules,
+            lanes: BTreeMap::new(),
+            groups: Vec::new(),
+            load: Load::default(),
+            anchor: None,
+            under_way: 0,
+            is_open: true,
+            last_id: 0,
+        }
+    }
+
+    /// Replaces the polls: each with its lane and period. A poll that stays keeps its instants. The
+    /// first instant of a new one is now.
+    pub fn set_polls(&mut self, now: Instant, polls: &[(PollId, Lane, Micros)]) {
+        let anchor = *self.anchor.get_or_insert(now);
+        let mut groups: BTreeMap<(Lane, Micros), Group> = BTreeMap::new();
+        for &(poll, lane, period) in polls {
+            let period = period.max(Micros(1));
+            let group = groups.entry((lane, period)).or_insert_with(|| Group {
+                lane,
+                period,
+                polls: Vec::new(),
+                position: 0,
+                due: now,
+                skipped: 0,
+            });
+            group.polls.push(poll);
+            self.lanes.entry(lane).or_default();
+        }
+        for group in groups.values_mut() {
+            let same = |old: &&Group| (old.lane, old.period) == (group.lane, group.period);
+            match self.groups.iter().find(same) {
+                Some(old) => {
+                    (group.due, group.skipped) = (old.due, old.skipped);
+                    group.position = old.position.min(group.polls.len().saturating_sub(1));
+                }
+                None => group.due = last_on_grid(anchor, group.period, now),
+            }
+        }
+        self.groups = groups.into_values().collect();
+        self.load.keep(|poll| polls.iter().any(|(kept, ..)| *kept == poll));
+        self.load.decide_anew();
+    }
+
+    /// Silent lanes take nearly no time.
+    fn update_load(&mut self, now: Instant) {
+        let answers =
+            |group: &&Group| self.lanes.get(&group.lane).is_some_and(|lane| !lane.is_silent());
+        let groups = self.groups.iter().filter(answers);
+        self.load.update(now, groups.map(|group| (group.period, &*group.polls)));
+    }
+
+    /// Queues a command that is sent until `deadline`, or refused.
+    ///
+    /// # Errors
+    /// Too many commands wait already.
+    pub fn command(
+        &mut self,
+        lane: Lane,
+        command: C,
+        deadline: Instant,
+    ) -> Result<CommandId, QueueFull> {
+        let id = self.new_id();
+        let state = self.lanes.entry(lane).or_default();
+        if state.commands.len() >= QUEUE {
+            return Err(QueueFull);
+        }
+        state.commands.push_back((id, command, deadline));
+        Ok(id)
+    }
+
+    /// Queues a stop ahead of all commands and polls. It is repeated until [`Outcome::Answered`], or
+    /// until it has failed for good. Gives the commands of the lane that wait and do not pass `keep`:
+    /// they are not sent any more.
+    pub fn stop(
+        &mut self,
+        now: Instant,
+        lane: Lane,
+        command: C,
+        keep: impl Fn(&C) -> bool,
+    ) -> (CommandId, Vec<(CommandId, C)>) {
+        let id = self.new_id();
+        let state = self.lanes.entry(lane).or_default();
+        let overtaken = state.overtake(keep);
+        state.add_stop(now, id, command);
+        (id, overtaken)
+    }
+
+    /// What to do now. Call again until it is [`Next::Wait`].
+    pub fn next(&mut self, now: Instant) -> Next<C> {
+        self.update_load(now);
+        let is_open = self.is_open;
+        let expired = self.lanes.values_mut().find_map(|lane| lane.take_expired(now, is_open));
+        if let Some((id, command)) = expired {
+            return Next::Expired(id, command);
+        }
+        if !self.is_open {
+            return Next::Wait(self.first_deadline());
+        }
+        self.next_stop(now)
+            .or_else(|| self.next_command(now))
+            .or_else(|| self.next_poll(now))
+            .map_or_else(|| Next::Wait(self.until(now)), |(lane, job)| Next::Begin(lane, job))
+    }
+
+    fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
+        let preempts = self.rules.stop_preempts;
+        for (&lane, state) in &mut self.lanes {
+            if state.under_way.is_some() && !(preempts && state.may_be_displaced()) {
+                continue;
+            }
+            if let Some((id, command)) = state.next_stop(now) {
+                let displaced = state.under_way.take();
+                match displaced {
+                    Some(displaced) => self.load.over(now, displaced.since),
+                    None => self.under_way += 1,
+                }
+                state.under_way = Some(UnderWay { kind: Kind::Stop(id), since: now });
+                self.load.began(now);
+                let displaced = displaced.and_then(UnderWay::displaced);
+                return Some((lane, Job::Stop { id, command, displaced }));
+            }
+        }
+        None
+    }
+
+    fn next_command(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
+        if self.under_way >= self.rules.window {
+            return None;
+        }
+        let due =
+            |lane: Lane| self.groups.iter().any(|group| group.lane == lane && group.due <= now);
+        let first = self.lanes.iter().filter(|(lane, state)| {
+            let has_turn = state.commands_in_a_row < COMMANDS_IN_A_ROW || !due(**lane);
+            state.is_free() && has_turn
+        });
+        let (&lane, _) = first
+            .filter_map(|(lane, state)| Some((lane, state.commands.front()?.0)))
+            .min_by_key(|(_, id)| *id)?;
+        let state = self.lanes.get_mut(&lane)?;
+        let (id, command, _) = state.commands.pop_front()?;
+        state.commands_in_a_row += 1;
+        state.under_way = Some(UnderWay { kind: Kind::Command(id), since: now });
+        self.under_way += 1;
+        self.load.began(now);
+        Some((lane, Job::Command(id, command)))
+    }
+
+    fn next_poll(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
+        if self.under_way >= self.rules.window {
+            return None;
+        }
+        let stretch = self.load.stretch();
+        let ready = |group: &&mut Group| {
+            let is_free = self.lanes.get(&group.lane).is_some_and(|lane| lane.may_poll(now));
+            is_free && group.due <= now
+        };
+        let group = self.groups.iter_mut().filter(ready).min_by_key(|group| {
+            let deadline = group.due + stretched(group.period, stretch);
+            (self.load.has_measured(group.next_poll()), deadline, group.period)
+        })?;
+        let (lane, instant) = (group.lane, group.due);
+        let poll = group.next_poll();
+        group.position += 1;
+        if group.position == group.polls.len() {
+            group.finish_instant(now, stretch, self.anchor.unwrap_or(now));
+        }
+        let state = self.lanes.get_mut(&lane)?;
+        state.commands_in_a_row = 0;
+        state.under_way = Some(UnderWay { kind: Kind::Poll(poll), since: now });
+        self.under_way += 1;
+        self.load.began(now);
+        self.load.waited(now.since(instant));
+        Some((lane, Job::Poll(poll, instant)))
+    }
+
+    fn first_deadline(&self) -> Option<Instant> {
+        self.lanes.values().filter_map(|lane| lane.first_deadline(self.is_open)).min()
+    }
+
+    /// When something is due that no end of an exchange brings about.
+    fn until(&self, now: Instant) -> Option<Instant> {
+        let retries = self.lanes.values().filter_map(LaneState::next_retry);
+        let has_room = self.under_way < self.rules.window;
+        let of_groups = self.groups.iter().filter_map(|group| {
+            let lane = self.lanes.get(&group.lane).filter(|lane| has_room && lane.is_free())?;
+            Some(group.due.max(lane.quiet_until()))
+        });
+        self.first_deadline()
+            .into_iter()
+            .chain(retries)
+            .chain(of_groups)
+            .filter(|instant| *instant > now)
+            .min()
+    }
+
+    /// The exchange of a lane is over. Gives what it was and how it ended.
+    pub fn ended(&mut self, now: Instant, lane: Lane, outcome: Outcome) -> Option<Verdict> {
+        let state = self.lanes.get_mut(&lane)?;
+        let exchange = state.under_way.take()?;
+        self.under_way -= 1;
+        self.load.ended(now, &exchange, outcome);
+        Some(state.judge(now, exchange, outcome))
+    }
+
+    /// The line is closed: nothing begins until [`reopened`](Self::reopened). Gives what was under way.
+    pub fn closed(&mut self, now: Instant) -> Vec<(Lane, Verdict)> {
+        self.is_open = false;
+        let lanes: Vec<Lane> = self.lanes.keys().copied().collect();
+        let ended = lanes
+            .into_iter()
+            .filter_map(|lane| Some((lane, self.ended(now, lane, Outcome::Closed)?)));
+        ended.collect()
+    }
+
+    /// The line is open again.
+    pub fn reopened(&mut self, now: Instant) {
+        self.is_open = true;
+        self.lanes.values_mut().for_each(LaneState::trust);
+        let anchor = self.anchor.unwrap_or(now);
+        for group in &mut self.groups {
+            group.due = group.due.max(last_on_grid(anchor, group.period, now));
+        }
+    }
+
+    /// The measured load of the line.
+    pub fn load(&self) -> &Load {
+        &self.load
+    }
+
+    /// The period of a poll that the line carries, predicted from measured exchanges.
+    pub fn predicted_period(&self, period: Micros) -> Micros {
+        stretched(period, self.load.stretch())
+    }
+
+    /// Instants that were skipped because the line was too slow.
+    pub fn skipped(&self) -> u64 {
+        self.groups.iter().map(|group| group.skipped).sum()
+    }
+
+    fn new_id(&mut self) -> CommandId {
+        self.last_id += 1;
+        CommandId(self.last_id)
+    }
+}
+
+impl Group {
+    /// A group has polls, and the position is that of one of them.
+    fn next_poll(&self) -> PollId {
+        self.polls[self.position]
+    }
+
+    /// Goes on with the next instant. Instants that are over are skipped.
+    fn finish_instant(&mut self, now: Instant, stretch: f64, anchor: Instant) {
+        let period = stretched(self.period, stretch);
+        let periods = (now.since(self.due).0 / period.0).max(1);
+        self.skipped += periods - 1;
+        self.due += Micros(periods.saturating_mul(period.0));
+        if period == self.period {
+            // An instant of a slowed line is between two of the grid.
+            self.due = last_on_grid(anchor, period, self.due + Micros(period.0 - 1));
+        }
+        self.position = 0;
+    }
+}
+
+fn stretched(period: Micros, stretch: f64) -> Micros {
+    Micros((period.0 as f64 * stretch).round() as u64).max(period)
+}
+
+/// The last instant of a period that is not after `now`.
+fn last_on_grid(anchor: Instant, period: Micros, now: Instant) -> Instant {
+    let since = now.since(anchor).0;
+    anchor + Micros(since - since % period.0)
+}

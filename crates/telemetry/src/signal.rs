@@ -1,0 +1,218 @@
+//! What can be read of a motor again and again.
+
+use std::fmt;
+
+use motorlink_proto::rmd::{COMMANDS, Code, CommandInfo, Field, MotorId};
+use motorlink_proto::st::register::Access;
+use motorlink_proto::st::{MotorNumber, RegisterId, UnknownRegister, find_register};
+
+/// A motor of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Motor {
+    /// A motor of the ST drive.
+    St(MotorNumber),
+    /// A motor on the CAN bus.
+    Rmd(MotorId),
+}
+
+/// A value of a motor that is read again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Signal {
+    /// The motor.
+    pub motor: Motor,
+    /// The value.
+    pub source: Source,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Source {
+    /// A register of an ST drive.
+    Register(RegisterId),
+    /// A value in the replies of an RMD motor.
+    Quantity(Quantity),
+}
+
+/// A value in the replies of RMD motors: the index in the list of all quantities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Quantity(u8);
+
+/// No signal has this name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownSignal {
+    /// Of an RMD motor.
+    #[error("unknown quantity `{0}`: the quantities are {names}", names = listed())]
+    Quantity(String),
+    /// Of an ST drive.
+    #[error(transparent)]
+    Register(#[from] UnknownRegister),
+    /// The register can be written only.
+    #[error("{0} can only be written")]
+    WriteOnly(RegisterId),
+}
+
+impl Signal {
+    /// The signal of a motor with this name: that of a register, or of a quantity such as `speed_dps`.
+    ///
+    /// # Errors
+    /// The motor has no such signal.
+    pub fn named(motor: Motor, name: &str) -> Result<Self, UnknownSignal> {
+        let source = match motor {
+            Motor::St(_) => {
+                let register = find_register(name)?;
+                let access = register.shape().map(|shape| shape.access);
+                if access == Some(Access::WriteOnly) {
+                    return Err(UnknownSignal::WriteOnly(register));
+                }
+                Source::Register(register)
+            }
+            Motor::Rmd(_) => Source::Quantity(Quantity::named(name)?),
+        };
+        Ok(Signal { motor, source })
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Source::Register(register) => register.fmt(f),
+            Source::Quantity(quantity) => f.write_str(&quantity.name()),
+        }
+    }
+}
+
+impl Quantity {
+    /// All quantities. Those of the reads with the most values come first.
+    pub fn all() -> impl Iterator<Item = Quantity> {
+        (0..).map(Quantity).zip(rows()).map(|(quantity, _)| quantity)
+    }
+
+    /// The quantity of this name.
+    ///
+    /// # Errors
+    /// There is none; the error lists the names.
+    pub fn named(name: &str) -> Result<Self, UnknownSignal> {
+        let found = Self::all().find(|quantity| quantity.name() == name);
+        found.ok_or_else(|| UnknownSignal::Quantity(name.to_owned()))
+    }
+
+    /// The name, with its unit: `speed_dps`.
+    pub fn name(self) -> String {
+        self.row().0
+    }
+
+    /// The value in a reply, with its unit.
+    pub fn field(self) -> &'static Field {
+        self.row().2
+    }
+
+    /// The reads whose replies have this value, and where.
+    pub fn reads(self) -> impl Iterator<Item = (Code, &'static Field)> {
+        let wanted = self.field();
+        reads().into_iter().filter_map(move |row| {
+            let same = |field: &&Field| field.name == wanted.name && field.scale == wanted.scale;
+            Some((row.code, row.reply.iter().find(same)?))
+        })
+    }
+
+    fn row(self) -> (String, Code, &'static Field) {
+        rows().swap_remove(self.0.into())
+    }
+}
+
+/// The reads that are repeated. Those with the most values come first.
+fn reads() -> Vec<&'static CommandInfo> {
+    let mut reads: Vec<_> = COMMANDS.iter().filter(|row| row.sampled).collect();
+    reads.sort_by_key(|row| std::cmp::Reverse(row.reply.len()));
+    reads
+}
+
+/// Each quantity once: its name, the first read that has it, and its field.
+fn rows() -> Vec<(String, Code, &'static Field)> {
+    let reads = reads();
+    let mut rows: Vec<(String, Code, &'static Field)> = Vec::new();
+    for row in &reads {
+        for field in row.reply {
+            let name = name(row, field, &reads);
+            if !rows.iter().any(|(known, ..)| *known == name) {
+                rows.push((name, row.code, field));
+            }
+        }
+    }
+    rows
+}
+
+/// The field's name. If another read has the same name for something else, it is the noun of the read.
+fn name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
+    let mut fields = reads.iter().flat_map(|read| read.reply);
+    let name = field.name_with_unit().to_string();
+    match row.stem.strip_prefix("read_") {
+        Some(noun) if fields.any(|it| it.name == field.name && it.scale != field.scale) => {
+            name.replacen(field.name, noun, 1)
+        }
+        _ => name,
+    }
+}
+
+fn listed() -> String {
+    Quantity::all().map(Quantity::name).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_are_fields_of_replies() {
+        let names: Vec<_> = Quantity::all().map(Quantity::name).collect();
+        assert_eq!(
+            names,
+            [
+                "temperature_celsius",
+                "iq_amps",
+                "speed_dps",
+                "encoder",
+                "voltage_volts",
+                "errors",
+                "phase_a_amps",
+                "phase_b_amps",
+                "phase_c_amps",
+                "multi_turn_angle_degrees",
+                "single_turn_angle_degrees",
+            ]
+        );
+        for quantity in Quantity::all() {
+            assert_eq!(Quantity::named(&quantity.name()), Ok(quantity));
+        }
+    }
+
+    #[test]
+    fn a_temperature_is_in_two_replies_and_an_angle_in_one() {
+        let codes = |name: &str| -> Vec<u8> {
+            let quantity = Quantity::named(name).unwrap();
+            quantity.reads().map(|(code, _)| code.into()).collect()
+        };
+        assert_eq!(codes("temperature_celsius"), [0x9C, 0x9A]);
+        assert_eq!(codes("iq_amps"), [0x9C]);
+        assert_eq!(codes("multi_turn_angle_degrees"), [0x92]);
+        assert_eq!(codes("single_turn_angle_degrees"), [0x94]);
+    }
+
+    #[test]
+    fn a_signal_has_the_name_of_its_register_or_quantity() {
+        let (st, rmd) =
+            (Motor::St(MotorNumber::new(1).unwrap()), Motor::Rmd(MotorId::new(1).unwrap()));
+        let signal = Signal::named(st, "SPEED_MEAS").unwrap();
+        assert_eq!(signal.source, Source::Register(RegisterId::SPEED_MEAS));
+        assert_eq!(Signal::named(rmd, "speed_dps").unwrap().source.to_string(), "speed_dps");
+        let unknown = Signal::named(st, "SPED_MEAS").unwrap_err().to_string();
+        assert_eq!(unknown, "there is no register `SPED_MEAS`; did you mean `SPEED_MEAS`?");
+        let unknown = Signal::named(rmd, "speed").unwrap_err().to_string();
+        assert!(
+            unknown.starts_with("unknown quantity `speed`: the quantities are temp"),
+            "{unknown}"
+        );
+        let refused = Signal::named(st, "IQ_SPEEDMODE").unwrap_err().to_string();
+        assert_eq!(refused, "IQ_SPEEDMODE can only be written");
+    }
+}
