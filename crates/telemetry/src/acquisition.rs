@@ -1,6 +1,7 @@
 //! The engine of one line: signals for its consumers, commands in between, stops before all.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::{Deref, DerefMut};
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +10,7 @@ use motorlink::{Clock, LinkState};
 use motorlink_proto::time::{Instant, Micros};
 
 use crate::event::{CommandError, Event, What};
-use crate::line::{Line, LineError, Reply, Request, may_move};
+use crate::line::{Line, LineError, Reply, Request, Stopped, may_move};
 use crate::plan::{Poll, Read, Wants};
 use crate::sample::Values;
 use crate::schedule::{
@@ -51,10 +52,10 @@ struct Command {
 /// The engine of one line. Nothing in it waits, except for the opening of the port: call
 /// [`advance`](Self::advance) when its descriptor is readable and after the time that it gives.
 ///
-/// It stops no motor by itself. At the end, stop what was started with the client of the line
-/// ([`into_line`](Self::into_line)).
+/// When it is dropped, it stops the motors that were started through it, and waits until they confirm
+/// it. [`end`](Self::end) says whether they did.
 pub struct Acquisition {
-    line: Box<dyn Line>,
+    line: StopsAtEnd,
     clock: Clock,
     schedule: Schedule<Arc<Command>>,
     polls: BTreeMap<PollId, Arc<Poll>>,
@@ -74,13 +75,48 @@ pub struct Acquisition {
     failures: BTreeMap<Lane, u32>,
 }
 
+/// A line whose motors are stopped when it is dropped. It is there until then.
+struct StopsAtEnd(Option<Box<dyn Line>>);
+
+impl StopsAtEnd {
+    fn stop_started(&mut self) -> Vec<Stopped> {
+        self.0.take().map_or_else(Vec::new, Line::stop_started)
+    }
+}
+
+impl Drop for StopsAtEnd {
+    fn drop(&mut self) {
+        self.stop_started();
+    }
+}
+
+impl Deref for StopsAtEnd {
+    type Target = dyn Line;
+
+    fn deref(&self) -> &Self::Target {
+        self.0.as_deref().expect("the line is there until the end")
+    }
+}
+
+impl DerefMut for StopsAtEnd {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        self.0.as_deref_mut().expect("the line is there until the end")
+    }
+}
+
+impl Drop for Acquisition {
+    fn drop(&mut self) {
+        self.consumers.values().for_each(|consumer| consumer.subscription.close());
+    }
+}
+
 impl Acquisition {
     /// The engine of an open line.
     pub fn new(line: Box<dyn Line>) -> Self {
         Acquisition {
             clock: line.clock(),
             schedule: Schedule::new(line.rules()),
-            line,
+            line: StopsAtEnd(Some(line)),
             polls: BTreeMap::new(),
             last_poll: 0,
             consumers: BTreeMap::new(),
@@ -94,9 +130,9 @@ impl Acquisition {
         }
     }
 
-    /// The line, to stop what was started.
-    pub fn into_line(self) -> Box<dyn Line> {
-        self.line
+    /// Stops the motors that were started through this engine, and closes the port.
+    pub fn end(mut self) -> Vec<Stopped> {
+        self.line.stop_started()
     }
 
     /// The clock of the line.

@@ -70,6 +70,9 @@ pub enum CommandError {
     /// The line was closed meanwhile. It is unknown whether the drive executed it.
     #[error("the line was lost; it is unknown whether the drive executed the command")]
     Closed,
+    /// The engine ended meanwhile. It is unknown whether the drive executed it.
+    #[error("the engine of this line has ended")]
+    Ended,
     /// The drive refused, or did not answer.
     #[error(transparent)]
     Line(#[from] LineError),

@@ -5,6 +5,7 @@ pub mod acquisition;
 pub mod event;
 pub mod line;
 pub mod plan;
+pub mod runner;
 pub mod sample;
 pub mod schedule;
 pub mod signal;

@@ -78,6 +78,15 @@ impl LineError {
     }
 }
 
+/// A motor that was stopped at the end.
+#[derive(Debug)]
+pub struct Stopped {
+    /// The motor.
+    pub motor: Motor,
+    /// Whether it confirmed the stop. Otherwise it may still be turning.
+    pub result: Result<(), LineError>,
+}
+
 /// What an exchange that is over calls.
 pub type Done<'a> = dyn FnMut(Lane, Result<Reply, LineError>) + 'a;
 
@@ -119,6 +128,9 @@ pub trait Line: Send {
     /// # Errors
     /// The port's. It is closed, and the exchanges under way are given up.
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError>;
+
+    /// Stops the motors that were started through this line, and waits until they confirm it.
+    fn stop_started(self: Box<Self>) -> Vec<Stopped>;
 
     /// The fewest exchanges that read these signals. They change when the drive has refused to
     /// configure a data segment.

@@ -7,7 +7,7 @@ use motorlink::rmd::{Error, EventClient, Options};
 use motorlink::{Clock, LinkState, port::PortName};
 use motorlink_proto::rmd::{Command, MotorId, MotorSet};
 
-use super::{Done, Line, LineError, Reply, Request};
+use super::{Done, Line, LineError, Reply, Request, Stopped};
 use crate::plan::{Poll, Read, Wants, rmd_polls};
 use crate::sample::Sample;
 use crate::schedule::{Lane, LineRules};
@@ -32,11 +32,6 @@ impl RmdLine {
     /// Uses a client that is open.
     pub fn new(client: EventClient) -> Self {
         RmdLine { client, confirming: MotorSet::EMPTY }
-    }
-
-    /// The client, to stop what is moving.
-    pub fn into_client(self) -> EventClient {
-        self.client
     }
 }
 
@@ -109,6 +104,17 @@ impl Line for RmdLine {
             self.confirming = MotorSet::EMPTY;
         }
         Ok(wait?)
+    }
+
+    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
+        let client = self.client.into_client();
+        let stopped = client.stop_on_drop().stop_now().into_iter();
+        stopped
+            .map(|one| Stopped {
+                motor: Motor::Rmd(one.id),
+                result: one.result.map_err(LineError::from),
+            })
+            .collect()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {

@@ -10,10 +10,11 @@ use motorlink_proto::st::{
     Confirmation, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
 };
 
-use super::{Done, Line, LineError, Reply, Request};
+use super::{Done, Line, LineError, Reply, Request, Stopped};
 use crate::plan::{Poll, Read, Wants, st_polls};
 use crate::sample::Sample;
 use crate::schedule::{Lane, LineRules};
+use crate::signal::Motor;
 
 /// A serial line has one exchange at a time.
 const LANE: Lane = Lane(0);
@@ -64,11 +65,6 @@ impl StLine {
             Profile::Mcsdk54 => Vec::new(),
         };
         StLine { client, step: Step::Idle, configured: Default::default(), segments }
-    }
-
-    /// The client, to stop what was started.
-    pub fn into_client(self) -> EventClient {
-        self.client
     }
 
     fn begin_segment(&mut self, segment: Segment) -> Result<Step, Error> {
@@ -169,7 +165,6 @@ impl Line for StLine {
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
         loop {
             let progress = match &mut self.step {
-                Step::Idle => return Ok(None),
                 Step::Confirming(confirmation) => {
                     match self.client.advance_confirmation(confirmation) {
                         Progress::Done(result) => Progress::Done(result.map(|()| Vec::new())),
@@ -180,7 +175,8 @@ impl Line for StLine {
                     let values = segment_values(&segment.registers, payload)?;
                     (values.count() == segment.registers.len()).then(|| payload.to_vec())
                 }),
-                Step::Once | Step::Configuring(_) => {
+                // What comes unasked is read, too.
+                Step::Idle | Step::Once | Step::Configuring(_) => {
                     self.client.advance(|payload| Some(payload.to_vec()))
                 }
             };
@@ -202,6 +198,17 @@ impl Line for StLine {
                 },
             }
         }
+    }
+
+    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
+        let client = self.client.into_client();
+        let stopped = client.stop_on_drop().stop_now().into_iter();
+        stopped
+            .map(|one| Stopped {
+                motor: Motor::St(one.motor),
+                result: one.result.map_err(LineError::from),
+            })
+            .collect()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {

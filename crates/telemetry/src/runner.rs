@@ -1,0 +1,213 @@
+//! The engine of a line in a thread of its own, for programs without an event loop.
+
+use std::collections::HashMap;
+use std::io::{self, Read, Write};
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use motorlink_proto::time::Micros;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+
+use crate::acquisition::Acquisition;
+use crate::event::CommandError;
+use crate::line::{Reply, Request, Stopped};
+use crate::schedule::CommandId;
+
+/// The result of a command or a stop.
+pub type CommandResult = Result<Reply, CommandError>;
+
+type Task = Box<dyn FnOnce(&mut Engine) + Send>;
+
+/// The engine in its thread, with the senders that wait.
+struct Engine {
+    acquisition: Acquisition,
+    waiting: HashMap<CommandId, Sender<CommandResult>>,
+}
+
+/// An engine in a thread. When it is dropped, the motors that were started through it are stopped.
+#[derive(Debug)]
+pub struct Runner {
+    remote: Remote,
+    thread: Option<JoinHandle<Vec<Stopped>>>,
+}
+
+/// Uses the engine of a [`Runner`] from any thread. It fails once the runner is gone.
+#[derive(Debug, Clone)]
+pub struct Remote {
+    tasks: Sender<Task>,
+    wake: Arc<UnixStream>,
+}
+
+/// The engine has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the engine of this line has ended")]
+pub struct Ended;
+
+impl Runner {
+    /// Starts the thread. The name is that of the line.
+    ///
+    /// # Errors
+    /// The system gives no thread or no descriptor.
+    pub fn start(name: &str, acquisition: Acquisition) -> io::Result<Self> {
+        let (wake, woken) = UnixStream::pair()?;
+        wake.set_nonblocking(true)?;
+        woken.set_nonblocking(true)?;
+        let (tasks, inbox) = mpsc::channel();
+        let engine = Engine { acquisition, waiting: HashMap::new() };
+        let thread = std::thread::Builder::new().name(name.to_owned());
+        let thread = thread.spawn(move || engine.run(&inbox, woken))?;
+        let remote = Remote { tasks, wake: Arc::new(wake) };
+        Ok(Runner { remote, thread: Some(thread) })
+    }
+
+    /// Uses the engine from other threads.
+    pub fn remote(&self) -> &Remote {
+        &self.remote
+    }
+
+    /// Stops the motors that were started through the engine, and ends it.
+    pub fn end(mut self) -> Vec<Stopped> {
+        self.close()
+    }
+
+    fn close(&mut self) -> Vec<Stopped> {
+        // The engine ends when it is told, however many remotes there are.
+        let _ = self.remote.wake.shutdown(std::net::Shutdown::Both);
+        let ended = self.thread.take().map(JoinHandle::join);
+        ended.and_then(Result::ok).unwrap_or_default()
+    }
+}
+
+impl Drop for Runner {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+impl Remote {
+    /// Runs a function on the engine, between two steps of it, and gives its result.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn with<R: Send + 'static>(
+        &self,
+        task: impl FnOnce(&mut Acquisition) -> R + Send + 'static,
+    ) -> Result<R, Ended> {
+        let (sender, receiver) = mpsc::channel();
+        self.send(move |engine| {
+            // Whoever asked may have gone.
+            let _ = sender.send(task(&mut engine.acquisition));
+        })?;
+        receiver.recv().map_err(|_| Ended)
+    }
+
+    /// Sends a command and waits for its result.
+    ///
+    /// # Errors
+    /// See [`CommandError`].
+    pub fn command(&self, by: &Arc<str>, request: Request, time_to_live: Micros) -> CommandResult {
+        let by = Arc::clone(by);
+        let result = self.ask(move |engine, sender| {
+            match engine.acquisition.command(&by, request, time_to_live) {
+                Ok(id) => drop(engine.waiting.insert(id, sender)),
+                Err(error) => drop(sender.send(Err(error))),
+            }
+        });
+        result.unwrap_or(Err(CommandError::Ended))
+    }
+
+    /// Stops a motor and waits until it confirms it, or until the stop has failed for good.
+    ///
+    /// # Errors
+    /// See [`CommandError`]. The motor may still be turning.
+    pub fn stop(&self, by: &Arc<str>, request: Request) -> CommandResult {
+        let by = Arc::clone(by);
+        let result = self.ask(move |engine, sender| {
+            let Engine { acquisition, waiting } = engine;
+            let id = acquisition.stop(&by, request, &mut |id, result| tell(waiting, id, result));
+            engine.waiting.insert(id, sender);
+        });
+        result.unwrap_or(Err(CommandError::Ended))
+    }
+
+    fn ask(
+        &self,
+        begin: impl FnOnce(&mut Engine, Sender<CommandResult>) + Send + 'static,
+    ) -> Result<CommandResult, Ended> {
+        let (sender, receiver) = mpsc::channel();
+        self.send(move |engine| begin(engine, sender))?;
+        receiver.recv().map_err(|_| Ended)
+    }
+
+    fn send(&self, task: impl FnOnce(&mut Engine) + Send + 'static) -> Result<(), Ended> {
+        self.tasks.send(Box::new(task)).map_err(|_| Ended)?;
+        match (&*self.wake).write(&[0]) {
+            Ok(_) => Ok(()),
+            // It is awake if it has not read the last bytes.
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(()),
+            Err(_) => Err(Ended),
+        }
+    }
+}
+
+fn tell(
+    waiting: &mut HashMap<CommandId, Sender<CommandResult>>,
+    id: CommandId,
+    result: CommandResult,
+) {
+    if let Some(sender) = waiting.remove(&id) {
+        // Whoever asked may have gone.
+        let _ = sender.send(result);
+    }
+}
+
+impl Engine {
+    fn run(mut self, inbox: &Receiver<Task>, mut woken: UnixStream) -> Vec<Stopped> {
+        loop {
+            loop {
+                match inbox.try_recv() {
+                    Ok(task) => task(&mut self),
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return self.acquisition.end(),
+                }
+            }
+            let Engine { acquisition, waiting } = &mut self;
+            let wait = acquisition.advance(&mut |id, result| tell(waiting, id, result));
+            if self.await_next(&woken, wait).is_err() || is_closed(&mut woken) {
+                return self.acquisition.end();
+            }
+        }
+    }
+
+    /// Waits until there is something to do.
+    fn await_next(&self, woken: &UnixStream, wait: Option<Duration>) -> Result<(), Errno> {
+        let line = self.acquisition.descriptor();
+        let mut fds: Vec<PollFd<'_>> = line
+            .into_iter()
+            .chain([woken.as_fd()])
+            .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
+            .collect();
+        let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
+        match poll(&mut fds, wait.as_ref()) {
+            Ok(_) | Err(Errno::INTR) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// Reads what woke the engine; whether the runner is gone.
+fn is_closed(woken: &mut UnixStream) -> bool {
+    let mut bytes = [0; 64];
+    loop {
+        match woken.read(&mut bytes) {
+            Ok(0) => return true,
+            Ok(_) => {}
+            Err(error) => return error.kind() != io::ErrorKind::WouldBlock,
+        }
+    }
+}
