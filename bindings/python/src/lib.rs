@@ -59,9 +59,9 @@ mod _core {
         module.add("ST_SCAN_TIMEOUT", motorlink::st::SCAN_TIMEOUT.as_secs_f64())?;
         module.add("ST_ATTEMPTS", motorlink_proto::st::VERIFY_ATTEMPTS)?;
         module.add("RMD_TIMEOUT", seconds(motorlink_proto::rmd::DEFAULT_TIMEOUT))?;
-        module.add("RMD_STOP_ATTEMPTS", motorlink::rmd::STOP_ATTEMPTS)?;
-        module.add("RMD_STOP_PAUSE", seconds(motorlink::rmd::STOP_PAUSE))?;
-        module.add("RMD_STOP_TIME", seconds(motorlink::rmd::STOP_TIME))?;
+        module.add("RMD_STOP_ATTEMPTS", motorlink::STOP_ATTEMPTS)?;
+        module.add("RMD_STOP_PAUSE", seconds(motorlink::STOP_PAUSE))?;
+        module.add("RMD_STOP_TIME", seconds(motorlink::STOP_TIME))?;
         module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;
         let tolerance = motorlink::rmd::FullTurn::TOLERANCE;
         module.add("RMD_FULL_TURN_TOLERANCE", TurnCentiDegrees::UNIT.value(tolerance.digits()))?;

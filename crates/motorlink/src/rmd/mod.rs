@@ -36,5 +36,3 @@ pub use motor::Motor;
 pub use options::Options;
 pub use stop_on_drop::{StopOnDrop, Stopped};
 pub use stopping::{StopAction, Stopping};
-
-pub use crate::stopping::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
