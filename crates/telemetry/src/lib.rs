@@ -16,16 +16,15 @@
 //! use motorlink_telemetry::plan::Wants;
 //! use motorlink_telemetry::runner::Runner;
 //! use motorlink_telemetry::signal::{Motor, Signal};
-//! use motorlink_telemetry::subscription::{Full, Record, Subscription};
+//! use motorlink_telemetry::subscription::{Full, Record};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let line = RmdLine::open(&"socketcan:can0".parse()?, Default::default())?;
 //! let runner = Runner::start("can0", Acquisition::new(Box::new(line)))?;
 //! let motor = Motor::Rmd(MotorId::new(1).ok_or("an ID is 1 to 32")?);
 //! let speed = Signal::named(motor, "speed_dps")?;
-//! let subscription = Subscription::new(1000, Full::DropOldest);
-//! let (theirs, wants) = (subscription.clone(), Wants::from([(speed, Micros::from_millis(10))]));
-//! runner.remote().with(move |engine| engine.subscribe(theirs, wants))?;
+//! let wants = Wants::from([(speed, Micros::from_millis(10))]);
+//! let (_, subscription) = runner.remote().subscribe(wants, 1000, Full::DropOldest)?;
 //! while let Some(record) = subscription.wait(std::time::Duration::from_secs(1)) {
 //!     if let Record::Values(values) = record {
 //!         println!("{:?} µs {:?}", values.time().0, values.get(speed));

@@ -13,10 +13,12 @@ use motorlink_proto::time::Micros;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::acquisition::Acquisition;
+use crate::acquisition::{Acquisition, ConsumerId, Rate};
 use crate::event::CommandError;
 use crate::line::{Reply, Request, Stopped};
+use crate::plan::Wants;
 use crate::schedule::CommandId;
+use crate::subscription::{Full, Subscription};
 
 /// The result of a command or a stop.
 pub type CommandResult = Result<Reply, CommandError>;
@@ -104,6 +106,56 @@ impl Remote {
             let _ = sender.send(task(&mut engine.acquisition));
         })?;
         receiver.recv().map_err(|_| Ended)
+    }
+
+    /// Sends these signals, and all events, to a new subscription.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn subscribe(
+        &self,
+        wants: Wants,
+        capacity: usize,
+        full: Full,
+    ) -> Result<(ConsumerId, Subscription), Ended> {
+        let subscription = Subscription::new(capacity, full);
+        let theirs = subscription.clone();
+        let id = self.with(move |engine| engine.subscribe(theirs, wants))?;
+        Ok((id, subscription))
+    }
+
+    /// Ends a subscription.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn unsubscribe(&self, id: ConsumerId) -> Result<(), Ended> {
+        self.with(move |engine| engine.unsubscribe(id))
+    }
+
+    /// The rates of all signals that are read.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn rates(&self) -> Result<Vec<Rate>, Ended> {
+        self.with(|engine| engine.rates().collect())
+    }
+
+    /// Refuses all motion from now on, whoever asks, until it is released.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn latch(&self, by: &Arc<str>) -> Result<(), Ended> {
+        let by = Arc::clone(by);
+        self.with(move |engine| engine.latch(&by))
+    }
+
+    /// Allows motion again.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn release(&self, by: &Arc<str>) -> Result<(), Ended> {
+        let by = Arc::clone(by);
+        self.with(move |engine| engine.release(&by))
     }
 
     /// Sends a command and waits for its result.

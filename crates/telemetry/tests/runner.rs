@@ -88,11 +88,8 @@ fn by(name: &str) -> Arc<str> {
 }
 
 fn subscribe(runner: &Runner, signals: &[Signal], period: Micros) -> Subscription {
-    let subscription = Subscription::new(100_000, Full::DropNewest);
     let wants: Wants = signals.iter().map(|signal| (*signal, period)).collect();
-    let theirs = subscription.clone();
-    runner.remote().with(move |engine| engine.subscribe(theirs, wants)).unwrap();
-    subscription
+    runner.remote().subscribe(wants, 100_000, Full::DropNewest).unwrap().1
 }
 
 #[test]
@@ -165,14 +162,14 @@ fn a_stop_and_a_latch_hold_for_every_sender() {
     let remote = runner.remote();
     remote.command(&by("arm"), turn(2, 360.0), SECOND).unwrap();
     assert!(drives.is_reached(|dps| dps > 300.0, "rmd2.speed_dps"));
-    remote.with(|engine| engine.latch(&by("operator"))).unwrap();
+    remote.latch(&by("operator")).unwrap();
     remote.stop(&by("operator"), Request::rmd(id(2), &Stop)).unwrap();
     assert!(drives.is_reached(|dps| dps.abs() < 5.0, "rmd2.speed_dps"));
     for sender in ["arm", "operator"] {
         let refused = remote.command(&by(sender), turn(2, 360.0), SECOND);
         assert!(matches!(refused, Err(CommandError::Latched(_))), "{refused:?}");
     }
-    remote.with(|engine| engine.release(&by("operator"))).unwrap();
+    remote.release(&by("operator")).unwrap();
     remote.command(&by("arm"), turn(2, 360.0), SECOND).unwrap();
 }
 
