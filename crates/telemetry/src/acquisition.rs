@@ -12,7 +12,7 @@ use motorlink_proto::time::{Instant, Micros};
 use crate::event::{CommandError, Event, What};
 use crate::line::{Line, LineError, Reply, Request, Stopped, may_move};
 use crate::plan::{Poll, Read, Wants};
-use crate::sample::Values;
+use crate::sample::{Samples, Values};
 use crate::schedule::{
     CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Schedule, Verdict,
 };
@@ -370,7 +370,10 @@ impl Acquisition {
             }
             Ok(reply) => match self.line.samples(&poll, &reply) {
                 Some(samples) => {
-                    self.refused.remove(&id);
+                    match implausible(&poll, &samples) {
+                        Some((signals, why)) => self.refuse(id, signals, why),
+                        None => drop(self.refused.remove(&id)),
+                    }
                     let instant = self.instants.get(&lane).copied().unwrap_or(requested);
                     let replied = self.clock.now();
                     let values = Arc::new(Values { poll, instant, requested, replied, samples });
@@ -378,7 +381,10 @@ impl Acquisition {
                         consumer.values(id, &values);
                     }
                 }
-                None => self.refuse(id, &poll, "the reply does not fit the request".into()),
+                None => {
+                    let why = "the reply does not fit the request".into();
+                    self.refuse(id, poll.signals.clone(), why);
+                }
             },
             Err(error) if poll.read == Read::Confirm && error.is_unconfirmed() => {
                 let since = self.confirmed.get(&lane).copied().unwrap_or_default();
@@ -386,14 +392,16 @@ impl Acquisition {
             }
             Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, &error),
             // The drive may have no data segments: then the plan is another.
-            Err(error) if !self.replan() => self.refuse(id, &poll, error.to_string().into()),
+            Err(error) if !self.replan() => {
+                self.refuse(id, poll.signals.clone(), error.to_string().into());
+            }
             Err(_) => {}
         }
     }
 
-    fn refuse(&mut self, id: PollId, poll: &Poll, why: Arc<str>) {
+    fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: Arc<str>) {
         if self.refused.insert(id) {
-            self.tell(What::Refused(poll.signals.clone(), why));
+            self.tell(What::Refused(signals, why));
         }
     }
 
@@ -488,4 +496,12 @@ impl Acquisition {
         }
         lanes.into_values().collect()
     }
+}
+
+/// The signals whose values are not plausible, and the reason for the first one.
+fn implausible(poll: &Poll, samples: &Samples) -> Option<(Vec<Signal>, Arc<str>)> {
+    let pairs = poll.signals.iter().zip(samples);
+    let odd: Vec<_> = pairs.filter_map(|(it, sample)| Some((*it, sample.err()?))).collect();
+    let why = odd.first()?.1.to_string().into();
+    Some((odd.into_iter().map(|(signal, _)| signal).collect(), why))
 }

@@ -28,7 +28,8 @@ pub enum What {
     Silent(Motor, Arc<str>),
     /// A silent motor answers again.
     Answers(Motor),
-    /// The drive refuses to give signals. Said once, until it gives them.
+    /// The drive refuses to give signals, or their values are not plausible. Said once, until they
+    /// come.
     Refused(Vec<Signal>, Arc<str>),
     /// A reply came twice or late. The values of this motor since this moment may be those of other
     /// signals.

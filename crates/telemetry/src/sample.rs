@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::st::Reading;
+use motorlink_proto::st::{Implausible, Reading};
 use motorlink_proto::time::Instant;
 
 use crate::plan::Poll;
@@ -17,11 +17,19 @@ pub struct Sample {
     pub value: f64,
 }
 
-impl From<Reading> for Sample {
-    fn from(reading: Reading) -> Self {
-        Sample { digits: reading.digits(), value: reading.value() }
+impl Sample {
+    /// The value of a register.
+    ///
+    /// # Errors
+    /// It is plausible in the other profile only. The error has the digits.
+    pub(crate) fn of(reading: Reading) -> Result<Self, Implausible> {
+        let reading = reading.plausible()?;
+        Ok(Sample { digits: reading.digits(), value: reading.value() })
     }
 }
+
+/// Values, each or why it is not plausible.
+pub type Samples = Vec<Result<Sample, Implausible>>;
 
 /// The values of one reply.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +43,7 @@ pub struct Values {
     /// When the reply was complete.
     pub replied: Instant,
     /// The values.
-    pub samples: Vec<Sample>,
+    pub samples: Samples,
 }
 
 impl Values {
@@ -44,9 +52,9 @@ impl Values {
         Instant(self.requested.0.midpoint(self.replied.0))
     }
 
-    /// The value of a signal, if the reply has it.
+    /// The value of a signal, if the reply has it and it is plausible.
     pub fn get(&self, signal: Signal) -> Option<Sample> {
         let at = self.poll.signals.iter().position(|it| *it == signal)?;
-        self.samples.get(at).copied()
+        self.samples.get(at)?.ok()
     }
 }

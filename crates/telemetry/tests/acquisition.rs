@@ -425,6 +425,23 @@ fn a_refused_register_is_said_once() {
 }
 
 #[test]
+fn a_value_of_the_other_profile_is_no_value() {
+    let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
+    let bench = Bench::new(&config).unwrap();
+    // FLUXWK_BUS of shipped firmware has digits of 0.1 %.
+    let mut engine = Engine::st_with(&bench, "", st_options(Profile::Spec));
+    let wanted = signals(st(1), &["FLUXWK_BUS"]);
+    let subscription = engine.subscribe(&wanted, Micros(50_000));
+    engine.run(SECOND);
+    let got = Got::of(&subscription);
+    assert!(got.replies() >= 19 && got.values(wanted[0]).is_empty());
+    let refused: Vec<_> = got.events().filter(|what| matches!(what, What::Refused(..))).collect();
+    let [What::Refused(signals, why)] = refused[..] else { panic!("{refused:?}") };
+    assert_eq!(*signals, wanted);
+    assert!(why.contains("not plausible") && why.contains("mcsdk-5.4"), "{why}");
+}
+
+#[test]
 fn a_bad_line_gives_no_wrong_value_without_saying_so() {
     let mut doubts = 0;
     for seed in 0..8 {

@@ -12,7 +12,7 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, OwnedRequest, RegisterId};
 
 use crate::plan::{Poll, Read, Wants};
-use crate::sample::Sample;
+use crate::sample::Samples;
 use crate::schedule::{Lane, LineRules};
 use crate::signal::Motor;
 
@@ -137,7 +137,7 @@ pub trait Line: Send {
     fn polls(&self, wants: &Wants) -> Vec<Poll>;
 
     /// The values of a poll's signals in its reply; `None` if the reply is none of its replies.
-    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>>;
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples>;
 }
 
 impl Poll {

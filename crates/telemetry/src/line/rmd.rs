@@ -9,7 +9,7 @@ use motorlink_proto::rmd::{Command, MotorId, MotorSet};
 
 use super::{Done, Line, LineError, Reply, Request, Stopped};
 use crate::plan::{Poll, Read, Wants, rmd_polls};
-use crate::sample::Sample;
+use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
 use crate::signal::{Motor, Signal, Source};
 
@@ -121,12 +121,12 @@ impl Line for RmdLine {
         rmd_polls(wants)
     }
 
-    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>> {
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples> {
         let (Reply::Rmd(data), Read::Command(read)) = (reply, &poll.read) else { return None };
         let sample = |signal: &Signal| match signal.source {
             Source::Quantity(quantity) => {
                 let (_, field) = quantity.reads().find(|(code, _)| code == read)?;
-                Some(Sample { digits: field.raw(data), value: field.value(data) })
+                Some(Ok(Sample { digits: field.raw(data), value: field.value(data) }))
             }
             Source::Register(_) => None,
         };

@@ -12,7 +12,7 @@ use motorlink_proto::st::{
 
 use super::{Done, Line, LineError, Reply, Request, Stopped};
 use crate::plan::{Poll, Read, Wants, st_polls};
-use crate::sample::Sample;
+use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
 use crate::signal::Motor;
 
@@ -215,10 +215,10 @@ impl Line for StLine {
         st_polls(wants, &self.segments)
     }
 
-    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Vec<Sample>> {
+    fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples> {
         let Reply::St(payload) = reply else { return None };
         let profile = self.client.profile();
-        let sample = |register, bits| Reading { register, bits, profile }.into();
+        let sample = |register, bits| Sample::of(Reading { register, bits, profile });
         match &poll.read {
             Read::Register(register) => {
                 Some(vec![sample(*register, register.decode(profile, payload)?)])
