@@ -144,6 +144,20 @@ fn a_stop_of_all_on_a_good_bus_takes_less_than_half_a_second() {
 }
 
 #[test]
+fn a_few_replies_do_not_show_that_none_is_lost() {
+    let after = |attempts, sent, lost| {
+        let confirmed: MotorSet = MotorId::new(1).into_iter().collect();
+        let silent = MotorSet::ALL.without(confirmed);
+        Stopping { confirmed, failed: Vec::new(), silent, attempts, sent, lost }
+            .is_silence_certain()
+    };
+    // If half of the requests are lost, one motor gets four with a probability of 1/16.
+    assert!(!after(4, 4, 0) && !after(10, 10, 0));
+    assert!(after(11, 11, 0) && after(4, 1_000, 0));
+    assert!(!after(4, 1_000, 100) && after(8, 1_000, 100));
+}
+
+#[test]
 fn silence_is_not_certain_if_no_motor_confirmed() {
     let bench = turning_bench();
     let bus = distrustful(&bench, "drop=1,only=received", 0);

@@ -8,6 +8,10 @@ use crate::stopping::{STOP_ATTEMPTS, STOP_TIME, await_retry};
 /// The greatest probability that a motor is taken for an ID without a motor.
 const MISSED: f64 = 1e-6;
 
+/// The number of quick requests that make silence certain after [`STOP_ATTEMPTS`], if one motor
+/// answers all of them.
+const MEASUREMENTS: u32 = 64;
+
 /// How motors are stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StopAction {
@@ -46,12 +50,20 @@ pub struct Stopping {
 }
 
 impl Stopping {
-    /// Whether the IDs in [`silent`](Self::silent) have no motor with power. At the measured rate of
-    /// lost replies, all replies of a motor are lost with a probability of less than one in a million.
-    /// `false` if no motor confirmed: then no rate was measured.
+    /// Whether the IDs in [`silent`](Self::silent) have no motor with power: all replies of a motor are
+    /// lost with a probability of less than one in a million. `false` if no motor confirmed: then no
+    /// rate of lost replies was measured.
     pub fn is_silence_certain(&self) -> bool {
-        let rate = f64::from(self.lost) / f64::from(self.sent);
-        !self.confirmed.is_empty() && rate.powf(self.attempts.into()) < MISSED
+        !self.confirmed.is_empty() && self.probability_of_silence() < MISSED
+    }
+
+    /// The probability that a motor has no reply to any of its requests. Few measured requests say
+    /// little about the rate of lost replies, so this is the mean over all rates, each as likely as its
+    /// measurement makes it (rule of succession).
+    fn probability_of_silence(&self) -> f64 {
+        let (lost, sent) = (f64::from(self.lost), f64::from(self.sent));
+        let next_is_lost = |n| (lost + f64::from(n)) / (sent + 1.0 + f64::from(n));
+        (1..=self.attempts).map(next_is_lost).product()
     }
 }
 
@@ -97,6 +109,9 @@ impl Client {
             let port = stopping.attempt(self, left, action, !left.without(expected).is_empty());
             left =
                 stopping.failed.iter().filter(|(_, error)| is_repeatable(error)).map(id).collect();
+            if stopping.attempts >= STOP_ATTEMPTS && port.is_ok() {
+                stopping.measure(self);
+            }
             let is_silence_certain =
                 left.intersection(expected).is_empty() && stopping.is_silence_certain();
             let is_over = clock.now() >= give_up || port.is_err() || is_silence_certain;
@@ -153,6 +168,24 @@ impl Stopping {
             self.failed.extend(unheard.map(|id| (id, error.clone())));
         }
         port
+    }
+
+    /// Measures how many replies are lost, with the motors that have confirmed: they answer at once,
+    /// other than the silent IDs. Ends with the first lost reply: then more attempts are needed, which
+    /// measure, too.
+    fn measure(&mut self, bus: &Client) {
+        let ids = self.confirmed;
+        for _ in 0..MEASUREMENTS {
+            let lost = self.lost;
+            let measured = bus.insist(ids.map(|id| (id, ReadStatus.encode())), |_, result| {
+                self.sent += 1;
+                self.lost += u32::from(result.is_err());
+            });
+            if ids.is_empty() || self.is_silence_certain() || self.lost > lost || measured.is_err()
+            {
+                return;
+            }
+        }
     }
 
     /// Asks each of `ids` for its status. An ID that does not answer is silent.
