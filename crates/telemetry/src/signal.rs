@@ -101,14 +101,15 @@ impl Quantity {
         self.row().0
     }
 
-    /// The value in a reply, with its unit.
-    pub fn field(self) -> &'static Field {
-        self.row().2
+    /// The read with the most values that has this one, and where.
+    pub fn read(self) -> (Code, &'static Field) {
+        let (_, code, field) = self.row();
+        (code, field)
     }
 
     /// The reads whose replies have this value, and where.
     pub fn reads(self) -> impl Iterator<Item = (Code, &'static Field)> {
-        let wanted = self.field();
+        let (_, wanted) = self.read();
         reads().into_iter().filter_map(move |row| {
             let same = |field: &&Field| field.name == wanted.name && field.scale == wanted.scale;
             Some((row.code, row.reply.iter().find(same)?))

@@ -5,7 +5,6 @@ mod client;
 mod gear;
 mod gears;
 mod options;
-mod quantity;
 mod request;
 mod sample;
 
@@ -14,9 +13,8 @@ pub(crate) use client::{RmdClient, four_currents, motor_ids, not_stopped, scan_r
 pub(crate) use gear::rmd_encoder_degrees;
 pub(crate) use gears::Gears;
 pub(crate) use options::{LimitChange, RmdOptions};
-pub(crate) use quantity::rmd_quantities;
 pub(crate) use request::{RmdRequest, motor_id, rmd_encode, rmd_full_turn_tolerance};
-pub(crate) use sample::RmdSampling;
+pub(crate) use sample::{RmdSampling, rmd_quantities};
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{

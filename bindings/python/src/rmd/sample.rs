@@ -6,21 +6,22 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use motorlink::Clock;
 use motorlink::port::PortError;
 use motorlink::rmd::{Client, Error, GearRatio, MotorId};
-use motorlink_proto::rmd::Code;
+use motorlink_proto::rmd::{Code, Field};
+use motorlink_telemetry::signal::Quantity;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
 use super::gear::{behind, gear};
-use super::quantity::Quantity;
 use super::request::{RmdRequest, motor_id};
-use crate::error::rmd_error;
+use crate::error::{invalid_value, rmd_error};
 use crate::sampling::{Plan, Rows, Taken, cell};
 
 /// The quantities of one motor.
 struct Lane {
     id: MotorId,
     gear: Option<GearRatio>,
-    quantities: Vec<Quantity>,
+    /// The command that reads each quantity, and where it is in the reply.
+    quantities: Vec<(Code, &'static Field)>,
 }
 
 /// The requests of a row, and its values in the replies.
@@ -42,17 +43,18 @@ impl Questions {
     fn new(py: Python<'_>, motors: Vec<Wanted>, raw: bool) -> PyResult<Self> {
         let mut lanes = Vec::with_capacity(motors.len());
         for (id, names, gear_ratio) in motors {
-            let quantities: PyResult<_> =
-                names.iter().map(|name| Quantity::named(py, name)).collect();
+            let named = |name: &String| Quantity::named(name).map(Quantity::read);
+            let quantities: Result<_, _> = names.iter().map(named).collect();
+            let quantities = quantities.map_err(|unknown| invalid_value(py, unknown))?;
             let (id, gear) = (motor_id(py, id)?, gear(py, gear_ratio)?);
-            lanes.push(Lane { id, gear, quantities: quantities? });
+            lanes.push(Lane { id, gear, quantities });
         }
         let mut cycles: Vec<Vec<(MotorId, [u8; 8])>> = Vec::new();
         for lane in &lanes {
             let mut codes: Vec<Code> = Vec::new();
-            for quantity in &lane.quantities {
-                if !codes.contains(&quantity.code) {
-                    codes.push(quantity.code);
+            for (code, _) in &lane.quantities {
+                if !codes.contains(code) {
+                    codes.push(*code);
                 }
             }
             cycles.resize_with(cycles.len().max(codes.len()), Vec::new);
@@ -67,7 +69,7 @@ impl Questions {
     fn values(&self, replies: &Replies) -> Vec<[u8; 8]> {
         let mut values = Vec::new();
         for lane in &self.lanes {
-            for Quantity { code, field } in &lane.quantities {
+            for (code, field) in &lane.quantities {
                 let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
                 // Each request has a reply, otherwise the row has failed.
                 let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
@@ -181,4 +183,10 @@ impl RmdSampling {
     fn take<'py>(&self, py: Python<'py>) -> (Bound<'py, PyByteArray>, u64) {
         self.lock().take().into_python(py)
     }
+}
+
+/// The names that can be sampled.
+#[pyfunction]
+pub(crate) fn rmd_quantities() -> Vec<String> {
+    Quantity::all().map(Quantity::name).collect()
 }

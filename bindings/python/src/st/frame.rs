@@ -28,31 +28,6 @@ pub(super) fn too_long(py: Python<'_>) -> PyErr {
     invalid_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
 }
 
-/// A request without its list of bytes, and that list.
-pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
-    let (request, bytes): (Request<'static>, &[u8]) = match request {
-        Request::SetRegister { register, value } => {
-            (Request::SetRegister { register, value: &[] }, value)
-        }
-        Request::GetProfilerInfo(steps) => (Request::GetProfilerInfo(&[]), steps),
-        Request::ConfigureSegment { segment, registers } => {
-            (Request::ConfigureSegment { segment, registers: &[] }, registers)
-        }
-        Request::GetRegister(register) => (Request::GetRegister(register), &[]),
-        Request::ExecuteCommand(command) => (Request::ExecuteCommand(command), &[]),
-        Request::GetBoardInfo => (Request::GetBoardInfo, &[]),
-        Request::SetRamp(ramp) => (Request::SetRamp(ramp), &[]),
-        Request::GetRevupData(phase) => (Request::GetRevupData(phase), &[]),
-        Request::SetRevupData(phase, data) => (Request::SetRevupData(phase, data), &[]),
-        Request::SetCurrentReference(both) => (Request::SetCurrentReference(both), &[]),
-        Request::GetFirmwareVersion => (Request::GetFirmwareVersion, &[]),
-        Request::GetSegment(segment) => (Request::GetSegment(segment), &[]),
-        Request::SetTorqueRamp(ramp) => (Request::SetTorqueRamp(ramp), &[]),
-        Request::SetPosition(target) => (Request::SetPosition(target), &[]),
-    };
-    (request, bytes.to_vec())
-}
-
 /// What the reply to a request from a frame becomes. Its numbers are digits.
 pub(super) fn reply(request: Request<'_>) -> Reply {
     match request {

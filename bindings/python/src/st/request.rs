@@ -3,7 +3,8 @@
 use motorlink::st::{Error, Target};
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber,
-    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
+    OwnedRequest, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS,
+    TorqueRamp,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
@@ -19,35 +20,23 @@ use crate::number::{digits, milliseconds};
 #[pyclass(frozen, eq, module = "motorlink._core")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StRequest {
-    /// The request without its list of bytes.
-    request: Request<'static>,
-    /// The list of bytes, for requests that have one.
-    bytes: Vec<u8>,
+    request: OwnedRequest,
     scale: Scale,
     reply: Reply,
 }
 
 impl StRequest {
-    fn told(scale: Scale, request: Request<'static>) -> Self {
-        StRequest { request, bytes: Vec::new(), scale, reply: Reply::Nothing }
+    fn told(scale: Scale, request: Request<'_>) -> Self {
+        Self::asked(scale, request, Reply::Nothing)
     }
 
-    fn asked(scale: Scale, request: Request<'static>, reply: Reply) -> Self {
-        StRequest { reply, ..Self::told(scale, request) }
+    fn asked(scale: Scale, request: Request<'_>, reply: Reply) -> Self {
+        StRequest { request: request.into(), scale, reply }
     }
 
     /// The request for a client.
     pub(crate) fn request(&self) -> Request<'_> {
-        match self.request {
-            Request::SetRegister { register, .. } => {
-                Request::SetRegister { register, value: &self.bytes }
-            }
-            Request::GetProfilerInfo(_) => Request::GetProfilerInfo(&self.bytes),
-            Request::ConfigureSegment { segment, .. } => {
-                Request::ConfigureSegment { segment, registers: &self.bytes }
-            }
-            other => other,
-        }
+        self.request.request()
     }
 
     /// Reads the payload of a positive acknowledge; `None` if it does not fit the request.
@@ -69,15 +58,14 @@ impl StRequest {
 
     /// Writes these bytes to a register.
     pub(super) fn writing(register: RegisterId, value: &[u8]) -> Self {
-        let request = Request::SetRegister { register, value: &[] };
-        StRequest { bytes: value.to_vec(), ..Self::told(Scale::plain(), request) }
+        Self::told(Scale::plain(), Request::SetRegister { register, value })
     }
 
     /// Selects the registers of a data segment.
     pub(super) fn choosing(segment: u8, registers: &[RegisterId]) -> Self {
-        let request = Request::ConfigureSegment { segment, registers: &[] };
-        let bytes = registers.iter().map(|register| register.0).collect();
-        StRequest { bytes, ..Self::told(Scale::plain(), request) }
+        let registers: Vec<u8> = registers.iter().map(|register| register.0).collect();
+        let request = Request::ConfigureSegment { segment, registers: &registers };
+        Self::told(Scale::plain(), request)
     }
 
     /// Reads a data segment that has these registers.
@@ -126,9 +114,8 @@ impl StRequest {
         let scale = Scale::new(py, profile, full_scale_amps)?;
         let bits = scale.bits(register, value, raw)?;
         let size = usize::from(register.write_size(scale.profile).min(4));
-        let request = Request::SetRegister { register, value: &[] };
-        let bytes = bits.to_le_bytes()[..size].to_vec();
-        Ok(StRequest { bytes, ..Self::told(scale, request) })
+        let value = &bits.to_le_bytes()[..size];
+        Ok(Self::told(scale, Request::SetRegister { register, value }))
     }
 
     /// Writes any bytes to any register (0x01, 4.4).
@@ -306,8 +293,7 @@ impl StRequest {
     /// Lists the registers of motor profiler steps (0x0B of profile `mcsdk-5.4`).
     #[staticmethod]
     fn get_profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
-        let request = Self::asked(Scale::plain(), Request::GetProfilerInfo(&[]), Reply::Bytes);
-        StRequest { bytes: steps, ..request }.fitting(py)
+        Self::asked(Scale::plain(), Request::GetProfilerInfo(&steps), Reply::Bytes).fitting(py)
     }
 
     /// The motor and the request of a frame.
@@ -362,13 +348,13 @@ impl StRequest {
     /// The document's name of the frame code: `GET_REG`.
     #[getter]
     fn code(&self) -> &'static str {
-        self.request.code().name()
+        self.request().code().name()
     }
 
     /// Whether the request only reads. Other requests change something in the drive.
     #[getter]
     fn is_read(&self) -> bool {
-        self.request.is_read()
+        self.request().is_read()
     }
 
     /// The raw protocol values of the request, by name.
@@ -385,8 +371,7 @@ impl StRequest {
 impl StRequest {
     /// What the reply to a decoded request becomes. Its numbers are digits.
     fn decoded(scale: Scale, request: Request<'_>) -> Self {
-        let (request, bytes) = frame::owned(request);
-        StRequest { bytes, ..Self::asked(scale, request, frame::reply(request)) }
+        Self::asked(scale, request, frame::reply(request))
     }
 
     /// The request, if it fits a frame.
@@ -397,11 +382,11 @@ impl StRequest {
 
     /// The register and the bits of a write. Other requests cannot be verified.
     pub(super) fn verifiable(&self, py: Python<'_>) -> PyResult<(RegisterId, i32)> {
-        let Request::SetRegister { register, .. } = self.request else {
+        let Request::SetRegister { register, value } = self.request() else {
             return Err(invalid_value(py, "only a write can be verified"));
         };
         let mut bits = [0; 4];
-        bits.iter_mut().zip(&self.bytes).for_each(|(slot, byte)| *slot = *byte);
+        bits.iter_mut().zip(value).for_each(|(slot, byte)| *slot = *byte);
         Ok((register, i32::from_le_bytes(bits)))
     }
 }
