@@ -69,6 +69,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn ids_have_their_rows_and_gaps_have_none() {
         rows::<1>(&[0, 1, 2, 3]);
         rows::<1>(&[7]);
