@@ -148,7 +148,7 @@ impl Verifying {
 
 /// Registers that command the drive: a write makes the motor act, the drive changes the register
 /// itself, or another motor is addressed afterwards.
-fn acts(register: RegisterId) -> bool {
+pub(super) fn acts(register: RegisterId) -> bool {
     matches!(
         register,
         RegisterId::TARGET_MOTOR
