@@ -10,12 +10,14 @@
 //! | stop motors at the end of a scope, on errors and panics | [`st::StopOnDrop`], [`rmd::StopOnDrop`] |
 //! | limit speeds and currents | [`st::Limits`], [`rmd::Limits`] |
 //! | find the baud rate of an ST drive | [`st::scan_baud`] |
+//! | write settings to a file, compare and restore them | [`settings`] |
 //! | stop the motors of another program when it ends | [`relay::Relay`] |
 #![forbid(unsafe_code)]
 
 pub mod arrival;
 pub mod relay;
 pub mod rmd;
+pub mod settings;
 pub mod st;
 mod stopping;
 mod turn;

@@ -25,7 +25,7 @@ impl Client {
 }
 
 impl Motor<'_> {
-    pub(super) fn bus(&self) -> &Client {
+    pub(crate) fn bus(&self) -> &Client {
         self.bus
     }
 

@@ -37,7 +37,7 @@ macro_rules! commands {
 }
 
 impl Motor<'_> {
-    pub(super) fn client(&self) -> &Client {
+    pub(crate) fn client(&self) -> &Client {
         self.client
     }
 

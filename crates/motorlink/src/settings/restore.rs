@@ -1,0 +1,349 @@
+//! Writes the settings of a file to a motor. If a write fails, it writes the old values again.
+
+use std::fmt;
+
+use motorlink_proto::st::VERIFY_ATTEMPTS;
+
+use super::compare::Compared;
+use super::{Comparison, Tunable, Writing, list};
+
+/// What a restore may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Permissions {
+    /// Write to the ROM of the motor, which wears it.
+    pub rom: bool,
+    /// Change a motor that is not at rest.
+    pub running: bool,
+}
+
+/// Why the settings of a file were not restored.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RestoreError<E> {
+    /// A value that cannot be written differs. Nothing was written.
+    #[error(
+        "{name} is {file} in the file and {now} in the motor, and cannot be written: the settings are \
+         those of another kind of drive; nothing was written"
+    )]
+    Fixed {
+        /// The name of the setting.
+        name: String,
+        /// Its value in the file.
+        file: String,
+        /// The value of the motor.
+        now: String,
+    },
+    /// A write to the ROM is not allowed. Nothing was written.
+    #[error(
+        "{} is in the ROM of the motor, and each write wears the ROM; nothing was written",
+        list(.settings)
+    )]
+    Rom {
+        /// The names of the settings.
+        settings: Vec<String>,
+    },
+    /// The motor is not at rest. Nothing was written.
+    #[error("the motor {motion}, and new settings could change how it moves; nothing was written")]
+    Running {
+        /// What the motor does.
+        motion: String,
+    },
+    /// An exchange before the first write failed, or a limit forbids a value. Nothing was written.
+    #[error("{0}; nothing was written")]
+    Before(E),
+    /// A write failed, or the restore was interrupted.
+    #[error(transparent)]
+    Undone(Box<Undone<E>>),
+}
+
+/// A restore that ended early, and the settings after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Undone<E> {
+    /// Why it ended.
+    pub cause: Cause<E>,
+    /// Settings that were written and have their old values again.
+    pub rolled_back: Vec<String>,
+    /// Settings that have the values of the file.
+    pub changed: Vec<String>,
+    /// Settings that have an unknown value: the old or the new one, unless the motor takes neither.
+    pub unknown: Vec<String>,
+    /// Settings whose values in ROM are unknown.
+    pub unknown_in_rom: Vec<String>,
+    /// Why the roll-back failed.
+    pub rollback_error: Option<E>,
+}
+
+/// Why a restore ended early.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Cause<E> {
+    /// An exchange failed.
+    #[error("{} could not be restored: {error}", list(.settings))]
+    Exchange {
+        /// The names of the settings.
+        settings: Vec<String>,
+        /// The error.
+        error: E,
+    },
+    /// The motor acknowledged a write and has other values.
+    #[error("the motor did not take {}", .settings.join(", "))]
+    Differs {
+        /// Each setting with its values.
+        settings: Vec<String>,
+    },
+    /// The caller ended it.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Why a block does not have its values.
+enum Failed<E> {
+    /// It was refused, and is as before.
+    Refused(E),
+    /// An exchange failed.
+    Exchange(E),
+    /// It has other digits.
+    Differs(Vec<i64>),
+}
+
+impl<Id: Copy + PartialEq> Comparison<Id> {
+    /// Writes the settings that differ, reads each back, and returns when the motor has all of them. With
+    /// [`Permissions::rom`] gains are made permanent at the end, also if they did not differ: the values in
+    /// ROM cannot be read. `is_interrupted` ends the restore before the next write.
+    ///
+    /// # Errors
+    /// Nothing was written, or the old values were written again, as far as the line allowed.
+    pub fn restore<M: Tunable<Id = Id>>(
+        &self,
+        motor: &M,
+        permissions: Permissions,
+        mut is_interrupted: impl FnMut() -> bool,
+    ) -> Result<(), RestoreError<M::Error>> {
+        self.check(motor, permissions)?;
+        let mut restoring = Restoring { motor, written: Vec::new() };
+        let undone = |restoring: Restoring<'_, M>, cause| {
+            Err(RestoreError::Undone(Box::new(restoring.undo(cause))))
+        };
+        for block in self.blocks.iter().filter(|block| block.differs()) {
+            if is_interrupted() {
+                return undone(restoring, Cause::Interrupted);
+            }
+            if let Err(cause) = restoring.write(block) {
+                return undone(restoring, cause);
+            }
+        }
+        for block in self.to_keep(permissions) {
+            if is_interrupted() {
+                return undone(restoring, Cause::Interrupted);
+            }
+            if let Err(cause) = restoring.keep(block) {
+                let mut undone = restoring.undo(cause);
+                let names = block.settings.iter().map(|setting| setting.name.clone());
+                undone.unknown_in_rom = names.collect();
+                return Err(RestoreError::Undone(Box::new(undone)));
+            }
+        }
+        Ok(())
+    }
+
+    /// The names of the settings that [`restore`](Self::restore) makes permanent by a request of its own,
+    /// also if they do not differ.
+    pub fn permanent(&self, permissions: Permissions) -> Vec<&str> {
+        let settings = self.to_keep(permissions).flat_map(|block| &block.settings);
+        settings.map(|setting| setting.name.as_str()).collect()
+    }
+
+    /// The blocks that are made permanent by a request of their own.
+    fn to_keep(&self, permissions: Permissions) -> impl Iterator<Item = &Compared<Id>> {
+        let is_kept =
+            move |block: &&Compared<Id>| block.writing == Writing::Kept && permissions.rom;
+        self.blocks.iter().filter(is_kept)
+    }
+
+    /// Checks whether [`restore`](Self::restore) would be refused before its first write. Writes nothing.
+    ///
+    /// # Errors
+    /// Those of `restore`, except [`RestoreError::Undone`].
+    pub fn check<M: Tunable<Id = Id>>(
+        &self,
+        motor: &M,
+        permissions: Permissions,
+    ) -> Result<(), RestoreError<M::Error>> {
+        let differing = || self.blocks.iter().filter(|block| block.differs());
+        let fixed = self.differences().find(|difference| difference.writing == Writing::Fixed);
+        if let Some(difference) = fixed {
+            let [file, now] =
+                [difference.file, difference.now].map(|digits| difference.setting.shown(digits));
+            let name = difference.setting.name.clone();
+            return Err(RestoreError::Fixed { name, file, now });
+        }
+        let permanent = differing().filter(|block| block.writing == Writing::Permanent);
+        let settings: Vec<String> = permanent.flat_map(Compared::names).collect();
+        if !permissions.rom && !settings.is_empty() {
+            return Err(RestoreError::Rom { settings });
+        }
+        for block in differing() {
+            motor.check(block.id, &block.file).map_err(RestoreError::Before)?;
+        }
+        let is_idle = differing().next().is_none() && self.to_keep(permissions).next().is_none();
+        if permissions.running || is_idle {
+            return Ok(());
+        }
+        let motion = motor.motion().and_then(|motion| motor.confirm().map(|()| motion));
+        match motion.map_err(RestoreError::Before)? {
+            Some(motion) => Err(RestoreError::Running { motion }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A restore in progress.
+struct Restoring<'a, M: Tunable> {
+    motor: &'a M,
+    /// Blocks that do not have their old values, in the order of the writes.
+    written: Vec<&'a Compared<M::Id>>,
+}
+
+impl<'a, M: Tunable> Restoring<'a, M> {
+    fn write(&mut self, block: &'a Compared<M::Id>) -> Result<(), Cause<M::Error>> {
+        self.written.push(block);
+        self.set(block, &block.file, &block.expected).map_err(|failed| match failed {
+            Failed::Refused(error) => {
+                self.written.pop();
+                Cause::Exchange { settings: block.names(), error }
+            }
+            Failed::Exchange(error) => Cause::Exchange { settings: block.names(), error },
+            Failed::Differs(read) => {
+                let values = block.settings.iter().zip(block.expected.iter().zip(read));
+                let values = values.filter(|(_, (expected, read))| *expected != read);
+                let settings = values.map(|(setting, (expected, read))| {
+                    let (name, read) = (&setting.name, setting.shown(read));
+                    format!("{name} {} (it has {read})", setting.shown(*expected))
+                });
+                Cause::Differs { settings: settings.collect() }
+            }
+        })
+    }
+
+    /// Makes a block permanent.
+    fn keep(&self, block: &Compared<M::Id>) -> Result<(), Cause<M::Error>> {
+        let mut kept = self.motor.keep(block.id, &block.file);
+        for _ in 1..VERIFY_ATTEMPTS {
+            if kept.as_ref().is_err_and(M::is_line_failure) {
+                kept = self.motor.keep(block.id, &block.file);
+            }
+        }
+        let names = block.settings.iter().map(|setting| setting.name.clone()).collect();
+        kept.map_err(|error| Cause::Exchange { settings: names, error })
+    }
+
+    /// Writes a block until it reads back as `expected`. A ROM is not written again if the motor has
+    /// acknowledged the write and has another value.
+    fn set(
+        &self,
+        block: &Compared<M::Id>,
+        digits: &[i64],
+        expected: &[i64],
+    ) -> Result<(), Failed<M::Error>> {
+        let id = block.id;
+        for attempt in 1.. {
+            let written = self.motor.write(id, digits);
+            let is_acknowledged = written.is_ok();
+            match written {
+                Err(error) if M::is_refusal(&error) && attempt == 1 => {
+                    return Err(Failed::Refused(error));
+                }
+                Err(error) if !M::is_line_failure(&error) => return Err(Failed::Exchange(error)),
+                // A write without an acknowledge may have been carried out.
+                _ => {}
+            }
+            let (failed, is_final) = match self.motor.read(id) {
+                Ok(read) if read == expected => {
+                    return self.motor.confirm().map_err(Failed::Exchange);
+                }
+                Ok(read) => {
+                    let is_final = is_acknowledged && block.writing == Writing::Permanent;
+                    (Failed::Differs(read), is_final)
+                }
+                Err(error) => {
+                    let is_final = !M::is_line_failure(&error);
+                    (Failed::Exchange(error), is_final)
+                }
+            };
+            if is_final || attempt >= VERIFY_ATTEMPTS {
+                return Err(failed);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the old values again, in the reverse order.
+    fn undo(self, cause: Cause<M::Error>) -> Undone<M::Error> {
+        let mut undone = Undone {
+            cause,
+            rolled_back: Vec::new(),
+            changed: Vec::new(),
+            unknown: Vec::new(),
+            unknown_in_rom: Vec::new(),
+            rollback_error: None,
+        };
+        let mut is_lost = false;
+        for block in self.written.iter().rev() {
+            if is_lost {
+                // It was read back and confirmed.
+                undone.changed.splice(0..0, block.names());
+                continue;
+            }
+            let error = match self.set(block, &block.now, &block.now) {
+                Ok(()) => {
+                    undone.rolled_back.splice(0..0, block.names());
+                    continue;
+                }
+                Err(Failed::Differs(_)) => None,
+                Err(Failed::Refused(error) | Failed::Exchange(error)) => Some(error),
+            };
+            is_lost = error.as_ref().is_some_and(M::is_line_failure);
+            undone.unknown.splice(0..0, block.names());
+            undone.rollback_error = undone.rollback_error.or(error);
+        }
+        undone
+    }
+}
+
+impl<E> Undone<E> {
+    /// Whether every setting has its old value.
+    pub fn is_complete(&self) -> bool {
+        self.changed.is_empty() && self.unknown.is_empty() && self.unknown_in_rom.is_empty()
+    }
+}
+
+impl<E: fmt::Display> fmt::Display for Undone<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; ", self.cause)?;
+        if self.is_complete() && self.rolled_back.is_empty() {
+            return f.write_str("nothing was changed");
+        }
+        if !self.rolled_back.is_empty() {
+            write!(f, "rolled back to the old values: {}", list(&self.rolled_back))?;
+        }
+        if self.is_complete() {
+            return Ok(());
+        }
+        let parts = [
+            (&self.unknown, "unknown, old or new"),
+            (&self.changed, "as in the file"),
+            (&self.unknown_in_rom, "unknown in ROM"),
+        ];
+        let mut separator = if self.rolled_back.is_empty() { "" } else { "; " };
+        for (names, state) in parts.into_iter().filter(|(names, _)| !names.is_empty()) {
+            write!(f, "{separator}{state}: {}", list(names))?;
+            separator = "; ";
+        }
+        f.write_str("; all others are as before")?;
+        match &self.rollback_error {
+            Some(error) => write!(f, " (the roll-back failed: {error})"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> std::error::Error for Undone<E> {}
