@@ -33,6 +33,8 @@ RMD = [
     *("torque4 0 0 0 0", "torque4 0 0 0 0 --expect 1,2", "torque 1 --current-limit 1", "raw 9a"),
     *("status --gear-ratio 6 --encoder-bits 14", "encoder --encoder-bits 14", "acceleration 9 --gear-ratio 6"),
 ]
+#: What reads or writes a file of settings.
+FILES = ["dump", "dump FILE --overwrite", "diff FILE", "restore FILE", "restore FILE --dry-run"]
 SCAN = "`motorlink rmd -p sim: scan` lists the motors that answer"
 
 
@@ -73,8 +75,8 @@ def test_the_schema_is_one_and_the_documents_lines_follow_it():
 
 
 def test_every_subcommand_is_tested_here(run):
-    assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK]} | {"scan"}
-    assert subcommands(run, "rmd") == {word(command) for command in RMD}
+    assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK, *FILES]} | {"scan"}
+    assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "completions", "man"}
     assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "conformance"} | others
 
@@ -101,6 +103,23 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
     out, err = checked("rmd", "-p", "sim:", "--timeout", "500ms", *command.split())
     assert out and not err
     assert all(line["motor"] in range(1, 5) and line["port"] == "sim:" for line in out)
+
+
+@pytest.mark.parametrize("command", FILES)
+@pytest.mark.parametrize("protocol, setting", [("st", "SPEED_KP"), ("rmd", "speed_kp")])
+@pytest.mark.parametrize("differs", [False, True])
+def test_settings_are_told_by_name(checked, run, tmp_path, protocol, setting, command, differs):
+    motor = (protocol, "-p", "sim:", *(("--timeout", "500ms") if protocol == "rmd" else ()))
+    file = tmp_path / "motor1.toml"
+    run(*motor, "dump", file).ended(0)
+    if differs:
+        file.write_text(re.sub(f"^{setting} = .*$", f"{setting} = 77", file.read_text(), flags=re.M))
+    words = command.replace("FILE", str(file)).split()
+    out, err = checked(*motor, *words, code=1 if differs and words[0] == "diff" else 0)
+    assert all((line["motor"], line["port"]) == (1, "sim:") for line in out)
+    assert bool(err) == (differs and words[0] == "diff")
+    is_dump = words[0] == "dump"
+    assert (setting in out[0].get("values", {})) == (differs or is_dump)
 
 
 @pytest.mark.parametrize(

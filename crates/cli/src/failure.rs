@@ -38,6 +38,8 @@ pub struct Problem {
 pub enum Kind {
     /// The drive refused, or did not do it.
     Refused,
+    /// The motor has other settings than a file.
+    Differs,
     /// The command does not make sense.
     Usage,
     /// The connection failed.
@@ -51,7 +53,7 @@ pub enum Kind {
 impl Kind {
     fn exit_code(self) -> u8 {
         match self {
-            Kind::Refused => 1,
+            Kind::Refused | Kind::Differs => 1,
             Kind::Usage => 2,
             Kind::Link | Kind::Silent | Kind::Output => 3,
         }
@@ -60,6 +62,7 @@ impl Kind {
     fn word(self) -> &'static str {
         match self {
             Kind::Refused => "refused",
+            Kind::Differs => "differs",
             Kind::Usage => "usage",
             Kind::Link => "link",
             Kind::Silent => "silent",
@@ -71,6 +74,11 @@ impl Kind {
 impl Failure {
     pub fn refused(message: impl Into<String>) -> Self {
         Problem::new(Kind::Refused, message).into()
+    }
+
+    /// A difference between a motor and a file.
+    pub fn differs(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Differs, message).into()
     }
 
     pub fn usage(message: impl Into<String>) -> Self {
@@ -212,7 +220,7 @@ impl Failure {
             && problem.kind != Kind::Output
         {
             problem.fact("port", port);
-            if matches!(problem.kind, Kind::Refused | Kind::Silent) {
+            if matches!(problem.kind, Kind::Refused | Kind::Differs | Kind::Silent) {
                 problem.motor(motor);
             }
         }

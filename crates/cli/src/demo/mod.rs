@@ -18,7 +18,7 @@ use story::Story;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 use crate::output::note;
-use crate::sim::outputs;
+use crate::outputs;
 
 /// Title of the picture, for screen readers.
 const TITLE: &str =

@@ -4,13 +4,15 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 30] = [
+const HARMLESS: [&str; 32] = [
     "acceleration",
     "angle",
     "clear-errors",
     "completions",
     "conformance",
     "demo",
+    "diff",
+    "dump",
     "encoder",
     "fault-ack",
     "get",

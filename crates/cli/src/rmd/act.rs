@@ -7,7 +7,7 @@ use motorlink::rmd::{
 
 use super::args::{self, Act, MaxSpeed, Wait};
 use super::session::Session;
-use super::settings;
+use super::{files, settings};
 use crate::arrival;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -32,6 +32,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Acceleration { dps_per_second } => settings::acceleration(session, dps_per_second),
         Act::Encoder => session.show(&motor.encoder()?),
         Act::EncoderOffset { offset } => settings::encoder_offset(session, offset),
+        Act::Restore(args) => files::restore(session, &args),
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;

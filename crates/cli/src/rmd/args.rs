@@ -8,6 +8,7 @@ use motorlink::rmd::{EncoderBits, GearRatio, MotorId, MotorSet, SpinDirection};
 use crate::connection::Connection;
 use crate::pasteable::{self, number_options, port_option};
 use crate::repeat::Repeat;
+use crate::settings::{DumpArgs, FileArg, RestoreArgs};
 use crate::span::{parse_distance, parse_span, span_up_to};
 use crate::{help, hint};
 
@@ -103,6 +104,15 @@ pub enum Read {
         #[command(flatten)]
         repeat: Repeat,
     },
+    /// Write the settings of the motor as text: gains, acceleration limit, encoder offset
+    ///
+    /// The text is TOML: names, values and units in a fixed order, for version control. The gains are those
+    /// in RAM: the protocol cannot read the ROM.
+    Dump(DumpArgs),
+    /// Show which settings of the motor differ from a file (exit code 1 if some differ)
+    ///
+    /// The exit code is 0 if all settings of the file are those of the motor, and 1 if some differ.
+    Diff(FileArg),
     /// Show multi-turn and single-turn angle
     Angle {
         #[command(flatten)]
@@ -206,6 +216,16 @@ pub enum Act {
               hide_possible_values = true)]
         expect: Vec<MotorSet>,
     },
+    /// Write the settings of a file that differ from those of the motor
+    ///
+    /// First it shows the difference. Each written setting is read back. If a write fails, or after
+    /// Ctrl-C, the old values are written again. If that fails, the message names the settings.
+    /// Settings that the file does not have stay as they are. A motor that turns is refused.
+    ///
+    /// Gains and acceleration are lost at power-off. With --write-rom the gains are written to the ROM,
+    /// too, at the end and also if they do not differ: the ROM cannot be read. The encoder offset is in
+    /// ROM only. If it differs, --write-rom is needed. Each write wears the ROM.
+    Restore(RestoreArgs),
     /// Send any eight bytes
     Raw {
         /// Bytes in hexadecimal; missing bytes are 00
@@ -297,7 +317,7 @@ impl Act {
 
     /// Whether the command is never given to several motors at once.
     pub fn is_for_one(&self) -> bool {
-        matches!(self, Act::Zero | Act::EncoderOffset { .. })
+        matches!(self, Act::Zero | Act::EncoderOffset { .. } | Act::Restore(_))
     }
 
     /// Whether the command waits for the end of a move.

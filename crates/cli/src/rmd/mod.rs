@@ -2,6 +2,7 @@
 
 mod act;
 mod args;
+mod files;
 mod read;
 mod session;
 mod settings;
@@ -51,6 +52,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
             })
         }
         Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
+        Command::Read(Read::Dump(_) | Read::Diff(_)) if ids.len() > 1 => {
+            Err(Failure::usage("a file has the settings of one motor: give one --id"))
+        }
+        Command::Read(Read::Dump(args)) => files::dump(&session, &args),
+        Command::Read(Read::Diff(args)) => files::diff(&session, &args),
         Command::Read(Read::Status { repeat } | Read::Angle { repeat })
             if ids.len() > 1 && repeat.every.is_some() =>
         {

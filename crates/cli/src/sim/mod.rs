@@ -1,6 +1,5 @@
 //! `motorlink sim`: serves simulated drives and executes commands from stdin, or plays a scenario.
 
-pub mod outputs;
 mod plot;
 mod presets;
 mod run;

@@ -8,11 +8,11 @@ use motorlink_link::printable;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
-use super::outputs::{self, Output};
 use super::plot;
 use crate::failure::Failure;
 use crate::json;
 use crate::output::{note, print_line};
+use crate::outputs::{self, Output};
 
 /// Values of the final state in a line of text.
 const ON_A_LINE: usize = 5;

@@ -12,7 +12,7 @@ use motorlink::time;
 use super::args::{Act, Pfc, Wait};
 use super::read::explain;
 use super::session::Session;
-use super::{mode, set};
+use super::{mode, set, settings};
 use crate::advice;
 use crate::arrival;
 use crate::failure::Failure;
@@ -124,6 +124,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
             motor.set_revup_data(phase, data)?;
             session.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
+        Act::Restore(args) => settings::restore(session, &args),
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
 }

@@ -10,6 +10,7 @@ use crate::angle::{parse_angle, parse_tolerance};
 use crate::connection::Connection;
 use crate::pasteable::{self, number_options, port_option, unless_default};
 use crate::repeat::Repeat;
+use crate::settings::{DumpArgs, FileArg, RestoreArgs};
 use crate::span::{parse_distance, parse_duration, parse_milliseconds, parse_span, span_up_to};
 use crate::{help, hint};
 
@@ -136,6 +137,16 @@ pub enum Read {
         #[command(flatten)]
         repeat: Repeat,
     },
+    /// Write the settings of the motor as text: gains, divisors, rev-up
+    ///
+    /// The text is TOML: names, values and units in a fixed order, for version control. References, modes
+    /// and what moves a motor are not settings.
+    Dump(DumpArgs),
+    /// Show which settings of the motor differ from a file (exit code 1 if some differ)
+    ///
+    /// The exit code is 0 if all settings of the file are those of the motor, and 1 if some differ. If
+    /// the drive refuses to read one, it is 1, too: the error then has the name of the drive's answer.
+    Diff(FileArg),
     /// Try the usual baud rates, and show for each whether a drive answers
     Scan {
         /// Rates to try instead of the usual ones
@@ -241,6 +252,12 @@ pub enum Act {
         #[arg(value_enum)]
         action: Pfc,
     },
+    /// Write the settings of a file that differ from those of the motor
+    ///
+    /// First it shows the difference. Each written setting is read back. If a write fails, or after
+    /// Ctrl-C, the old values are written again. If that fails, the message names the settings.
+    /// Settings that the file does not have stay as they are. A motor that is not at rest is refused.
+    Restore(RestoreArgs),
     /// Send any frame
     Raw {
         /// Frame code and payload in hexadecimal; header, length and checksum are added

@@ -9,6 +9,7 @@ mod registers;
 mod scan;
 mod session;
 mod set;
+mod settings;
 
 pub use args::Args;
 use args::{Act, Command, DriveArgs, Read};
@@ -60,6 +61,8 @@ fn run_at(
             Read::Segment { segment, registers, repeat } => {
                 read::segment(&connect()?, segment, &registers, &repeat)
             }
+            Read::Dump(args) => settings::dump(&connect()?, &args),
+            Read::Diff(args) => settings::diff(&connect()?, &args),
             Read::Info => read::info(&connect()?),
             Read::Status { repeat } => read::status(&connect()?, &repeat),
         },

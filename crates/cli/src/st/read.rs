@@ -1,6 +1,8 @@
 //! Commands that read.
 
-use motorlink::st::{Error, FirmwareVersion, Flags, Profile, RegisterId, Status, find_register};
+use motorlink::st::{
+    BoardInfo, Error, FirmwareVersion, Flags, Profile, RegisterId, Status, find_register,
+};
 use serde_json::{Value, json};
 
 use super::refusal;
@@ -23,6 +25,15 @@ pub fn info(session: &Session) -> Result<(), Failure> {
         Err(error) if error.is_refusal() => ("has no version".to_owned(), Value::Null),
         Err(error) => return Err(error.into()),
     };
+    note_other_profile(session, &info);
+    session.confirmed()?.result(
+        format!("board     {} {major}.{minor}.{patch}\nfirmware  {text}", info.name),
+        Line::about(&session.port, None).with("board", board).with("firmware", firmware),
+    )
+}
+
+/// Prints a note if the drive looks like one of the other profile.
+pub fn note_other_profile(session: &Session, info: &BoardInfo) {
     if info.profile != session.client.profile() {
         let looks_like = match info.profile {
             Profile::Mcsdk54 => "ST's firmware",
@@ -33,10 +44,6 @@ pub fn info(session: &Session) -> Result<(), Failure> {
             info.profile.name()
         ));
     }
-    session.confirmed()?.result(
-        format!("board     {} {major}.{minor}.{patch}\nfirmware  {text}", info.name),
-        Line::about(&session.port, None).with("board", board).with("firmware", firmware),
-    )
 }
 
 /// The registers that `status` shows.

@@ -1,5 +1,5 @@
-//! Files that a scenario is written to: none is an input or another output, and none is destroyed by
-//! a run that fails.
+//! Files that results are written to: none is an input or another output, and none is destroyed by a
+//! command that fails.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, Error, ErrorKind, Write, stdout};
@@ -134,6 +134,11 @@ impl Place {
 }
 
 impl Output {
+    /// Whether a regular file would be replaced.
+    pub fn exists(&self) -> bool {
+        matches!(self, Output::File(place) if place.real.exists())
+    }
+
     /// Writes a content. A regular file is replaced when the content is complete, and is not changed
     /// before.
     pub fn write(

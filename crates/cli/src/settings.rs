@@ -1,0 +1,298 @@
+//! `dump`, `diff` and `restore`: settings of a motor as text, for both protocols.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use motorlink::settings::{
+    self, Cause, Comparison, Difference, Kind, Permissions, Problem, RestoreError, Setting,
+    SettingsFile, Tunable, Undone, Unread,
+};
+use motorlink_link::printable;
+
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::json::{Line, Row};
+use crate::output::{Printer, never_wait_for_messages, note};
+use crate::outputs::{self, Output};
+use crate::pasteable::quoted;
+
+/// The name of stdin.
+const STDIN: &str = "-";
+
+/// Where settings are written to.
+#[derive(clap::Args, Clone)]
+pub struct DumpArgs {
+    /// The file to write; `-` is stdout
+    #[arg(value_name = "FILE", default_value = "-", value_hint = clap::ValueHint::FilePath)]
+    file: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// A file with settings.
+#[derive(clap::Args, Clone)]
+pub struct FileArg {
+    /// The file, as `dump` writes it; `-` is stdin
+    #[arg(value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
+    file: PathBuf,
+}
+
+/// What a restore does.
+#[derive(clap::Args, Clone)]
+pub struct RestoreArgs {
+    #[command(flatten)]
+    file: FileArg,
+    /// Show what would be written, and write nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Restore also if the motor is not at rest. The new settings may change how it moves
+    #[arg(long)]
+    running: bool,
+}
+
+/// A motor with its settings, and where results go.
+pub struct Tuned<'a, M: Tunable> {
+    pub motor: M,
+    pub output: Printer,
+    /// The first members of a JSON result.
+    pub line: Line,
+    /// The failure if settings of a file cannot be read.
+    pub unread: &'a dyn Fn(Unread<M::Error>) -> Failure,
+    /// Whether the ROM of the motor may be written.
+    pub write_rom: bool,
+}
+
+impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> {
+    /// `dump`: writes the settings as text.
+    pub fn dump(self, args: &DumpArgs) -> Result<(), Failure> {
+        let output = outputs::resolve(&[("FILE", Some(&args.file))], &[])?;
+        let file = output.into_iter().flatten().next().filter(|file| *file != Output::Stdout);
+        if !args.overwrite && file.as_ref().is_some_and(Output::exists) {
+            let name = shown(&args.file);
+            return Err(Failure::usage(format!("`{name}` exists; nothing was written"))
+                .trying("add --overwrite to replace it"));
+        }
+        let dump = settings::dump(&self.motor).map_err(Into::into)?;
+        let rows: Vec<Row> = dump.values().map(|(setting, digits)| row(setting, digits)).collect();
+        let Some(file) = file else {
+            return self.output.result(dump.text().trim_end(), self.line.values(&rows));
+        };
+        file.write(|out| out.write_all(dump.text().as_bytes()))?;
+        let name = shown(&args.file);
+        let text = format!("{} settings of {} are in {name}", rows.len(), self.name());
+        self.output.result(text, self.line.ok(true).with("file", name).values(&rows))
+    }
+
+    /// `diff`: shows the settings that differ. It is a failure if some do, as of `diff`.
+    pub fn diff(self, args: &FileArg) -> Result<(), Failure> {
+        let comparison = self.compare(args)?;
+        self.show(&comparison, args)?;
+        match comparison.differences().count() {
+            0 => Ok(()),
+            count => {
+                let (motor, file) = (self.name(), shown(&args.file));
+                Err(Failure::differs(format!(
+                    "{motor} differs from {file} in {}",
+                    settings_of(count)
+                )))
+            }
+        }
+    }
+
+    /// `restore`: shows the settings that differ, writes them and reads them back.
+    pub fn restore(self, args: &RestoreArgs) -> Result<(), Failure> {
+        let permissions = Permissions { rom: self.write_rom, running: args.running };
+        let comparison = self.compare(&args.file)?;
+        self.show(&comparison, &args.file)?;
+        let failed = |error| self.not_restored(error, &args.file);
+        if args.dry_run {
+            comparison.check(&self.motor, permissions).map_err(failed)?;
+            if !self.output.json {
+                note("nothing was written");
+            }
+            return Ok(());
+        }
+        // A signal ends the restore before its next write.
+        never_wait_for_messages();
+        interrupt::take_over();
+        let restored = comparison.restore(&self.motor, permissions, interrupt::interrupted);
+        restored.map_err(failed)?;
+        let differences: Vec<Difference> = comparison.differences().collect();
+        let before = differences.iter().map(|one| row(one.setting, one.now)).collect::<Vec<_>>();
+        let after = differences.iter().map(|one| row(one.setting, one.file)).collect::<Vec<_>>();
+        let mut line = self.line.clone().ok(true);
+        if !differences.is_empty() {
+            line = line.with_values("before", &before).values(&after);
+        }
+        let mut done = Vec::new();
+        if !differences.is_empty() {
+            done.push(format!("{} written and read back", settings_of(differences.len())));
+        }
+        let permanent = comparison.permanent(permissions);
+        if !permanent.is_empty() {
+            done.push(format!("written to the ROM: {}", permanent.join(", ")));
+        }
+        if done.is_empty() && !self.output.json {
+            return Ok(());
+        }
+        self.output.result(format!("{}: {}", self.name(), done.join("; ")), line)
+    }
+
+    fn compare(&self, args: &FileArg) -> Result<Comparison<M::Id>, Failure> {
+        let name = shown(&args.file);
+        let text = read(&args.file)
+            .map_err(|error| Failure::usage(format!("cannot read `{name}`: {error}")))?;
+        let file = SettingsFile::parse(&text, &self.motor).map_err(|error| {
+            let failure = Failure::usage(format!("{name}: {error}; nothing was sent"));
+            match error.problem {
+                Problem::OtherProfile { file, .. } => {
+                    failure.trying(format!("add --profile {file} if the drive speaks it"))
+                }
+                _ => failure,
+            }
+        })?;
+        Comparison::read(&self.motor, &file).map_err(|unread| {
+            let names = unread.settings.join(", ");
+            let is_refusal = M::is_refusal(&unread.error);
+            let failure = (self.unread)(unread);
+            let failure = match names.is_empty() {
+                true => failure,
+                false => failure.with_fact(format!("{names} of {name} cannot be read")),
+            };
+            match is_refusal {
+                true => {
+                    failure.trying_also("remove the line if the drive does not have this setting")
+                }
+                false => failure,
+            }
+        })
+    }
+
+    /// Shows the settings that differ: those of the motor, those of the file.
+    fn show(&self, comparison: &Comparison<M::Id>, args: &FileArg) -> Result<(), Failure> {
+        let name = shown(&args.file);
+        let differences: Vec<Difference> = comparison.differences().collect();
+        if self.output.json {
+            let line = self.line.clone().with("file", name).with("same", differences.is_empty());
+            if differences.is_empty() {
+                return self.output.result("", line);
+            }
+            let now = differences.iter().map(|one| row(one.setting, one.now)).collect::<Vec<_>>();
+            let file = differences.iter().map(|one| row(one.setting, one.file)).collect::<Vec<_>>();
+            return self.output.result("", line.values(&now).with_values("wanted", &file));
+        }
+        if differences.is_empty() {
+            return self
+                .output
+                .result(format!("{} has the settings of {name}", self.name()), self.line.clone());
+        }
+        let rows = differences.iter().map(|one| {
+            let Difference { setting, now, file, .. } = one;
+            [
+                setting.name.clone(),
+                setting.number(*now),
+                setting.number(*file),
+                setting.scale.symbol.to_owned(),
+            ]
+        });
+        let head = ["setting".to_owned(), self.name(), "file".to_owned(), String::new()];
+        let rows: Vec<[String; 4]> = std::iter::once(head).chain(rows).collect();
+        let width = |column: usize| {
+            rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default()
+        };
+        let [first, second, third] = [0, 1, 2].map(width);
+        for [setting, now, file, unit] in &rows {
+            let line = format!("{setting:<first$}  {now:>second$}  {file:>third$}  {unit}");
+            self.output.result(line.trim_end(), self.line.clone())?;
+        }
+        Ok(())
+    }
+
+    fn not_restored(&self, error: RestoreError<M::Error>, args: &FileArg) -> Failure {
+        let text = error.to_string();
+        match error {
+            RestoreError::Rom { .. } => Failure::usage(text)
+                .trying("add --write-rom to allow it, or remove the lines from the file"),
+            RestoreError::Running { .. } => {
+                let stop = format!("`motorlink {} stop`", self.motor.kind().protocol);
+                Failure::refused(text).trying(format!("stop it first: {stop}; or add --running"))
+            }
+            RestoreError::Before(error) => error.into().then("nothing was written"),
+            RestoreError::Undone(undone) => self.undone(text, *undone, args),
+            _ => Failure::usage(text),
+        }
+    }
+
+    /// The failure of a restore that ended early, with the state of the motor.
+    fn undone(&self, text: String, undone: Undone<M::Error>, args: &FileArg) -> Failure {
+        let Kind { protocol, .. } = self.motor.kind();
+        let diff =
+            format!("`motorlink {protocol} diff {}`", quoted(&args.file.display().to_string()));
+        let show = format!("{diff} shows what differs");
+        let is_complete = undone.is_complete();
+        let states = [
+            ("rolled_back", &undone.rolled_back),
+            ("changed", &undone.changed),
+            ("unknown", &undone.unknown),
+            ("unknown_in_rom", &undone.unknown_in_rom),
+        ];
+        let mut line = self.line.clone();
+        for (name, settings) in states.into_iter().filter(|(_, settings)| !settings.is_empty()) {
+            line = line.with(name, settings.clone());
+        }
+        let failure = match undone.cause {
+            Cause::Interrupted => {
+                note(match is_complete {
+                    true => text,
+                    false => format!("{text}; {}", crate::pasteable::complete(&show, None)),
+                });
+                return Failure::Interrupted;
+            }
+            Cause::Exchange { error, .. } => error.into().saying(text),
+            Cause::Differs { .. } => Failure::refused(text),
+        };
+        let failure = if is_complete { failure } else { failure.trying_also(&show) };
+        if self.output.json
+            && let Err(output) = self.output.result("", line.failed(&failure))
+        {
+            return failure.and(output);
+        }
+        failure
+    }
+
+    fn name(&self) -> String {
+        format!("motor {}", self.motor.kind().motor)
+    }
+}
+
+/// A value as people and programs read it.
+fn row(setting: &Setting, digits: i64) -> Row {
+    match setting.scale.symbol {
+        "" => Row::plain(&setting.name, digits),
+        unit => {
+            let scale = setting.scale;
+            Row::quantity(&setting.name, scale.value(digits), scale.decimals, unit)
+        }
+    }
+}
+
+fn settings_of(count: usize) -> String {
+    format!("{count} {}", if count == 1 { "setting" } else { "settings" })
+}
+
+fn shown(path: &Path) -> String {
+    match path == Path::new(STDIN) {
+        true => "the file".to_owned(),
+        false => printable(&path.display().to_string()),
+    }
+}
+
+fn read(path: &Path) -> std::io::Result<String> {
+    if path != Path::new(STDIN) {
+        return std::fs::read_to_string(path);
+    }
+    let mut text = String::new();
+    std::io::stdin().read_to_string(&mut text)?;
+    Ok(text)
+}
