@@ -1,8 +1,11 @@
-//! Parsers of the host library: slcan, port names, configurations and commands of simulated drives.
+//! Parsers of the host library: slcan, port names, files of settings, configurations and commands of
+//! simulated drives.
 
 use motorlink::port::PortName;
+use motorlink::settings::{Comparison, Permissions, RestoreError, SettingsFile, Tunable, dump};
 use motorlink::slcan::{self, Answer, Device, HostCodec};
 use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink_link::fault::Faults;
 use motorlink_link::printable;
 use motorlink_link::serve::ServeName;
 use motorlink_proto::can::CanFrame;
@@ -11,7 +14,7 @@ use motorlink_proto::st::{self as st, Frame, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::rmd::RmdConfig;
-use motorlink_testbench::{BenchConfig, SimServer};
+use motorlink_testbench::{Bench, BenchConfig, SimServer};
 
 use crate::input::Input;
 
@@ -91,6 +94,44 @@ pub fn st_value(data: &[u8]) {
             assert!(raw && !value.is_finite() || same == Ok(value), "{text}: {shown}");
         }
     }
+}
+
+/// Any text as a file of settings. A motor has the settings of an accepted file after a restore, or all
+/// of its own.
+pub fn settings_file(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let bench = Bench::new(&BenchConfig::default()).expect("the default can be built");
+    let st = motorlink::st::Client::over("st", bench.bytes(&Faults::NONE), Default::default());
+    restored(text, &st.motor(1).expect("the drive has it"));
+    let rmd = motorlink::rmd::Client::over("rmd", bench.can(&Faults::NONE), Default::default());
+    restored(text, &rmd.motor(1).expect("the bus has it"));
+}
+
+fn restored<M: Tunable<Error: std::fmt::Debug + std::fmt::Display>>(text: &str, motor: &M) {
+    let file = match SettingsFile::parse(text, motor) {
+        Ok(file) => file,
+        Err(error) => {
+            assert!((1..=text.split('\n').count()).contains(&error.line), "{error}");
+            assert_eq!(printable(&error.to_string()), error.to_string());
+            return;
+        }
+    };
+    // The drive may not have a register of the file.
+    let Ok(comparison) = Comparison::read(motor, &file) else { return };
+    let before = dump(motor).expect("the line is good").text();
+    match comparison.restore(motor, Permissions { rom: true, running: true }, || false) {
+        Ok(()) => {
+            let after = Comparison::read(motor, &file).expect("it was read before");
+            assert_eq!(after.differences().count(), 0);
+        }
+        Err(RestoreError::Undone(undone)) => assert!(undone.is_complete(), "{undone}"),
+        Err(_) => {}
+    }
+    let own = SettingsFile::parse(&before, motor).expect("it is the text of a motor");
+    let back = Comparison::read(motor, &own).expect("the motor has its settings");
+    back.restore(motor, Permissions { rom: true, running: true }, || false)
+        .expect("they were its own");
+    assert_eq!(dump(motor).expect("the line is good").text(), before);
 }
 
 /// Any text as a configuration. Drives of an accepted one start and turn with finite numbers.

@@ -28,6 +28,7 @@ pub const TARGETS: &[Target] = &[
     ("slcan", host::slcan),
     ("port_name", host::port_name),
     ("st_value", host::st_value),
+    ("settings_file", host::settings_file),
     ("sim_config", host::sim_config),
     ("sim_command", host::sim_command),
 ];

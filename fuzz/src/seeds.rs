@@ -61,6 +61,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "slcan" => rmd().map(|(id, data)| adapter(id, data)).collect(),
         "port_name" => PORTS.iter().map(|name| name.as_bytes().to_vec()).collect(),
         "st_value" => values(),
+        "settings_file" => settings(),
         "sim_config" => configurations(),
         "sim_command" => commands(),
         _ => panic!("there is no target {target}"),
@@ -203,6 +204,16 @@ fn values() -> Vec<Vec<u8>> {
 }
 
 /// The example of docs/SIMULATOR.md, and every member of a configuration.
+/// The files of settings that the pages show.
+fn settings() -> Vec<Vec<u8>> {
+    let files = ["docs/ST.md", "docs/RMD.md"].map(text).map(|page| {
+        let file =
+            page.split("```toml fragment\n").nth(1).and_then(|rest| rest.split("```").next());
+        file.expect("the page shows a file").as_bytes().to_vec()
+    });
+    files.into()
+}
+
 fn configurations() -> Vec<Vec<u8>> {
     let page = text("docs/SIMULATOR.md");
     let shown = page.split("```toml config\n").nth(1).and_then(|rest| rest.split("```").next());
