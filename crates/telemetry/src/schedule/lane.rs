@@ -5,64 +5,12 @@ use std::collections::VecDeque;
 use motorlink::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
 use motorlink_proto::time::{Instant, Micros};
 
-use super::{CommandId, Displaced, PollId};
+use super::exchange::{CommandId, Kind, Outcome, UnderWay, Verdict};
 
 /// The pause before the next poll after the second failure in a row. It doubles with each more.
 const FIRST_PAUSE: Micros = Micros::from_millis(100);
 /// The longest pause.
 const LONGEST_PAUSE: Micros = Micros::from_millis(2_000);
-
-/// How an exchange ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// With a reply.
-    Answered,
-    /// With a refusal of the drive, or with one of the client before anything was sent.
-    Refused,
-    /// Without a reply that could be read.
-    Failed,
-    /// The line was closed.
-    Closed,
-}
-
-/// What an exchange was that is over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// A poll, begun at this moment.
-    Poll(PollId, Instant),
-    /// A command.
-    Command(CommandId),
-    /// A stop that the drive confirmed.
-    Stopped(CommandId),
-    /// A stop that is repeated.
-    StopAgain(CommandId),
-    /// A stop that is not repeated. The motor may still be turning.
-    StopFailed(CommandId),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Stop(CommandId),
-    Command(CommandId),
-    Poll(PollId),
-}
-
-/// The exchange of a lane.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct UnderWay {
-    pub(super) kind: Kind,
-    pub(super) since: Instant,
-}
-
-impl UnderWay {
-    pub(super) fn displaced(self) -> Option<Displaced> {
-        match self.kind {
-            Kind::Poll(poll) => Some(Displaced::Poll(poll)),
-            Kind::Command(id) => Some(Displaced::Command(id)),
-            Kind::Stop(_) => None,
-        }
-    }
-}
 
 #[derive(Debug)]
 struct Stop<C> {

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::PollId;
-use super::lane::{Kind, Outcome, UnderWay};
+use super::exchange::{Kind, Outcome, PollId, UnderWay};
 
 /// The part of the time that polls and commands may fill. The rest is for stops and for noise.
 const FULL: f64 = 0.95;

@@ -19,6 +19,7 @@
 //!
 //! **Silence.** A lane that does not answer is asked less and less often, with one poll at a time.
 
+mod exchange;
 mod lane;
 mod load;
 
@@ -26,8 +27,9 @@ use std::collections::BTreeMap;
 
 use motorlink_proto::time::{Instant, Micros};
 
-use lane::{Kind, LaneState, UnderWay};
-pub use lane::{Outcome, Verdict};
+pub use exchange::{CommandId, Displaced, Lane, Outcome, PollId, Verdict};
+use exchange::{Kind, UnderWay};
+use lane::LaneState;
 pub use load::Load;
 
 /// Commands of a lane that go ahead of a poll that is due. Then the poll goes first once, so that
@@ -35,18 +37,6 @@ pub use load::Load;
 const COMMANDS_IN_A_ROW: u32 = 8;
 /// Commands that may wait in a lane.
 const QUEUE: usize = 256;
-
-/// What has one exchange at a time: a serial line, or a motor on a CAN bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Lane(pub u8);
-
-/// A poll: one exchange that is repeated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PollId(pub u32);
-
-/// A command or a stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CommandId(pub u64);
 
 /// What to do next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,15 +65,6 @@ pub enum Job<C> {
     Command(CommandId, C),
     /// A poll, for this instant of its group.
     Poll(PollId, Instant),
-}
-
-/// An exchange that a stop replaced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Displaced {
-    /// A poll.
-    Poll(PollId),
-    /// A command. The drive may have executed it.
-    Command(CommandId),
 }
 
 /// How a line is used.

@@ -1,9 +1,10 @@
 //! Looks up registers in the table.
 
+use super::access::Writing;
 use super::feature::Features;
 use super::id::RegisterId;
 use super::row::Row;
-use super::shape::{Shape, Text, Writing};
+use super::shape::{Shape, Text};
 use super::table::{IDS, INDEX, ROWS, TEXTS, UNITS};
 use crate::st::Profile;
 use core::fmt;

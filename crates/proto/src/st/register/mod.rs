@@ -6,6 +6,7 @@
 //! write(register::SPEED_MEAS, 1500); // SPEED_MEAS is read-only: this does not compile
 //! ```
 
+mod access;
 mod feature;
 mod id;
 mod index;
@@ -18,11 +19,12 @@ mod typed;
 mod unit;
 mod value;
 
+pub use access::{Access, Origin, Writing};
 pub use feature::{Feature, Features};
 pub use id::RegisterId;
 pub use lookup::segment_values;
 pub(in crate::st) use row::{Conversion, Row};
-pub use shape::{Access, Origin, Shape, Text, Writing};
+pub use shape::{Shape, Text};
 pub use table::*;
 pub use typed::{Dac, Never, ReadOnly, ReadWrite, Readable, Register, Writable, WriteOnly};
 pub use unit::Unit;

@@ -1,7 +1,7 @@
 //! What a slave needs of the register table. Firmware carries all rows, so they are packed.
 
+use super::access::{Access, Origin, Writing};
 use super::feature::{Feature, Features};
-use super::shape::{Access, Origin, Writing};
 use super::unit::Unit;
 use super::value::Type;
 use crate::st::Profile;

@@ -5,11 +5,12 @@
 //! from the access, `mcsdk(read, write)` has the bits of its GET_REG reply and of its SET_REG
 //! value; 0 means not handled.
 
+use super::access::{Access, Origin};
 use super::feature::Feature;
 use super::id::RegisterId;
 use super::index::{Index, runs};
 use super::row::{REFUSED, Row, Rows, distinct};
-use super::shape::{Access, Origin, Text};
+use super::shape::Text;
 use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;

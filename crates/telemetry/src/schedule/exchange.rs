@@ -1,0 +1,76 @@
+//! Exchanges: what they are, and how they end.
+
+use motorlink_proto::time::Instant;
+
+/// What has one exchange at a time: a serial line, or a motor on a CAN bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Lane(pub u8);
+
+/// A poll: one exchange that is repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PollId(pub u32);
+
+/// A command or a stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CommandId(pub u64);
+
+/// An exchange that a stop replaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Displaced {
+    /// A poll.
+    Poll(PollId),
+    /// A command. The drive may have executed it.
+    Command(CommandId),
+}
+
+/// How an exchange ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// With a reply.
+    Answered,
+    /// With a refusal of the drive, or with one of the client before anything was sent.
+    Refused,
+    /// Without a reply that could be read.
+    Failed,
+    /// The line was closed.
+    Closed,
+}
+
+/// What an exchange was that is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// A poll, begun at this moment.
+    Poll(PollId, Instant),
+    /// A command.
+    Command(CommandId),
+    /// A stop that the drive confirmed.
+    Stopped(CommandId),
+    /// A stop that is repeated.
+    StopAgain(CommandId),
+    /// A stop that is not repeated. The motor may still be turning.
+    StopFailed(CommandId),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Stop(CommandId),
+    Command(CommandId),
+    Poll(PollId),
+}
+
+/// The exchange of a lane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct UnderWay {
+    pub(super) kind: Kind,
+    pub(super) since: Instant,
+}
+
+impl UnderWay {
+    pub(super) fn displaced(self) -> Option<Displaced> {
+        match self.kind {
+            Kind::Poll(poll) => Some(Displaced::Poll(poll)),
+            Kind::Command(id) => Some(Displaced::Command(id)),
+            Kind::Stop(_) => None,
+        }
+    }
+}
