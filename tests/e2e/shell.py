@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 from program import Running
+from terminal import Terminal
 
 REPOSITORY = Path(__file__).parents[2]
 #: Ports of real devices, and the simulated ones that replace them.
@@ -39,6 +40,11 @@ def serves(words):
     if words[:2] == ["motorlink", "guard"]:
         return "--prove" not in words
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
+
+
+def is_view(words):
+    """Whether a command shows a view in a terminal, which `q` ends."""
+    return words[:2] == ["motorlink", "watch"]
 
 
 def runs_on(words):
@@ -77,6 +83,8 @@ class Shell:
             self.background.append(command)
             command.line(announcements(words) - 1, LIMIT)
             return
+        if is_view(words):
+            return self._view(line, expected)
         command = self._start(line)
         try:
             if runs_on(words):
@@ -87,6 +95,16 @@ class Shell:
             command.end()
         said = "\n".join([*command.out[-40:], *command.err[-40:]])
         assert code == expected, f"exit code {code}, not {expected}: {line}\n{said}"
+
+    def _view(self, line, expected):
+        view = Terminal(["bash", "-c", f"exec {line}"], folder=self.folder, **self.variables)
+        try:
+            view.shows("q quit", within=LIMIT)
+            view.press("q")
+            code = view.wait(LIMIT)
+        finally:
+            view.end()
+        assert code == expected, f"exit code {code}, not {expected}: {line}\n{view.text}"
 
     def _start(self, line):
         return Running(

@@ -43,7 +43,7 @@ def examples(text):
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     # The program itself, and commands without subcommands.
     pages = helps(run, command) if command else [
-        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",))
+        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",), ("watch",))
     ]
     lines = {line: None for _, text in pages for line in examples(text)}
     assert len(lines) >= 3

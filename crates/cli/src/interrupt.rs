@@ -59,10 +59,15 @@ pub fn take_over() {
     TAKEN_OVER.store(true, Ordering::SeqCst);
 }
 
+/// Whether a second signal, too, leaves the end to the caller of [`take_over`].
+pub fn hold_on(holds: bool) {
+    HOLDS.store(holds, Ordering::SeqCst);
+}
+
 /// As [`take_over`], if motors depend on this process: all signals that would end it are handled, a second
 /// signal does not end it at once, and no signal suspends it.
 pub fn hold() {
-    HOLDS.store(true, Ordering::SeqCst);
+    hold_on(true);
     take_over();
     let Some(handle) = HANDLE.get() else { return };
     let killing: Vec<i32> = KILLING.into_iter().chain(LINUX.into_iter().flatten()).collect();

@@ -29,6 +29,7 @@ mod st;
 mod terminal;
 mod trace;
 mod voice;
+mod watch;
 
 use std::ffi::OsString;
 
@@ -62,6 +63,9 @@ enum Command {
     /// Command and read RMD motors on a CAN bus
     #[command(after_help = help::rmd_ports())]
     Rmd(rmd::Args),
+    /// Watch motors in the terminal: values, registers, stop
+    #[command(after_help = help::watch_ports())]
+    Watch(watch::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Print completions for a shell
@@ -113,6 +117,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),
+        Command::Watch(args) => watch::run(args),
         Command::Conformance(args) => conformance::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

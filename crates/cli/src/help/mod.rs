@@ -64,6 +64,16 @@ pub fn rmd_ports() -> String {
         + &faults(&RMD_FAULTS)
 }
 
+/// Behind `motorlink watch --help`.
+pub fn watch_ports() -> String {
+    format!("{WATCH_PORTS}\n{PORT_VARIABLE}")
+}
+
+const WATCH_PORTS: &str = "\
+`motorlink st --help` and `motorlink rmd --help` list the forms of ports. The
+keys are in the last line of the view, and all of them behind `?`.
+";
+
 const SLCAN_OPTIONS: &str = "\
 Options of slcan ports: baud=RATE is the baud rate of the adapter. echo=1 is for
 an adapter that sends back each frame. clock=HOST:PORT is the clock of an

@@ -11,6 +11,8 @@ mod several;
 pub use args::Args;
 use args::{Act, Command, Read};
 use session::connect;
+pub use session::wanted;
+pub use settings::GainChange;
 
 use motorlink::rmd::MotorId;
 

@@ -69,7 +69,7 @@ fn limit<Q: Quantity>(value: f64, units: &RmdUnits, option: &str) -> Result<Q, F
 
 /// A value in the physical unit at the shown shaft, or with --raw in digits. A value that no frame can
 /// carry is refused, never cut.
-fn wanted<Q: Quantity>(value: f64, units: &RmdUnits) -> Result<Q, Failure> {
+pub fn wanted<Q: Quantity>(value: f64, units: &RmdUnits) -> Result<Q, Failure> {
     let scale = if units.raw { Q::UNIT.raw() } else { units.scale(Q::UNIT) };
     let digits = scale.wanted(value);
     digits.map(Q::from_digits).map_err(|error| Failure::usage(format!("{error}; nothing was sent")))

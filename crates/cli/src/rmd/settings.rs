@@ -119,7 +119,7 @@ fn unread(error: Error, what: &str) -> Failure {
 }
 
 /// Which gains are set.
-enum GainChange {
+pub enum GainChange {
     /// All, in the order of the frame.
     All([u8; Pid::FIELDS.len()]),
     /// Some, by their index in [`Pid::FIELDS`].
@@ -127,7 +127,7 @@ enum GainChange {
 }
 
 impl GainChange {
-    fn parse(words: &[String]) -> Result<Self, Failure> {
+    pub fn parse(words: &[String]) -> Result<Self, Failure> {
         if words.iter().any(|word| word.contains('=')) {
             return words
                 .iter()
@@ -143,7 +143,8 @@ impl GainChange {
         })
     }
 
-    fn on(&self, gains: Pid) -> Pid {
+    /// The gains after the change.
+    pub fn on(&self, gains: Pid) -> Pid {
         let mut data = gains.encode_as(0);
         let mut put = |index: usize, gain: u8| {
             data[usize::from(Pid::FIELDS[index].offset)] = gain;

@@ -10,12 +10,15 @@ mod scan;
 mod session;
 mod set;
 mod settings;
+mod units;
 
 pub use args::Args;
 use args::{Act, Command, DriveArgs, Read};
 use motorlink::port::PortName;
 use motorlink::st::SCAN_TIMEOUT;
+pub use read::STATUS;
 use session::connect;
+pub use units::StUnits;
 
 use crate::connection::Connection;
 use crate::failure::Failure;

@@ -47,7 +47,7 @@ pub fn note_other_profile(session: &Session, info: &BoardInfo) {
 }
 
 /// The registers that `status` shows.
-const STATUS: [RegisterId; 10] = [
+pub const STATUS: [RegisterId; 10] = [
     RegisterId::STATUS,
     RegisterId::FLAGS,
     RegisterId::CONTROL_MODE,

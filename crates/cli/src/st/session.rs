@@ -1,13 +1,12 @@
 //! An open drive, for all commands.
 
 use motorlink::port::PortName;
-use motorlink::rmd::Scale;
-use motorlink::st::register::Unit;
 use motorlink::st::{
-    Client, FullScale, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId, parse_value,
+    Client, FullScale, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId,
 };
 
 use super::args::DriveArgs;
+use super::units::StUnits;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::{self, Line, Row};
@@ -112,9 +111,15 @@ impl Session {
         Ok(self.output)
     }
 
+    /// How values are shown and taken.
+    pub fn units(&self) -> StUnits {
+        let profile = self.client.profile();
+        StUnits { profile, raw: self.raw, full_scale: self.full_scale }
+    }
+
     /// A register's value as the drive has it.
     pub fn reading(&self, register: RegisterId, bits: i32) -> Reading {
-        Reading { register, bits, profile: self.client.profile() }
+        self.units().reading(register, bits)
     }
 
     /// A value that was read. With --raw it is not checked: people read its digits.
@@ -132,56 +137,22 @@ impl Session {
 
     /// A register's value as people read it.
     pub fn text(&self, reading: &Reading) -> String {
-        match (self.raw, reading.name()) {
-            (true, _) => reading.digits().to_string(),
-            _ if reading.is_current() => self.current_text(reading.digits()),
-            (false, Some(name)) if reading.register != RegisterId::TARGET_MOTOR => {
-                format!("{name} ({:#x})", reading.digits())
-            }
-            _ => reading.to_string(),
-        }
+        self.units().text(reading)
     }
 
     /// A current as people read it: with --full-scale in A, with its digits behind it.
     pub fn current_text(&self, digits: impl Into<i64>) -> String {
-        Row::current("", digits.into(), self.full_scale).text
+        self.units().current_row(digits.into()).text
     }
 
-    /// The digits of a current: of A with --full-scale, otherwise the number itself.
+    /// The digits of a current.
     pub fn current<T: TryFrom<i64>>(&self, current: f64) -> Result<T, Failure> {
-        let unfit = |why: String| Failure::usage(format!("{why}; nothing was sent"));
-        let digits = match self.full_scale {
-            Some(full_scale) => {
-                full_scale.scale().wanted(current).map_err(|error| unfit(error.to_string()))?
-            }
-            None => {
-                let whole = Scale::plain(i64::MIN, i64::MAX).wanted(current);
-                let whole = whole.ok().filter(|&digits| digits as f64 == current);
-                let unit = Unit::S16A.symbol();
-                whole.ok_or_else(|| {
-                    unfit(format!(
-                        "{current} is not a whole number, and a current is in digits, {unit}"
-                    ))
-                    .trying("for currents in A add --full-scale")
-                })?
-            }
-        };
-        let unit = Unit::S16A.symbol();
-        T::try_from(digits).map_err(|_| unfit(format!("{digits} {unit} does not fit the message")))
+        self.units().current(current)
     }
 
-    /// The bits of a value for a register: a current as [`current`](Self::current).
+    /// The bits of a value for a register.
     pub fn bits(&self, register: RegisterId, text: &str) -> Result<i32, Failure> {
-        let is_current = self.reading(register, 0).is_current();
-        match text.parse::<f64>() {
-            Ok(amps) if is_current && self.full_scale.is_some() => {
-                Ok(i32::from(self.current::<i16>(amps)?))
-            }
-            Err(_) if is_current && self.full_scale.is_some() => Err(Failure::usage(format!(
-                "`{text}` is not a current: with --full-scale give a number in A; nothing was sent"
-            ))),
-            _ => Ok(parse_value(register, text, self.client.profile(), self.raw)?),
-        }
+        self.units().bits(register, text)
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {

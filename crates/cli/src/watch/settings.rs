@@ -1,0 +1,221 @@
+//! Registers of an ST drive and gains of an RMD motor: read, and written with a read-back, through
+//! the engine.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use motorlink::rmd::{
+    Acceleration, Command, DpsPerSecond, Field, Payload, Pid, ReadAcceleration, ReadPid,
+    WriteAccelerationRam, WritePidRam,
+};
+use motorlink::st::{
+    Error, Features, RegisterId, Request as StRequest, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
+};
+use motorlink::time::Micros;
+use motorlink_telemetry::event::CommandError;
+use motorlink_telemetry::line::{LineError, Reply, Request};
+use motorlink_telemetry::runner::Remote;
+use motorlink_telemetry::signal::Motor;
+
+use super::values::Units;
+use crate::failure::Failure;
+use crate::rmd::{GainChange, wanted};
+
+/// A command that waits longer is refused: nobody waits for it any more.
+pub const TIME_TO_LIVE: Micros = Micros(2_000_000);
+
+/// What can be read, and perhaps written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Item {
+    Register(RegisterId),
+    /// A gain, by its place in the frame.
+    Gain(usize),
+    Acceleration,
+}
+
+impl Item {
+    /// All of a motor.
+    pub fn of(motor: Motor, units: &Units) -> Vec<Item> {
+        let profile = units.st.profile;
+        match motor {
+            Motor::St(_) => RegisterId::all()
+                .filter(|register| {
+                    register.shape().is_some_and(|shape| {
+                        shape.read_size(profile, Features::NONE.with(shape.feature)).is_some()
+                    })
+                })
+                .map(Item::Register)
+                .collect(),
+            Motor::Rmd(_) => {
+                (0..Pid::FIELDS.len()).map(Item::Gain).chain([Item::Acceleration]).collect()
+            }
+        }
+    }
+
+    pub fn name(&self) -> String {
+        match self {
+            Item::Register(register) => register.to_string(),
+            Item::Gain(place) => Pid::FIELDS[*place].name.to_owned(),
+            Item::Acceleration => Acceleration::FIELDS[0].name.to_owned(),
+        }
+    }
+
+    /// What it means.
+    pub fn meaning(&self) -> &'static str {
+        match self {
+            Item::Register(register) => register.text().map_or("", |text| text.doc),
+            Item::Gain(place) => Pid::FIELDS[*place].doc,
+            Item::Acceleration => Acceleration::FIELDS[0].doc,
+        }
+    }
+
+    /// Why it is not written here, if it is not.
+    pub fn unwritable(&self, units: &Units) -> Option<String> {
+        let Item::Register(register) = self else { return None };
+        match VerifiedWrite::new::<Infallible>(units.st.profile, *register, 0) {
+            Ok(_) => None,
+            Err(Unverified::Acts) => {
+                Some(format!("{register} makes the motor act: this view starts and moves nothing"))
+            }
+            Err(_) => Some(format!("{register} can only be read")),
+        }
+    }
+}
+
+/// One motor, as a worker reads and writes it.
+#[derive(Clone)]
+pub struct Access {
+    pub remote: Remote,
+    pub by: Arc<str>,
+    pub motor: Motor,
+    pub units: Units,
+}
+
+impl Access {
+    /// The value, as people read it; otherwise why there is none, in short.
+    pub fn read(&self, item: Item) -> Result<String, String> {
+        match item {
+            Item::Register(register) => {
+                let reading = self.units.st.reading(register, self.register_bits(register)?);
+                let reading = reading.plausible().map_err(|why| why.to_string())?;
+                Ok(self.units.st.text(&reading))
+            }
+            Item::Gain(place) => {
+                let gains = self.ask(&ReadPid)?;
+                Ok(self.units.rmd.field(&Pid::FIELDS[place], &gains).text)
+            }
+            Item::Acceleration => {
+                let reply = self.ask(&ReadAcceleration)?;
+                Ok(self.units.rmd.field(acceleration(), &reply).text)
+            }
+        }
+    }
+
+    /// Writes a value and reads it back. Says what it was and is.
+    pub fn write(&self, item: Item, text: &str) -> Result<String, String> {
+        if let Some(why) = item.unwritable(&self.units) {
+            return Err(format!("{why}; nothing was sent"));
+        }
+        let (name, before) = (item.name(), self.read(item));
+        let before = before.map_err(|why| format!("{name} was not written: {why}"))?;
+        match item {
+            Item::Register(register) => self.write_register(register, text)?,
+            Item::Gain(place) => self.write_gain(place, text)?,
+            Item::Acceleration => self.write_acceleration(text)?,
+        }
+        let unread = |why| format!("{name} was written, and could not be read back: {why}");
+        let after = self.read(item).map_err(unread)?;
+        self.confirm().map_err(unread)?;
+        Ok(format!("{name} was {before}, is {after} (read back)"))
+    }
+
+    fn write_register(&self, register: RegisterId, text: &str) -> Result<(), String> {
+        let bits = self.units.st.bits(register, text).map_err(|failure| failure.text())?;
+        let write = VerifiedWrite::new::<Infallible>(self.units.st.profile, register, bits)
+            .map_err(|_| format!("{register} cannot be written and read back"))?;
+        let exchange = |request: &StRequest<'_>| match request {
+            StRequest::GetRegister(register) => self.register_bits(*register).map(Some),
+            request => self.st(*request).map(|_| None),
+        };
+        // Whoever typed the value sees the error, and can write again.
+        match write.run(VERIFY_ATTEMPTS, exchange, |_| true) {
+            Ok(_) => Ok(()),
+            Err(Unverified::Differs { expected, read }) => {
+                let shown = |bits| self.units.st.text(&self.units.st.reading(register, bits));
+                Err(format!("{register} reads {} instead of {}", shown(read), shown(expected)))
+            }
+            Err(Unverified::Exchange(why)) => Err(format!("{register}: {why}")),
+            Err(Unverified::NotReadable | Unverified::Acts) => {
+                Err(format!("{register} cannot be written and read back"))
+            }
+        }
+    }
+
+    fn write_gain(&self, place: usize, text: &str) -> Result<(), String> {
+        let word = format!("{}={text}", Pid::FIELDS[place].name);
+        let change = GainChange::parse(&[word]).map_err(|failure| failure.text())?;
+        let wanted = change.on(Pid::decode(&self.ask(&ReadPid)?));
+        self.ask(&WritePidRam(wanted))?;
+        match Pid::decode(&self.ask(&ReadPid)?) {
+            read if read == wanted => Ok(()),
+            _ => Err("the motor has other gains than were written".to_owned()),
+        }
+    }
+
+    fn write_acceleration(&self, text: &str) -> Result<(), String> {
+        let not_a_number = |_| format!("`{text}` is not a number; nothing was sent");
+        let number: f64 = text.parse().map_err(not_a_number)?;
+        let limit: Result<DpsPerSecond, Failure> = wanted(number, &self.units.rmd);
+        let wanted = Acceleration { acceleration: limit.map_err(|failure| failure.text())? };
+        self.ask(&WriteAccelerationRam(wanted))?;
+        match Acceleration::decode(&self.ask(&ReadAcceleration)?) {
+            read if read == wanted => Ok(()),
+            read => Err(format!(
+                "the motor has the limit {} instead of {}",
+                self.units.rmd.shown(read.acceleration),
+                self.units.rmd.shown(wanted.acceleration)
+            )),
+        }
+    }
+
+    fn register_bits(&self, register: RegisterId) -> Result<i32, String> {
+        let payload = self.st(StRequest::GetRegister(register))?;
+        let bits = register.decode(self.units.st.profile, &payload);
+        bits.ok_or_else(|| "the reply has another size: is --profile right?".to_owned())
+    }
+
+    fn st(&self, request: StRequest<'_>) -> Result<Vec<u8>, String> {
+        let Motor::St(motor) = self.motor else { return Err(LineError::Protocol.to_string()) };
+        match self.send(Request::st(motor.number(), request))? {
+            Reply::St(payload) => Ok(payload),
+            Reply::Rmd(_) | Reply::Confirmed => Err(LineError::Protocol.to_string()),
+        }
+    }
+
+    fn ask(&self, command: &impl Command) -> Result<[u8; 8], String> {
+        let Motor::Rmd(id) = self.motor else { return Err(LineError::Protocol.to_string()) };
+        match self.send(Request::rmd(id, command))? {
+            Reply::Rmd(data) => Ok(data),
+            Reply::St(_) | Reply::Confirmed => Err(LineError::Protocol.to_string()),
+        }
+    }
+
+    /// Makes sure that the replies belong to their requests.
+    fn confirm(&self) -> Result<(), String> {
+        self.send(Request::Confirm(self.motor)).map(drop)
+    }
+
+    fn send(&self, request: Request) -> Result<Reply, String> {
+        self.remote.command(&self.by, request, TIME_TO_LIVE).map_err(|error| match error {
+            // The motor and the register are on the screen.
+            CommandError::Line(LineError::St(Error::Refused { code, .. })) => {
+                format!("refused: {code}: {}", code.doc())
+            }
+            error => error.to_string(),
+        })
+    }
+}
+
+fn acceleration() -> &'static Field {
+    &Acceleration::FIELDS[0]
+}

@@ -1,0 +1,362 @@
+//! The view without a terminal and without drives.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink::rmd::MotorId;
+use motorlink::st::{MotorNumber, Profile, RegisterId};
+use motorlink::time::{Instant, Micros};
+use motorlink_telemetry::acquisition::Rate;
+use motorlink_telemetry::event::{Event, What};
+use motorlink_telemetry::plan::{Poll, Read};
+use motorlink_telemetry::sample::{Sample, Values};
+use motorlink_telemetry::signal::{Motor, Signal, Source};
+use motorlink_telemetry::subscription::Record;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use ratatui::style::{Color, Modifier};
+
+use super::keys::{Ask, Field, Place, View};
+use super::model::{Model, Port, Row};
+use super::settings::Item;
+use super::values::Units;
+use super::view::{self, Shown, Theme};
+use crate::json::RmdUnits;
+use crate::st::StUnits;
+
+const PERIOD: Duration = Duration::from_millis(100);
+
+fn units() -> Units {
+    let st = StUnits { profile: Profile::Spec, raw: false, full_scale: None };
+    Units { st, rmd: RmdUnits::default() }
+}
+
+fn st(number: u8) -> Motor {
+    Motor::St(MotorNumber::new(number).unwrap())
+}
+
+fn rmd(number: u8) -> Motor {
+    Motor::Rmd(MotorId::new(number).unwrap())
+}
+
+/// Two ST motors at the first port, three RMD motors at the second.
+fn model() -> Model {
+    let ports = vec![
+        Port::new("st0".to_owned(), "./st0".to_owned()),
+        Port::new("can0".to_owned(), "slcan:./can0".to_owned()),
+    ];
+    let row = |port, motor, name: &str| Row::new(port, motor, name.to_owned(), PERIOD);
+    let rows = vec![
+        row(0, st(1), "st0:1"),
+        row(0, st(2), "st0:2"),
+        row(1, rmd(1), "can0:1"),
+        row(1, rmd(2), "can0:2"),
+        row(1, rmd(32), "can0:32"),
+    ];
+    let mut model = Model::new(units(), ports, rows, PERIOD);
+    give(&mut model, 0, st(1), &[("STATUS", 6), ("SPEED_MEAS", 1500), ("TORQUE_MEAS", -1234)]);
+    give(&mut model, 0, st(1), &[("HEATS_TEMP", 45), ("BUS_VOLTAGE", 325), ("FLAGS", 0)]);
+    give(&mut model, 0, st(2), &[("STATUS", 10), ("SPEED_MEAS", 0), ("FLAGS", 0x0002_0002)]);
+    give(&mut model, 1, rmd(1), &[("speed_dps", -360), ("iq_amps", 64)]);
+    give(
+        &mut model,
+        1,
+        rmd(1),
+        &[("temperature_celsius", 31), ("voltage_volts", 241), ("errors", 0)],
+    );
+    give(&mut model, 1, rmd(2), &[("speed_dps", 0), ("errors", 0b1000)]);
+    let rate = |signal, achieved| Rate {
+        signal,
+        asked: Micros::from(PERIOD),
+        predicted: Micros::from(PERIOD),
+        achieved,
+    };
+    model.rates(0, &[rate(Signal::named(st(1), "SPEED_MEAS").unwrap(), 9.9)]);
+    model
+}
+
+/// A reply with these values.
+fn give(model: &mut Model, port: usize, motor: Motor, values: &[(&str, i64)]) {
+    let signals: Vec<Signal> =
+        values.iter().map(|(name, _)| Signal::named(motor, name).unwrap()).collect();
+    let sample = |(_, digits): &(&str, i64)| Ok(Sample { digits: *digits, value: *digits as f64 });
+    let poll = Poll { motor, period: Micros::from(PERIOD), read: Read::Confirm, signals };
+    let values = Values {
+        poll: Arc::new(poll),
+        instant: Instant(0),
+        requested: Instant(0),
+        replied: Instant(0),
+        samples: values.iter().map(sample).collect(),
+    };
+    model.take(port, &Record::Values(Arc::new(values)));
+}
+
+fn happens(model: &mut Model, port: usize, what: What) {
+    model.take(port, &Record::Event(Arc::new(Event { time: Instant(0), what })));
+}
+
+fn press(place: &mut Place, code: KeyCode) -> Option<Ask> {
+    press_with(place, code, KeyModifiers::NONE)
+}
+
+fn press_with(place: &mut Place, code: KeyCode, modifiers: KeyModifiers) -> Option<Ask> {
+    let list = |row| Item::of(if row < 2 { st(1) } else { rmd(1) }, &units());
+    place.press(KeyEvent::new(code, modifiers), list, |item| item.unwritable(&units()))
+}
+
+fn type_in(place: &mut Place, text: &str) {
+    for letter in text.chars() {
+        assert_eq!(press(place, KeyCode::Char(letter)), None, "{letter}");
+    }
+}
+
+/// What is drawn.
+fn drawn(model: &Model, place: &Place, width: u16, height: u16) -> Terminal<TestBackend> {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    let read = BTreeMap::new();
+    let shown = Shown { model, place, read: &read };
+    terminal.draw(|frame| view::draw(frame, &shown, &Theme::plain())).unwrap();
+    terminal
+}
+
+fn lines(terminal: &Terminal<TestBackend>) -> Vec<String> {
+    let buffer = terminal.backend().buffer();
+    let width = usize::from(buffer.area.width);
+    let cells: Vec<&str> = buffer.content.iter().map(|cell| cell.symbol()).collect();
+    cells.chunks(width).map(|line| line.concat().trim_end().to_owned()).collect()
+}
+
+#[test]
+fn each_motor_has_a_row_with_its_values() {
+    let lines = lines(&drawn(&model(), &Place::new(5), 80, 24));
+    assert_eq!(
+        lines[..9],
+        [
+            "motorlink watch: 5 motors on 2 ports, 10.0 Hz asked for",
+            " motor      state                speed     current  temp supply got/asked speed",
+            ">st0:1      RUN               1500 rpm  -1234 s16A 45 °C  325 V  9.9/10.0 █",
+            " st0:2      FAULT_NOW            0 rpm           -     -      -         - ▁",
+            " can0:1     turning           -360 °/s     1.031 A 31 °C 24.1 V         - █",
+            " can0:2     ERROR                0 °/s           -     -      -         - ▁",
+            " can0:32    -                        -           -     -      -         -",
+            "st0:2: present: OVER_VOLT (bus voltage too high)",
+            "can0:2: over temperature protection",
+        ]
+    );
+    assert_eq!(
+        lines[22..],
+        [
+            "SPACE STOP ALL  up/down select  Enter details  r registers  s stop  u unlatch",
+            "? help  q quit",
+        ]
+    );
+}
+
+#[test]
+fn a_port_that_is_gone_and_back_is_said() {
+    let mut model = model();
+    happens(&mut model, 1, What::Lost("the far end hung up".into()));
+    let gone = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(gone[4].starts_with(" can0:1     PORT GONE 0s             -"), "{gone:?}");
+    assert!(gone.contains(&"can0: port gone for 0s: the far end hung up".to_owned()), "{gone:?}");
+    happens(&mut model, 1, What::Back);
+    let back = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(back[4].starts_with(" can0:1     turning"), "{back:?}");
+    assert!(back.iter().any(|line| line.ends_with("can0: the port is back after 0s")), "{back:?}");
+}
+
+#[test]
+fn a_silent_motor_has_no_present_value() {
+    let mut model = model();
+    happens(&mut model, 0, What::Silent(st(1), "no reply".into()));
+    let silent = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(silent[2].starts_with(">st0:1      NO ANSWER 0s             -"), "{silent:?}");
+    happens(&mut model, 0, What::Answers(st(1)));
+    let answers = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(answers[2].starts_with(">st0:1      RUN"), "{answers:?}");
+}
+
+#[test]
+fn a_stop_that_is_not_confirmed_is_said_in_bold_words() {
+    let mut model = model();
+    (0..5).for_each(|row| model.stopping(row));
+    assert_eq!(model.state(&model.rows[0]).0, "stopping ...");
+    (0..4).for_each(|row| model.stopped(row, Ok(())));
+    model.stopped(4, Err("no reply".to_owned()));
+    // The result of the thread comes behind the event of the engine.
+    model.stopped(0, Err("no reply".to_owned()));
+    let terminal = drawn(&model, &Place::new(5), 80, 24);
+    let lines = lines(&terminal);
+    let bad = "stop NOT CONFIRMED, may still be turning: can0:32: no reply";
+    let at = lines.iter().position(|line| line == bad).unwrap_or_else(|| panic!("{lines:?}"));
+    let cell = terminal.backend().buffer().cell((0, at as u16)).unwrap().clone();
+    assert!(cell.modifier.contains(Modifier::BOLD));
+    assert_eq!(cell.fg, Color::Reset);
+    let good = "stop confirmed by 4 of 5: st0:1 st0:2 can0:1 can0:2";
+    assert!(lines.contains(&good.to_owned()), "{lines:?}");
+    assert!(lines[6].starts_with(" can0:32    NOT CONFIRMED"), "{lines:?}");
+}
+
+#[test]
+fn the_latch_is_always_in_view() {
+    let mut model = model();
+    happens(&mut model, 0, What::Latched("ann".into()));
+    for view in [View::Motors, View::Details, View::Settings] {
+        let place = Place { view, ..Place::new(5) };
+        for (width, height) in [(80, 24), (200, 60), (40, 10)] {
+            let lines = lines(&drawn(&model, &place, width, height));
+            assert!(lines[1].starts_with("LATCHED (u releases it): every motion"), "{lines:?}");
+        }
+    }
+    happens(&mut model, 0, What::Released("ann".into()));
+    assert!(model.latched().is_none());
+}
+
+#[test]
+fn nothing_panics_on_small_terminals_and_the_selected_motor_is_in_view() {
+    let mut model = model();
+    (0..5).for_each(|row| model.stopping(row));
+    (0..5).for_each(|row| model.stopped(row, Err("a long story ".repeat(20))));
+    for view in [View::Motors, View::Details, View::Settings] {
+        for shows_help in [false, true] {
+            for (width, height) in [(1, 1), (2, 3), (10, 4), (40, 10), (80, 24), (200, 60)] {
+                let items = Item::of(st(1), &units());
+                let place = Place { view, shows_help, items, row: 4, ..Place::new(5) };
+                drawn(&model, &place, width, height);
+            }
+        }
+    }
+    let place = Place { row: 4, ..Place::new(5) };
+    let lines = lines(&drawn(&model, &place, 40, 10));
+    assert!(lines.iter().any(|line| line.starts_with(">can0:32")), "{lines:?}");
+}
+
+#[test]
+fn details_have_all_signals_and_the_reason_of_a_refusal() {
+    let mut model = model();
+    let signal = Signal { motor: st(1), source: Source::Register(RegisterId::MOTOR_POWER) };
+    happens(&mut model, 0, What::Refused(vec![signal], "UNKNOWN_REG".into()));
+    let place = Place { view: View::Details, ..Place::new(5) };
+    let lines = lines(&drawn(&model, &place, 80, 24));
+    assert_eq!(lines[1], "st0:1  RUN  on ./st0");
+    assert_eq!(lines[2], "no fault is reported");
+    assert!(lines[3].starts_with("STATUS        RUN (0x6)"), "{lines:?}");
+    let speed = lines.iter().find(|line| line.starts_with("SPEED_MEAS    1500 rpm  ")).unwrap();
+    assert!(speed.ends_with("  9.9 Hz, asked 10.0, line 10.0"), "{speed}");
+    assert!(lines.contains(&"MOTOR_POWER   none: UNKNOWN_REG".to_owned()), "{lines:?}");
+    assert!(lines.iter().any(|line| line.starts_with("replies 2, silent 0 times")), "{lines:?}");
+}
+
+#[test]
+fn stop_all_works_from_every_view_and_while_typing() {
+    let item = Item::Register(RegisterId::SPEED_KP);
+    let fields = [Field::None, Field::Search, Field::Edit(item, "12".to_owned()), Field::Release];
+    let keys = [
+        (KeyCode::Char(' '), KeyModifiers::NONE),
+        (KeyCode::Char('!'), KeyModifiers::SHIFT),
+        (KeyCode::F(12), KeyModifiers::NONE),
+        (KeyCode::Char('x'), KeyModifiers::CONTROL),
+    ];
+    for view in [View::Motors, View::Details, View::Settings] {
+        for field in &fields {
+            for (code, modifiers) in keys {
+                for shows_help in [false, true] {
+                    let mut place = Place { view, shows_help, ..Place::new(5) };
+                    place.field = field.clone();
+                    let asked = press_with(&mut place, code, modifiers);
+                    assert_eq!(asked, Some(Ask::StopAll), "{view:?} {field:?} {code:?}");
+                    assert_eq!(place.field, *field);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_latch_is_released_after_a_y_only() {
+    for (code, asked) in [
+        (KeyCode::Char('y'), Some(Ask::Release)),
+        (KeyCode::Char('n'), None),
+        (KeyCode::Enter, None),
+        (KeyCode::Esc, None),
+        (KeyCode::Char('u'), None),
+    ] {
+        let mut place = Place::new(5);
+        assert_eq!(press(&mut place, KeyCode::Char('u')), None);
+        assert_eq!(press(&mut place, code), asked, "{code:?}");
+        assert_eq!(place.field, Field::None);
+    }
+}
+
+#[test]
+fn a_register_is_found_and_edited() {
+    let mut place = Place::new(5);
+    press(&mut place, KeyCode::Char('r'));
+    assert_eq!(place.view, View::Settings);
+    type_in(&mut place, "/speed_k");
+    assert_eq!(place.search, "speed_k");
+    press(&mut place, KeyCode::Enter);
+    let names: Vec<String> = place.found().iter().map(Item::name).collect();
+    assert_eq!(names[..3], ["SPEED_KP", "SPEED_KI", "SPEED_KD"]);
+    press(&mut place, KeyCode::Down);
+    type_in(&mut place, "e8x");
+    press(&mut place, KeyCode::Backspace);
+    type_in(&mut place, "00");
+    let item = Item::Register(RegisterId::SPEED_KI);
+    assert_eq!(press(&mut place, KeyCode::Enter), Some(Ask::Write(item, "800".to_owned())));
+    // An empty value and Esc write nothing.
+    type_in(&mut place, "e");
+    assert_eq!(press(&mut place, KeyCode::Enter), None);
+    type_in(&mut place, "e12");
+    assert_eq!(press(&mut place, KeyCode::Esc), None);
+    assert_eq!(place.field, Field::None);
+    press(&mut place, KeyCode::Esc);
+    assert_eq!((place.view, place.search.as_str()), (View::Settings, ""));
+    press(&mut place, KeyCode::Esc);
+    assert_eq!(place.view, View::Motors);
+}
+
+#[test]
+fn registers_that_move_the_motor_are_not_edited() {
+    let moving = [
+        RegisterId::TARGET_MOTOR,
+        RegisterId::CONTROL_MODE,
+        RegisterId::TORQUE_REF,
+        RegisterId::FLUX_REF,
+        RegisterId::RAMP_FINAL_SPEED,
+    ];
+    for register in moving {
+        let why = Item::Register(register).unwritable(&units()).unwrap();
+        assert!(why.contains("makes the motor act"), "{why}");
+    }
+    let mut place = Place::new(5);
+    type_in(&mut place, "r/CONTROL_MODE");
+    press(&mut place, KeyCode::Enter);
+    type_in(&mut place, "e");
+    assert_eq!(place.field, Field::None);
+    assert!(place.message.clone().unwrap().0.starts_with("CONTROL_MODE makes the motor act"));
+    let reads = Item::Register(RegisterId::SPEED_MEAS).unwritable(&units());
+    assert_eq!(reads.unwrap(), "SPEED_MEAS can only be read");
+    assert_eq!(Item::Register(RegisterId::SPEED_KP).unwritable(&units()), None);
+    assert_eq!(Item::Gain(0).unwritable(&units()), None);
+}
+
+#[test]
+fn the_selection_stays_in_the_list() {
+    let mut place = Place::new(2);
+    for (code, row) in [
+        (KeyCode::Up, 0),
+        (KeyCode::Char('j'), 1),
+        (KeyCode::Down, 1),
+        (KeyCode::Char('k'), 0),
+        (KeyCode::End, 1),
+        (KeyCode::Home, 0),
+        (KeyCode::PageDown, 1),
+        (KeyCode::PageUp, 0),
+    ] {
+        press(&mut place, code);
+        assert_eq!(place.row, row, "{code:?}");
+    }
+}

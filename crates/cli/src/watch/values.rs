@@ -1,0 +1,143 @@
+//! Which signals a motor's row has, and how values are shown.
+
+use motorlink::rmd::Errors;
+use motorlink::st::{Flags, Reading, RegisterId, Status};
+use motorlink_telemetry::sample::Sample;
+use motorlink_telemetry::signal::{Motor, Quantity, Signal, Source};
+
+use crate::json::{RmdUnits, Row};
+use crate::st::{STATUS, StUnits};
+
+/// How values of both protocols are shown and taken.
+#[derive(Clone, Copy)]
+pub struct Units {
+    pub st: StUnits,
+    pub rmd: RmdUnits,
+}
+
+/// The signals of a row.
+#[derive(Clone, Copy)]
+pub struct Main {
+    /// The state of an ST motor. An RMD motor has none.
+    pub state: Option<Source>,
+    pub faults: Source,
+    pub speed: Source,
+    pub current: Source,
+    pub temperature: Source,
+    pub voltage: Source,
+}
+
+impl Main {
+    pub fn of(motor: Motor) -> Self {
+        let register = Source::Register;
+        match motor {
+            Motor::St(_) => Main {
+                state: Some(register(RegisterId::STATUS)),
+                faults: register(RegisterId::FLAGS),
+                speed: register(RegisterId::SPEED_MEAS),
+                current: register(RegisterId::TORQUE_MEAS),
+                temperature: register(RegisterId::HEATS_TEMP),
+                voltage: register(RegisterId::BUS_VOLTAGE),
+            },
+            Motor::Rmd(_) => Main {
+                state: None,
+                faults: quantity("errors"),
+                speed: quantity("speed_dps"),
+                current: quantity("iq_amps"),
+                temperature: quantity("temperature_celsius"),
+                voltage: quantity("voltage_volts"),
+            },
+        }
+    }
+
+    /// What changes fast, and is read at the rate that was asked for.
+    pub fn fast(&self) -> impl Iterator<Item = Source> {
+        [Some(self.speed), Some(self.current), self.state, Some(self.faults)].into_iter().flatten()
+    }
+
+    /// What changes slowly.
+    pub fn slow(&self) -> [Source; 2] {
+        [self.temperature, self.voltage]
+    }
+}
+
+fn quantity(name: &str) -> Source {
+    Source::Quantity(Quantity::named(name).expect("replies of RMD motors have it"))
+}
+
+/// The signals that the details of a motor show.
+pub fn details(motor: Motor) -> Vec<Signal> {
+    let sources: Vec<Source> = match motor {
+        Motor::St(_) => STATUS.map(Source::Register).to_vec(),
+        Motor::Rmd(_) => Quantity::all().map(Source::Quantity).collect(),
+    };
+    sources.into_iter().map(|source| Signal { motor, source }).collect()
+}
+
+impl Units {
+    /// A value with its unit or its name.
+    pub fn text(&self, source: Source, sample: Sample) -> String {
+        match source {
+            Source::Register(register) => self.st.text(&self.reading(register, sample)),
+            Source::Quantity(quantity) => self.row(quantity, sample).text,
+        }
+    }
+
+    /// A value for a narrow column.
+    pub fn short(&self, source: Source, sample: Sample) -> String {
+        let Source::Register(register) = source else { return self.text(source, sample) };
+        let reading = self.reading(register, sample);
+        if !reading.is_current() {
+            return reading.to_string();
+        }
+        let row = self.st.current_row(reading.digits());
+        format!("{} {}", row.short(), row.unit())
+    }
+
+    fn reading(&self, register: RegisterId, sample: Sample) -> Reading {
+        self.st.reading(register, sample.digits as i32)
+    }
+
+    fn row(&self, quantity: Quantity, sample: Sample) -> Row {
+        let (_, field) = quantity.read();
+        let mut data = [0; 8];
+        let (offset, size) = (usize::from(field.offset), usize::from(field.len));
+        data[offset..offset + size].copy_from_slice(&sample.digits.to_le_bytes()[..size]);
+        self.rmd.field(field, &data)
+    }
+}
+
+/// The state in one word. An RMD motor does not report one: its speed and its errors say it.
+pub fn state(main: &Main, value: impl Fn(Source) -> Option<Sample>) -> Option<String> {
+    if let Some(source) = main.state {
+        return value(source).map(|sample| Status::from(sample.digits as u8).to_string());
+    }
+    let (errors, speed) = (value(main.faults), value(main.speed)?);
+    Some(match errors.is_some_and(|errors| errors.digits != 0) {
+        true => "ERROR".to_owned(),
+        false if speed.digits != 0 => "turning".to_owned(),
+        false => "at rest".to_owned(),
+    })
+}
+
+/// The faults in words; none if there is none.
+pub fn faults(motor: Motor, sample: Sample) -> Option<String> {
+    match motor {
+        Motor::Rmd(_) => {
+            let errors = Errors(sample.digits as u8);
+            (!errors.is_empty()).then(|| errors.to_string())
+        }
+        Motor::St(_) => {
+            let flags = Flags(sample.digits as u32);
+            let words = |half: u16| {
+                let set = Flags::NAMES.iter().filter(move |(bit, ..)| half & bit != 0);
+                set.map(|(_, name, doc)| format!("{name} ({doc})")).collect::<Vec<_>>().join(", ")
+            };
+            match (flags.present(), flags.occurred()) {
+                (0, 0) => None,
+                (0, occurred) => Some(format!("over, not acknowledged: {}", words(occurred))),
+                (present, _) => Some(format!("present: {}", words(present))),
+            }
+        }
+    }
+}

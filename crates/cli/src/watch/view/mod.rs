@@ -1,0 +1,122 @@
+//! What is drawn: lines of text, of which the lowest tell the keys.
+
+mod details;
+mod help;
+mod motors;
+mod parts;
+pub mod settings;
+mod text;
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+use ratatui::widgets::Paragraph;
+
+use super::keys::{Field, HELP, Place, View};
+use parts::MARK;
+pub use parts::{Shown, Theme};
+use text::wrapped;
+
+/// Behind what is typed.
+const CURSOR: char = '_';
+
+/// Draws everything.
+pub fn draw(frame: &mut Frame<'_>, shown: &Shown<'_>, theme: &Theme) {
+    let area = frame.area();
+    let (width, height) = (usize::from(area.width), usize::from(area.height));
+    let keys = keys(shown.place, width);
+    let top = title(shown, theme, width);
+    let mut bottom: Vec<Line<'_>> = field(shown, theme, width);
+    bottom.extend(keys.into_iter().map(|line| Line::styled(line, theme.dim())));
+    let left = height.saturating_sub(top.len() + bottom.len());
+    let mut lines = top;
+    let mut body = match (shown.place.shows_help, shown.place.view) {
+        (true, _) => help::lines(theme, width),
+        (_, View::Motors) => motors::lines(shown, theme, width, left),
+        (_, View::Details) => details::lines(shown, theme, width, left),
+        (_, View::Settings) => settings::lines(shown, theme, width, left),
+    };
+    body.resize(left, Line::default());
+    lines.extend(body);
+    lines.extend(bottom);
+    // The cursor is where the user is: for screen readers, and a hidden one would have to come back.
+    let starts = |line: &Line<'_>, mark: &str| {
+        line.spans.first().is_some_and(|span| span.content.starts_with(mark))
+    };
+    let (at, mark) = match shown.place.field {
+        Field::None => (lines.iter().position(|line| starts(line, MARK)), 0),
+        _ => {
+            let at = lines.iter().rposition(|line| line.to_string().ends_with(CURSOR));
+            (at, at.map_or(0, |at| lines[at].width().saturating_sub(1)))
+        }
+    };
+    let (x, y) = (mark.min(width.saturating_sub(1)), at.unwrap_or(0).min(height.saturating_sub(1)));
+    frame.set_cursor_position((x as u16, y as u16));
+    frame.render_widget(Paragraph::new(lines), Rect { x: 0, y: 0, ..area });
+}
+
+/// The first lines: what is watched, and the latch.
+fn title(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+    let model = shown.model;
+    let count = |count: usize, one: &str| match count {
+        1 => format!("1 {one}"),
+        _ => format!("{count} {one}s"),
+    };
+    let ports = count(model.ports.len(), "port");
+    let motors = count(model.rows.len(), "motor");
+    let hertz = 1.0 / model.period.as_secs_f64();
+    let mut lines = vec![Line::styled(
+        text::fit(&format!("motorlink watch: {motors} on {ports}, {hertz:.1} Hz asked for"), width),
+        theme.bold(),
+    )];
+    if let Some(by) = model.latched() {
+        let text =
+            format!("LATCHED (u releases it): every motion is refused since {by} stopped all");
+        lines.push(Line::styled(text::fit(&text, width), theme.bad().patch(theme.selected())));
+    }
+    lines
+}
+
+/// What is typed, or the question that waits for a y.
+fn field(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+    let place = shown.place;
+    let text = match &place.field {
+        Field::None => return Vec::new(),
+        Field::Search => format!("search: {}{CURSOR}", place.search),
+        Field::Edit(item, text) => {
+            let name = &shown.model.rows[place.row].name;
+            format!("{name}: new value of {}: {text}{CURSOR}", item.name())
+        }
+        Field::Release => {
+            let by = shown.model.latched().map_or("nobody", |by| by);
+            format!(
+                "release the latch of {by}, so that motors can be started again? y or n: {CURSOR}"
+            )
+        }
+    };
+    wrapped(&text, width).into_iter().map(|line| Line::styled(line, theme.bold())).collect()
+}
+
+/// The last lines: the keys of the view.
+fn keys(place: &Place, width: usize) -> Vec<String> {
+    let is_shown = |view: Option<View>| view.is_none_or(|view| view == place.view);
+    let words: Vec<String> = match &place.field {
+        Field::None => HELP
+            .iter()
+            .filter(|key| is_shown(key.view) && !key.short.is_empty())
+            .filter(|key| key.key != "Esc" || place.view != View::Motors)
+            .filter(|key| key.key != "r" || place.view != View::Settings)
+            .map(|key| {
+                let mut names = key.key.split(' ');
+                let first = names.next().unwrap_or_default();
+                let first = if first == "up" { "up/down" } else { first };
+                format!("{first} {}", key.short)
+            })
+            .collect(),
+        Field::Release => vec!["SPACE STOP ALL".into(), "y release".into(), "n leave it".into()],
+        Field::Search | Field::Edit(..) => {
+            vec!["SPACE STOP ALL".into(), "Enter done".into(), "Esc cancel".into()]
+        }
+    };
+    text::flow(&words, "  ", width)
+}

@@ -1,0 +1,75 @@
+//! The registers of an ST drive, or the gains of an RMD motor.
+
+use ratatui::text::{Line, Span};
+
+use super::super::keys::Place;
+use super::super::settings::Item;
+use super::parts::{Shown, Theme, first, listed};
+use super::text::{fit, wrapped};
+
+/// Registers around the selected one that are read. No terminal shows more of them at once.
+const AROUND: usize = 60;
+const NAME: usize = 24;
+const VALUE: usize = 24;
+
+/// The registers that are read again and again.
+pub fn in_view(place: &Place) -> Vec<Item> {
+    let found = place.found();
+    let begin = place.item.saturating_sub(AROUND / 2);
+    found.into_iter().skip(begin).take(AROUND).collect()
+}
+
+pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Line<'static>> {
+    let place = shown.place;
+    let Some(row) = shown.model.rows.get(place.row) else { return Vec::new() };
+    let found = place.found();
+    let search = match place.search.as_str() {
+        "" => String::new(),
+        text => format!(", with `{text}`"),
+    };
+    let text = format!("{}: {} of {}{search}", row.name, found.len(), place.items.len());
+    let mut lines = vec![Line::styled(fit(&text, width), theme.bold())];
+    let about = about(shown, width);
+    let message: Vec<Line<'static>> = place
+        .message
+        .iter()
+        .flat_map(|(text, is_bad)| {
+            let style = theme.of(*is_bad).patch(theme.bold());
+            wrapped(text, width).into_iter().map(move |line| Line::styled(line, style))
+        })
+        .collect();
+    let last = about.len() + message.len();
+    let listed_lines = height.saturating_sub(lines.len() + last).max(1);
+    let begin = first(place.item, listed_lines);
+    for (at, item) in found.iter().enumerate().skip(begin).take(listed_lines) {
+        let value = match shown.read.get(&(place.row, *item)) {
+            Some(Ok(value)) => value.clone(),
+            Some(Err(why)) => format!("({why})"),
+            None => "...".to_owned(),
+        };
+        let meaning = width.saturating_sub(1 + NAME + 1 + VALUE + 1);
+        let text = format!(
+            "{} {} {}",
+            fit(&item.name(), NAME),
+            fit(&value, VALUE),
+            fit(item.meaning(), meaning)
+        );
+        lines.push(listed(vec![Span::raw(text)], at == place.item, theme));
+    }
+    lines.resize(lines.len().max(height.saturating_sub(last)), Line::default());
+    lines.extend(about.into_iter().map(|line| Line::styled(line, theme.dim())));
+    lines.extend(message);
+    lines
+}
+
+/// The selected register in full.
+fn about(shown: &Shown<'_>, width: usize) -> Vec<String> {
+    let place = shown.place;
+    let Some(item) = place.found().get(place.item).copied() else { return Vec::new() };
+    let value = match shown.read.get(&(place.row, item)) {
+        Some(Ok(value)) => format!(" is {value}"),
+        Some(Err(why)) => format!(": {why}"),
+        None => String::new(),
+    };
+    wrapped(&format!("{}{value}: {}", item.name(), item.meaning()), width)
+}

@@ -1,0 +1,304 @@
+"""`motorlink watch` in a terminal, on simulated drives. What motors do is read from the simulator."""
+
+import signal
+
+import pytest
+
+from program import eventually
+from terminal import Terminal
+
+
+@pytest.fixture
+def watch(motorlink, tmp_path):
+    """`watch(ports, ...)`: the view on these ports, in a terminal."""
+    started = []
+
+    def watch(*words, columns=80, lines=24, **variables):
+        terminal = Terminal([motorlink, "watch", *map(str, words)], columns, lines, **variables)
+        started.append(terminal)
+        return terminal
+
+    yield watch
+    for terminal in started:
+        terminal.end()
+
+
+@pytest.fixture
+def bench(sim, run):
+    """Drives of both kinds: ST motor 1 and RMD motor 2 turn, when they are told to."""
+
+    class Bench:
+        def __init__(self):
+            self.sim = sim()
+            self.st, self.can = self.sim.st, f"slcan:{self.sim.can}"
+            self.ports = ("-p", self.st, "-p", self.can)
+
+        def turn(self):
+            run("st", "-p", self.st, "start").ended(0)
+            run("rmd", "-p", self.can, "--id", 2, "speed", 360).ended(0)
+            eventually(lambda: self.speed("st") > 300 and self.speed("rmd") > 10, "two motors that turn")
+
+        def speed(self, kind):
+            port, number = {"st": (f"pty:{self.st}", 1), "rmd": (f"slcan-pty:{self.sim.can}", 2)}[kind]
+            motor = self.sim.motor(number, port)
+            return abs(motor.get("speed_rpm", motor.get("speed_dps")))
+
+        def rests(self):
+            eventually(lambda: self.speed("st") < 1 and self.speed("rmd") < 0.1, "motors at rest", 30)
+
+    return Bench()
+
+
+@pytest.mark.parametrize("columns, lines", [(80, 24), (200, 60)])
+def test_twelve_motors_have_a_row_each(sim, watch, tmp_path, columns, lines):
+    st, rmd = (tmp_path / "st0", tmp_path / "st1"), (tmp_path / "can0", tmp_path / "can1")
+    sim(st=[f"pty:{path}" for path in st], rmd=[f"slcan-pty:{path}" for path in rmd])
+    ports = [word for path in st for word in ("-p", path)]
+    ports += [word for path in rmd for word in ("-p", f"slcan:{path}")]
+    terminal = watch(*ports, columns=columns, lines=lines)
+    names = [f"st{bus}:{number}" for bus in (0, 1) for number in (1, 2)]
+    names += [f"can{bus}:{number}" for bus in (0, 1) for number in (1, 2, 3, 4)]
+    terminal.shows("12 motors on 4 ports", *names, "SPACE STOP ALL", "q quit")
+    for name in names:
+        eventually(lambda: "/10.0" in terminal.line_of(f"{name} "), f"the rate of {name}", 30)
+        row = terminal.line_of(f"{name} ")
+        assert ("IDLE" if name.startswith("st") else "at rest") in row
+        assert "°C" in row and " V " in row and "…" not in row and len(row) <= columns
+    terminal.press("q")
+    assert terminal.wait() == 0
+    eventually(lambda: terminal.is_as_before, "the terminal as before")
+
+
+def test_values_are_those_of_the_drives(bench, watch):
+    bench.turn()
+    terminal = watch(*bench.ports, "--rate", 20)
+    terminal.shows("RUN", "turning", "360 °/s")
+    eventually(lambda: "/20.0" in terminal.line_of("st0:1 "), "the rate")
+
+
+@pytest.mark.parametrize("key", ["space", "!", "F12", "ctrl-x"])
+def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch, key):
+    bench.turn()
+    terminal = watch(*bench.ports)
+    terminal.shows("RUN", "turning")
+    terminal.press("r", "/", "SPEED_KP", "enter", "e", "12")
+    terminal.shows("new value of SPEED_KP: 12_")
+    terminal.press(key)
+    bench.rests()
+    terminal.shows("LATCHED", "new value of SPEED_KP: 12_")
+    terminal.press("esc")
+    terminal.shows_no("new value")
+    terminal.press("esc")
+    terminal.shows_no("with `SPEED_KP`")
+    terminal.press("esc")
+    terminal.shows("stop confirmed by all 6")
+
+
+def test_s_stops_the_selected_motor_only(bench, watch):
+    bench.turn()
+    terminal = watch(*bench.ports)
+    terminal.shows("RUN", "turning")
+    terminal.press("s")
+    terminal.shows("stop confirmed by 1 of 6: st0:1")
+    eventually(lambda: bench.speed("st") < 1, "a motor at rest", 30)
+    assert bench.speed("rmd") > 10
+    assert "LATCHED" not in terminal.text
+    terminal.press("j", "j", "j", "s")
+    terminal.shows("stop confirmed by 2 of 6: st0:1 can0:2")
+    bench.rests()
+
+
+def test_the_latch_is_released_after_a_y(bench, watch):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.press("!")
+    terminal.shows("LATCHED")
+    terminal.press("u")
+    terminal.shows("release the latch of watch")
+    terminal.press("n")
+    terminal.shows_no("y or n")
+    assert "LATCHED" in terminal.text
+    terminal.press("u", "y")
+    terminal.shows_no("LATCHED")
+
+
+def test_a_register_is_written_and_read_back(bench, watch, run):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.press("r", "/", "SPEED_KP", "enter")
+    terminal.shows("SPEED_KP", "s16A/unit")
+    terminal.press("e", "7770", "backspace", "enter")
+    terminal.shows("is 777 s16A/unit (read back)")
+    terminal.press("e", "70000", "enter")
+    terminal.shows("NOT WRITTEN", "32767")
+    assert terminal.bold("NOT WRITTEN")
+    terminal.press("q")
+    assert terminal.wait() == 0
+    assert "777" in run("st", "-p", bench.st, "get", "SPEED_KP").ended(0).out
+
+
+def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run):
+    terminal = watch("-p", bench.can, "--id", 3)
+    terminal.shows("can0:3")
+    terminal.press("r")
+    terminal.shows("position_kp", "acceleration")
+    terminal.press("/", "speed_kp", "enter", "e", "77", "enter")
+    terminal.shows("speed_kp was", "is 77 (read back)")
+    terminal.press("e", "256", "enter")
+    terminal.shows("NOT WRITTEN", "0 to 255")
+    terminal.press("esc")
+    terminal.shows_no("with `speed_kp`")
+    terminal.press("end", "e", "1500", "enter")
+    terminal.shows("is 1500 °/s² (read back)")
+    terminal.press("ctrl-c")
+    assert terminal.wait() == 0
+    assert "77" in run("rmd", "-p", bench.can, "--id", 3, "pid").ended(0).out
+
+
+def test_a_register_that_moves_the_motor_is_refused(bench, watch):
+    terminal = watch("-p", bench.st, "--motor", 1)
+    terminal.shows("IDLE")
+    terminal.press("r", "/", "CONTROL_MODE", "enter", "e")
+    terminal.shows("CONTROL_MODE makes the motor act: this view starts and moves nothing")
+    assert "new value" not in terminal.text
+
+
+def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.press("?")
+    terminal.shows("any key closes this help")
+    for key in ("SPACE ! F12 Ctrl-X", "up down j k", "Enter", "/", "e Enter", "r ", "s ", "u ", "Esc", "?", "Ctrl-Z"):
+        assert terminal.line_of(key), key
+    terminal.press("esc")
+    terminal.shows_no("any key closes this help")
+    for key, name in (("down", "st0:2"), ("j", "can0:1"), ("up", "st0:2"), ("k", "st0:1"), ("end", "can0:4"), ("home", "st0:1")):
+        terminal.press(key)
+        terminal.shows(f">{name}")
+    terminal.press("enter")
+    terminal.shows("st0:1  IDLE", "CONTROL_MODE", "SPEED (0x1)", "MOTOR_POWER", "replies")
+    terminal.press("down")
+    terminal.shows("st0:2  IDLE")
+    terminal.press("esc")
+    terminal.shows("got/asked")
+    terminal.press("end", "enter")
+    terminal.shows("can0:4  at rest", "multi_turn_angle_degrees", "phase_a_amps", "0.00 °")
+    terminal.press("esc")
+    terminal.shows(">can0:4")
+
+
+def test_a_port_that_goes_away_and_comes_back_is_said(sim, watch):
+    drives = sim(rmd=())
+    terminal = watch("-p", drives.st)
+    terminal.shows("IDLE")
+    drives.kill()
+    terminal.shows("PORT GONE", "st0: port gone for")
+    terminal.press("!")
+    terminal.shows("NOT CONFIRMED, may still be turning: st0:1 st0:2")
+    assert terminal.bold("NOT CONFIRMED, may")
+    sim(rmd=())
+    terminal.shows("the port is back after", "°C", within=30)
+    terminal.press("!")
+    terminal.shows("stop confirmed by all 2")
+
+
+def test_a_motor_that_becomes_silent_is_said(sim, watch):
+    drives = sim(st=())
+    terminal = watch("-p", f"slcan:{drives.can}")
+    terminal.shows("at rest")
+    drives.process.send_signal(signal.SIGSTOP)
+    try:
+        terminal.shows("NO ANSWER")
+    finally:
+        drives.process.send_signal(signal.SIGCONT)
+    terminal.shows("answers again")
+
+
+def test_the_view_follows_the_size_of_the_terminal(bench, watch):
+    terminal = watch(*bench.ports)
+    terminal.shows("got/asked")
+    terminal.resize(200, 60)
+    eventually(lambda: len(terminal.lines[1]) > 100, "a wide header")
+    terminal.resize(40, 10)
+    terminal.shows("SPACE STOP ALL", "q quit", ">st0:1")
+    for key in ("?", "r", "enter"):
+        terminal.press(key)
+        terminal.shows_no(">st0:1")
+        terminal.press("esc")
+        terminal.shows(">st0:1")
+    terminal.resize(80, 24)
+    terminal.shows("got/asked", "can0:4")
+    terminal.press("q")
+    assert terminal.wait() == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_the_terminal_as_it_was(bench, watch, number):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.signal(number)
+    assert terminal.wait() == 0
+    eventually(lambda: terminal.is_as_before, "the terminal as before")
+
+
+def is_suspended(terminal):
+    with open(f"/proc/{terminal.process.pid}/stat") as stat:
+        return stat.read().rpartition(")")[2].split()[0] == "T"
+
+
+@pytest.mark.parametrize("how", ["ctrl-z", signal.SIGTSTP])
+def test_it_can_be_suspended(bench, watch, how):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.press(how) if isinstance(how, str) else terminal.signal(how)
+    eventually(lambda: is_suspended(terminal), "a suspended program")
+    eventually(lambda: terminal.is_as_before, "the terminal as before")
+    terminal.signal(signal.SIGCONT)
+    eventually(lambda: not terminal.is_as_before, "the view again")
+    terminal.press("?")
+    terminal.shows("any key closes this help")
+    terminal.press("q")
+    assert terminal.wait() == 0
+    eventually(lambda: terminal.is_as_before, "the terminal as before")
+
+
+def test_motors_that_others_started_go_on_when_it_ends_or_is_killed(bench, watch):
+    bench.turn()
+    for end in ("q", signal.SIGKILL):
+        terminal = watch(*bench.ports)
+        terminal.shows("RUN", "turning")
+        terminal.press(end) if isinstance(end, str) else terminal.signal(end)
+        terminal.wait()
+        assert bench.speed("st") > 300 and bench.speed("rmd") > 10
+
+
+def test_it_ends_when_its_terminal_is_gone(bench, motorlink):
+    terminal = Terminal([motorlink, "watch", *bench.ports])
+    terminal.shows("can0:4")
+    terminal.hang_up()
+    assert terminal.wait() == 0
+
+
+def test_without_a_terminal_it_says_what_to_use(run, watch, bench):
+    failed = run("watch", "-p", bench.st).ended(2)
+    assert "watch needs a terminal" in failed.err and "--every" in failed.err
+    terminal = watch("-p", bench.st, TERM="dumb")
+    terminal.shows("watch needs a terminal", "--every 100ms")
+    assert terminal.wait() == 2
+
+
+def test_a_port_without_motors_is_an_error(sim, watch):
+    port = sim(st=()).can
+    terminal = watch("-p", port)
+    terminal.shows("no motor answers at")
+    assert terminal.wait() == 3
+    assert "\x1b[?1049h".encode() not in terminal.raw
+
+
+@pytest.mark.parametrize("variables, has_colours", [({}, False), ({"NO_COLOR": None}, True)])
+def test_colours_are_left_out_on_request(bench, watch, variables, has_colours):
+    bench.sim.do("supply", motor=1, port=f"pty:{bench.st}", volts=5)
+    terminal = watch(*bench.ports, **variables)
+    terminal.shows("FAULT_NOW", "UNDER_VOLT")
+    assert (b"38;5;1" in terminal.raw) == has_colours, terminal.raw
+    assert terminal.bold("UNDER_VOLT")
