@@ -6,6 +6,7 @@
 //! | name a signal | [`signal::Signal::named`] |
 //! | receive values and events | [`subscription::Subscription`] |
 //! | see which exchanges read signals | [`plan`] |
+//! | exchange messages with other programs that use the same lines | [`share`] |
 //! | schedule exchanges of your own, sans I/O | [`schedule::Schedule`] |
 //!
 //! ```no_run
@@ -42,5 +43,6 @@ pub mod plan;
 pub mod runner;
 pub mod sample;
 pub mod schedule;
+pub mod share;
 pub mod signal;
 pub mod subscription;

@@ -1,0 +1,389 @@
+//! The texts of both sides, as JSON.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// The longest name of a program, in bytes.
+pub const LONGEST_NAME: usize = 64;
+/// The most records that wait for a program in one subscription.
+pub const LONGEST_QUEUE: u32 = 100_000;
+/// The most signals of one subscription.
+pub const MOST_SIGNALS: usize = 1024;
+/// The most subscriptions of a program.
+pub const MOST_SUBSCRIPTIONS: usize = 16;
+/// The longest time to live of a command and the longest period, in seconds.
+pub const LONGEST_TIME: f64 = 3600.0;
+
+/// A request of a program. It gets one answer or one refusal with the same id.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// A number of the program's choice.
+    pub id: u32,
+    /// What it asks for.
+    #[serde(flatten)]
+    pub ask: Ask,
+}
+
+/// What a program asks for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "ask", rename_all = "kebab-case")]
+pub enum Ask {
+    /// The first request: the program's name, and the version that it speaks.
+    Hello {
+        /// The version of the messages.
+        protocol: u32,
+        /// Who it is, for the log.
+        name: String,
+    },
+    /// The lines that the share holds.
+    Lines,
+    /// What can be read of the motors of a line.
+    Signals {
+        /// The line.
+        line: String,
+    },
+    /// Sends signals again and again.
+    Subscribe {
+        /// The signals.
+        signals: Vec<SignalName>,
+        /// The time between two values, in seconds.
+        period: f64,
+        /// How many records wait at most for this program.
+        queue: u32,
+        /// What is lost when more would wait.
+        drop: Drop,
+    },
+    /// Ends a subscription.
+    Unsubscribe {
+        /// The subscription.
+        subscription: u32,
+    },
+    /// Sends a command to a motor, ahead of all reads.
+    Command {
+        /// The line.
+        line: String,
+        /// The motor.
+        motor: u8,
+        /// ST: frame code and payload, without motor, length and checksum. RMD: the eight bytes.
+        bytes: Vec<u8>,
+        /// The time to live in seconds: it is not sent later.
+        time_to_live: f64,
+    },
+    /// Stops a motor, or all, ahead of all commands.
+    Stop {
+        /// The motor; all motors that were started or read, without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motor: Option<MotorName>,
+    },
+    /// Refuses motion of all programs until it is released.
+    Latch,
+    /// Allows motion again.
+    Release,
+    /// The rates of all signals that are read.
+    Rates,
+}
+
+/// A motor of a share.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct MotorName {
+    /// The line.
+    pub line: String,
+    /// The motor's number or ID.
+    pub motor: u8,
+}
+
+/// A signal of a share.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SignalName {
+    /// The line.
+    pub line: String,
+    /// The motor's number or ID.
+    pub motor: u8,
+    /// The name of the register or the quantity.
+    pub name: String,
+}
+
+/// What a full queue loses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Drop {
+    /// The oldest: for what shows the present.
+    Oldest,
+    /// The newest: for what keeps everything up to then.
+    Newest,
+}
+
+/// A text from the share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Text {
+    /// A request was carried out.
+    Answer {
+        /// That of the request.
+        id: u32,
+        /// What it asked for.
+        #[serde(flatten)]
+        answer: Answer,
+    },
+    /// A request was not carried out.
+    Refusal {
+        /// That of the request.
+        id: u32,
+        /// The reason, for programs.
+        reason: Reason,
+        /// The reason in words.
+        message: String,
+    },
+    /// The columns of a group. It comes before its first data.
+    Group(Group),
+    /// Something happened.
+    Event(Event),
+    /// Events before the next text are missing, because the program was too slow.
+    Missed {
+        /// How many.
+        events: u64,
+    },
+    /// The last text: the share closes the connection.
+    Closing {
+        /// Why, in words.
+        message: String,
+    },
+    /// A text of a later version.
+    #[serde(other)]
+    Later,
+}
+
+/// The answer to each [`Ask`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "to", rename_all = "kebab-case")]
+pub enum Answer {
+    /// To hello.
+    Hello {
+        /// The version of the messages.
+        protocol: u32,
+        /// The name of the program at the other end, with its version.
+        share: String,
+    },
+    /// To lines.
+    Lines {
+        /// All lines.
+        lines: Vec<Line>,
+        /// Who stopped the motors, if motion is refused.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        latched_by: Option<String>,
+    },
+    /// To signals.
+    Signals {
+        /// All signals of a motor.
+        signals: Vec<Column>,
+    },
+    /// To subscribe.
+    Subscribe {
+        /// Its number.
+        subscription: u32,
+    },
+    /// To unsubscribe.
+    Unsubscribe,
+    /// To command: the drive acknowledged it.
+    Command {
+        /// ST: the payload of the reply. RMD: the eight bytes.
+        bytes: Vec<u8>,
+    },
+    /// To stop.
+    Stop {
+        /// The motors and how they took it.
+        motors: Vec<StoppedMotor>,
+    },
+    /// To latch.
+    Latch,
+    /// To release.
+    Release,
+    /// To rates.
+    Rates {
+        /// Those of all signals that are read.
+        rates: Vec<SignalRate>,
+    },
+}
+
+/// A line of a share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Its name.
+    pub line: String,
+    /// `st` or `rmd`.
+    pub protocol: Protocol,
+    /// The port that the share holds.
+    pub port: String,
+    /// The line's clock now, in seconds.
+    pub t: f64,
+    /// The wall clock at the same moment, in seconds since 1970.
+    pub wall: f64,
+}
+
+/// What the drives of a line speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Protocol {
+    /// ST's Motor Control Protocol.
+    St,
+    /// The RMD protocol.
+    Rmd,
+}
+
+/// A signal with its unit.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// The name of the register or the quantity.
+    pub name: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+}
+
+/// How a motor took a stop.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoppedMotor {
+    /// The motor.
+    #[serde(flatten)]
+    pub motor: MotorName,
+    /// Why it may still be turning; without it the drive confirmed the stop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
+
+/// How often a signal is read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SignalRate {
+    /// The signal.
+    #[serde(flatten)]
+    pub signal: SignalName,
+    /// The shortest period that a program asked for, in seconds.
+    pub asked: f64,
+    /// The period that the line carries, in seconds.
+    pub predicted: f64,
+    /// Values in the last second.
+    pub achieved: f64,
+}
+
+/// Signals that are read in one exchange.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Group {
+    /// Its number, which is never used again.
+    pub group: u32,
+    /// Whose it is.
+    pub subscription: u32,
+    /// The line.
+    pub line: String,
+    /// The motor.
+    pub motor: u8,
+    /// The signals, in the order of the columns after `t` and `span`.
+    pub columns: Vec<Column>,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// When: the wall clock, in seconds since 1970.
+    pub wall: f64,
+    /// The line, unless it is about all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<String>,
+    /// When, by the clock of the line, in seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub t: Option<f64>,
+    /// From when on values are doubtful, by the clock of the line, in seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub since: Option<f64>,
+    /// The motor, if it is about one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<u8>,
+    /// The program that did it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<String>,
+    /// What happened.
+    pub event: Happening,
+    /// The same in words.
+    pub message: String,
+}
+
+/// The kind of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Happening {
+    /// A program came.
+    Joined,
+    /// A program left, or was killed.
+    Left,
+    /// A command was sent.
+    Commanded,
+    /// A stop was asked for.
+    Stopping,
+    /// A drive confirmed a stop.
+    Stopped,
+    /// No drive confirmed a stop: the motor may still be turning.
+    StopFailed,
+    /// Motion is refused from now on.
+    Latched,
+    /// Motion is possible again.
+    Released,
+    /// The port failed. It is opened again.
+    Lost,
+    /// The port is open again.
+    Back,
+    /// A motor does not answer. It is asked less often.
+    Silent,
+    /// A silent motor answers again.
+    Answers,
+    /// The drive refuses to give signals.
+    Refused,
+    /// Values of a motor may be those of other signals since the given time.
+    Doubtful,
+    /// An event of a later version.
+    #[serde(other)]
+    Later,
+}
+
+/// Why a request was not carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The request is not possible: another line, motor, signal or number is needed.
+    Usage,
+    /// The version is another one.
+    Version,
+    /// Motion is refused until the latch is released.
+    Latched,
+    /// It could not be sent within its time to live. Nothing was sent.
+    Expired,
+    /// A stop came first. Nothing was sent.
+    Overtaken,
+    /// A stop replaced it. The drive may have executed it before the stop.
+    Displaced,
+    /// Too much waits already. Nothing was sent.
+    Busy,
+    /// The drive refused.
+    Refused,
+    /// The line failed. It is unknown whether the drive executed it.
+    Line,
+    /// A reason of a later version.
+    #[serde(other)]
+    Later,
+}
+
+/// A text that is not a message of this version.
+#[derive(Debug, thiserror::Error)]
+#[error("not a message of a share: {0}")]
+pub struct MessageError(#[from] serde_json::Error);
+
+/// A text of either side as JSON.
+pub fn encode(message: &impl Serialize) -> Vec<u8> {
+    // The messages have string keys and no maps, which is all that could fail.
+    serde_json::to_vec(message).unwrap_or_default()
+}
+
+/// A text of either side from JSON.
+///
+/// # Errors
+/// It is none.
+pub fn decode<M: DeserializeOwned>(payload: &[u8]) -> Result<M, MessageError> {
+    Ok(serde_json::from_slice(payload)?)
+}
