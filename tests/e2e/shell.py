@@ -39,6 +39,8 @@ def serves(words):
     """Whether a command serves ports until it is ended."""
     if words[:2] == ["motorlink", "guard"]:
         return "--prove" not in words
+    if words[:2] == ["motorlink", "share"]:
+        return True
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
 
 

@@ -39,7 +39,7 @@ def examples(text):
     return [line.strip() for line in block[1].replace("\\\n", "").splitlines()] if block else []
 
 
-@pytest.mark.parametrize("command", ["st", "rmd", "guard", "sim", "conformance", ""])
+@pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "conformance", ""])
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     # The program itself, and commands without subcommands.
     pages = helps(run, command) if command else [

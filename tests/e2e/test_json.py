@@ -10,6 +10,7 @@ from jsonschema import Draft202012Validator
 
 from peers import device, slcan_adapter
 from program import environment, eventually
+from sharing import Client
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMA = json.loads((DOCS / "json.schema.json").read_text())
@@ -78,7 +79,7 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK, *FILES]} | {"scan"}
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "completions", "man"}
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "conformance"} | others
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "conformance"} | others
 
 
 @pytest.mark.parametrize("command", ST)
@@ -141,6 +142,7 @@ def test_settings_are_told_by_name(checked, run, tmp_path, protocol, setting, co
         ("rmd -p sim: -i 9 angle", 3, {"kind": "silent", "motor": 9}),
         ("rmd -p sim: scan 9", 3, {"kind": "link"}),
         ("guard st -p sim:", 2, {"kind": "usage"}),
+        ("share -p sim: --at nowhere", 2, {"kind": "usage"}),
         ("sim run /nothing-there.toml", 2, {"kind": "usage"}),
         ("conformance st -p sim: --only no_such_case", 2, {"kind": "usage"}),
     ],
@@ -261,6 +263,20 @@ def test_a_guard_tells_what_happens(sim, start, run, tmp_path):
     guard.interrupt()
     guard.wait()
     assert check("\n".join(guard.out)) and check("\n".join(guard.err))
+
+
+def test_a_share_tells_what_happens(sim, start, tmp_path):
+    drives, path = sim(), tmp_path / "share"
+    share = start("share", "-p", drives.st, "--at", f"unix:{path}", "--json")
+    share.line(0)
+    client = Client(path, "tuner")
+    client.command("st0", 1, 3, 1)
+    share.until(lambda: any('"commanded"' in line for line in share.out), "a command")
+    client.socket.close()
+    share.until(lambda: any('"stopped"' in line for line in share.out), "the motor is stopped")
+    share.interrupt()
+    share.wait()
+    assert len(check("\n".join(share.out))) > 4
 
 
 def test_a_guard_tells_what_it_proved(sim, checked):

@@ -89,10 +89,15 @@ impl Port {
     pub fn name(&self) -> Result<PortName, Failure> {
         match self.port.as_deref() {
             Some(name) if !name.is_empty() => Ok(name.parse()?),
-            _ => Err(Failure::usage("the port is missing").trying(
-                "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
-                 `-p sim:` needs no hardware",
-            )),
+            _ => Err(missing_port()),
         }
     }
+}
+
+/// Neither -p nor MOTORLINK_PORT names a port.
+pub fn missing_port() -> Failure {
+    Failure::usage("the port is missing").trying(
+        "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
+         `-p sim:` needs no hardware",
+    )
 }

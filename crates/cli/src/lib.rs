@@ -23,6 +23,7 @@ mod recording;
 mod repeat;
 mod rmd;
 mod settings;
+mod share;
 mod sim;
 mod span;
 mod st;
@@ -55,6 +56,8 @@ enum Command {
     Sim(sim::Args),
     /// Stand between a program and a drive, and stop the motors when the program ends or fails
     Guard(guard::Args),
+    /// Hold ports, and let several programs use the drives at the same time
+    Share(share::Args),
     /// List serial devices and CAN interfaces, with their problems
     Ports(ports::Args),
     /// Command and read a drive that speaks ST's Motor Control Protocol
@@ -114,6 +117,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Demo(args) => demo::run(args),
         Command::Sim(args) => sim::run(args),
         Command::Guard(args) => guard::run(args, program),
+        Command::Share(args) => share::run(&args),
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),

@@ -192,7 +192,10 @@ impl Acquisition {
         let now = self.clock.now();
         let lane = self.line.lane(&request);
         let command = Command { by: Arc::clone(by), request: request.clone(), is_stop: true };
-        let keep = |queued: &Arc<Command>| !may_move(&queued.request);
+        let motor = request.motor();
+        let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
+        let keep =
+            |queued: &Arc<Command>| !may_move(&queued.request) || is_other(queued.request.motor());
         let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), keep);
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
@@ -302,6 +305,10 @@ impl Acquisition {
                 self.polls.get(&id).map(|poll| poll.request())
             }
             Job::Command(id, command) => {
+                if let Some(latch) = self.latch.clone().filter(|_| may_move(&command.request)) {
+                    self.schedule.ended(self.clock.now(), lane, Outcome::Refused);
+                    return ended(id, Err(CommandError::Latched(latch)));
+                }
                 let what = What::Commanded(id, Arc::clone(&command.by), command.request.clone());
                 self.tell(what);
                 Some(command.request.clone())

@@ -24,11 +24,12 @@ use crate::subscription::{Full, Subscription};
 pub type CommandResult = Result<Reply, CommandError>;
 
 type Task = Box<dyn FnOnce(&mut Engine) + Send>;
+type Ending = Box<dyn FnOnce(CommandResult) + Send>;
 
-/// The engine in its thread, with the senders that wait.
+/// The engine in its thread, with the commands whose end is awaited.
 struct Engine {
     acquisition: Acquisition,
-    waiting: HashMap<CommandId, Sender<CommandResult>>,
+    waiting: HashMap<CommandId, Ending>,
 }
 
 /// An engine in a thread. When it is dropped, the motors that were started through it are stopped.
@@ -101,11 +102,19 @@ impl Remote {
         task: impl FnOnce(&mut Acquisition) -> R + Send + 'static,
     ) -> Result<R, Ended> {
         let (sender, receiver) = mpsc::channel();
-        self.send(move |engine| {
+        self.post(move |engine| {
             // Whoever asked may have gone.
-            let _ = sender.send(task(&mut engine.acquisition));
+            let _ = sender.send(task(engine));
         })?;
         receiver.recv().map_err(|_| Ended)
+    }
+
+    /// Runs a function on the engine, between two steps of it, and does not wait for it.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn post(&self, task: impl FnOnce(&mut Acquisition) + Send + 'static) -> Result<(), Ended> {
+        self.send(|engine| task(&mut engine.acquisition))
     }
 
     /// Sends these signals, and all events, to a new subscription.
@@ -163,14 +172,26 @@ impl Remote {
     /// # Errors
     /// See [`CommandError`].
     pub fn command(&self, by: &Arc<str>, request: Request, time_to_live: Micros) -> CommandResult {
+        let wait = |ended| self.command_then(by, request, time_to_live, ended);
+        Self::wait(wait).unwrap_or(Err(CommandError::Ended))
+    }
+
+    /// As [`command`](Self::command), without waiting: `ended` receives the result in the engine's thread.
+    ///
+    /// # Errors
+    /// The engine has ended. If it ends later, `ended` is dropped.
+    pub fn command_then(
+        &self,
+        by: &Arc<str>,
+        request: Request,
+        time_to_live: Micros,
+        ended: impl FnOnce(CommandResult) + Send + 'static,
+    ) -> Result<(), Ended> {
         let by = Arc::clone(by);
-        let result = self.ask(move |engine, sender| {
-            match engine.acquisition.command(&by, request, time_to_live) {
-                Ok(id) => drop(engine.waiting.insert(id, sender)),
-                Err(error) => drop(sender.send(Err(error))),
-            }
-        });
-        result.unwrap_or(Err(CommandError::Ended))
+        self.send(move |engine| match engine.acquisition.command(&by, request, time_to_live) {
+            Ok(id) => drop(engine.waiting.insert(id, Box::new(ended))),
+            Err(error) => ended(Err(error)),
+        })
     }
 
     /// Stops a motor and waits until it confirms it, or until the stop has failed for good.
@@ -178,21 +199,31 @@ impl Remote {
     /// # Errors
     /// See [`CommandError`]. The motor may still be turning.
     pub fn stop(&self, by: &Arc<str>, request: Request) -> CommandResult {
-        let by = Arc::clone(by);
-        let result = self.ask(move |engine, sender| {
-            let Engine { acquisition, waiting } = engine;
-            let id = acquisition.stop(&by, request, &mut |id, result| tell(waiting, id, result));
-            engine.waiting.insert(id, sender);
-        });
-        result.unwrap_or(Err(CommandError::Ended))
+        Self::wait(|ended| self.stop_then(by, request, ended)).unwrap_or(Err(CommandError::Ended))
     }
 
-    fn ask(
+    /// As [`stop`](Self::stop), without waiting: `ended` receives the result in the engine's thread.
+    ///
+    /// # Errors
+    /// The engine has ended. If it ends later, `ended` is dropped.
+    pub fn stop_then(
         &self,
-        begin: impl FnOnce(&mut Engine, Sender<CommandResult>) + Send + 'static,
-    ) -> Result<CommandResult, Ended> {
+        by: &Arc<str>,
+        request: Request,
+        ended: impl FnOnce(CommandResult) + Send + 'static,
+    ) -> Result<(), Ended> {
+        let by = Arc::clone(by);
+        self.send(move |engine| {
+            let Engine { acquisition, waiting } = engine;
+            let id = acquisition.stop(&by, request, &mut |id, result| tell(waiting, id, result));
+            engine.waiting.insert(id, Box::new(ended));
+        })
+    }
+
+    fn wait(begin: impl FnOnce(Ending) -> Result<(), Ended>) -> Result<CommandResult, Ended> {
         let (sender, receiver) = mpsc::channel();
-        self.send(move |engine| begin(engine, sender))?;
+        // Whoever asked may have gone.
+        begin(Box::new(move |result| drop(sender.send(result))))?;
         receiver.recv().map_err(|_| Ended)
     }
 
@@ -207,14 +238,9 @@ impl Remote {
     }
 }
 
-fn tell(
-    waiting: &mut HashMap<CommandId, Sender<CommandResult>>,
-    id: CommandId,
-    result: CommandResult,
-) {
-    if let Some(sender) = waiting.remove(&id) {
-        // Whoever asked may have gone.
-        let _ = sender.send(result);
+fn tell(waiting: &mut HashMap<CommandId, Ending>, id: CommandId, result: CommandResult) {
+    if let Some(ended) = waiting.remove(&id) {
+        ended(result);
     }
 }
 

@@ -72,6 +72,29 @@ impl Signal {
     }
 }
 
+impl Source {
+    /// All signals of a motor of the same kind.
+    pub fn all(motor: Motor) -> Vec<Source> {
+        let is_readable = |register: &RegisterId| {
+            register.shape().is_some_and(|shape| shape.access != Access::WriteOnly)
+        };
+        match motor {
+            Motor::St(_) => RegisterId::all().filter(is_readable).map(Source::Register).collect(),
+            Motor::Rmd(_) => Quantity::all().map(Source::Quantity).collect(),
+        }
+    }
+
+    /// The symbol of the unit of values; empty without a unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Source::Register(register) => {
+                register.shape().map_or("", |shape| shape.unit.quantity())
+            }
+            Source::Quantity(quantity) => quantity.read().1.scale.symbol,
+        }
+    }
+}
+
 impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -185,6 +208,21 @@ mod tests {
         for quantity in Quantity::all() {
             assert_eq!(Quantity::named(&quantity.name()), Ok(quantity));
         }
+    }
+
+    #[test]
+    fn every_listed_signal_has_a_name_and_its_unit() {
+        let (st, rmd) =
+            (Motor::St(MotorNumber::new(1).unwrap()), Motor::Rmd(MotorId::new(1).unwrap()));
+        for motor in [st, rmd] {
+            for source in Source::all(motor) {
+                assert_eq!(Signal::named(motor, &source.to_string()), Ok(Signal { motor, source }));
+            }
+        }
+        let unit = |motor, name| Signal::named(motor, name).unwrap().source.unit();
+        assert_eq!(unit(st, "SPEED_MEAS"), "rpm");
+        assert_eq!(unit(st, "STATUS"), "");
+        assert_eq!(unit(rmd, "speed_dps"), "°/s");
     }
 
     #[test]

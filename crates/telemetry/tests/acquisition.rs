@@ -8,7 +8,7 @@ use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, EventBytes, Evented, Link, PortError};
 use motorlink_link::fault::Faults;
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{MotorId, Off, SetSpeed, Stop};
+use motorlink_proto::rmd::{MotorId, Off, ReadStatus, SetSpeed, Stop};
 use motorlink_proto::st::{self, MotorNumber, Profile, RegisterId};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::CentiDps;
@@ -526,4 +526,39 @@ fn the_sender_of_a_command_is_named_in_an_event() {
         matches!(what, What::Commanded(id, who, Request::Rmd(..)) if *id == sent && *who == by)
     });
     assert!(told, "{:?}", got.records);
+}
+
+#[test]
+fn a_latch_holds_for_a_command_that_waits() {
+    let bench = bench();
+    let mut engine = Engine::rmd(&bench, "");
+    let motor = MotorId::new(1).unwrap();
+    let turn = Request::rmd(motor, &SetSpeed { speed: CentiDps::from_dps(360.0) });
+    let reading = engine.command(Request::rmd(motor, &ReadStatus)).unwrap();
+    let moving = engine.command(turn.clone()).unwrap();
+    engine.acquisition.latch(&"operator".into());
+    engine.run(SECOND);
+    assert!(matches!(engine.result(reading), Some(Ok(_))), "{:?}", engine.ended);
+    let refused = engine.result(moving);
+    assert!(matches!(refused, Some(Err(CommandError::Latched(_)))), "{:?}", engine.ended);
+    engine.acquisition.release(&"operator".into());
+    let moving = engine.command(turn).unwrap();
+    engine.run(SECOND);
+    assert!(matches!(engine.result(moving), Some(Ok(_))), "{:?}", engine.ended);
+}
+
+#[test]
+fn a_stop_overtakes_the_commands_of_its_own_motor_only() {
+    let bench = bench();
+    let mut engine = Engine::st(&bench, "");
+    let ramp = st::Ramp { speed_rpm: 900, duration_ms: 100 };
+    let [first, second] =
+        [1, 2].map(|motor| engine.command(Request::st(motor, st::Request::SetRamp(ramp))).unwrap());
+    let stop = st::Request::ExecuteCommand(st::Command::StopMotor);
+    let stop = engine.stop(Request::st(1, stop));
+    engine.run(SECOND);
+    let overtaken = engine.result(first);
+    assert!(matches!(overtaken, Some(Err(CommandError::Overtaken))), "{:?}", engine.ended);
+    assert!(matches!(engine.result(second), Some(Ok(_))), "{:?}", engine.ended);
+    assert!(matches!(engine.result(stop), Some(Ok(_))), "{:?}", engine.ended);
 }

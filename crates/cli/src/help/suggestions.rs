@@ -4,7 +4,7 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 32] = [
+const HARMLESS: [&str; 33] = [
     "acceleration",
     "angle",
     "clear-errors",
@@ -31,6 +31,7 @@ const HARMLESS: [&str; 32] = [
     "scan",
     "scenarios",
     "segment",
+    "share",
     "sim",
     "st",
     "status",

@@ -32,3 +32,4 @@ pub use link::StationLink;
 pub use name::ServeName;
 pub use server::{Served, Server, Turn};
 pub use station::{MOST_CLIENTS, Station, Traffic};
+pub use unix::UnixServer;

@@ -18,7 +18,7 @@ use crate::port::PortError;
 const BACKLOG: i32 = 64;
 
 /// A listening Unix socket. Only its user may connect.
-pub(super) struct UnixServer {
+pub struct UnixServer {
     listener: UnixListener,
     path: PathBuf,
     /// The inode of the socket's file, so that another file at its path is not removed.
@@ -27,7 +27,10 @@ pub(super) struct UnixServer {
 
 impl UnixServer {
     /// Listens at `path`. Replaces the socket of a killed server.
-    pub(super) fn open(path: &Path) -> Result<Self, PortError> {
+    ///
+    /// # Errors
+    /// Somebody listens there, another file is there, or the system gives no socket.
+    pub fn open(path: &Path) -> Result<Self, PortError> {
         let port = path.display().to_string();
         clear(path)?;
         let failed =
@@ -37,7 +40,8 @@ impl UnixServer {
         Ok(UnixServer { listener: fd.into(), path: path.to_owned(), inode })
     }
 
-    pub(super) fn listener(&self) -> &UnixListener {
+    /// The socket, which does not wait.
+    pub fn listener(&self) -> &UnixListener {
         &self.listener
     }
 }

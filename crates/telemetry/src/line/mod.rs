@@ -9,7 +9,7 @@ use std::time::Duration;
 use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Code, MotorId};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, OwnedRequest, RegisterId};
+use motorlink_proto::st::{Effect, MotorNumber, OwnedRequest, RegisterId};
 
 use crate::plan::{Poll, Read, Wants};
 use crate::sample::Samples;
@@ -138,6 +138,30 @@ pub trait Line: Send {
 
     /// The values of a poll's signals in its reply; `None` if the reply is none of its replies.
     fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples>;
+}
+
+impl Request {
+    /// The motor that it is for; `None` for the current motor of an ST drive.
+    pub fn motor(&self) -> Option<Motor> {
+        match self {
+            Request::St(motor, _) | Request::Segment(motor, ..) => {
+                MotorNumber::new(*motor).map(Motor::St)
+            }
+            Request::Rmd(id, _) => Some(Motor::Rmd(*id)),
+            Request::Confirm(motor) => Some(*motor),
+        }
+    }
+
+    /// Whether it only reads.
+    pub fn is_read(&self) -> bool {
+        match self {
+            Request::St(_, request) => request.request().is_read(),
+            Request::Rmd(_, [code, ..]) => {
+                Code::from(*code).info().is_some_and(|row| row.stem.starts_with("read_"))
+            }
+            Request::Segment(..) | Request::Confirm(_) => true,
+        }
+    }
 }
 
 impl Poll {

@@ -26,6 +26,18 @@ pub struct Frame {
     pub payload: Vec<u8>,
 }
 
+impl Frame {
+    /// A JSON text.
+    pub fn text(payload: Vec<u8>) -> Self {
+        Frame { kind: Kind::Text, payload }
+    }
+
+    /// Samples.
+    pub fn data(payload: Vec<u8>) -> Self {
+        Frame { kind: Kind::Data, payload }
+    }
+}
+
 /// The stream cannot be read any further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {

@@ -51,7 +51,7 @@ pub enum Ask {
         /// How many records wait at most for this program.
         queue: u32,
         /// What is lost when more would wait.
-        drop: Drop,
+        drop: DropRule,
     },
     /// Ends a subscription.
     Unsubscribe {
@@ -106,7 +106,7 @@ pub struct SignalName {
 /// What a full queue loses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Drop {
+pub enum DropRule {
     /// The oldest: for what shows the present.
     Oldest,
     /// The newest: for what keeps everything up to then.
@@ -163,6 +163,8 @@ pub enum Answer {
         protocol: u32,
         /// The name of the program at the other end, with its version.
         share: String,
+        /// The name that the log has for this program. Others may have the same.
+        name: String,
     },
     /// To lines.
     Lines {

@@ -1,11 +1,14 @@
 //! The messages between a share, which holds the ports, and the programs that use its drives.
 //!
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
-//! (binary columns), [`frame`] puts both on a stream of bytes.
+//! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
+//! [`server`] connects programs to it through a Unix socket.
 
 pub mod data;
 pub mod frame;
+pub mod hub;
 pub mod message;
+pub mod server;
 
 /// The version of the messages.
 pub const VERSION: u32 = 1;

@@ -1,0 +1,327 @@
+//! What programs ask for.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use motorlink_proto::rmd::MotorId;
+use motorlink_proto::st::MotorNumber;
+use motorlink_proto::time::Micros;
+use serde::Deserialize;
+
+use super::feed::Feed;
+use super::line::{Held, Motion};
+use super::place::{SessionId, Speaks};
+use super::session::Gathering;
+use super::{Hub, Work, reason};
+use crate::event::CommandError;
+
+use crate::share::VERSION;
+use crate::share::frame::{Frame, Kind};
+use crate::share::message::{
+    self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
+    MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
+};
+use crate::signal::{Motor, Signal, Source};
+use crate::subscription::Full;
+
+/// The shortest period of a subscription, in seconds.
+const SHORTEST_PERIOD: f64 = 1e-4;
+
+/// Why a request is refused at once.
+type Refused = (Reason, String);
+
+fn usage(message: impl Into<String>) -> Refused {
+    (Reason::Usage, message.into())
+}
+
+impl Hub {
+    /// A program has sent a message.
+    pub fn received(&mut self, session: SessionId, frame: &Frame) {
+        if frame.kind != Kind::Text {
+            return self.close(session, "a program sends requests only");
+        }
+        match message::decode::<message::Request>(&frame.payload) {
+            Ok(request) => self.asked(session, request.id, request.ask),
+            Err(error) => match (self.sessions.get_mut(&session), id_of(&frame.payload)) {
+                (Some(session), Some(id)) => {
+                    session.refuse(id, Reason::Usage, error.to_string());
+                }
+                _ => self.close(session, error.to_string()),
+            },
+        }
+    }
+
+    fn asked(&mut self, session: SessionId, id: u32, ask: Ask) {
+        if let Some(session) = self.sessions.get_mut(&session) {
+            session.pending += 1;
+        }
+        let answered = match (self.name(session), ask) {
+            (None, Ask::Hello { protocol, name }) => self.hello(session, protocol, &name),
+            (None, _) => Err(usage("the first request is `hello`")),
+            (Some(_), Ask::Hello { .. }) => Err(usage("this program has said hello")),
+            (Some(name), ask) => self.carry_out(session, &name, id, ask),
+        };
+        let Some(session) = self.sessions.get_mut(&session) else { return };
+        match answered {
+            Ok(Some(answer)) => session.answer(id, answer),
+            Ok(None) => return,
+            Err((reason, message)) => session.refuse(id, reason, message),
+        }
+        session.pending -= 1;
+    }
+
+    fn name(&self, session: SessionId) -> Option<Arc<str>> {
+        self.sessions.get(&session)?.name.clone()
+    }
+
+    fn hello(
+        &mut self,
+        id: SessionId,
+        protocol: u32,
+        name: &str,
+    ) -> Result<Option<Answer>, Refused> {
+        if protocol != VERSION {
+            let message = format!("this share speaks version {VERSION}, the program {protocol}");
+            return Err((Reason::Version, message));
+        }
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(is_printable) {
+            return Err(usage(format!("a name has 1 to {LONGEST_NAME} bytes that can be printed")));
+        }
+        let is_taken = |name: &str| {
+            self.sessions.values().any(|session| session.name.as_deref() == Some(name))
+        };
+        let mut own = name.to_owned();
+        let mut count = 1;
+        while is_taken(&own) {
+            count += 1;
+            own = format!("{name} {count}");
+        }
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.name = Some(own.as_str().into());
+        }
+        self.say(Happening::Joined, &own, format!("{own} joined"));
+        Ok(Some(Answer::Hello { protocol: VERSION, share: self.share.clone(), name: own }))
+    }
+
+    /// Gives the answer, or `None` if it comes later.
+    fn carry_out(
+        &mut self,
+        session: SessionId,
+        name: &Arc<str>,
+        id: u32,
+        ask: Ask,
+    ) -> Result<Option<Answer>, Refused> {
+        match ask {
+            Ask::Hello { .. } => Ok(None),
+            Ask::Lines => {
+                let latched_by = self.latch.as_deref().map(str::to_owned);
+                Ok(Some(Answer::Lines { lines: self.lines(), latched_by }))
+            }
+            Ask::Signals { line } => {
+                let line = self.line(&line)?;
+                Ok(Some(Answer::Signals { signals: self.lines[line].columns() }))
+            }
+            Ask::Subscribe { signals, period, queue, drop } => {
+                let subscription = self.subscribe(session, &signals, period, queue, drop)?;
+                Ok(Some(Answer::Subscribe { subscription }))
+            }
+            Ask::Unsubscribe { subscription } => {
+                let session = self.sessions.get_mut(&session);
+                let feed = session.and_then(|session| session.feeds.remove(&subscription));
+                let feed = feed.ok_or_else(|| usage(format!("no subscription {subscription}")))?;
+                feed.end(&self.lines);
+                Ok(Some(Answer::Unsubscribe))
+            }
+            Ask::Command { line, motor, bytes, time_to_live } => {
+                self.command(session, name, id, &MotorName { line, motor }, &bytes, time_to_live)?;
+                Ok(None)
+            }
+            Ask::Stop { motor } => self.stop_asked(session, name, id, motor.as_ref()),
+            Ask::Latch => {
+                self.latch = Some(Arc::clone(name));
+                for held in &self.lines {
+                    let by = Arc::clone(name);
+                    held.remote().post(move |engine| engine.latch(&by)).map_err(ended)?;
+                }
+                Ok(Some(Answer::Latch))
+            }
+            Ask::Release => {
+                self.latch = None;
+                for held in &self.lines {
+                    let by = Arc::clone(name);
+                    held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;
+                }
+                Ok(Some(Answer::Release))
+            }
+            Ask::Rates => self.rates(session, id),
+        }
+    }
+
+    fn line(&self, name: &str) -> Result<usize, Refused> {
+        self.lines.iter().position(|held| held.name == name).ok_or_else(|| {
+            let names: Vec<_> = self.lines.iter().map(|held| held.name.as_str()).collect();
+            usage(format!("no line `{name}`; the lines are {}", names.join(", ")))
+        })
+    }
+
+    fn motor(&self, MotorName { line, motor }: &MotorName) -> Result<(usize, Motor), Refused> {
+        let line = self.line(line)?;
+        Ok((line, self.lines[line].motor(*motor).map_err(usage)?))
+    }
+
+    fn subscribe(
+        &mut self,
+        id: SessionId,
+        signals: &[SignalName],
+        period: f64,
+        queue: u32,
+        drop: DropRule,
+    ) -> Result<u32, Refused> {
+        let mut wanted: BTreeMap<usize, BTreeSet<Signal>> = BTreeMap::new();
+        if signals.is_empty() || signals.len() > MOST_SIGNALS {
+            return Err(usage(format!("a subscription has 1 to {MOST_SIGNALS} signals")));
+        }
+        if !(1..=LONGEST_QUEUE).contains(&queue) {
+            return Err(usage(format!("a queue has 1 to {LONGEST_QUEUE} records")));
+        }
+        let period = span("the period", period, SHORTEST_PERIOD)?;
+        for SignalName { line, motor, name } in signals {
+            let (line, motor) = self.motor(&MotorName { line: line.clone(), motor: *motor })?;
+            let signal = Signal::named(motor, name).map_err(|error| usage(error.to_string()))?;
+            wanted.entry(line).or_default().insert(signal);
+        }
+        let full = match drop {
+            DropRule::Oldest => Full::DropOldest,
+            DropRule::Newest => Full::DropNewest,
+        };
+        let Some(session) = self.sessions.get_mut(&id) else { return Ok(0) };
+        if session.feeds.len() >= MOST_SUBSCRIPTIONS {
+            let message = format!("a program has up to {MOST_SUBSCRIPTIONS} subscriptions");
+            return Err((Reason::Busy, message));
+        }
+        session.last_feed += 1;
+        let mut feed = Feed::new(session.last_feed);
+        for (line, signals) in wanted {
+            self.lines[line].known.extend(signals.iter().map(|signal| signal.motor));
+            feed.add(&self.lines, line, signals, period, (queue as usize, full)).map_err(ended)?;
+        }
+        session.feeds.insert(session.last_feed, feed);
+        Ok(session.last_feed)
+    }
+
+    fn command(
+        &mut self,
+        session: SessionId,
+        name: &Arc<str>,
+        id: u32,
+        motor: &MotorName,
+        bytes: &[u8],
+        time_to_live: f64,
+    ) -> Result<(), Refused> {
+        let (line, motor) = self.motor(motor)?;
+        let request = self.lines[line].request(motor, bytes).map_err(usage)?;
+        let time_to_live = span("the time to live", time_to_live, 0.0)?;
+        let motion = Motion::of(&request);
+        let tell = self.teller(session, Some(id), line);
+        let held = &mut self.lines[line];
+        held.known.insert(motor);
+        let before = match motion {
+            // Noted before it is sent.
+            Motion::Starts => held.owners.insert(motor, session),
+            Motion::Stops | Motion::Keeps => None,
+        };
+        let ended_with = move |result| tell(Work::Command { motor, motion, before, result });
+        let begun = match motion {
+            Motion::Stops => held.remote().stop_then(name, request, ended_with),
+            Motion::Starts | Motion::Keeps => {
+                held.remote().command_then(name, request, time_to_live, ended_with)
+            }
+        };
+        begun.map_err(ended)
+    }
+
+    fn stop_asked(
+        &mut self,
+        session: SessionId,
+        name: &Arc<str>,
+        id: u32,
+        motor: Option<&MotorName>,
+    ) -> Result<Option<Answer>, Refused> {
+        let motors: Vec<(usize, Motor)> = match motor {
+            Some(motor) => vec![self.motor(motor)?],
+            None => {
+                let lines = self.lines.iter().enumerate();
+                lines
+                    .flat_map(|(line, held)| held.known.iter().map(move |motor| (line, *motor)))
+                    .collect()
+            }
+        };
+        if motors.is_empty() {
+            return Ok(Some(Answer::Stop { motors: Vec::new() }));
+        }
+        self.gather(session, id, motors.len())?;
+        for (line, motor) in motors {
+            self.stop(line, motor, session, Some(id), name);
+        }
+        Ok(None)
+    }
+
+    fn rates(&mut self, session: SessionId, id: u32) -> Result<Option<Answer>, Refused> {
+        self.gather(session, id, self.lines.len())?;
+        for (line, held) in self.lines.iter().enumerate() {
+            let tell = self.teller(session, Some(id), line);
+            let task = |engine: &mut crate::acquisition::Acquisition| {
+                tell(Work::Rates(engine.rates().collect()));
+            };
+            held.remote().post(task).map_err(ended)?;
+        }
+        Ok(None)
+    }
+
+    /// Waits for several parts of an answer.
+    fn gather(&mut self, session: SessionId, id: u32, missing: usize) -> Result<(), Refused> {
+        let Some(session) = self.sessions.get_mut(&session) else { return Ok(()) };
+        if session.gathering.contains_key(&id) {
+            return Err(usage(format!("request {id} is not finished; use another id")));
+        }
+        session.gathering.insert(id, Gathering { missing, ..Gathering::default() });
+        Ok(())
+    }
+}
+
+impl Held {
+    /// The signals of a motor.
+    fn columns(&self) -> Vec<Column> {
+        let motor = match self.speaks {
+            Speaks::St(_) => MotorNumber::new(1).map(Motor::St),
+            Speaks::Rmd => MotorId::new(1).map(Motor::Rmd),
+        };
+        let column = |motor| move |source| Column::of(&Signal { motor, source });
+        motor.into_iter().flat_map(|it| Source::all(it).into_iter().map(column(it))).collect()
+    }
+}
+
+/// The id of a request that cannot be read otherwise.
+fn id_of(payload: &[u8]) -> Option<u32> {
+    #[derive(Deserialize)]
+    struct Numbered {
+        id: u32,
+    }
+    message::decode::<Numbered>(payload).ok().map(|numbered| numbered.id)
+}
+
+fn span(what: &str, seconds: f64, least: f64) -> Result<Micros, Refused> {
+    if !(least..=LONGEST_TIME).contains(&seconds) {
+        return Err(usage(format!("{what} is {least} to {LONGEST_TIME} s")));
+    }
+    Ok(Micros((seconds * 1e6).round() as u64))
+}
+
+fn ended(error: crate::runner::Ended) -> Refused {
+    let error = CommandError::from(error);
+    (reason(&error), error.to_string())
+}
+
+fn is_printable(character: char) -> bool {
+    motorlink_link::is_printable(character)
+}

@@ -1,0 +1,190 @@
+//! A line that a share holds, and whose motors are whose.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::sync::Arc;
+
+use motorlink::Clock;
+use motorlink_proto::rmd::{Code, MotorId, Stop};
+use motorlink_proto::st as proto;
+use motorlink_proto::st::{Effect, MotorNumber};
+use motorlink_proto::time::Instant;
+
+use super::place::{SessionId, Speaks, seconds, wall_now};
+use super::words::Words;
+use crate::acquisition::Acquisition;
+use crate::line::{Request, Stopped, may_move};
+use crate::plan::Wants;
+use crate::runner::{Remote, Runner};
+use crate::share::message::{Event, Line, Protocol};
+use crate::signal::Motor;
+use crate::subscription::{Full, Record, Subscription};
+
+/// Events of an engine that wait for the share.
+const EVENTS: usize = 10_000;
+
+/// A line that a share holds.
+pub struct Held {
+    pub(super) name: String,
+    port: String,
+    pub(super) speaks: Speaks,
+    runner: Runner,
+    clock: Clock,
+    /// One moment by both clocks.
+    anchor: (Instant, f64),
+    events: Subscription,
+    words: Words,
+    /// Who turned a motor last. They may have left; then its stop is not confirmed.
+    pub(super) owners: BTreeMap<Motor, SessionId>,
+    /// The motors that were read or commanded.
+    pub(super) known: BTreeSet<Motor>,
+}
+
+/// What a command does to the motion of its motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Motion {
+    /// Whoever sends it is responsible for the stop.
+    Starts,
+    Stops,
+    Keeps,
+}
+
+impl Held {
+    /// Starts the engine of an open line.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(
+        name: &str,
+        port: &str,
+        speaks: Speaks,
+        mut acquisition: Acquisition,
+    ) -> io::Result<Self> {
+        let clock = acquisition.clock().clone();
+        let events = Subscription::new(EVENTS, Full::DropOldest);
+        acquisition.subscribe(events.clone(), Wants::new());
+        Ok(Held {
+            name: name.to_owned(),
+            port: port.to_owned(),
+            speaks,
+            anchor: (clock.now(), wall_now()),
+            clock,
+            events,
+            words: Words::default(),
+            owners: BTreeMap::new(),
+            known: BTreeSet::new(),
+            runner: Runner::start(name, acquisition)?,
+        })
+    }
+
+    pub(super) fn remote(&self) -> &Remote {
+        self.runner.remote()
+    }
+
+    pub(super) fn info(&self) -> Line {
+        let now = self.clock.now();
+        let protocol = match self.speaks {
+            Speaks::St(_) => Protocol::St,
+            Speaks::Rmd => Protocol::Rmd,
+        };
+        let (line, port) = (self.name.clone(), self.port.clone());
+        Line { line, protocol, port, t: seconds(now), wall: self.wall(now) }
+    }
+
+    /// The wall clock at a moment of the line's clock.
+    fn wall(&self, at: Instant) -> f64 {
+        let (from, wall) = self.anchor;
+        wall + seconds(at) - seconds(from)
+    }
+
+    /// What happened since the last call; `None` after the end of the engine. `retry` receives the
+    /// motors whose stop should be tried again, because they or their port are back.
+    pub(super) fn take_events(&mut self, retry: &mut Vec<Motor>) -> Option<Vec<Event>> {
+        let mut events = Vec::new();
+        while let Some(record) = self.events.take() {
+            let Record::Event(event) = record else { continue };
+            self.words.retries(&event.what, self.owners.keys(), retry);
+            let told = self.words.of(&self.name, self.speaks, &event.what);
+            events.extend(told.map(|told| Event {
+                wall: self.wall(event.time),
+                line: Some(self.name.clone()),
+                t: Some(seconds(event.time)),
+                ..told
+            }));
+        }
+        let has_ended = events.is_empty() && self.events.is_closed();
+        (!has_ended).then_some(events)
+    }
+
+    /// The motor of this number.
+    pub(super) fn motor(&self, number: u8) -> Result<Motor, String> {
+        match self.speaks {
+            Speaks::St(_) => MotorNumber::new(number).map(Motor::St).ok_or_else(|| {
+                format!("{}: an ST motor of a share has a number from 1 to 7", self.name)
+            }),
+            Speaks::Rmd => MotorId::new(number)
+                .map(Motor::Rmd)
+                .ok_or_else(|| format!("{}: an ID is 1 to {}", self.name, MotorId::COUNT)),
+        }
+    }
+
+    /// The request of these bytes.
+    pub(super) fn request(&self, motor: Motor, bytes: &[u8]) -> Result<Request, String> {
+        match (motor, self.speaks) {
+            (Motor::Rmd(id), _) => match <[u8; 8]>::try_from(bytes) {
+                Ok(bytes) => Ok(Request::Rmd(id, bytes)),
+                Err(_) => Err(format!("a request has 8 bytes, not {}", bytes.len())),
+            },
+            (Motor::St(motor), Speaks::St(profile)) => {
+                let Some((code, payload)) = bytes.split_first() else {
+                    return Err("a request has at least its frame code".to_owned());
+                };
+                match proto::Request::decode(profile, *code, payload) {
+                    Ok(proto::Request::ConfigureSegment { .. }) => {
+                        Err("the share uses the data segments itself; subscribe to the signals"
+                            .to_owned())
+                    }
+                    Ok(request) => Ok(Request::st(motor.number(), request)),
+                    Err(error) => Err(format!("a drive refuses these bytes with {error}")),
+                }
+            }
+            (Motor::St(_), Speaks::Rmd) => Err("the line has RMD motors".to_owned()),
+        }
+    }
+
+    /// Ends the engine; gives the motors that were stopped.
+    pub(super) fn end(self) -> Vec<Stopped> {
+        self.runner.end()
+    }
+}
+
+impl Motion {
+    pub(super) fn of(request: &Request) -> Self {
+        match request {
+            Request::St(_, request) => match Effect::of(&request.request()) {
+                Effect::Starts => Motion::Starts,
+                Effect::Stops => Motion::Stops,
+                _ => Motion::Keeps,
+            },
+            Request::Rmd(_, [code, ..]) if Code::from(*code).ends_motion() => Motion::Stops,
+            _ if may_move(request) => Motion::Starts,
+            _ => Motion::Keeps,
+        }
+    }
+}
+
+/// What stops a motor.
+pub(super) fn stop(motor: Motor) -> Request {
+    match motor {
+        Motor::St(motor) => {
+            let stop = proto::Request::ExecuteCommand(proto::Command::StopMotor);
+            Request::st(motor.number(), stop)
+        }
+        Motor::Rmd(id) => Request::rmd(id, &Stop),
+    }
+}
+
+/// The name of whoever the share acts for when they have left.
+pub(super) fn after(name: &Arc<str>) -> Arc<str> {
+    format!("share, after {name}").into()
+}

@@ -1,0 +1,342 @@
+//! The share without a socket: lines, programs, whose motors are whose.
+//!
+//! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
+
+mod asked;
+mod feed;
+mod line;
+mod place;
+mod session;
+mod words;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, Sender};
+
+use super::frame::Frame;
+use super::message::{self, Event, Happening, MotorName, Reason, SignalName, SignalRate};
+use crate::acquisition::Rate;
+use crate::event::CommandError;
+use crate::line::{Reply, Stopped};
+use crate::runner::{CommandResult, Ended};
+use crate::signal::Motor;
+use line::Motion;
+use place::{number, wall_now};
+use session::Session;
+
+pub use line::Held;
+pub use place::{SessionId, Speaks};
+
+/// The engine of a line has ended: its thread is gone.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}: the engine of this line has ended")]
+pub struct LineEnded(pub String);
+
+/// Lines and the programs that use them.
+pub struct Hub {
+    share: String,
+    lines: Vec<Held>,
+    sessions: BTreeMap<SessionId, Session>,
+    last_session: u64,
+    latch: Option<Arc<str>>,
+    log: VecDeque<Event>,
+    done: Sender<Done>,
+    ended: Receiver<Done>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+/// Something that an engine has finished.
+struct Done {
+    session: SessionId,
+    /// The request; `None` for what nobody asked for.
+    id: Option<u32>,
+    line: usize,
+    what: Work,
+}
+
+enum Work {
+    Command { motor: Motor, motion: Motion, before: Option<SessionId>, result: CommandResult },
+    Stop { motor: Motor, result: CommandResult },
+    Rates(Vec<Rate>),
+}
+
+impl Hub {
+    /// Holds these lines. `share` is the name of this program. `wake` is called from other threads when
+    /// [`advance`](Self::advance) should be called.
+    pub fn new(share: &str, lines: Vec<Held>, wake: impl Fn() + Send + Sync + 'static) -> Self {
+        let (done, ended) = mpsc::channel();
+        Hub {
+            share: share.to_owned(),
+            lines,
+            sessions: BTreeMap::new(),
+            last_session: 0,
+            latch: None,
+            log: VecDeque::new(),
+            done,
+            ended,
+            wake: Arc::new(wake),
+        }
+    }
+
+    /// The lines.
+    pub fn lines(&self) -> Vec<message::Line> {
+        self.lines.iter().map(Held::info).collect()
+    }
+
+    /// A program has connected.
+    pub fn join(&mut self) -> SessionId {
+        self.last_session += 1;
+        let id = SessionId(self.last_session);
+        self.sessions.insert(id, Session::default());
+        id
+    }
+
+    /// A program has gone. The motors that it turned last are stopped.
+    pub fn leave(&mut self, id: SessionId) {
+        let Some(session) = self.sessions.remove(&id) else { return };
+        for (_, feed) in session.feeds {
+            feed.end(&self.lines);
+        }
+        let Some(name) = session.name else { return };
+        self.say(Happening::Left, &name, format!("{name} left"));
+        let by = line::after(&name);
+        for line in 0..self.lines.len() {
+            let owners = self.lines[line].owners.iter();
+            let orphans: Vec<Motor> =
+                owners.filter(|(_, owner)| **owner == id).map(|(motor, _)| *motor).collect();
+            for motor in orphans {
+                self.stop(line, motor, id, None, &by);
+            }
+        }
+    }
+
+    /// Whether a program may send more requests now.
+    pub fn is_accepting(&self, id: SessionId) -> bool {
+        self.sessions.get(&id).is_some_and(Session::is_accepting)
+    }
+
+    /// Whether the connection of a program has to be closed after its last message.
+    pub fn is_closing(&self, id: SessionId) -> bool {
+        self.sessions.get(&id).is_none_or(Session::is_closing)
+    }
+
+    /// Closes the connection of a program, after a message that says why.
+    pub fn close(&mut self, id: SessionId, why: impl Into<String>) {
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.close(why.into());
+        }
+    }
+
+    /// The next message for a program.
+    pub fn next(&mut self, id: SessionId) -> Option<Frame> {
+        self.sessions.get_mut(&id)?.next(&self.lines)
+    }
+
+    /// The next event for the log.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.log.pop_front()
+    }
+
+    /// Takes the samples and events of the engines so far. Call it some 60 times a second.
+    ///
+    /// # Errors
+    /// An engine has ended.
+    pub fn collect(&mut self) -> Result<(), LineEnded> {
+        self.sessions.values_mut().for_each(Session::collect);
+        self.collect_events()
+    }
+
+    fn collect_events(&mut self) -> Result<(), LineEnded> {
+        for line in 0..self.lines.len() {
+            let mut retry = Vec::new();
+            let held = &mut self.lines[line];
+            let events =
+                held.take_events(&mut retry).ok_or_else(|| LineEnded(held.name.clone()))?;
+            events.into_iter().for_each(|event| self.publish(event));
+            for motor in retry {
+                self.stop_if_orphaned(line, motor);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the results of the engines so far.
+    pub fn advance(&mut self) {
+        while let Ok(done) = self.ended.try_recv() {
+            self.finish(done);
+        }
+    }
+
+    /// Stops the motors that were started through the share, and ends it. Gives the line of each.
+    pub fn end(self) -> Vec<(String, Stopped)> {
+        let Hub { lines, .. } = self;
+        // All lines stop at the same time.
+        let ends: Vec<_> = lines
+            .into_iter()
+            .map(|held| (held.name.clone(), std::thread::spawn(move || held.end())))
+            .collect();
+        let stopped = ends.into_iter().map(|(name, end)| (name, end.join().unwrap_or_default()));
+        stopped
+            .flat_map(|(name, motors)| motors.into_iter().map(move |one| (name.clone(), one)))
+            .collect()
+    }
+
+    fn publish(&mut self, event: Event) {
+        self.sessions.values_mut().for_each(|session| session.tell(&event));
+        self.log.push_back(event);
+    }
+
+    fn say(&mut self, event: Happening, by: &str, message: String) {
+        // In the order in which it happened. The end of a line is told at the next call.
+        let _ = self.collect_events();
+        let by = Some(by.to_owned());
+        let (wall, line, t, since, motor) = (wall_now(), None, None, None, None);
+        self.publish(Event { wall, line, t, since, motor, by, event, message });
+    }
+
+    fn finish(&mut self, Done { session, id, line, what }: Done) {
+        match what {
+            Work::Command { motor, motion, before, result } => {
+                self.command_ended(session, line, motor, motion, before, &result);
+                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                session.pending -= 1;
+                match result {
+                    Ok(reply) => session.answer(id, answer(reply)),
+                    Err(error) => session.refuse(id, reason(&error), error.to_string()),
+                }
+            }
+            Work::Stop { motor, result } => {
+                let Some(held) = self.lines.get_mut(line) else { return };
+                if result.is_ok() {
+                    held.owners.remove(&motor);
+                }
+                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                let motor = MotorName { line: held.name.clone(), motor: number(motor) };
+                session.stopped(id, motor, result.err().map(|error| error.to_string()));
+            }
+            Work::Rates(rates) => {
+                let Some(held) = self.lines.get(line) else { return };
+                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                let named = |rate: Rate| SignalRate {
+                    signal: SignalName {
+                        line: held.name.clone(),
+                        motor: number(rate.signal.motor),
+                        name: rate.signal.source.to_string(),
+                    },
+                    asked: rate.asked.0 as f64 / 1e6,
+                    predicted: rate.predicted.0 as f64 / 1e6,
+                    achieved: rate.achieved,
+                };
+                session.rates(id, rates.into_iter().map(named).collect());
+            }
+        }
+    }
+
+    /// Whose the motor is after a command.
+    fn command_ended(
+        &mut self,
+        session: SessionId,
+        line: usize,
+        motor: Motor,
+        motion: Motion,
+        before: Option<SessionId>,
+        result: &CommandResult,
+    ) {
+        let is_here = |id: &SessionId| self.sessions.contains_key(id);
+        let (is_alive, before) = (is_here(&session), before.filter(is_here));
+        let Some(held) = self.lines.get_mut(line) else { return };
+        match (motion, result) {
+            (Motion::Stops, Ok(_)) => drop(held.owners.remove(&motor)),
+            (Motion::Starts, Err(error)) if !may_be_executed(error) => {
+                // A refused start takes the motor from nobody.
+                if let Some(before) = before.filter(|_| held.owners.get(&motor) == Some(&session)) {
+                    held.owners.insert(motor, before);
+                }
+            }
+            (Motion::Starts, _) => {
+                // A stop may have been confirmed since.
+                if is_alive || !held.owners.contains_key(&motor) {
+                    held.owners.insert(motor, session);
+                }
+                self.stop_if_orphaned(line, motor);
+            }
+            (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
+        }
+    }
+
+    fn stop_if_orphaned(&mut self, line: usize, motor: Motor) {
+        let Some(owner) = self.lines.get(line).and_then(|held| held.owners.get(&motor)) else {
+            return;
+        };
+        if !self.sessions.contains_key(owner) {
+            let owner = *owner;
+            self.stop(line, motor, owner, None, &"share".into());
+        }
+    }
+
+    fn stop(
+        &mut self,
+        line: usize,
+        motor: Motor,
+        session: SessionId,
+        id: Option<u32>,
+        by: &Arc<str>,
+    ) {
+        let Some(held) = self.lines.get(line) else { return };
+        let tell = self.teller(session, id, line);
+        let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
+            tell(Work::Stop { motor, result });
+        });
+        if begun.is_err() {
+            let result = Err(CommandError::Ended);
+            self.finish(Done { session, id, line, what: Work::Stop { motor, result } });
+        }
+    }
+
+    /// Receives the end of something in an engine's thread.
+    fn teller(
+        &self,
+        session: SessionId,
+        id: Option<u32>,
+        line: usize,
+    ) -> impl FnOnce(Work) + Send + use<> {
+        let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
+        move |what| {
+            // The hub may have gone.
+            let _ = done.send(Done { session, id, line, what });
+            wake();
+        }
+    }
+}
+
+fn answer(reply: Reply) -> message::Answer {
+    let bytes = match reply {
+        Reply::St(payload) => payload,
+        Reply::Rmd(bytes) => bytes.to_vec(),
+        Reply::Confirmed => Vec::new(),
+    };
+    message::Answer::Command { bytes }
+}
+
+fn reason(error: &CommandError) -> Reason {
+    match error {
+        CommandError::Expired => Reason::Expired,
+        CommandError::Overtaken => Reason::Overtaken,
+        CommandError::Displaced => Reason::Displaced,
+        CommandError::Latched(_) => Reason::Latched,
+        CommandError::TooMany => Reason::Busy,
+        CommandError::Line(error) if !error.is_line_failure() => Reason::Refused,
+        CommandError::Closed | CommandError::Ended | CommandError::Line(_) => Reason::Line,
+    }
+}
+
+/// Whether a drive may have executed a command that failed.
+fn may_be_executed(error: &CommandError) -> bool {
+    matches!(reason(error), Reason::Displaced | Reason::Line)
+}
+
+impl From<Ended> for CommandError {
+    fn from(_: Ended) -> Self {
+        CommandError::Ended
+    }
+}

@@ -1,0 +1,39 @@
+//! Who and what the parts of a hub speak of: programs, protocols, motors, times.
+
+use std::time::SystemTime;
+
+use motorlink_proto::st::Profile;
+use motorlink_proto::time::Instant;
+
+use crate::signal::Motor;
+
+/// A program at the share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SessionId(pub(super) u64);
+
+/// What the drives of a line speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speaks {
+    /// ST's protocol, in this profile.
+    St(Profile),
+    /// The RMD protocol.
+    Rmd,
+}
+
+/// The number of a motor on its line.
+pub(super) fn number(motor: Motor) -> u8 {
+    match motor {
+        Motor::St(motor) => motor.number(),
+        Motor::Rmd(id) => id.number(),
+    }
+}
+
+pub(super) fn seconds(at: Instant) -> f64 {
+    at.0 as f64 / 1e6
+}
+
+/// The wall clock, in seconds since 1970.
+pub(super) fn wall_now() -> f64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0.0, |since| since.as_secs_f64())
+}

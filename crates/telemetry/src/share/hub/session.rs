@@ -1,0 +1,161 @@
+//! A program at a share: what it asked for, and what waits for it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use super::feed::Feed;
+use super::line::Held;
+use crate::share::frame::Frame;
+use crate::share::message::{
+    self, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
+};
+
+/// Events that wait for a program.
+const EVENTS: usize = 1000;
+/// Requests of a program that are not finished, or whose answers wait.
+const REQUESTS: usize = 256;
+
+/// A program at a share.
+#[derive(Default)]
+pub(super) struct Session {
+    /// `None` before hello.
+    pub(super) name: Option<Arc<str>>,
+    answers: VecDeque<Text>,
+    events: VecDeque<Event>,
+    missed: u64,
+    /// Requests without an answer.
+    pub(super) pending: usize,
+    pub(super) gathering: BTreeMap<u32, Gathering>,
+    pub(super) feeds: BTreeMap<u32, Feed>,
+    pub(super) last_feed: u32,
+    last_group: u32,
+    /// The feeds whose values are collected next.
+    due: VecDeque<u32>,
+    samples: VecDeque<Frame>,
+    closing: Closing,
+}
+
+/// Whether the connection goes on.
+#[derive(Default)]
+enum Closing {
+    #[default]
+    Open,
+    /// The program is told why it ends.
+    Because(String),
+    Said,
+}
+
+/// The parts of an answer, of several motors or lines.
+#[derive(Default)]
+pub(super) struct Gathering {
+    pub(super) missing: usize,
+    pub(super) stopped: Vec<StoppedMotor>,
+    pub(super) rates: Option<Vec<SignalRate>>,
+}
+
+impl Session {
+    pub(super) fn answer(&mut self, id: u32, answer: Answer) {
+        self.answers.push_back(Text::Answer { id, answer });
+    }
+
+    pub(super) fn refuse(&mut self, id: u32, reason: Reason, message: impl Into<String>) {
+        self.answers.push_back(Text::Refusal { id, reason, message: message.into() });
+    }
+
+    /// The program gets nothing but this after what waits already.
+    pub(super) fn close(&mut self, why: String) {
+        if matches!(self.closing, Closing::Open) {
+            self.closing = Closing::Because(why);
+        }
+    }
+
+    pub(super) fn is_closing(&self) -> bool {
+        !matches!(self.closing, Closing::Open)
+    }
+
+    /// Whether more requests can be taken.
+    pub(super) fn is_accepting(&self) -> bool {
+        !self.is_closing() && self.pending + self.answers.len() < REQUESTS
+    }
+
+    pub(super) fn tell(&mut self, event: &Event) {
+        if self.name.is_none() {
+            return;
+        }
+        if self.events.len() >= EVENTS {
+            self.events.pop_front();
+            self.missed += 1;
+        }
+        self.events.push_back(event.clone());
+    }
+
+    /// Collects the values of all subscriptions, when the program takes them.
+    pub(super) fn collect(&mut self) {
+        let waiting: Vec<u32> =
+            self.feeds.keys().copied().filter(|id| !self.due.contains(id)).collect();
+        self.due.extend(waiting);
+    }
+
+    /// What the program gets next: answers first.
+    pub(super) fn next(&mut self, lines: &[Held]) -> Option<Frame> {
+        if let Some(text) = self.answers.pop_front() {
+            return Some(Frame::text(message::encode(&text)));
+        }
+        if self.missed > 0 {
+            let events = std::mem::take(&mut self.missed);
+            return Some(Frame::text(message::encode(&Text::Missed { events })));
+        }
+        if let Some(event) = self.events.pop_front() {
+            return Some(Frame::text(message::encode(&Text::Event(event))));
+        }
+        if self.is_closing() {
+            return match std::mem::replace(&mut self.closing, Closing::Said) {
+                Closing::Because(message) => {
+                    Some(Frame::text(message::encode(&Text::Closing { message })))
+                }
+                Closing::Open | Closing::Said => None,
+            };
+        }
+        while self.samples.is_empty() {
+            let id = self.due.pop_front()?;
+            if let Some(feed) = self.feeds.get_mut(&id) {
+                self.samples.extend(feed.collect(lines, &mut self.last_group));
+            }
+        }
+        self.samples.pop_front()
+    }
+
+    /// A motor took the stop of a request, or did not.
+    pub(super) fn stopped(&mut self, id: u32, motor: MotorName, failure: Option<String>) {
+        if let Some(gathering) = self.gathering.get_mut(&id) {
+            gathering.stopped.push(StoppedMotor { motor, failure });
+            self.gathered(id);
+        }
+    }
+
+    /// The rates of a line.
+    pub(super) fn rates(&mut self, id: u32, rates: Vec<SignalRate>) {
+        if let Some(gathering) = self.gathering.get_mut(&id) {
+            gathering.rates.get_or_insert_default().extend(rates);
+            self.gathered(id);
+        }
+    }
+
+    fn gathered(&mut self, id: u32) {
+        let Some(gathering) = self.gathering.get_mut(&id) else { return };
+        gathering.missing = gathering.missing.saturating_sub(1);
+        if gathering.missing > 0 {
+            return;
+        }
+        let Some(Gathering { mut stopped, rates, .. }) = self.gathering.remove(&id) else { return };
+        self.pending -= 1;
+        stopped.sort_by(|one, other| one.motor.cmp(&other.motor));
+        self.answer(
+            id,
+            match rates {
+                Some(rates) => Answer::Rates { rates },
+                None => Answer::Stop { motors: stopped },
+            },
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! The events of an engine for programs and people.
+
+use std::collections::HashMap;
+
+use motorlink::st::Transcript;
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Direction, describe};
+use motorlink_proto::st::{Frame, MAX_FRAME};
+
+use super::place::{Speaks, number, seconds};
+use crate::event::What;
+use crate::line::Request;
+use crate::schedule::CommandId;
+use crate::share::message::{Event, Happening};
+use crate::signal::Motor;
+
+/// The stops whose end is not known yet.
+#[derive(Debug, Default)]
+pub(super) struct Words {
+    stops: HashMap<CommandId, (Option<Motor>, String)>,
+}
+
+impl Words {
+    /// The motors, among these, whose stop should be tried again after an event.
+    pub(super) fn retries<'m>(
+        &self,
+        what: &What,
+        motors: impl Iterator<Item = &'m Motor>,
+        retry: &mut Vec<Motor>,
+    ) {
+        match what {
+            What::Back => retry.extend(motors),
+            What::Answers(motor) => retry.extend(motors.filter(|it| *it == motor)),
+            _ => {}
+        }
+    }
+
+    /// The event, without its times. Reads and confirmations are none.
+    pub(super) fn of(&mut self, line: &str, speaks: Speaks, what: &What) -> Option<Event> {
+        let event = |event, motor: Option<Motor>, by: Option<&str>, message: String| {
+            let motor = motor.map(number);
+            let by = by.map(str::to_owned);
+            let place = match motor {
+                Some(motor) => format!("{line}, motor {motor}"),
+                None => line.to_owned(),
+            };
+            let message = format!("{place}: {message}");
+            Some(Event { wall: 0.0, line: None, t: None, since: None, motor, by, event, message })
+        };
+        match what {
+            What::Lost(why) => {
+                event(Happening::Lost, None, None, format!("the port failed: {why}"))
+            }
+            What::Back => event(Happening::Back, None, None, "the port is open again".to_owned()),
+            What::Silent(motor, why) => {
+                event(Happening::Silent, Some(*motor), None, format!("it does not answer: {why}"))
+            }
+            What::Answers(motor) => {
+                event(Happening::Answers, Some(*motor), None, "it answers again".to_owned())
+            }
+            What::Refused(signals, why) => {
+                let motor = signals.first().map(|signal| signal.motor);
+                let names: Vec<_> = signals.iter().map(|it| it.source.to_string()).collect();
+                let message = format!("no values of {}: {why}", names.join(", "));
+                event(Happening::Refused, motor, None, message)
+            }
+            What::Doubtful(motor, since) => {
+                let message = "values may be those of other signals".to_owned();
+                let told = event(Happening::Doubtful, Some(*motor), None, message)?;
+                Some(Event { since: Some(seconds(*since)), ..told })
+            }
+            What::Commanded(_, by, request) if !request.is_read() => {
+                let message = format!("{by} sends {}", described(speaks, request));
+                event(Happening::Commanded, request.motor(), Some(by), message)
+            }
+            What::Confirmed(..) | What::Commanded(..) => None,
+            What::Stopping(id, by, request) => {
+                self.stops.insert(*id, (request.motor(), by.to_string()));
+                let message = format!("{by} stops it");
+                event(Happening::Stopping, request.motor(), Some(by), message)
+            }
+            What::Stopped(id) => {
+                let (motor, by) = self.stops.remove(id)?;
+                let message = "it confirmed the stop".to_owned();
+                event(Happening::Stopped, motor, Some(&by), message)
+            }
+            What::StopFailed(id, why) => {
+                let (motor, by) = self.stops.remove(id)?;
+                let message = format!("it may still be turning: {why}");
+                event(Happening::StopFailed, motor, Some(&by), message)
+            }
+            What::Latched(by) => {
+                let message = format!("{by} refuses motion until it is released");
+                event(Happening::Latched, None, Some(by), message)
+            }
+            What::Released(by) => {
+                event(Happening::Released, None, Some(by), format!("{by} allows motion again"))
+            }
+        }
+    }
+}
+
+/// A request with names and units.
+fn described(speaks: Speaks, request: &Request) -> String {
+    match (request, speaks) {
+        (Request::St(motor, request), Speaks::St(profile)) => {
+            let mut bytes = [0; MAX_FRAME];
+            let frame = Frame::command(*motor, &request.request(), &mut bytes);
+            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
+        }
+        (Request::Rmd(id, data), _) => {
+            describe(CanFrame::new(id.can_id(), *data), Direction::HostToDrive).to_string()
+        }
+        _ => String::new(),
+    }
+}

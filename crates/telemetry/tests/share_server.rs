@@ -1,0 +1,463 @@
+//! A share at a Unix socket: programs that come, ask, read too slowly, and are gone.
+
+use std::io::{Read, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use motorlink_proto::st::Profile;
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::frame::{self, Kind, Reader};
+use motorlink_telemetry::share::hub::{Held, Speaks};
+use motorlink_telemetry::share::message::*;
+use motorlink_telemetry::share::server::Server;
+use motorlink_testbench::{Bench, BenchConfig, Serving};
+
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// A share of simulated drives on ptys: the line st0 and the line rmd0.
+struct Share {
+    bench: Bench,
+    path: PathBuf,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Vec<(String, Stopped)>>>,
+    _serving: Serving,
+}
+
+impl Share {
+    fn new(name: &str) -> Self {
+        let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
+        let path = |kind: &str| folder.join(format!("share-{name}-{kind}-{}", std::process::id()));
+        let (st, rmd) = (path("st").display().to_string(), path("rmd").display().to_string());
+        let bench = Bench::new(&BenchConfig::default()).unwrap();
+        let ports =
+            [format!("pty:{st}"), format!("slcan-pty:{rmd}")].map(|port| port.parse().unwrap());
+        let [served_st, served_rmd] = ports;
+        let serving = bench.serve(Some(served_st), Some(served_rmd)).unwrap();
+        let line = StLine::open(&st.parse().unwrap(), Default::default()).unwrap();
+        let speaks = Speaks::St(Profile::Spec);
+        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
+        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), Default::default());
+        let engine = Acquisition::new(Box::new(line.unwrap()));
+        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
+        let socket = path("socket");
+        let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
+        let ends = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&ends);
+        let thread = std::thread::spawn(move || {
+            while !told.load(Ordering::SeqCst) {
+                server.turn().unwrap();
+            }
+            server.end("the test is over")
+        });
+        Share { bench, path: socket, ends, thread: Some(thread), _serving: serving }
+    }
+
+    fn join(&self, name: &str) -> Program {
+        let mut program = Program::connect(&self.path);
+        let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
+        assert!(matches!(program.ask(hello), Ok(Answer::Hello { .. })));
+        program
+    }
+
+    fn end(&mut self) -> Vec<(String, Stopped)> {
+        self.ends.store(true, Ordering::SeqCst);
+        self.thread.take().map_or_else(Vec::new, |thread| thread.join().unwrap())
+    }
+
+    fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
+        let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
+        let end = Instant::now() + LIMIT;
+        while !what(self.bench.values()[at]) {
+            assert!(Instant::now() < end, "{signal} is {}", self.bench.values()[at]);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Share {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// What a program has received.
+#[derive(Debug)]
+enum Got {
+    Text(Text),
+    Data(Data),
+    End,
+}
+
+struct Program {
+    stream: UnixStream,
+    reader: Reader,
+    last: u32,
+    others: Vec<Got>,
+}
+
+impl Program {
+    fn connect(path: &Path) -> Self {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(LIMIT)).unwrap();
+        Program { stream, reader: Reader::default(), last: 0, others: Vec::new() }
+    }
+
+    fn send(&mut self, ask: Ask) -> u32 {
+        self.last += 1;
+        let mut bytes = Vec::new();
+        let text = encode(&Request { id: self.last, ask });
+        frame::append(Kind::Text, &text, &mut bytes).unwrap();
+        self.stream.write_all(&bytes).unwrap();
+        self.last
+    }
+
+    fn receive(&mut self) -> Got {
+        loop {
+            if let Some(frame) = self.reader.take().unwrap() {
+                return match frame.kind {
+                    Kind::Text => Got::Text(decode(&frame.payload).unwrap()),
+                    Kind::Data => Got::Data(Data::decode(&frame.payload).unwrap()),
+                };
+            }
+            let mut bytes = [0; 4096];
+            match self.stream.read(&mut bytes).unwrap() {
+                0 => return Got::End,
+                size => self.reader.push(&bytes[..size]),
+            }
+        }
+    }
+
+    fn ask(&mut self, ask: Ask) -> Result<Answer, (Reason, String)> {
+        let sent = self.send(ask);
+        loop {
+            match self.receive() {
+                Got::Text(Text::Answer { id, answer }) if id == sent => return Ok(answer),
+                Got::Text(Text::Refusal { id, reason, message }) if id == sent => {
+                    return Err((reason, message));
+                }
+                Got::End => panic!("the connection has ended"),
+                other => self.others.push(other),
+            }
+        }
+    }
+
+    fn command(&mut self, line: &str, motor: u8, bytes: &[u8]) -> Result<Answer, (Reason, String)> {
+        let (line, bytes, time_to_live) = (line.to_owned(), bytes.to_vec(), 1.0);
+        self.ask(Ask::Command { line, motor, bytes, time_to_live })
+    }
+
+    fn turn(&mut self, motor: u8, dps: i32) {
+        let [a, b, c, d] = (dps * 100).to_le_bytes();
+        self.command("rmd0", motor, &[0xA2, 0, 0, 0, a, b, c, d]).unwrap();
+    }
+
+    fn start_st(&mut self) {
+        let [a, b, c, d] = 1500i32.to_le_bytes();
+        self.command("st0", 1, &[0x07, a, b, c, d, 100, 0]).unwrap();
+        self.command("st0", 1, &[0x03, 1]).unwrap();
+    }
+
+    fn subscribe(&mut self, signals: &[(&str, u8, &str)], queue: u32) -> u32 {
+        let signals = signals.iter().map(|&(line, motor, name)| SignalName {
+            line: line.to_owned(),
+            motor,
+            name: name.to_owned(),
+        });
+        let signals = signals.collect();
+        let ask = Ask::Subscribe { signals, period: 0.01, queue, drop: DropRule::Oldest };
+        match self.ask(ask) {
+            Ok(Answer::Subscribe { subscription }) => subscription,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Reads until this event.
+    fn await_event(&mut self, wanted: Happening) -> Event {
+        loop {
+            match self.receive() {
+                Got::Text(Text::Event(event)) if event.event == wanted => return event,
+                Got::End => panic!("{wanted:?} did not come"),
+                _ => {}
+            }
+        }
+    }
+
+    /// The next samples.
+    fn data(&mut self) -> Data {
+        loop {
+            match self.receive() {
+                Got::Data(data) => return data,
+                Got::End => panic!("no samples"),
+                other => self.others.push(other),
+            }
+        }
+    }
+
+    fn closing(&mut self) -> String {
+        let mut why = None;
+        loop {
+            match self.receive() {
+                Got::Text(Text::Closing { message }) => why = Some(message),
+                Got::End => return why.expect("a reason"),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn motor(line: &str, motor: u8) -> MotorName {
+    MotorName { line: line.to_owned(), motor }
+}
+
+#[test]
+fn programs_see_lines_and_signals_and_each_other() {
+    let share = Share::new("lines");
+    let mode = share.path.metadata().unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    let mut first = share.join("tuner");
+    let mut second = Program::connect(&share.path);
+    let hello = Ask::Hello { protocol: VERSION, name: "tuner".to_owned() };
+    let answer = second.ask(hello).unwrap();
+    assert!(matches!(answer, Answer::Hello { name, .. } if name == "tuner 2"));
+    let Ok(Answer::Lines { lines, latched_by: None }) = first.ask(Ask::Lines) else { panic!() };
+    let names: Vec<_> = lines.iter().map(|it| (it.line.as_str(), it.protocol)).collect();
+    assert_eq!(names, [("st0", Protocol::St), ("rmd0", Protocol::Rmd)]);
+    for (line, wanted, unit) in [("st0", "SPEED_MEAS", "rpm"), ("rmd0", "speed_dps", "°/s")] {
+        let answer = first.ask(Ask::Signals { line: line.to_owned() });
+        let Ok(Answer::Signals { signals }) = answer else { panic!("{answer:?}") };
+        assert!(signals.iter().any(|it| it.name == wanted && it.unit == unit), "{signals:?}");
+    }
+    drop(second);
+    assert_eq!(first.await_event(Happening::Left).by.as_deref(), Some("tuner 2"));
+}
+
+#[test]
+fn samples_come_with_their_columns_while_another_program_commands() {
+    let share = Share::new("samples");
+    let (mut viewer, mut tuner) = (share.join("viewer"), share.join("tuner"));
+    let signals = [("st0", 1, "SPEED_MEAS"), ("st0", 1, "STATUS"), ("rmd0", 2, "speed_dps")];
+    viewer.subscribe(&signals, 1000);
+    tuner.start_st();
+    tuner.turn(2, 360);
+    let (mut is_st, mut is_rmd) = (false, false);
+    let mut groups = Vec::new();
+    let mut sequences = std::collections::BTreeMap::new();
+    while !(is_st && is_rmd) {
+        let data = viewer.data();
+        groups.extend(viewer.others.drain(..).filter_map(|got| match got {
+            Got::Text(Text::Group(group)) => Some(group),
+            _ => None,
+        }));
+        let group = groups.iter().find(|it| it.group == data.group).expect("described before");
+        assert_eq!(data.columns.len(), 2 + group.columns.len());
+        let next = sequences.entry(data.group).or_insert(0);
+        assert_eq!((data.sequence, data.lost), (*next, 0));
+        *next += 1;
+        let last = |name: &str| {
+            let at = group.columns.iter().position(|column| column.name == name)?;
+            data.columns[2 + at].last().copied()
+        };
+        is_st |= last("SPEED_MEAS").is_some_and(|rpm| rpm > 1000.0);
+        is_rmd |= last("speed_dps").is_some_and(|dps| dps > 300.0);
+    }
+    let Ok(Answer::Rates { rates }) = viewer.ask(Ask::Rates) else { panic!() };
+    assert_eq!(rates.len(), 3);
+    assert!(rates.iter().all(|rate| rate.asked == 0.01), "{rates:?}");
+}
+
+#[test]
+fn the_motors_of_a_program_that_goes_stop_and_no_others() {
+    let share = Share::new("gone");
+    let mut watcher = share.join("watcher");
+    for round in 0..10 {
+        let (mut stays, mut goes) = (share.join("stays"), share.join("goes"));
+        stays.turn(1, 360);
+        goes.turn(1, 200);
+        stays.turn(1, 360);
+        goes.turn(2, 360);
+        goes.start_st();
+        share.reaches("rmd2.speed_dps", |dps| dps > 300.0);
+        drop(goes);
+        share.reaches("rmd2.speed_dps", |dps| dps.abs() < 5.0);
+        share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+        share.reaches("rmd1.speed_dps", |dps| dps > 300.0);
+        stays.ask(Ask::Stop { motor: Some(motor("rmd0", 1)) }).unwrap();
+        drop(stays);
+        assert_eq!(watcher.await_event(Happening::Left).by.as_deref(), Some("goes"), "{round}");
+        assert_eq!(watcher.await_event(Happening::Left).by.as_deref(), Some("stays"), "{round}");
+    }
+}
+
+#[test]
+fn a_stop_of_all_and_a_latch_hold_for_all_programs() {
+    let share = Share::new("latch");
+    let (mut operator, mut arm) = (share.join("operator"), share.join("arm"));
+    arm.turn(1, 360);
+    arm.start_st();
+    share.reaches("rmd1.speed_dps", |dps| dps > 300.0);
+    operator.ask(Ask::Latch).unwrap();
+    let Ok(Answer::Stop { motors }) = operator.ask(Ask::Stop { motor: None }) else { panic!() };
+    assert_eq!(motors.len(), 2);
+    assert!(motors.iter().all(|one| one.failure.is_none()), "{motors:?}");
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
+    let (reason, message) = arm.command("rmd0", 1, &[0xA2, 0, 0, 0, 1, 1, 0, 0]).unwrap_err();
+    assert_eq!(reason, Reason::Latched);
+    assert!(message.contains("operator"), "{message}");
+    let (reason, _) = arm.command("st0", 1, &[0x03, 1]).unwrap_err();
+    assert_eq!(reason, Reason::Latched);
+    operator.ask(Ask::Release).unwrap();
+    arm.turn(1, 360);
+    arm.command("rmd0", 1, &[0x81, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+}
+
+#[test]
+fn requests_that_are_not_possible_are_refused_with_words() {
+    let share = Share::new("usage");
+    let mut early = Program::connect(&share.path);
+    assert_eq!(early.ask(Ask::Lines).unwrap_err().0, Reason::Usage);
+    let hello = |protocol, name: &str| Ask::Hello { protocol, name: name.to_owned() };
+    assert_eq!(early.ask(hello(9, "x")).unwrap_err().0, Reason::Version);
+    for name in ["", "a\nb", &"x".repeat(LONGEST_NAME + 1)] {
+        assert_eq!(early.ask(hello(VERSION, name)).unwrap_err().0, Reason::Usage);
+    }
+    let mut program = share.join("x");
+    assert_eq!(program.ask(hello(VERSION, "y")).unwrap_err().0, Reason::Usage);
+    let commands: [(&str, u8, &[u8], &str); 6] = [
+        ("st1", 1, &[3, 1], "no line `st1`; the lines are st0, rmd0"),
+        ("st0", 0, &[3, 1], "number from 1 to 7"),
+        ("st0", 1, &[], "frame code"),
+        ("st0", 1, &[0x0E, 0, 1], "subscribe"),
+        ("rmd0", 33, &[0; 8], "1 to 32"),
+        ("rmd0", 1, &[0x9A], "8 bytes, not 1"),
+    ];
+    for (line, motor, bytes, words) in commands {
+        let (reason, message) = program.command(line, motor, bytes).unwrap_err();
+        assert_eq!(reason, Reason::Usage);
+        assert!(message.contains(words), "{message}");
+    }
+    let (reason, message) = program.command("st0", 1, &[2, 0xEE]).unwrap_err();
+    assert_eq!(reason, Reason::Refused, "{message}");
+    let (line, bytes, time_to_live) = ("st0".to_owned(), vec![3, 2], f64::NAN);
+    let refused = program.ask(Ask::Command { line, motor: 1, bytes, time_to_live });
+    assert_eq!(refused.unwrap_err().0, Reason::Usage);
+    let ask = Ask::Unsubscribe { subscription: 4 };
+    assert_eq!(program.ask(ask).unwrap_err().0, Reason::Usage);
+    let mut bytes = Vec::new();
+    let later = br#"{"id":77,"ask":"dance"}"#;
+    frame::append(Kind::Text, later, &mut bytes).unwrap();
+    program.stream.write_all(&bytes).unwrap();
+    let refused = program.receive();
+    assert!(
+        matches!(refused, Got::Text(Text::Refusal { id: 77, reason: Reason::Usage, .. })),
+        "{refused:?}"
+    );
+    program.ask(Ask::Lines).unwrap();
+}
+
+#[test]
+fn damage_ends_the_connection_with_words_and_nothing_else() {
+    let share = Share::new("damage");
+    let mut viewer = share.join("viewer");
+    viewer.subscribe(&[("st0", 1, "SPEED_MEAS")], 100);
+    let text = |payload: &[u8]| {
+        let mut bytes = Vec::new();
+        frame::append(Kind::Text, payload, &mut bytes).unwrap();
+        bytes
+    };
+    let damaged = [
+        b"GET / HTTP/1.1\r\n\r\n".to_vec(),
+        vec![0xFF; 5000],
+        text(b"{"),
+        text(b"\xFF\xFE"),
+        text(br#"{"ask":"lines"}"#),
+        vec![1, 0, 0, 0, 2, 0, 0, 0, 7],
+    ];
+    for bytes in damaged {
+        let mut program = Program::connect(&share.path);
+        program.stream.write_all(&bytes).unwrap();
+        assert!(!program.closing().is_empty());
+    }
+    // Half a message and no more.
+    let mut half = Program::connect(&share.path);
+    half.stream.write_all(&text(br#"{"id":1,"ask":"lines"}"#)[..12]).unwrap();
+    drop(half);
+    assert!(viewer.data().rows() > 0);
+}
+
+#[test]
+fn a_program_that_does_not_read_loses_samples_and_slows_nobody() {
+    let share = Share::new("slow");
+    let (mut slow, mut viewer) = (share.join("slow"), share.join("viewer"));
+    let signals: Vec<_> = (1..=4)
+        .flat_map(|motor| ["speed_dps", "voltage_volts", "phase_a_amps"].map(|name| (motor, name)))
+        .map(|(motor, name)| ("rmd0", motor, name))
+        .collect();
+    // Its socket takes what would come within minutes, so its events have to fill it.
+    slow.subscribe(&signals, 20);
+    for _ in 0..3000 {
+        viewer.command("st0", 1, &[0x03, 7]).unwrap();
+    }
+    viewer.subscribe(&[("rmd0", 1, "speed_dps")], 100);
+    for _ in 0..50 {
+        assert_eq!(viewer.data().lost, 0);
+    }
+    let mut missed = 0;
+    let mut lost = 0;
+    while missed == 0 || lost == 0 {
+        match slow.receive() {
+            Got::Text(Text::Missed { events }) => missed += events,
+            Got::Data(data) => lost += data.lost,
+            Got::End => panic!("it was closed"),
+            Got::Text(_) => {}
+        }
+    }
+}
+
+#[test]
+fn requests_are_answered_each_once_however_many_there_are() {
+    let share = Share::new("many");
+    let mut program = share.join("x");
+    let count = 2000;
+    let mut stream = program.stream.try_clone().unwrap();
+    let writes = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        for id in 0..count {
+            let text = encode(&Request { id, ask: Ask::Lines });
+            frame::append(Kind::Text, &text, &mut bytes).unwrap();
+        }
+        stream.write_all(&bytes).unwrap();
+    });
+    let mut answered = 0;
+    while answered < count {
+        match program.receive() {
+            Got::Text(Text::Answer { id, .. }) => {
+                assert_eq!(id, answered);
+                answered += 1;
+            }
+            Got::End => panic!("{answered} answers"),
+            _ => {}
+        }
+    }
+    writes.join().unwrap();
+}
+
+#[test]
+fn programs_are_told_when_the_share_ends_and_motors_stop() {
+    let mut share = Share::new("end");
+    let mut program = share.join("x");
+    program.turn(3, 360);
+    share.reaches("rmd3.speed_dps", |dps| dps > 300.0);
+    let stopped = share.end();
+    assert!(matches!(&stopped[..], [(line, one)] if line == "rmd0" && one.result.is_ok()));
+    share.reaches("rmd3.speed_dps", |dps| dps.abs() < 5.0);
+    assert_eq!(program.closing(), "the test is over");
+    assert!(!share.path.exists());
+}

@@ -1,0 +1,186 @@
+"""A share of the built program: several programs on its drives, each killed, and the share itself."""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from program import eventually
+from sharing import Client, event
+
+#: Programs that are killed. ROUNDS=50 for more.
+ROUNDS = int(os.environ.get("ROUNDS", "5"))
+START, STOP, RUNNING = (3, 1), (3, 2), 6
+
+#: A program that watches a motor.
+WATCHES = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from sharing import Client
+client = Client(sys.argv[1], "watches")
+client.subscribe(("st0", 1, "SPEED_MEAS"), period=0.005)
+client.until(lambda it: isinstance(it, tuple))
+print("watching", flush=True)
+client.until(lambda it: False)
+"""
+
+#: A program that turns ST motor 1 and RMD motor 2, says so, and waits to be killed.
+TURNS = """
+import struct, sys
+sys.path.insert(0, sys.argv[2])
+from sharing import Client
+client = Client(sys.argv[1], "turns")
+ramp = client.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
+start = client.command("st0", 1, 3, 1)
+turn = client.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+assert {it["kind"] for it in (ramp, start, turn)} == {"answer"}, (ramp, start, turn)
+print("turning", flush=True)
+while client.receive():
+    pass
+"""
+
+
+@pytest.fixture
+def drives(sim):
+    """Simulated drives on a port of each kind."""
+    return sim()
+
+
+@pytest.fixture
+def share(start, drives, tmp_path):
+    """A share of these drives; its socket is `path`."""
+    path = tmp_path / "share"
+    running = start("share", "-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--json")
+    ready = json.loads(running.line(0))
+    assert [line["line"] for line in ready["lines"]] == ["st0", "rmd0"]
+    running.path = path
+    return running
+
+
+def speeds(client):
+    """The motors' speeds, by the drives themselves."""
+    rpm = client.command("st0", 1, 2, 30)["bytes"]
+    dps = client.command("rmd0", 2, 0x9C, *7 * [0])["bytes"]
+    return struct.unpack("<i", bytes(rpm))[0], struct.unpack_from("<h", bytes(dps), 4)[0]
+
+
+def are_still(client):
+    """Whether the motors rest."""
+    rpm, dps = speeds(client)
+    return abs(rpm) < 30 and abs(dps) < 5
+
+
+def program(code, share, said):
+    """Another process that uses the share, after it has said this."""
+    words = [sys.executable, "-c", code, str(share.path), str(Path(__file__).parent)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == f"{said}\n"
+    return process
+
+
+def killed(process):
+    """Kills it with SIGKILL."""
+    process.kill()
+    process.communicate()
+
+
+def test_the_motors_of_a_killed_program_stop_and_a_viewer_misses_nothing(share):
+    viewer, tuner = Client(share.path, "viewer"), Client(share.path, "tuner")
+    viewer.subscribe(("st0", 1, "SPEED_MEAS"), ("rmd0", 2, "speed_dps"), queue=100_000)
+    # A motor of another program that stays.
+    tuner.command("rmd0", 1, 0xA2, 0, 0, 0, *struct.pack("<i", 9000))
+    times, sequences, lost = {}, {}, 0
+    for _ in range(ROUNDS):
+        process = program(TURNS, share, "turning")
+        eventually(lambda: min(speeds(tuner)) > 300, "motors that turn")
+        killed(process)
+        eventually(lambda: are_still(tuner), "motors that stop")
+        tuner.until(event("left", by="turns"))
+    while len(times) < 2 or min(map(len, times.values())) < 30 * ROUNDS:
+        group, sequence, missing, t0, columns = viewer.until(lambda it: isinstance(it, tuple))
+        assert sequence == sequences.get(group, 0)
+        sequences[group] = sequence + 1
+        times.setdefault(group, []).extend(t0 + t for t in columns[0])
+        lost += missing
+    assert lost == 0
+    dps = bytes(tuner.command("rmd0", 1, 0x9C, *7 * [0])["bytes"])
+    assert struct.unpack_from("<h", dps, 4)[0] > 60
+    gaps = [b - a for t in times.values() for a, b in zip(t, t[1:])]
+    gaps.sort()
+    late = sum(gap > 0.02 for gap in gaps)
+    print(f"{ROUNDS} kills, {len(gaps)} samples each 10 ms, {late} gaps above 20 ms, longest {gaps[-1] * 1000:.0f} ms")
+
+
+def test_a_killed_viewer_disturbs_nobody(share):
+    tuner = Client(share.path, "tuner")
+    for _ in range(ROUNDS):
+        process = program(WATCHES, share, "watching")
+        assert tuner.command("st0", 1, *START)["kind"] == "answer"
+        killed(process)
+        tuner.until(event("left", by="watches"))
+        eventually(lambda: tuner.command("st0", 1, 2, 2)["bytes"] == [RUNNING], "a motor that runs")
+        assert tuner.command("st0", 1, *STOP)["kind"] == "answer"
+        eventually(lambda: are_still(tuner), "motors that stop")
+
+
+def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, drives, run):
+    process = program(TURNS, share, "turning")
+    watcher = Client(share.path, "watcher")
+    share.interrupt()
+    assert watcher.until(lambda it: it.get("kind") == "closing")["message"] == "the share was ended"
+    assert share.wait() == 0
+    process.communicate()
+    stopped = [json.loads(line) for line in share.out if '"stopped"' in line]
+    assert {(it["line"], it["motor"]) for it in stopped} == {("st0", 1), ("rmd0", 2)}
+    eventually(
+        lambda: run("st", "-p", drives.st, "get", "SPEED_MEAS", "--json").values["SPEED_MEAS"] < 30,
+        "a motor that stops",
+    )
+    assert not share.path.exists()
+
+
+def test_after_the_kill_of_a_share_programs_see_the_end_and_a_new_one_takes_its_place(
+    share, drives, start
+):
+    client = Client(share.path, "x")
+    share.process.send_signal(signal.SIGKILL)
+    share.wait()
+    assert list(iter(client.receive, None)) is not None
+    new = start("share", "-p", drives.st, "--at", f"unix:{share.path}")
+    assert new.line(0).startswith(f"share at unix:{share.path}: st0 (serial:")
+    assert Client(share.path, "y").ask("lines")["kind"] == "answer"
+
+
+def test_a_share_takes_no_place_of_others(share, drives, run, tmp_path):
+    taken = run("share", "-p", "sim:", "--at", f"unix:{share.path}").ended(3)
+    assert "is served" in taken.err or "another" in taken.err, taken.err
+    (tmp_path / "file").write_text("mine")
+    run("share", "-p", "sim:", "--at", f"unix:{tmp_path}/file").ended(3)
+    assert (tmp_path / "file").read_text() == "mine"
+    run("share", "--at", f"unix:{tmp_path}/other").ended(2)
+    run("share", "-p", "sim:", "--at", "tcp:1").ended(2)
+
+
+def test_the_log_says_who_did_what(start, sim, tmp_path):
+    drives, path = sim(), tmp_path / "share"
+    running = start("share", "-p", drives.st, "--at", f"unix:{path}")
+    running.line(0)
+    client = Client(path, "tuner")
+    client.command("st0", 1, *START)
+    client.ask("stop", motor={"line": "st0", "motor": 1})
+    client.ask("latch")
+    client.socket.close()
+    for said in (
+        "tuner sends EXECUTE_CMD START_MOTOR",
+        "tuner stops it",
+        "it confirmed the stop",
+        "tuner refuses motion",
+        "tuner left",
+    ):
+        running.until(lambda: any(said in line for line in running.out), said)
+    assert running.out[1] == "tuner joined"
