@@ -274,8 +274,21 @@ def test_a_refused_register_does_not_take_the_values_of_the_others(st):
     message = st("get", "MIN_APP_SPEED", "I_A", "SC_RS", "STATUS").ended(1)
     assert [line.split()[0] for line in message.out.splitlines()] == ["MIN_APP_SPEED", "STATUS"]
     assert "I_A has access D" in message.err and "add --profile mcsdk-5.4" in message.err
-    loop = st("get", "MIN_APP_SPEED", "I_A", "--every", "5ms", "--count", 3).ended(1)
+    loop = st("get", "MIN_APP_SPEED", "SC_RS", "--every", "5ms", "--count", 3).ended(1)
     assert [line.split()[1:] for line in loop.out.splitlines()[2:]] == 3 * [["600", "-"]]
+    assert loop.err.count("refused reading SC_RS") == 2, "once in the loop, and as the result"
+
+
+def test_a_loop_reads_registers_of_access_d_in_a_data_segment(st):
+    loop = st("--trace", "get", "MIN_APP_SPEED", "I_A", "--every", "5ms", "--count", 3).ended(0)
+    assert [line.split()[1:] for line in loop.out.splitlines()[2:]] == 3 * [["600", "0"]]
+    assert "CONFIG_DYN_STRUCT segment 3: " in loop.err and "GET_REG I_A" not in loop.err
+
+
+def test_the_segment_of_a_loop_can_be_chosen(st):
+    loop = st("--trace", "segment", "--segment", 1, "I_A", "I_B", "--every", "5ms", "--count", 3).ended(0)
+    assert len(loop.out.splitlines()) == 5
+    assert {line.split("segment ")[1][0] for line in loop.err.splitlines() if "segment " in line} == {"1"}
 
 
 @pytest.mark.parametrize(

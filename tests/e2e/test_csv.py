@@ -37,9 +37,9 @@ def test_rmd_values_have_their_units_and_raw_values_none(run, tmp_path):
 
 
 def test_a_refused_value_is_empty(run, tmp_path):
-    words = ("get", "I_A", "STATUS", "--every", "5ms", "--count", 2, "--csv", tmp_path / "a")
+    words = ("get", "SC_RS", "STATUS", "--every", "5ms", "--count", 2, "--csv", tmp_path / "a")
     run("st", "-p", "sim:", *words).ended(1)
-    assert [(row["I_A"], row["STATUS"]) for row in read(tmp_path / "a")] == 2 * [("", "0")]
+    assert [(row["SC_RS"], row["STATUS"]) for row in read(tmp_path / "a")] == 2 * [("", "0")]
 
 
 def test_a_file_that_exists_is_overwritten_with_force_only(run, tmp_path):

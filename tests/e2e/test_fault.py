@@ -1,5 +1,6 @@
 """`--fault`: a line with chosen faults, on real and on simulated ports."""
 
+import json
 import time
 
 import pytest
@@ -45,10 +46,10 @@ def test_the_same_seed_does_the_same(run):
 
 
 def test_a_watch_goes_on_through_damage(run):
-    fault = "drop=5e-2,seed=3"
+    fault = "drop=1e-2,seed=3"
     watch = run(
         *ST, "--json", "--timeout", "30ms", "--fault", fault, "get", "BUS_VOLTAGE", "--every", "2ms",
-        "--count", 12,
+        "--count", 40,
     ).ended(0)
     assert {plain(line)["BUS_VOLTAGE"] for line in watch.lines if "values" in line} == {325}
     events = [line["event"] for line in watch.lines if "event" in line]
@@ -107,3 +108,15 @@ def test_a_drive_that_acknowledges_and_ignores_is_found_out(run, tmp_path):
 def test_what_acts_on_the_motor_is_not_verified(run, register):
     refused = run(*ST, "--trace", "set", register, 1, "--verify").ended(2)
     assert "cannot be verified" in refused.err and "->" not in refused.err
+
+
+def test_a_line_that_is_too_slow_is_said_once(run):
+    slow = ("--fault", "delay=20ms")
+    table = run(*ST, *slow, "get", "SPEED_MEAS", "--every", "10ms", "--count", 12).ended(0)
+    (said,) = [line for line in table.err.splitlines() if line]
+    assert said.startswith("asked 100 Hz; this line carries about ")
+    assert 10 < float(said.split()[-2]) < 25, "an exchange takes 40 ms"
+    times = [float(line.split()[0]) for line in table.out.splitlines()[2:]]
+    assert times == sorted(times) and len(times) == 12 and times[-1] >= 11 * 0.04
+    notes = run(*RMD, *slow, "--json", "angle", "--every", "5ms", "--count", 2).ended(0).err
+    assert json.loads(notes)["note"].startswith("asked 200 Hz; this line carries about ")

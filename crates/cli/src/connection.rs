@@ -1,9 +1,13 @@
 //! Options of every command that opens a port.
 
-use motorlink::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortName, TapBytes, TapCan};
+use std::sync::Arc;
+
+use motorlink::port::{
+    ByteLink, CanLink, EventBytes, EventCan, FaultBytes, FaultCan, PortName, TapBytes, TapCan,
+};
 use motorlink::rmd::IDENTIFIERS;
 use motorlink::st::Profile;
-use motorlink_link::fault::Faults;
+use motorlink_link::fault::{FaultError, Faults};
 
 use crate::failure::Failure;
 use crate::help;
@@ -54,13 +58,27 @@ impl Connection {
         &self,
         profile: Profile,
     ) -> Result<impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static, Failure> {
-        let (trace, mut faults) = (self.trace, self.fault.map(Faults::on_serial).transpose()?);
-        Ok(move |mut link: Box<dyn ByteLink>| {
-            if let Some(faults) = &mut faults {
-                link = Box::new(FaultBytes::new(link, faults));
-                faults.seed = faults.seed.wrapping_add(1);
-            }
-            if trace { Box::new(TapBytes::new(link, trace::bytes(profile))) } else { link }
+        let mut wrap = Wrap::new(self, Faults::on_serial)?;
+        Ok(move |link| {
+            let faulty = |link: Box<dyn ByteLink>, faults: &Faults| -> Box<dyn ByteLink> {
+                Box::new(FaultBytes::new(link, faults))
+            };
+            wrap.around(link, faulty, |link| Box::new(TapBytes::new(link, trace::bytes(profile))))
+        })
+    }
+
+    /// As [`around_line`](Self::around_line), for an event loop.
+    pub fn around_event_line(
+        &self,
+        profile: Profile,
+    ) -> Result<impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static, Failure>
+    {
+        let mut wrap = Wrap::new(self, Faults::on_serial)?;
+        Ok(move |link| {
+            let faulty = |link: Box<dyn EventBytes>, faults: &Faults| -> Box<dyn EventBytes> {
+                Box::new(FaultBytes::new(link, faults))
+            };
+            wrap.around(link, faulty, |link| Box::new(TapBytes::new(link, trace::bytes(profile))))
         })
     }
 
@@ -68,13 +86,25 @@ impl Connection {
     pub fn around_bus(
         &self,
     ) -> Result<impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static, Failure> {
-        let (trace, mut faults) = (self.trace, self.fault.map(Faults::on_can).transpose()?);
-        Ok(move |mut link: Box<dyn CanLink>| {
-            if let Some(faults) = &mut faults {
-                link = Box::new(FaultCan::new(link, faults, IDENTIFIERS));
-                faults.seed = faults.seed.wrapping_add(1);
-            }
-            if trace { Box::new(TapCan::new(link, trace::frames())) } else { link }
+        let mut wrap = Wrap::new(self, Faults::on_can)?;
+        Ok(move |link| {
+            let faulty = |link: Box<dyn CanLink>, faults: &Faults| -> Box<dyn CanLink> {
+                Box::new(FaultCan::new(link, faults, IDENTIFIERS))
+            };
+            wrap.around(link, faulty, |link| Box::new(TapCan::new(link, trace::frames())))
+        })
+    }
+
+    /// As [`around_bus`](Self::around_bus), for an event loop.
+    pub fn around_event_bus(
+        &self,
+    ) -> Result<impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static, Failure> {
+        let mut wrap = Wrap::new(self, Faults::on_can)?;
+        Ok(move |link| {
+            let faulty = |link: Box<dyn EventCan>, faults: &Faults| -> Box<dyn EventCan> {
+                Box::new(FaultCan::new(link, faults, IDENTIFIERS))
+            };
+            wrap.around(link, faulty, |link| Box::new(TapCan::new(link, trace::frames())))
         })
     }
 
@@ -100,4 +130,37 @@ pub fn missing_port() -> Failure {
         "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
          `-p sim:` needs no hardware",
     )
+}
+
+/// What is put around a port.
+struct Wrap {
+    trace: bool,
+    faults: Option<Faults>,
+}
+
+impl Wrap {
+    fn new(
+        connection: &Connection,
+        check: impl FnOnce(Faults) -> Result<Faults, FaultError>,
+    ) -> Result<Self, Failure> {
+        Ok(Wrap { trace: connection.trace, faults: connection.fault.map(check).transpose()? })
+    }
+
+    fn around<L>(
+        &mut self,
+        mut link: L,
+        faulty: impl FnOnce(L, &Faults) -> L,
+        tapped: impl FnOnce(L) -> L,
+    ) -> L {
+        if let Some(faults) = &mut self.faults {
+            link = faulty(link, faults);
+            faults.seed = faults.seed.wrapping_add(1);
+        }
+        if self.trace { tapped(link) } else { link }
+    }
+}
+
+/// The name of a port in the messages of clients.
+pub fn name_in_messages(port: &str) -> Arc<str> {
+    port.trim_end_matches(':').into()
 }

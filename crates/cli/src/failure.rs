@@ -5,6 +5,8 @@ use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
 use motorlink_link::{printable, printable_lines};
+use motorlink_telemetry::line::LineError;
+use motorlink_telemetry::runner::Ended;
 use serde_json::{Map, Value, json};
 
 use crate::{advice, pasteable};
@@ -350,6 +352,24 @@ impl From<rmd::Error> for Failure {
             problem.motor(motor.number());
         }
         problem.into()
+    }
+}
+
+impl From<&LineError> for Failure {
+    fn from(error: &LineError) -> Self {
+        match error {
+            LineError::St(error) => error.clone().into(),
+            LineError::Rmd(error) => error.clone().into(),
+            LineError::Closed => Failure::link(error.to_string()),
+            LineError::Reply | LineError::Implausible(_) => Failure::refused(error.to_string()),
+            LineError::Protocol => Failure::usage(error.to_string()),
+        }
+    }
+}
+
+impl From<Ended> for Failure {
+    fn from(error: Ended) -> Self {
+        Failure::link(error.to_string())
     }
 }
 

@@ -37,6 +37,8 @@ static STOPPING: Mutex<Option<String>> = Mutex::new(None);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
+/// Ends what a loop waits for.
+static END: Mutex<Option<Box<dyn Fn() + Send>>> = Mutex::new(None);
 
 /// Handles the signals. They end the process at once until [`take_over`].
 pub fn install() {
@@ -62,6 +64,12 @@ pub fn take_over() {
 /// Whether a second signal, too, leaves the end to the caller of [`take_over`].
 pub fn hold_on(holds: bool) {
     HOLDS.store(holds, Ordering::SeqCst);
+}
+
+/// As [`take_over`], and `end` ends what the caller waits for. A signal calls it in another thread.
+pub fn take_over_with(end: impl Fn() + Send + 'static) {
+    *END.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(end));
+    take_over();
 }
 
 /// As [`take_over`], if motors depend on this process: all signals that would end it are handled, a second
@@ -109,6 +117,9 @@ fn obey(signal: i32) {
             finish();
         }
         exit(INTERRUPTED_CODE);
+    }
+    if let Some(end) = &*END.lock().unwrap_or_else(PoisonError::into_inner) {
+        end();
     }
     let _held = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
     WAKE.notify_all();

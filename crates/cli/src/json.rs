@@ -214,8 +214,7 @@ impl RmdUnits {
     }
 
     /// A field of a message, as the command table has it.
-    pub fn field(&self, field: &Field, data: &[u8; 8]) -> Row {
-        let digits = field.raw(data);
+    pub fn field(&self, field: &Field, digits: i64) -> Row {
         if self.raw {
             return Row::digits(field.name, digits);
         }
@@ -227,21 +226,21 @@ impl RmdUnits {
                 json!({ "value": digits, "names": set.map(|(_, name)| *name).collect::<Value>() })
             }
             Meaning::Words(_) => {
-                json!({ "value": digits, "name": field.shown(data).to_string() })
+                json!({ "value": digits, "name": field.shown_digits(digits).to_string() })
             }
         };
-        Row { name: field.name.to_owned(), text: field.shown(data).to_string(), value }
+        Row { name: field.name.to_owned(), text: field.shown_digits(digits).to_string(), value }
     }
 
     /// The angle of encoder counts, with --encoder-bits.
     ///
     /// # Errors
     /// The encoder has more bits than were given.
-    pub fn encoder_angle(&self, field: &Field, data: &[u8; 8]) -> Result<Option<Row>, Failure> {
+    pub fn encoder_angle(&self, field: &Field, counts: i64) -> Result<Option<Row>, Failure> {
         let Some(bits) = self.encoder_bits.filter(|_| field.is_encoder_counts()) else {
             return Ok(None);
         };
-        let (name, counts, scale) = (field.name, field.raw(data), bits.scale());
+        let (name, scale) = (field.name, bits.scale());
         if counts > scale.most {
             let bits = bits.bits();
             return Err(Failure::refused(format!(
@@ -323,7 +322,8 @@ mod tests {
         let [phase, ..] = PhaseCurrents::FIELDS else { panic!("there is no phase") };
         for digits in i16::MIN..=i16::MAX {
             let [low, high] = digits.to_le_bytes();
-            let row = RmdUnits::default().field(phase, &[0x9D, 0, low, high, 0, 0, 0, 0]);
+            let row =
+                RmdUnits::default().field(phase, phase.raw(&[0x9D, 0, low, high, 0, 0, 0, 0]));
             let text = row.text.strip_suffix(" A").unwrap();
             assert_eq!(text.parse().ok(), row.value["value"].as_f64(), "{digits}");
         }

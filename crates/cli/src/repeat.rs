@@ -1,9 +1,16 @@
-//! Loops of samples, which continue after an outage of the line.
+//! `--every`: samples from the engine of the line. They go on after an outage.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use motorlink::Clock;
+use motorlink::time::{Instant as Moment, Micros};
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line as telemetry;
+use motorlink_telemetry::rows::{Absent, Gap, Item, Rows, Trouble};
+use motorlink_telemetry::runner::{Ended, Remote, Runner};
+use motorlink_telemetry::sample::Sample;
+use motorlink_telemetry::signal::Signal;
+use motorlink_telemetry::subscription::Full;
 use serde_json::Value;
 
 use crate::columns::Columns;
@@ -14,10 +21,21 @@ use crate::output::{Printer, missed, missed_text, never_wait, note, print_line};
 use crate::recording::Recording;
 use crate::span::parse_span;
 
+/// Records that wait until stdout is read.
+const QUEUE: usize = 100_000;
+/// How often to look whether the rates are known.
+const LOOK: Duration = Duration::from_millis(20);
+/// How often to look at the rates, once they are known.
+const SECOND: Duration = Duration::from_secs(1);
+/// A period that is longer than asked by this factor is said.
+const SLOWER: f64 = 1.05;
+/// It is said again if it changes by this factor.
+const OTHER: f64 = 1.5;
+
 /// How often to read, and where the samples go.
 #[derive(clap::Args, Clone)]
 pub struct Repeat {
-    /// Repeat at this interval, such as 100ms, until Ctrl-C
+    /// Repeat at this interval, such as 100ms, until Ctrl-C; a note says if the line is too slow
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub every: Option<Duration>,
     /// Stop after this many samples
@@ -31,64 +49,121 @@ pub struct Repeat {
     force: bool,
 }
 
-/// Prints one sample, or with --every many samples with their time. In a loop, a failed line is tried again
-/// until it works. JSON results begin with `object`. `clock` is that of the port.
-pub fn repeated(
-    clock: &Clock,
-    repeat: &Repeat,
-    output: Printer,
-    object: &Line,
-    mut sample: impl FnMut() -> Result<Vec<Cell>, Failure>,
-) -> Result<(), Failure> {
-    let Some(every) = repeat.every else { return output.cells(object.clone(), sample()?) };
-    let mut sink = Sink::new(repeat, output, object)?;
-    interrupt::take_over();
-    let mut outage = None;
-    let mut left = repeat.count.unwrap_or(u64::MAX);
-    let mut began = None;
-    let mut due = Duration::ZERO;
-    while left > 0 && !interrupt::interrupted() {
-        let sampled = sample();
-        // The time starts with the first sample, because the first exchange also recovers the line.
-        let now = clock.now();
-        let began = *began.get_or_insert(now);
-        let elapsed = Duration::from(now.since(began));
-        match sampled {
-            Ok(cells) if cells.iter().all(|cell| cell.row().is_none()) => {
-                return output.cells(object.clone(), cells);
+/// What is read again and again, and how it is shown.
+pub struct Watch<S, D> {
+    pub line: Box<dyn telemetry::Line>,
+    pub signals: Vec<Signal>,
+    pub output: Printer,
+    /// JSON results begin with it.
+    pub object: Line,
+    /// The cells of a row's values.
+    pub shown: S,
+    /// The failure of a line whose replies and requests do not go together.
+    pub doubt: D,
+}
+
+impl<S, D> Watch<S, D>
+where
+    S: FnMut(&[Result<Sample, Absent>]) -> Result<Vec<Cell>, Failure>,
+    D: Fn() -> Failure,
+{
+    /// Prints samples with their time, until the end that `repeat` has. A failed line is tried again
+    /// until it works.
+    pub fn run(mut self, every: Duration, repeat: &Repeat) -> Result<(), Failure> {
+        let mut sink = Sink::new(repeat, self.output, &self.object)?;
+        let mut pace = Pace::new(every);
+        let wants = self.signals.iter().map(|signal| (*signal, every.into())).collect();
+        let mut rows = Rows::new(self.signals);
+        let runner = Runner::start("motorlink-line", Acquisition::new(self.line))?;
+        let (_, subscription) = runner.remote().subscribe(wants, QUEUE, Full::DropNewest)?;
+        let ending = subscription.clone();
+        interrupt::take_over_with(move || ending.close());
+        let mut left = repeat.count.unwrap_or(u64::MAX);
+        while left > 0 && !interrupt::interrupted() {
+            match subscription.wait(pace.patience()) {
+                Some(record) => rows.take(&record),
+                None if subscription.is_closed() && !interrupt::interrupted() => Err(Ended)?,
+                None => {}
             }
-            Ok(cells) => {
-                if let Some(kind) = outage.take() {
-                    sink.back(elapsed, kind)?;
+            while let Some(item) = rows.next_item().filter(|_| left > 0) {
+                match item {
+                    Item::Row(row) => {
+                        let cells = (self.shown)(&row.values)?;
+                        if cells.iter().all(|cell| cell.row().is_none()) {
+                            return self.output.cells(self.object.clone(), cells);
+                        }
+                        sink.row(row.time, cells)?;
+                        left -= 1;
+                    }
+                    Item::Gap(Gap { time, why, unconfirmed }) => {
+                        let failure = match why {
+                            Trouble::Failed(error) => Failure::from(&*error),
+                            Trouble::Doubtful => (self.doubt)(),
+                        };
+                        sink.gap(time, failure, unconfirmed)?;
+                    }
+                    Item::Lost(count) => sink.lost(count)?,
                 }
-                sink.sample(elapsed, cells)?;
-                left -= 1;
             }
-            Err(Failure::Failed(problem)) if matches!(problem.kind, Kind::Link | Kind::Silent) => {
-                if outage.is_none() {
-                    outage = Some(problem.kind);
-                    sink.outage(elapsed, &problem)?;
-                }
+            if left > 0 {
+                pace.look(runner.remote())?;
             }
-            Err(other) => return Err(other),
         }
-        // If the line is slow, samples are skipped.
-        let now = Duration::from(clock.now().since(began));
-        while due <= now {
-            due += every;
-        }
-        if left > 0 && outage.is_none() {
-            interrupt::wait_by(clock, due - now);
-        } else if left > 0 {
-            // The clock of a lost port may be virtual, but the port returns in real time.
-            interrupt::wait(due - now);
+        match sink.refusal {
+            Some(refusal) => Err(refusal),
+            None if repeat.count.is_some() && left > 0 => Err(Failure::Interrupted),
+            None => Ok(()),
         }
     }
-    match sink.refusal {
-        Some(refusal) => Err(refusal),
-        None if repeat.count.is_some() && left > 0 => Err(Failure::Interrupted),
-        None => Ok(()),
+}
+
+/// Says that the line is too slow, before much time is lost.
+struct Pace {
+    every: Duration,
+    next: Instant,
+    /// The period that was said.
+    said: Option<Micros>,
+}
+
+impl Pace {
+    fn new(every: Duration) -> Self {
+        Pace { every, next: Instant::now(), said: None }
     }
+
+    fn patience(&self) -> Duration {
+        self.next.saturating_duration_since(Instant::now()).max(LOOK)
+    }
+
+    fn look(&mut self, engine: &Remote) -> Result<(), Failure> {
+        if Instant::now() < self.next {
+            return Ok(());
+        }
+        let slowest = |engine: &mut Acquisition| {
+            let rates = engine.is_predicted().then(|| engine.rates().map(|rate| rate.predicted));
+            rates.and_then(Iterator::max)
+        };
+        self.next = Instant::now() + LOOK;
+        let Some(predicted) = engine.with(slowest)? else { return Ok(()) };
+        self.next = Instant::now() + SECOND;
+        let ratio = |longer: Micros, shorter: Micros| longer.0 as f64 / shorter.0 as f64;
+        let asked = Micros::from(self.every);
+        let differs =
+            self.said.is_none_or(|said| ratio(predicted, said).max(ratio(said, predicted)) > OTHER);
+        if ratio(predicted, asked) > SLOWER && differs {
+            let [asked, carried] = [asked, predicted].map(hertz);
+            note(format!("asked {asked}; this line carries about {carried}"));
+            self.said = Some(predicted);
+        }
+        Ok(())
+    }
+}
+
+/// The rate of a period, with two or three digits.
+fn hertz(period: Micros) -> String {
+    let rate = 1e6 / period.0.max(1) as f64;
+    let decimals =
+        [100.0, 10.0, 1.0].iter().filter(|limit| rate < **limit).count().saturating_sub(1);
+    format!("{} Hz", format!("{rate:.decimals$}").parse::<f64>().unwrap_or(rate))
 }
 
 /// Where the samples of a loop go.
@@ -103,6 +178,10 @@ struct Sink<'a> {
     refusal: Option<Failure>,
     /// Names of refused values that a note was printed for.
     noted: Vec<String>,
+    /// The time of the first sample or event.
+    began: Option<Moment>,
+    /// The kind of the outage that lasts.
+    lasting: Option<Kind>,
 }
 
 impl<'a> Sink<'a> {
@@ -119,7 +198,59 @@ impl<'a> Sink<'a> {
             // A reader that waits does not stop the recording.
             never_wait(if output.json { missed } else { missed_text });
         }
-        Ok(Sink { output, object, columns, recording, prints, refusal: None, noted: Vec::new() })
+        Ok(Sink {
+            output,
+            object,
+            columns,
+            recording,
+            prints,
+            refusal: None,
+            noted: Vec::new(),
+            began: None,
+            lasting: None,
+        })
+    }
+
+    /// The time since the first sample or event. The first exchange also recovers the line, which is
+    /// not counted.
+    fn since_first(&mut self, time: Moment) -> Duration {
+        time.since(*self.began.get_or_insert(time)).into()
+    }
+
+    fn row(&mut self, time: Moment, cells: Vec<Cell>) -> Result<(), Failure> {
+        let elapsed = self.since_first(time);
+        if let Some(kind) = self.lasting.take() {
+            self.back(elapsed, kind)?;
+        }
+        self.sample(elapsed, cells)
+    }
+
+    /// An outage is said once. A failure that the next exchange would have again ends the loop.
+    fn gap(&mut self, time: Moment, failure: Failure, unconfirmed: u64) -> Result<(), Failure> {
+        let elapsed = self.since_first(time);
+        match failure {
+            Failure::Failed(problem) if matches!(problem.kind, Kind::Link | Kind::Silent) => {
+                if self.lasting.is_some() {
+                    return Ok(());
+                }
+                self.lasting = Some(problem.kind);
+                self.outage(elapsed, &problem, unconfirmed)
+            }
+            other => Err(other),
+        }
+    }
+
+    /// Records that were lost because stdout was not read.
+    fn lost(&mut self, count: u64) -> Result<(), Failure> {
+        match self.output.json {
+            true => print_line(&missed(count)),
+            false => {
+                note(format!(
+                    "{count} replies were dropped here, because stdout was not read in time"
+                ));
+                Ok(())
+            }
+        }
     }
 
     fn sample(&mut self, elapsed: Duration, cells: Vec<Cell>) -> Result<(), Failure> {
@@ -144,18 +275,30 @@ impl<'a> Sink<'a> {
         Ok(())
     }
 
-    fn outage(&mut self, elapsed: Duration, problem: &Problem) -> Result<(), Failure> {
+    fn outage(
+        &mut self,
+        elapsed: Duration,
+        problem: &Problem,
+        unconfirmed: u64,
+    ) -> Result<(), Failure> {
         if let Some(recording) = &mut self.recording {
             recording.event(elapsed.as_secs_f64(), "outage")?;
         }
+        if self.output.json {
+            let event = self.event(elapsed, "outage").with("error", problem.object());
+            let event = match unconfirmed {
+                0 => event,
+                count => event.with("unconfirmed", count),
+            };
+            return print_line(&Value::from(event));
+        }
         let (text, retry) = (problem.text(), "trying again until Ctrl-C");
-        match (self.output.json, problem.kind) {
-            (true, _) => {
-                let event = self.event(elapsed, "outage").with("error", problem.object());
-                return print_line(&Value::from(event));
-            }
-            (false, Kind::Silent) => note(format!("{text}; {retry}")),
-            (false, _) => note(format!("the line is lost: {text}; {retry}")),
+        match problem.kind {
+            Kind::Silent => note(format!("{text}; {retry}")),
+            _ => note(format!("the line is lost: {text}; {retry}")),
+        }
+        if unconfirmed > 0 {
+            note(format!("the last {unconfirmed} samples are left out: nothing confirmed them"));
         }
         Ok(())
     }

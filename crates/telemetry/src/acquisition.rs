@@ -19,8 +19,11 @@ use crate::schedule::{
 use crate::signal::{Motor, Signal};
 use crate::subscription::{Consumer, Record, Subscription};
 
-/// The longest time between two confirmations of a motor's values, if they are read more often.
+/// The time between two confirmations of a motor's values, if they are read more often.
 const CONFIRMATION: Micros = Micros::from_millis(100);
+/// For this time after a failure or a doubt, the values of each instant are confirmed: one more takes
+/// only those of its instant.
+const CAREFUL: Micros = Micros::from_millis(10_000);
 
 /// A consumer of values and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -69,6 +72,8 @@ pub struct Acquisition {
     instants: BTreeMap<Lane, Instant>,
     /// Until when the values of a lane are confirmed.
     confirmed: BTreeMap<Lane, Instant>,
+    /// Lanes whose values are confirmed at each instant, and until when.
+    careful: BTreeMap<Lane, Instant>,
     /// Polls that the drive refused.
     refused: BTreeSet<PollId>,
     /// Failures in a row of each lane.
@@ -125,6 +130,7 @@ impl Acquisition {
             is_open: true,
             instants: BTreeMap::new(),
             confirmed: BTreeMap::new(),
+            careful: BTreeMap::new(),
             refused: BTreeSet::new(),
             failures: BTreeMap::new(),
         }
@@ -243,6 +249,7 @@ impl Acquisition {
     pub fn advance(&mut self, ended: &mut Ended<'_>) -> Option<Duration> {
         loop {
             self.reopen_if_due();
+            self.trust_again();
             let until = self.begin_all(ended);
             let mut over = Vec::new();
             let moved = match self.is_open {
@@ -256,8 +263,8 @@ impl Acquisition {
             let wait = match moved {
                 Ok(wait) if self.line.link_state() == LinkState::Open => wait,
                 Ok(_) if !self.is_open => None,
-                Ok(_) => self.closed("the port was closed".into(), ended),
-                Err(error) => self.closed(error.to_string().into(), ended),
+                Ok(_) => self.closed(LineError::Closed, ended),
+                Err(error) => self.closed(error, ended),
             };
             if !is_over {
                 let now = self.clock.now();
@@ -274,6 +281,23 @@ impl Acquisition {
         self.is_open = true;
         self.schedule.reopened(self.clock.now());
         self.tell(What::Back);
+    }
+
+    /// Confirms the values of a lane at each instant for some time.
+    fn distrust(&mut self, lane: Lane) {
+        let until = self.clock.now() + CAREFUL;
+        if self.careful.insert(lane, until).is_none() {
+            self.replan();
+        }
+    }
+
+    fn trust_again(&mut self) {
+        let now = self.clock.now();
+        let before = self.careful.len();
+        self.careful.retain(|_, until| *until > now);
+        if self.careful.len() < before {
+            self.replan();
+        }
     }
 
     fn retry_in(&self) -> Option<Duration> {
@@ -334,6 +358,10 @@ impl Acquisition {
         let now = self.clock.now();
         let outcome = match &result {
             Ok(_) => Outcome::Answered,
+            // The motor answered, and the lane is in sync again.
+            Err(error) if error.is_unconfirmed() && error.unanswered_confirmation().is_none() => {
+                Outcome::Answered
+            }
             Err(error) if error.is_line_failure() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
@@ -389,34 +417,40 @@ impl Acquisition {
                     }
                 }
                 None => {
-                    let why = "the reply does not fit the request".into();
-                    self.refuse(id, poll.signals.clone(), why);
+                    self.refuse(id, poll.signals.clone(), LineError::Reply);
                 }
             },
             Err(error) if poll.read == Read::Confirm && error.is_unconfirmed() => {
                 let since = self.confirmed.get(&lane).copied().unwrap_or_default();
                 self.tell(What::Doubtful(poll.motor, since));
+                self.distrust(lane);
+                if let Some(error) = error.unanswered_confirmation() {
+                    self.failed(lane, poll.motor, error);
+                }
             }
-            Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, &error),
+            Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, error),
             // The drive may have no data segments: then the plan is another.
             Err(error) if !self.replan() => {
-                self.refuse(id, poll.signals.clone(), error.to_string().into());
+                self.refuse(id, poll.signals.clone(), error);
             }
             Err(_) => {}
         }
     }
 
-    fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: Arc<str>) {
+    fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: LineError) {
         if self.refused.insert(id) {
-            self.tell(What::Refused(signals, why));
+            self.tell(What::Refused(signals, Arc::new(why)));
         }
     }
 
-    fn failed(&mut self, lane: Lane, motor: Motor, why: &LineError) {
+    fn failed(&mut self, lane: Lane, motor: Motor, why: LineError) {
+        self.distrust(lane);
         let failures = self.failures.entry(lane).or_default();
         *failures += 1;
-        if *failures == 2 {
-            self.tell(What::Silent(motor, why.to_string().into()));
+        match *failures {
+            1 => self.tell(What::Unanswered(motor, Arc::new(why))),
+            2 => self.tell(What::Silent(motor, Arc::new(why))),
+            _ => {}
         }
     }
 
@@ -427,7 +461,7 @@ impl Acquisition {
     }
 
     /// The port is closed. Gives no time: its back-off is in [`retry_in`](Self::retry_in).
-    fn closed(&mut self, why: Arc<str>, ended: &mut Ended<'_>) -> Option<Duration> {
+    fn closed(&mut self, why: LineError, ended: &mut Ended<'_>) -> Option<Duration> {
         let now = self.clock.now();
         self.is_open = false;
         for (_, verdict) in self.schedule.closed(now) {
@@ -440,7 +474,7 @@ impl Acquisition {
                 Verdict::Poll(..) | Verdict::Stopped(_) | Verdict::StopAgain(_) => {}
             }
         }
-        self.tell(What::Lost(why));
+        self.tell(What::Lost(Arc::new(why)));
         None
     }
 
@@ -478,21 +512,30 @@ impl Acquisition {
             self.polls.insert(id, Arc::new(poll));
         }
         self.refused.retain(|id| self.polls.contains_key(id));
-        let lanes: Vec<_> = self
-            .polls
-            .iter()
+        // What confirms the values of an instant is the last exchange of it.
+        let (confirmations, reads): (Vec<_>, Vec<_>) =
+            self.polls.iter().partition(|(_, poll)| poll.read == Read::Confirm);
+        let lanes: Vec<_> = reads
+            .into_iter()
+            .chain(confirmations)
             .map(|(id, poll)| (*id, self.line.lane(&poll.request()), poll.period))
             .collect();
         self.schedule.set_polls(self.clock.now(), &lanes);
+        let is_opener = |id: &PollId| self.polls.get(id).is_some_and(|it| it.read == Read::Confirm);
+        let openers = lanes.iter().filter(|(id, ..)| is_opener(id));
+        self.schedule.set_openers(openers.map(|(id, lane, _)| (*lane, *id)).collect());
         true
     }
 
-    /// A confirmation for each lane, at the rate of its fastest poll, but not too often.
+    /// A confirmation for each lane, at the rate of its fastest poll, but not too often on a good line.
     fn confirmations(&self, polls: &[Poll]) -> Vec<Poll> {
         let mut lanes: BTreeMap<Lane, Poll> = BTreeMap::new();
         for poll in polls {
-            let period = poll.period.max(CONFIRMATION);
             let lane = self.line.lane(&poll.request());
+            let period = match self.careful.contains_key(&lane) {
+                true => poll.period,
+                false => poll.period.max(CONFIRMATION),
+            };
             let confirmation = lanes.entry(lane).or_insert_with(|| Poll {
                 motor: poll.motor,
                 period,
@@ -506,9 +549,9 @@ impl Acquisition {
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.
-fn implausible(poll: &Poll, samples: &Samples) -> Option<(Vec<Signal>, Arc<str>)> {
+fn implausible(poll: &Poll, samples: &Samples) -> Option<(Vec<Signal>, LineError)> {
     let pairs = poll.signals.iter().zip(samples);
     let odd: Vec<_> = pairs.filter_map(|(it, sample)| Some((*it, sample.err()?))).collect();
-    let why = odd.first()?.1.to_string().into();
+    let why = odd.first()?.1.into();
     Some((odd.into_iter().map(|(signal, _)| signal).collect(), why))
 }

@@ -21,16 +21,18 @@ pub struct Event {
 #[derive(Debug, Clone)]
 pub enum What {
     /// The port failed. It is opened again.
-    Lost(Arc<str>),
+    Lost(Arc<LineError>),
     /// The port is open again.
     Back,
+    /// A motor has not answered once, after it had answered.
+    Unanswered(Motor, Arc<LineError>),
     /// A motor has not answered twice in a row. It is asked less often.
-    Silent(Motor, Arc<str>),
+    Silent(Motor, Arc<LineError>),
     /// A silent motor answers again.
     Answers(Motor),
     /// The drive refuses to give signals, or their values are not plausible. Said once, until they
     /// come.
-    Refused(Vec<Signal>, Arc<str>),
+    Refused(Vec<Signal>, Arc<LineError>),
     /// A reply came twice or late. The values of this motor since this moment may be those of other
     /// signals.
     Doubtful(Motor, Instant),

@@ -5,6 +5,7 @@
 //! | read signals of a line again and again, and command its motors meanwhile | [`acquisition::Acquisition`], in a thread [`runner::Runner`] |
 //! | name a signal | [`signal::Signal::named`] |
 //! | receive values and events | [`subscription::Subscription`] |
+//! | make rows of values of the same instant | [`rows::Rows`] |
 //! | see which exchanges read signals | [`plan`] |
 //! | exchange messages with other programs that use the same lines | [`share`] |
 //! | schedule exchanges of your own, sans I/O | [`schedule::Schedule`] |
@@ -40,6 +41,7 @@ pub mod acquisition;
 pub mod event;
 pub mod line;
 pub mod plan;
+pub mod rows;
 pub mod runner;
 pub mod sample;
 pub mod schedule;

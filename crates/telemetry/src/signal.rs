@@ -130,6 +130,23 @@ impl Quantity {
         (code, field)
     }
 
+    /// The name without its unit: `speed`.
+    pub fn short_name(self) -> String {
+        let (name, _, field) = self.row();
+        let with_unit = field.name_with_unit().to_string();
+        let unit = with_unit.strip_prefix(field.name).unwrap_or_default();
+        name.strip_suffix(unit).unwrap_or(&name).to_owned()
+    }
+
+    /// The quantities in the reply of a read, in its order.
+    pub fn of_read(code: Code) -> impl Iterator<Item = Quantity> {
+        let reply = COMMANDS.iter().filter(move |row| row.code == code).flat_map(|row| row.reply);
+        reply.filter_map(move |wanted| {
+            let has = |(read, field): (Code, &Field)| read == code && field.name == wanted.name;
+            Self::all().find(|quantity| quantity.reads().any(has))
+        })
+    }
+
     /// The reads whose replies have this value, and where.
     pub fn reads(self) -> impl Iterator<Item = (Code, &'static Field)> {
         let (_, wanted) = self.read();
@@ -223,6 +240,16 @@ mod tests {
         assert_eq!(unit(st, "SPEED_MEAS"), "rpm");
         assert_eq!(unit(st, "STATUS"), "");
         assert_eq!(unit(rmd, "speed_dps"), "°/s");
+    }
+
+    #[test]
+    fn a_read_has_the_quantities_of_its_reply() {
+        let names =
+            |code| -> Vec<String> { Quantity::of_read(code).map(Quantity::short_name).collect() };
+        assert_eq!(names(Code::ReadStatus), ["temperature", "voltage", "errors"]);
+        assert_eq!(names(Code::ReadMultiTurnAngle), ["multi_turn_angle"]);
+        assert_eq!(names(Code::ReadSingleTurnAngle), ["single_turn_angle"]);
+        assert_eq!(names(Code::ReadPid), Vec::<String>::new());
     }
 
     #[test]

@@ -516,3 +516,34 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_opener_goes_first_and_after_each_failure_and_the_first_instant_is_behind_it() {
+    let mut asked = 0;
+    // The first exchange brings the line in sync; the fifth one fails.
+    let mut line = Line::new(SERIAL, move |_, _, _| {
+        asked += 1;
+        match asked {
+            1 => (Micros(70 * MILLISECOND), Outcome::Answered),
+            5 => (Micros(MILLISECOND), Outcome::Failed),
+            _ => (Micros(MILLISECOND), Outcome::Answered),
+        }
+    });
+    line.polls(&[(1, 0, 100), (2, 0, 100)]);
+    line.schedule.set_openers(BTreeMap::from([(Lane(0), PollId(2))]));
+    line.run(100 * MILLISECOND);
+    let begun: Vec<_> = line
+        .events
+        .iter()
+        .filter_map(|(at, _, event)| match event {
+            Event::Poll(poll, instant) => {
+                Some((at.0 / MILLISECOND, poll.0, instant.0 / MILLISECOND))
+            }
+            _ => None,
+        })
+        .collect();
+    let expected = [(0, 2, 0), (70, 1, 70), (71, 2, 70), (80, 1, 80), (81, 2, 80), (90, 2, 90)];
+    assert_eq!(begun[..6], expected);
+    assert_eq!(begun[6..8], [(91, 1, 90), (92, 2, 90)]);
+    assert!(line.schedule.load().stretch() == 1.0, "the time of the opener is not measured");
+}

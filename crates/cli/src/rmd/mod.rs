@@ -2,6 +2,7 @@
 
 mod act;
 mod args;
+mod every;
 mod files;
 mod read;
 mod session;
@@ -40,9 +41,25 @@ pub fn run(args: Args) -> Result<(), Failure> {
             None => motor.names(),
         });
     }
-    let (session, ids) = (connect(&connection, &motor, &port), motor.ids());
-    let session =
-        session.map_err(|failure| if is_stop { failure.of_stop("the motor") } else { failure });
+    let ids = motor.ids();
+    let first = ids.map(MotorId::number).min().unwrap_or(1);
+    let watched = match &command {
+        Command::Read(Read::Status { repeat }) => Some((&every::STATUS[..], repeat)),
+        Command::Read(Read::Angle { repeat }) => Some((&every::ANGLE[..], repeat)),
+        _ => None,
+    };
+    if let Some((reads, repeat)) = watched
+        && let Some(every) = repeat.every
+    {
+        let [id] = ids.collect::<Vec<_>>()[..] else {
+            return Err(Failure::usage("--every is for one motor: give one --id"));
+        };
+        let bus = every::Bus { connection: &connection, motor: &motor, port: &port };
+        let done = bus.watch(id, reads, (every, repeat));
+        return done.map_err(|failure| failure.about(&port.to_string(), first));
+    }
+    let session = connect(&connection, &motor, &port)
+        .map_err(|failure| if is_stop { failure.of_stop("the motor") } else { failure });
     let done = session.and_then(|mut session| match command {
         Command::Act(act) => {
             keep_error();
@@ -59,18 +76,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
         }
         Command::Read(Read::Dump(args)) => files::dump(&session, &args),
         Command::Read(Read::Diff(args)) => files::diff(&session, &args),
-        Command::Read(Read::Status { repeat } | Read::Angle { repeat })
-            if ids.len() > 1 && repeat.every.is_some() =>
-        {
-            Err(Failure::usage("--every is for one motor: give one --id"))
-        }
-        Command::Read(Read::Status { repeat }) => {
-            several::each(&mut session, ids, false, |session| read::status(session, &repeat))
-        }
-        Command::Read(Read::Angle { repeat }) => {
-            several::each(&mut session, ids, false, |session| read::angle(session, &repeat))
-        }
+        Command::Read(Read::Status { .. }) => several::each(&mut session, ids, false, read::status),
+        Command::Read(Read::Angle { .. }) => several::each(&mut session, ids, false, read::angle),
     });
-    let first = ids.map(MotorId::number).min().unwrap_or(1);
     done.map_err(|failure| failure.about(&port.to_string(), first))
 }

@@ -4,9 +4,8 @@ use motorlink::rmd::{MotorId, MotorSet, MultiTurnAngle, ScanResult, SingleTurnAn
 
 use super::session::Session;
 use crate::failure::Failure;
-use crate::json::{Cell, Row};
+use crate::json::Row;
 use crate::output::progress;
-use crate::repeat::{Repeat, repeated};
 
 /// The version of the protocol.
 const DRIVEN: &str = "V1.62";
@@ -65,36 +64,23 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     Ok(())
 }
 
-pub fn status(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
-    show(session, repeat, |session| {
-        let motor = session.motor()?;
-        // JSON names the motor outside of the values, and a loop is about one motor.
-        let names_motor = !session.output.json && repeat.every.is_none();
-        let id = names_motor.then(|| Row::plain("motor", motor.id().number().into()));
-        let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)?).collect();
-        // Both replies have the temperature.
-        all.extend(session.rows(&motor.motion_status()?)?.into_iter().skip(1));
-        all.extend(session.rows(&motor.phase_currents()?)?);
-        all.extend(angles(session)?);
-        Ok(all)
-    })
+pub fn status(session: &Session) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    // JSON names the motor outside of the values.
+    let id = (!session.output.json).then(|| Row::plain("motor", motor.id().number().into()));
+    let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)?).collect();
+    // Both replies have the temperature.
+    all.extend(session.rows(&motor.motion_status()?)?.into_iter().skip(1));
+    all.extend(session.rows(&motor.phase_currents()?)?);
+    all.extend(angles(session)?);
+    session.confirm()?;
+    session.output.rows(session.line(session.id), &all)
 }
 
-pub fn angle(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
-    show(session, repeat, angles)
-}
-
-fn show(
-    session: &Session,
-    repeat: &Repeat,
-    mut sample: impl FnMut(&Session) -> Result<Vec<Row>, Failure>,
-) -> Result<(), Failure> {
-    let object = session.line(session.id);
-    repeated(&session.bus.clock(), repeat, session.output, &object, || {
-        let rows = sample(session)?;
-        session.confirm()?;
-        Ok(rows.into_iter().map(Cell::Read).collect())
-    })
+pub fn angle(session: &Session) -> Result<(), Failure> {
+    let rows = angles(session)?;
+    session.confirm()?;
+    session.output.rows(session.line(session.id), &rows)
 }
 
 fn angles(session: &Session) -> Result<Vec<Row>, Failure> {

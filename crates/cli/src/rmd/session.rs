@@ -26,17 +26,21 @@ pub fn connect(
     port: &PortName,
 ) -> Result<Session, Failure> {
     let units = units(connection, motor)?;
-    let wanted_limits = limits(motor, &units)?;
-    let options = Options { timeout: motor.timeout, limits: wanted_limits, ..Options::default() };
-    let bus = Client::open_wrapped(port, connection.around_bus()?, options)?;
+    let bus = Client::open_wrapped(port, connection.around_bus()?, options(motor, &units)?)?;
     let output = connection.output();
     let id = motor.ids().map(MotorId::number).next().unwrap_or(1);
     let (write_rom, port) = (motor.write_rom, port.to_string());
     Ok(Session { bus, id, output, units, write_rom, port })
 }
 
+/// The options of a client.
+pub fn options(motor: &MotorArgs, units: &RmdUnits) -> Result<Options, Failure> {
+    let limits = limits(motor, units)?;
+    Ok(Options { timeout: motor.timeout, limits, ..Options::default() })
+}
+
 /// --raw and an option that converts values contradict each other.
-fn units(connection: &Connection, motor: &MotorArgs) -> Result<RmdUnits, Failure> {
+pub fn units(connection: &Connection, motor: &MotorArgs) -> Result<RmdUnits, Failure> {
     let MotorArgs { gear_ratio: gear, encoder_bits, .. } = *motor;
     let option = match (gear, encoder_bits) {
         (Some(_), _) => "--gear-ratio",
@@ -152,8 +156,8 @@ impl Session {
         let data = message.encode_as(0);
         let mut rows = Vec::new();
         for field in P::FIELDS {
-            rows.push(self.units.field(field, &data));
-            rows.extend(self.units.encoder_angle(field, &data)?);
+            rows.push(self.units.field(field, field.raw(&data)));
+            rows.extend(self.units.encoder_angle(field, field.raw(&data))?);
         }
         Ok(rows)
     }

@@ -127,7 +127,7 @@ pub enum Read {
     },
     /// Read registers at one instant, in one exchange; profile spec only
     Segment {
-        /// The segment of the drive to use, 0 to 3
+        /// The segment of the drive to use, 0 to 3. With --every no other one is used
         #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
         segment: u8,
         /// Names or numbers, at most 32; also registers of access D

@@ -2,6 +2,7 @@
 
 mod act;
 mod args;
+mod every;
 mod mode;
 mod read;
 mod refusal;
@@ -50,6 +51,7 @@ fn run_at(
     command: Command,
 ) -> Result<(), Failure> {
     let connect = || connect(connection, drive, port);
+    let watched = every::Drive { connection, drive, port };
     match command {
         Command::Act(act) => {
             keep_error();
@@ -60,14 +62,23 @@ fn run_at(
             Read::Scan { rates } => {
                 scan::run(connection, port, drive.timeout.unwrap_or(SCAN_TIMEOUT), &rates)
             }
-            Read::Get { registers, repeat } => read::get(&connect()?, &registers, &repeat),
-            Read::Segment { segment, registers, repeat } => {
-                read::segment(&connect()?, segment, &registers, &repeat)
-            }
+            Read::Get { registers, repeat } => match repeat.every {
+                Some(every) => watched.watch(&read::find_all(&registers)?, None, (every, &repeat)),
+                None => read::get(&connect()?, &registers),
+            },
+            Read::Segment { segment, registers, repeat } => match repeat.every {
+                Some(every) => {
+                    watched.watch(&read::find_all(&registers)?, Some(segment), (every, &repeat))
+                }
+                None => read::segment(&connect()?, segment, &registers),
+            },
             Read::Dump(args) => settings::dump(&connect()?, &args),
             Read::Diff(args) => settings::diff(&connect()?, &args),
             Read::Info => read::info(&connect()?),
-            Read::Status { repeat } => read::status(&connect()?, &repeat),
+            Read::Status { repeat } => match repeat.every {
+                Some(every) => watched.watch(&read::STATUS, None, (every, &repeat)),
+                None => read::status(&connect()?),
+            },
         },
     }
 }

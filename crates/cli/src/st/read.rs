@@ -10,7 +10,6 @@ use super::session::Session;
 use crate::failure::Failure;
 use crate::json::{Cell, Line};
 use crate::output::note;
-use crate::repeat::{Repeat, repeated};
 
 pub fn info(session: &Session) -> Result<(), Failure> {
     let info = session.client.board_info()?;
@@ -46,6 +45,9 @@ pub fn note_other_profile(session: &Session, info: &BoardInfo) {
     }
 }
 
+/// What only one profile has.
+pub const SEGMENTS: &str = "data segments";
+
 /// The registers that `status` shows.
 pub const STATUS: [RegisterId; 10] = [
     RegisterId::STATUS,
@@ -60,10 +62,7 @@ pub const STATUS: [RegisterId; 10] = [
     RegisterId::MOTOR_POWER,
 ];
 
-pub fn status(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
-    if repeat.every.is_some() {
-        return show(session, repeat, || read_all(session, &STATUS));
-    }
+pub fn status(session: &Session) -> Result<(), Failure> {
     let mut cells = read_all(session, &STATUS)?;
     for (register, cell) in STATUS.into_iter().zip(&mut cells) {
         let Cell::Read(row) = cell else { continue };
@@ -92,44 +91,25 @@ pub fn explain(flags: Flags) -> String {
     text
 }
 
-pub fn get(session: &Session, names: &[String], repeat: &Repeat) -> Result<(), Failure> {
-    let registers = find_all(names)?;
-    show(session, repeat, || read_all(session, &registers))
+pub fn get(session: &Session, names: &[String]) -> Result<(), Failure> {
+    let cells = read_all(session, &find_all(names)?)?;
+    session.output.cells(session.line(), cells)
 }
 
-pub fn segment(
-    session: &Session,
-    number: u8,
-    names: &[String],
-    repeat: &Repeat,
-) -> Result<(), Failure> {
-    session.wants(Profile::Spec, "data segments")?;
+pub fn segment(session: &Session, number: u8, names: &[String]) -> Result<(), Failure> {
+    session.wants(Profile::Spec, SEGMENTS)?;
     let registers = find_all(names)?;
     let motor = session.motor()?;
-    let mut configured = false;
-    show(session, repeat, || {
-        // A drive that was restarted has forgotten the segment.
-        let mut values = vec![0; registers.len()];
-        if !configured || motor.segment(number, &registers, &mut values).is_err() {
-            motor.configure_segment(number, &registers)?;
-            motor.segment(number, &registers, &mut values)?;
-            configured = true;
-        }
-        session.client.confirm()?;
-        let read = registers.iter().zip(values);
-        Ok(read.map(|(&register, bits)| cell(session, register, bits)).collect())
-    })
+    let mut values = vec![0; registers.len()];
+    motor.configure_segment(number, &registers)?;
+    motor.segment(number, &registers, &mut values)?;
+    session.client.confirm()?;
+    let read = registers.iter().zip(values);
+    let cells = read.map(|(&register, bits)| session.cell(register, bits)).collect();
+    session.output.cells(session.line(), cells)
 }
 
-fn show(
-    session: &Session,
-    repeat: &Repeat,
-    sample: impl FnMut() -> Result<Vec<Cell>, Failure>,
-) -> Result<(), Failure> {
-    repeated(&session.client.clock(), repeat, session.output, &session.line(), sample)
-}
-
-fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
+pub fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
     names.iter().map(|name| find_register(name).map_err(Failure::from)).collect()
 }
 
@@ -146,7 +126,7 @@ fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Fa
                 session.client.confirm()?;
             }
             match read {
-                Ok(bits) => Ok(cell(session, register, bits)),
+                Ok(bits) => Ok(session.cell(register, bits)),
                 Err(error) if refusal::is_about_register(&error) => {
                     let failure = refusal::of_read(error, register, session.client.profile());
                     Ok(Cell::Refused(register.to_string(), session.about(failure)))
@@ -155,12 +135,4 @@ fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Fa
             }
         })
         .collect()
-}
-
-/// A register with its value as people read it, or why its value is not plausible.
-fn cell(session: &Session, register: RegisterId, bits: i32) -> Cell {
-    match session.plausible(register, bits) {
-        Ok(reading) => Cell::Read(session.row(&reading)),
-        Err(failure) => Cell::Refused(register.to_string(), session.about(failure)),
-    }
 }

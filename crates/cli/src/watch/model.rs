@@ -295,7 +295,7 @@ impl Model {
         let now = Instant::now();
         match what {
             What::Lost(why) => {
-                self.ports[port].gone = Some((now, Arc::clone(why)));
+                self.ports[port].gone = Some((now, why.to_string().into()));
                 self.say(None, format!("{label}: the port is gone"), true);
             }
             What::Back => {
@@ -305,7 +305,7 @@ impl Model {
                 self.say(None, format!("{label}: the port is back{after}"), false);
             }
             What::Silent(motor, why) => self.of_motor(port, *motor, |row| {
-                row.silent = Some((now, Arc::clone(why)));
+                row.silent = Some((now, why.to_string().into()));
                 row.silences += 1;
                 Some((format!("does not answer: {why}"), true))
             }),
@@ -318,7 +318,7 @@ impl Model {
             What::Refused(signals, why) => {
                 for Signal { motor, source } in signals {
                     self.of_motor(port, *motor, |row| {
-                        row.refused.insert(*source, Arc::clone(why));
+                        row.refused.insert(*source, why.to_string().into());
                         Some((format!("does not give {source}: {why}"), true))
                     });
                 }
@@ -346,7 +346,7 @@ impl Model {
                 self.ports[port].latched = None;
                 self.say(None, format!("{label}: {by} released the latch"), false);
             }
-            What::Confirmed(..) | What::Commanded(..) => {}
+            What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => {}
         }
     }
 

@@ -102,11 +102,13 @@ impl Access {
             }
             Item::Gain(place) => {
                 let gains = self.ask(&ReadPid)?;
-                Ok(self.units.rmd.field(&Pid::FIELDS[place], &gains).text)
+                let field = &Pid::FIELDS[place];
+                Ok(self.units.rmd.field(field, field.raw(&gains)).text)
             }
             Item::Acceleration => {
                 let reply = self.ask(&ReadAcceleration)?;
-                Ok(self.units.rmd.field(acceleration(), &reply).text)
+                let field = acceleration();
+                Ok(self.units.rmd.field(field, field.raw(&reply)).text)
             }
         }
     }

@@ -9,6 +9,7 @@ use motorlink::st::{MotorNumber, Profile, RegisterId};
 use motorlink::time::{Instant, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::event::{Event, What};
+use motorlink_telemetry::line::LineError;
 use motorlink_telemetry::plan::{Poll, Read};
 use motorlink_telemetry::sample::{Sample, Values};
 use motorlink_telemetry::signal::{Motor, Signal, Source};
@@ -157,10 +158,10 @@ fn each_motor_has_a_row_with_its_values() {
 #[test]
 fn a_port_that_is_gone_and_back_is_said() {
     let mut model = model();
-    happens(&mut model, 1, What::Lost("the far end hung up".into()));
+    happens(&mut model, 1, What::Lost(LineError::Closed.into()));
     let gone = lines(&drawn(&model, &Place::new(5), 80, 24));
     assert!(gone[4].starts_with(" can0:1     PORT GONE 0s             -"), "{gone:?}");
-    assert!(gone.contains(&"can0: port gone for 0s: the far end hung up".to_owned()), "{gone:?}");
+    assert!(gone.contains(&"can0: port gone for 0s: the port was closed".to_owned()), "{gone:?}");
     happens(&mut model, 1, What::Back);
     let back = lines(&drawn(&model, &Place::new(5), 80, 24));
     assert!(back[4].starts_with(" can0:1     turning"), "{back:?}");
@@ -170,7 +171,7 @@ fn a_port_that_is_gone_and_back_is_said() {
 #[test]
 fn a_silent_motor_has_no_present_value() {
     let mut model = model();
-    happens(&mut model, 0, What::Silent(st(1), "no reply".into()));
+    happens(&mut model, 0, What::Silent(st(1), LineError::Closed.into()));
     let silent = lines(&drawn(&model, &Place::new(5), 80, 24));
     assert!(silent[2].starts_with(">st0:1      NO ANSWER 0s             -"), "{silent:?}");
     happens(&mut model, 0, What::Answers(st(1)));
@@ -237,7 +238,7 @@ fn nothing_panics_on_small_terminals_and_the_selected_motor_is_in_view() {
 fn details_have_all_signals_and_the_reason_of_a_refusal() {
     let mut model = model();
     let signal = Signal { motor: st(1), source: Source::Register(RegisterId::MOTOR_POWER) };
-    happens(&mut model, 0, What::Refused(vec![signal], "UNKNOWN_REG".into()));
+    happens(&mut model, 0, What::Refused(vec![signal], LineError::Reply.into()));
     let place = Place { view: View::Details, ..Place::new(5) };
     let lines = lines(&drawn(&model, &place, 80, 24));
     assert_eq!(lines[1], "st0:1  RUN  on ./st0");
@@ -245,7 +246,10 @@ fn details_have_all_signals_and_the_reason_of_a_refusal() {
     assert!(lines[3].starts_with("STATUS        RUN (0x6)"), "{lines:?}");
     let speed = lines.iter().find(|line| line.starts_with("SPEED_MEAS    1500 rpm  ")).unwrap();
     assert!(speed.ends_with("  9.9 Hz, asked 10.0, line 10.0"), "{speed}");
-    assert!(lines.contains(&"MOTOR_POWER   none: UNKNOWN_REG".to_owned()), "{lines:?}");
+    assert!(
+        lines.contains(&"MOTOR_POWER   none: the reply does not fit the request".to_owned()),
+        "{lines:?}"
+    );
     assert!(lines.iter().any(|line| line.starts_with("replies 2, silent 0 times")), "{lines:?}");
 }
 

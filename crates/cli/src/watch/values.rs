@@ -100,10 +100,7 @@ impl Units {
 
     fn row(&self, quantity: Quantity, sample: Sample) -> Row {
         let (_, field) = quantity.read();
-        let mut data = [0; 8];
-        let (offset, size) = (usize::from(field.offset), usize::from(field.len));
-        data[offset..offset + size].copy_from_slice(&sample.digits.to_le_bytes()[..size]);
-        self.rmd.field(field, &data)
+        self.rmd.field(field, sample.digits)
     }
 }
 

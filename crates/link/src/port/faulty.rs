@@ -1,11 +1,13 @@
 //! Ports with faults, to test a program's error handling on any port.
 
+use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_proto::can::{CanFrame, Identifiers};
 use motorlink_proto::time::Instant;
 
 use super::error::PortError;
+use super::event::Evented;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 use crate::fault::{Faults, Lane, Unit, Way};
@@ -136,6 +138,38 @@ impl<C: CanLink> CanLink for FaultCan<C> {
     }
 }
 
+/// Delayed data do not make the descriptor readable: while there are some, the port asks to be
+/// flushed, and a loop comes back for them.
+impl<B: ByteLink + Evented> Evented for FaultBytes<B> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.transmit()?;
+        Ok(self.link.flush()? || self.lanes.has_delayed())
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        self.link.discard()
+    }
+}
+
+impl<C: CanLink + Evented> Evented for FaultCan<C> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.transmit()?;
+        Ok(self.link.flush()? || self.lanes.has_delayed())
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        self.link.discard()
+    }
+}
+
 fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {
     let slots = buffer.iter_mut();
     slots.map_while(|slot| next().map(|byte| *slot = byte)).count()
@@ -158,6 +192,11 @@ impl<T: Unit> Lanes<T> {
 
     fn now(&self) -> Instant {
         self.clock.now()
+    }
+
+    /// Whether data are on their way.
+    fn has_delayed(&self) -> bool {
+        self.sent.due().or(self.received.due()).is_some()
     }
 
     /// The end of a wait that starts now.

@@ -1,11 +1,13 @@
 //! Taps: observers of a port's traffic.
 
+use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 use super::error::PortError;
+use super::event::Evented;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 
@@ -94,6 +96,34 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
             (self.observer)(Direction::Received, self.time.elapsed(), frame);
         }
         Ok(frame)
+    }
+}
+
+impl<B: Evented, F> Evented for TapBytes<B, F> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.link.flush()
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        self.link.discard()
+    }
+}
+
+impl<C: Evented, F> Evented for TapCan<C, F> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.link.flush()
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        self.link.discard()
     }
 }
 

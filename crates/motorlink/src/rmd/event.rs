@@ -31,8 +31,19 @@ impl EventClient {
     /// # Errors
     /// What keeps the port from being opened. No motor is asked anything.
     pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        Self::open_wrapped(port, |link| link, options)
+    }
+
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
+        options: Options,
+    ) -> Result<Self, Error> {
         let name = port.clone();
-        Self::open_with(&port.to_string(), Box::new(move || name.open_event_can()), options)
+        let open = move || Ok(wrap(name.open_event_can()?));
+        Self::open_with(&port.to_string(), Box::new(open), options)
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.

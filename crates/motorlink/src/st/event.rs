@@ -39,9 +39,19 @@ impl EventClient {
     /// # Errors
     /// What keeps the port from being opened. The drive is not asked anything.
     pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        Self::open_wrapped(port, |link| link, options)
+    }
+
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+        options: Options,
+    ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = Box::new(move || name.open_event_bytes());
-        Self::open_with(&port.to_string(), open, options.on(port))
+        let open = move || Ok(wrap(name.open_event_bytes()?));
+        Self::open_with(&port.to_string(), Box::new(open), options.on(port))
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.

@@ -76,8 +76,13 @@ impl Field {
     }
 
     /// The value as text, with its name and physical unit.
-    pub fn shown<'a>(&'a self, data: &'a [u8; 8]) -> impl fmt::Display + 'a {
-        Shown { field: self, data }
+    pub fn shown(&self, data: &[u8; 8]) -> impl fmt::Display + use<'_> {
+        self.shown_digits(self.raw(data))
+    }
+
+    /// As [`shown`](Self::shown), from the digits.
+    pub fn shown_digits(&self, digits: i64) -> impl fmt::Display + use<'_> {
+        Shown { field: self, digits }
     }
 
     /// Whether the number is encoder counts of a turn. All numbers of 16 bits without a unit are.
@@ -111,12 +116,12 @@ impl fmt::Display for Named<'_> {
 
 struct Shown<'a> {
     field: &'a Field,
-    data: &'a [u8; 8],
+    digits: i64,
 }
 
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (self.field.show)(self.field.raw(self.data) as u64, f)
+        (self.field.show)(self.digits as u64, f)
     }
 }
 

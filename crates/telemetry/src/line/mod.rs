@@ -9,7 +9,7 @@ use std::time::Duration;
 use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Code, MotorId};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, MotorNumber, OwnedRequest, RegisterId};
+use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
 
 use crate::plan::{Poll, Read, Wants};
 use crate::sample::Samples;
@@ -55,15 +55,41 @@ pub enum LineError {
     /// The request is for a drive of the other protocol.
     #[error("the line has drives of another protocol")]
     Protocol,
+    /// The reply is none of those of the request.
+    #[error("the reply does not fit the request")]
+    Reply,
+    /// The value is possible in another profile only.
+    #[error(transparent)]
+    Implausible(#[from] Implausible),
+    /// The port was closed meanwhile.
+    #[error("the port was closed")]
+    Closed,
 }
 
 impl LineError {
-    /// Whether nothing can be said about the motor, because it or the line was silent.
+    /// Whether nothing can be said about the motor, because it or the line was silent. A reply that
+    /// has the size of the other profile says something about what was read, not about the line.
     pub fn is_line_failure(&self) -> bool {
         match self {
+            LineError::St(motorlink::st::Error::Failed {
+                failure: proto::Failure::Size { fits: Some(_), .. },
+                ..
+            }) => false,
             LineError::St(error) => error.is_line_failure(),
             LineError::Rmd(error) => error.is_line_failure(),
-            LineError::Protocol => false,
+            LineError::Closed => true,
+            LineError::Protocol | LineError::Reply | LineError::Implausible(_) => false,
+        }
+    }
+
+    /// What came in place of the answer to a confirmation; `None` if there was an answer, or if this
+    /// is not about a confirmation.
+    pub(crate) fn unanswered_confirmation(&self) -> Option<LineError> {
+        match self {
+            LineError::St(motorlink::st::Error::Unconfirmed { why, .. }) => {
+                why.as_deref().cloned().map(LineError::St)
+            }
+            _ => None,
         }
     }
 

@@ -67,6 +67,12 @@ impl StLine {
         StLine { client, step: Step::Idle, configured: Default::default(), segments }
     }
 
+    /// Uses this data segment only, and none in the profile that has none.
+    pub fn using_segment(mut self, segment: u8) -> Self {
+        self.segments.retain(|it| *it == segment);
+        self
+    }
+
     fn begin_segment(&mut self, segment: Segment) -> Result<Step, Error> {
         let configured = &self.configured[usize::from(segment.number)];
         if configured.as_ref() == Some(&segment.registers) {

@@ -63,6 +63,8 @@ pub(super) enum Kind {
 pub(super) struct UnderWay {
     pub(super) kind: Kind,
     pub(super) since: Instant,
+    /// Whether the line was in sync when it began. Else its duration is not that of the exchange alone.
+    pub(super) in_sync: bool,
 }
 
 impl UnderWay {

@@ -28,6 +28,8 @@ pub(super) struct LaneState<C> {
     stops: VecDeque<Stop<C>>,
     pub(super) commands: VecDeque<(CommandId, C, Instant)>,
     pub(super) commands_in_a_row: u32,
+    /// Whether the last exchange was answered.
+    pub(super) in_sync: bool,
     /// Polls in a row that failed.
     failures: u32,
     quiet_until: Instant,
@@ -40,6 +42,7 @@ impl<C> Default for LaneState<C> {
             stops: VecDeque::new(),
             commands: VecDeque::new(),
             commands_in_a_row: 0,
+            in_sync: false,
             failures: 0,
             quiet_until: Instant(0),
         }
@@ -122,8 +125,14 @@ impl<C: Clone> LaneState<C> {
         (self.failures, self.quiet_until) = (0, Instant(0));
     }
 
+    /// Begins an exchange.
+    pub(super) fn begin(&mut self, now: Instant, kind: Kind) {
+        self.under_way = Some(UnderWay { kind, since: now, in_sync: self.in_sync });
+    }
+
     /// An exchange is over.
     pub(super) fn judge(&mut self, now: Instant, exchange: UnderWay, outcome: Outcome) -> Verdict {
+        self.in_sync = matches!(outcome, Outcome::Answered | Outcome::Refused);
         match outcome {
             Outcome::Answered | Outcome::Refused => self.trust(),
             Outcome::Failed => self.failed(now),

@@ -144,7 +144,7 @@ impl Load {
     pub(super) fn ended(&mut self, now: Instant, exchange: &UnderWay, outcome: Outcome) {
         self.over(now, exchange.since);
         let span = now.since(exchange.since);
-        if !matches!(outcome, Outcome::Answered | Outcome::Refused) {
+        if !exchange.in_sync || !matches!(outcome, Outcome::Answered | Outcome::Refused) {
             return;
         }
         self.durations.push(span);

@@ -101,9 +101,12 @@ pub struct Schedule<C> {
     rules: LineRules,
     lanes: BTreeMap<Lane, LaneState<C>>,
     groups: Vec<Group>,
+    openers: BTreeMap<Lane, PollId>,
     load: Load,
     /// The first instant.
     anchor: Option<Instant>,
+    /// Whether a poll that is no opener has begun.
+    is_started: bool,
     under_way: usize,
     is_open: bool,
     last_id: u64,
@@ -116,8 +119,10 @@ impl<C: Clone> Schedule<C> {
             rules,
             lanes: BTreeMap::new(),
             groups: Vec::new(),
+            openers: BTreeMap::new(),
             load: Load::default(),
             anchor: None,
+            is_started: false,
             under_way: 0,
             is_open: true,
             last_id: 0,
@@ -155,6 +160,12 @@ impl<C: Clone> Schedule<C> {
         self.groups = groups.into_values().collect();
         self.load.keep(|poll| polls.iter().any(|(kept, ..)| *kept == poll));
         self.load.decide_anew();
+    }
+
+    /// The polls that go first in a lane at the beginning and after a failure: they take the time in
+    /// which the line is brought in sync, so that the polls behind them are on time.
+    pub fn set_openers(&mut self, openers: BTreeMap<Lane, PollId>) {
+        self.openers = openers;
     }
 
     /// Silent lanes take nearly no time.
@@ -230,7 +241,7 @@ impl<C: Clone> Schedule<C> {
                     Some(displaced) => self.load.over(now, displaced.since),
                     None => self.under_way += 1,
                 }
-                state.under_way = Some(UnderWay { kind: Kind::Stop(id), since: now });
+                state.begin(now, Kind::Stop(id));
                 self.load.began(now);
                 let displaced = displaced.and_then(UnderWay::displaced);
                 return Some((lane, Job::Stop { id, command, displaced }));
@@ -255,7 +266,7 @@ impl<C: Clone> Schedule<C> {
         let state = self.lanes.get_mut(&lane)?;
         let (id, command, _) = state.commands.pop_front()?;
         state.commands_in_a_row += 1;
-        state.under_way = Some(UnderWay { kind: Kind::Command(id), since: now });
+        state.begin(now, Kind::Command(id));
         self.under_way += 1;
         self.load.began(now);
         Some((lane, Job::Command(id, command)))
@@ -275,14 +286,19 @@ impl<C: Clone> Schedule<C> {
             (self.load.has_measured(group.next_poll()), deadline, group.period)
         })?;
         let (lane, instant) = (group.lane, group.due);
-        let poll = group.next_poll();
-        group.position += 1;
-        if group.position == group.polls.len() {
-            group.finish_instant(now, stretch, self.anchor.unwrap_or(now));
-        }
         let state = self.lanes.get_mut(&lane)?;
+        let opener = self.openers.get(&lane).copied().filter(|_| !state.in_sync);
+        let poll = opener.unwrap_or_else(|| {
+            let poll = group.next_poll();
+            group.position += 1;
+            if group.position == group.polls.len() {
+                group.finish_instant(now, stretch, self.anchor.unwrap_or(now));
+            }
+            poll
+        });
+        self.is_started |= opener.is_none();
         state.commands_in_a_row = 0;
-        state.under_way = Some(UnderWay { kind: Kind::Poll(poll), since: now });
+        state.begin(now, Kind::Poll(poll));
         self.under_way += 1;
         self.load.began(now);
         self.load.waited(now.since(instant));
@@ -315,7 +331,17 @@ impl<C: Clone> Schedule<C> {
         let exchange = state.under_way.take()?;
         self.under_way -= 1;
         self.load.ended(now, &exchange, outcome);
-        Some(state.judge(now, exchange, outcome))
+        let verdict = state.judge(now, exchange, outcome);
+        if !self.is_started && matches!(verdict, Verdict::Poll(..)) {
+            self.start(now);
+        }
+        Some(verdict)
+    }
+
+    /// The first instant is now, behind the first opener.
+    fn start(&mut self, now: Instant) {
+        self.anchor = Some(now);
+        self.groups.iter_mut().for_each(|group| group.due = now);
     }
 
     /// The line is closed: nothing begins until [`reopened`](Self::reopened). Gives what was under way.

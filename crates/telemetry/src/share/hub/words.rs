@@ -73,7 +73,7 @@ impl Words {
                 let message = format!("{by} sends {}", described(speaks, request));
                 event(Happening::Commanded, request.motor(), Some(by), message)
             }
-            What::Confirmed(..) | What::Commanded(..) => None,
+            What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => None,
             What::Stopping(id, by, request) => {
                 self.stops.insert(*id, (request.motor(), by.to_string()));
                 let message = format!("{by} stops it");
