@@ -14,7 +14,9 @@ def watch(motorlink, tmp_path):
     started = []
 
     def watch(*words, columns=80, lines=24, **variables):
-        terminal = Terminal([motorlink, "watch", *map(str, words)], columns, lines, **variables)
+        # A busy machine may be late with a reply.
+        words = ["watch", "--timeout", "1s", *map(str, words)]
+        terminal = Terminal([motorlink, *words], columns, lines, **variables)
         started.append(terminal)
         return terminal
 

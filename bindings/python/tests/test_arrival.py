@@ -48,9 +48,9 @@ def test_a_motor_that_lost_its_turns_raises() -> None:
         client.motor(1).set_position(720, wait=True)
 
     async def main(port: str) -> None:
-        async with motorlink.aio.rmd.open(port) as client:
+        async with motorlink.aio.rmd.open(port, timeout=5.0) as client:
             task = asyncio.create_task(client.motor(1).set_position(0, 10, wait=True))
-            while client.moving != [1]:
+            while client.moving != [1] and not task.done():
                 await asyncio.sleep(0)
             bench.power_cycle("rmd1")
             with pytest.raises(NotArrivedError, match="lost its counted turns"):

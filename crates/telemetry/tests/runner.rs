@@ -17,7 +17,9 @@ use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 use motorlink_testbench::{Bench, BenchConfig, Serving};
 
-const SECOND: Micros = Micros(1_000_000);
+/// No command of these tests is too old.
+const MINUTE: Micros = Micros(60_000_000);
+const LATE: Duration = Duration::from_secs(5);
 
 /// Drives on ptys.
 struct Drives {
@@ -42,7 +44,9 @@ impl Drives {
 
     fn rmd(&self) -> Runner {
         let port = self.rmd.parse().unwrap();
-        let line = RmdLine::open(&port, Default::default()).unwrap();
+        // A busy machine may be late with a reply.
+        let options = motorlink::rmd::Options { timeout: LATE, ..Default::default() };
+        let line = RmdLine::open(&port, options).unwrap();
         Runner::start("rmd", Acquisition::new(Box::new(line))).unwrap()
     }
 
@@ -104,7 +108,7 @@ fn values_come_while_commands_are_sent_from_several_threads() {
             let remote = runner.remote().clone();
             std::thread::spawn(move || {
                 for _ in 0..20 {
-                    let reply = remote.command(&by("thread"), turn(number, 180.0), SECOND);
+                    let reply = remote.command(&by("thread"), turn(number, 180.0), MINUTE);
                     let Ok(Reply::Rmd(reply)) = reply else { panic!("{reply:?}") };
                     assert_eq!(reply[0], 0xA2);
                 }
@@ -135,12 +139,12 @@ fn values_come_while_commands_are_sent_from_several_threads() {
 fn motors_stop_when_the_runner_is_dropped() {
     let drives = Drives::new("dropped");
     let runner = drives.rmd();
-    runner.remote().command(&by("test"), turn(3, 360.0), SECOND).unwrap();
+    runner.remote().command(&by("test"), turn(3, 360.0), MINUTE).unwrap();
     assert!(drives.is_reached(|dps| dps > 300.0, "rmd3.speed_dps"));
     let remote = runner.remote().clone();
     drop(runner);
     assert!(drives.is_reached(|dps| dps.abs() < 5.0, "rmd3.speed_dps"));
-    let ended = remote.command(&by("test"), turn(3, 360.0), SECOND);
+    let ended = remote.command(&by("test"), turn(3, 360.0), MINUTE);
     assert!(matches!(ended, Err(CommandError::Ended)), "{ended:?}");
     assert!(remote.with(|_| ()).is_err());
 }
@@ -149,7 +153,7 @@ fn motors_stop_when_the_runner_is_dropped() {
 fn motors_stop_when_a_task_panics() {
     let drives = Drives::new("panicked");
     let runner = drives.rmd();
-    runner.remote().command(&by("test"), turn(1, 360.0), SECOND).unwrap();
+    runner.remote().command(&by("test"), turn(1, 360.0), MINUTE).unwrap();
     assert!(drives.is_reached(|dps| dps > 300.0, "rmd1.speed_dps"));
     assert!(runner.remote().with(|_| panic!("on purpose")).is_err());
     assert!(drives.is_reached(|dps| dps.abs() < 5.0, "rmd1.speed_dps"));
@@ -160,17 +164,17 @@ fn a_stop_and_a_latch_hold_for_every_sender() {
     let drives = Drives::new("latched");
     let runner = drives.rmd();
     let remote = runner.remote();
-    remote.command(&by("arm"), turn(2, 360.0), SECOND).unwrap();
+    remote.command(&by("arm"), turn(2, 360.0), MINUTE).unwrap();
     assert!(drives.is_reached(|dps| dps > 300.0, "rmd2.speed_dps"));
     remote.latch(&by("operator")).unwrap();
     remote.stop(&by("operator"), Request::rmd(id(2), &Stop)).unwrap();
     assert!(drives.is_reached(|dps| dps.abs() < 5.0, "rmd2.speed_dps"));
     for sender in ["arm", "operator"] {
-        let refused = remote.command(&by(sender), turn(2, 360.0), SECOND);
+        let refused = remote.command(&by(sender), turn(2, 360.0), MINUTE);
         assert!(matches!(refused, Err(CommandError::Latched(_))), "{refused:?}");
     }
     remote.release(&by("operator")).unwrap();
-    remote.command(&by("arm"), turn(2, 360.0), SECOND).unwrap();
+    remote.command(&by("arm"), turn(2, 360.0), MINUTE).unwrap();
 }
 
 #[test]
@@ -201,7 +205,7 @@ fn a_remote_outlives_nothing_it_waits_for() {
     // No motor has this ID: the exchange takes its timeout.
     let remote = runner.remote().clone();
     let waiting = std::thread::spawn(move || {
-        remote.command(&by("test"), Request::Rmd(id(20), Stop.encode()), SECOND)
+        remote.command(&by("test"), Request::Rmd(id(20), Stop.encode()), MINUTE)
     });
     drop(runner);
     let result = waiting.join().unwrap();

@@ -44,7 +44,10 @@ impl Share {
         let line = StLine::open(&st.parse().unwrap(), Default::default()).unwrap();
         let speaks = Speaks::St(Profile::Spec);
         let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
-        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), Default::default());
+        // A busy machine may be late with a reply.
+        let timeout = Duration::from_secs(5);
+        let options = motorlink::rmd::Options { timeout, ..Default::default() };
+        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
         let engine = Acquisition::new(Box::new(line.unwrap()));
         let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
         let socket = path("socket");

@@ -6,6 +6,7 @@ use motorlink::rmd::{GearRatio, MotorSet};
 use motorlink::st::{FullScale, Profile};
 
 use crate::hint;
+use crate::span::span_up_to;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -23,6 +24,9 @@ pub struct Args {
     /// How often state, speed and current are read, Hz, 0.1 to 1000
     #[arg(long, value_name = "HZ", default_value = "10", value_parser = parse_rate)]
     pub rate: Duration,
+    /// How long to wait for a reply, 1ms to 10s [default: 1s, on a CAN bus 50ms]
+    #[arg(long, value_name = "TIME", value_parser = span_up_to(Duration::from_secs(10)))]
+    pub timeout: Option<Duration>,
     /// Protocol variant of ST drives: spec is the document, mcsdk-5.4 is shipped firmware
     #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", value_parser = hint::profile())]
     pub profile: Profile,

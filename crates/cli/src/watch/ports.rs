@@ -28,14 +28,17 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
     let port: PortName = text.parse()?;
     let mut opened = Vec::new();
     if port.as_line().is_some() {
-        let options = motorlink::st::Options { profile: args.profile, ..Default::default() };
+        let mut options = motorlink::st::Options { profile: args.profile, ..Default::default() };
+        options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = StLine::open(&port, options).map_err(Failure::from)?;
         let runner = start(text, Acquisition::new(Box::new(line)))?;
         let motors = st_motors(runner.remote(), &args.motor, by, text)?;
         opened.push(Opened { runner, name: text.to_owned(), motors });
     }
     if port.as_can().is_some() {
-        let line = RmdLine::open(&port, Default::default()).map_err(Failure::from)?;
+        let mut options = motorlink::rmd::Options::default();
+        options.timeout = args.timeout.unwrap_or(options.timeout);
+        let line = RmdLine::open(&port, options).map_err(Failure::from)?;
         let runner = start(text, Acquisition::new(Box::new(line)))?;
         let motors = rmd_motors(runner.remote(), &args.id, by, text)?;
         opened.push(Opened { runner, name: text.to_owned(), motors });

@@ -11,9 +11,12 @@ use ratatui::crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, enabl
 use ratatui::{DefaultTerminal, Terminal};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
-use signal_hook::consts::{SIGCONT, SIGTSTP};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGTSTP};
 
 use crate::failure::Failure;
+
+/// Time for the end of the view, and for stops that are under way.
+const END: Duration = Duration::from_secs(10);
 
 /// A terminal that is restored when this is dropped. A panic restores it, too.
 pub struct Screen {
@@ -45,6 +48,7 @@ impl Screen {
             signal_hook::flag::register(signal, Arc::clone(&flag)).map(|_| flag)
         };
         let (suspend, go_on) = (flag(SIGTSTP)?, flag(SIGCONT)?);
+        std::thread::Builder::new().name("terminal".to_owned()).spawn(end_without_terminal)?;
         let terminal = ratatui::try_init().inspect_err(|_| restore())?;
         Ok(Screen { terminal, suspend, go_on })
     }
@@ -95,6 +99,17 @@ impl Screen {
             fds[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL);
         Ok(if is_gone { Wait::Gone } else { Wait::Keys })
     }
+}
+
+/// Ends the process some time after its terminal is gone. The view ends by itself, except if the
+/// terminal goes while crossterm looks for keys: it reads the end of the terminal for ever.
+fn end_without_terminal() {
+    let stdin = stdin();
+    let mut fds = [PollFd::new(&stdin, PollFlags::empty())];
+    // Without a wanted event this waits for the end of the terminal only.
+    while poll(&mut fds, None) == Err(Errno::INTR) {}
+    std::thread::sleep(END);
+    std::process::exit(128 + SIGHUP);
 }
 
 /// What came of waiting for keys.
