@@ -51,7 +51,7 @@ demo: toolchain ## 1 min: simulated drives, driven through real ports
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
-test: toolchain $(if $(SUDO),packages) ## 16 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 18 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 
@@ -67,17 +67,17 @@ flakes: toolchain $(if $(SUDO),packages) ## 45 min: parts that wait for time, RU
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## 4 min: tests in Rust
+unit: ## 5 min: tests in Rust
 	$(CARGO) test --workspace --all-features --locked $(T)
 
-python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
+python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 2 min: the program against independent clients
+e2e: $(VENV)/ready ## 5 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -85,7 +85,7 @@ e2e: $(VENV)/ready ## 2 min: the program against independent clients
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## 5 min: proto and the C face without undefined behaviour
+miri: ## 8 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
@@ -103,7 +103,7 @@ lint: ## 2 min: format, clippy, rustdoc: no warning
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
-pages: $(PAGES_VENV)/ready ## 3 min: every code block of README and docs runs
+pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
 	$(PAGES_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
