@@ -1,6 +1,7 @@
 //! What can be read of a motor again and again.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use motorlink_proto::rmd::{COMMANDS, Code, CommandInfo, Field, MotorId};
 use motorlink_proto::st::register::Access;
@@ -107,7 +108,7 @@ impl fmt::Display for Source {
 impl Quantity {
     /// All quantities. Those of the reads with the most values come first.
     pub fn all() -> impl Iterator<Item = Quantity> {
-        (0..).map(Quantity).zip(rows()).map(|(quantity, _)| quantity)
+        (0..).map(Quantity).zip(&*ROWS).map(|(quantity, _)| quantity)
     }
 
     /// The quantity of this name.
@@ -121,13 +122,13 @@ impl Quantity {
 
     /// The name, with its unit: `speed_dps`.
     pub fn name(self) -> String {
-        self.row().0
+        self.row().0.clone()
     }
 
     /// The read with the most values that has this one, and where.
     pub fn read(self) -> (Code, &'static Field) {
         let (_, code, field) = self.row();
-        (code, field)
+        (*code, *field)
     }
 
     /// The name without its unit: `speed`.
@@ -135,7 +136,7 @@ impl Quantity {
         let (name, _, field) = self.row();
         let with_unit = field.name_with_unit().to_string();
         let unit = with_unit.strip_prefix(field.name).unwrap_or_default();
-        name.strip_suffix(unit).unwrap_or(&name).to_owned()
+        name.strip_suffix(unit).unwrap_or(name).to_owned()
     }
 
     /// The quantities in the reply of a read, in its order.
@@ -150,38 +151,37 @@ impl Quantity {
     /// The reads whose replies have this value, and where.
     pub fn reads(self) -> impl Iterator<Item = (Code, &'static Field)> {
         let (_, wanted) = self.read();
-        reads().into_iter().filter_map(move |row| {
+        READS.iter().filter_map(move |row| {
             let same = |field: &&Field| field.name == wanted.name && field.scale == wanted.scale;
             Some((row.code, row.reply.iter().find(same)?))
         })
     }
 
-    fn row(self) -> (String, Code, &'static Field) {
-        rows().swap_remove(self.0.into())
+    fn row(self) -> &'static (String, Code, &'static Field) {
+        &ROWS[usize::from(self.0)]
     }
 }
 
 /// The reads that are repeated. Those with the most values come first.
-fn reads() -> Vec<&'static CommandInfo> {
+static READS: LazyLock<Vec<&'static CommandInfo>> = LazyLock::new(|| {
     let mut reads: Vec<_> = COMMANDS.iter().filter(|row| row.sampled).collect();
     reads.sort_by_key(|row| std::cmp::Reverse(row.reply.len()));
     reads
-}
+});
 
 /// Each quantity once: its name, the first read that has it, and its field.
-fn rows() -> Vec<(String, Code, &'static Field)> {
-    let reads = reads();
+static ROWS: LazyLock<Vec<(String, Code, &'static Field)>> = LazyLock::new(|| {
     let mut rows: Vec<(String, Code, &'static Field)> = Vec::new();
-    for row in &reads {
+    for row in &*READS {
         for field in row.reply {
-            let name = name(row, field, &reads);
+            let name = name(row, field, &READS);
             if !rows.iter().any(|(known, ..)| *known == name) {
                 rows.push((name, row.code, field));
             }
         }
     }
     rows
-}
+});
 
 /// The field's name. If another read has the same name for something else, it is the noun of the read.
 fn name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
