@@ -1,9 +1,11 @@
 //! The engine in a thread, against simulated drives on ptys.
 
-use std::path::PathBuf;
+mod drives;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use drives::served;
 use motorlink_proto::rmd::{Command, MotorId, SetSpeed, Stop};
 use motorlink_proto::st;
 use motorlink_proto::time::Micros;
@@ -15,7 +17,7 @@ use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
-use motorlink_testbench::{Bench, BenchConfig, Serving};
+use motorlink_testbench::{Bench, Serving};
 
 /// No command of these tests is too old.
 const MINUTE: Micros = Micros(60_000_000);
@@ -31,14 +33,7 @@ struct Drives {
 
 impl Drives {
     fn new(name: &str) -> Self {
-        let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
-        let path = |kind: &str| folder.join(format!("{name}-{kind}-{}", std::process::id()));
-        let (st, rmd) = (path("st").display().to_string(), path("rmd").display().to_string());
-        let bench = Bench::new(&BenchConfig::default()).unwrap();
-        let ports =
-            [format!("pty:{st}"), format!("slcan-pty:{rmd}")].map(|port| port.parse().unwrap());
-        let [served_st, served_rmd] = ports;
-        let serving = bench.serve(Some(served_st), Some(served_rmd)).unwrap();
+        let (bench, serving, st, rmd) = served(name);
         Drives { bench, serving: Some(serving), st, rmd: format!("slcan:{rmd}") }
     }
 

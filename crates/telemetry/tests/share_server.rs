@@ -1,5 +1,7 @@
 //! A share at a Unix socket: programs that come, ask, read too slowly, and are gone.
 
+mod drives;
+
 use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
@@ -9,6 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use drives::{path, served};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
@@ -18,7 +21,7 @@ use motorlink_telemetry::share::frame::{self, Kind, Reader};
 use motorlink_telemetry::share::hub::{Held, Speaks};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::server::Server;
-use motorlink_testbench::{Bench, BenchConfig, Serving};
+use motorlink_testbench::{Bench, Serving};
 
 const LIMIT: Duration = Duration::from_secs(30);
 
@@ -33,14 +36,7 @@ struct Share {
 
 impl Share {
     fn new(name: &str) -> Self {
-        let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
-        let path = |kind: &str| folder.join(format!("share-{name}-{kind}-{}", std::process::id()));
-        let (st, rmd) = (path("st").display().to_string(), path("rmd").display().to_string());
-        let bench = Bench::new(&BenchConfig::default()).unwrap();
-        let ports =
-            [format!("pty:{st}"), format!("slcan-pty:{rmd}")].map(|port| port.parse().unwrap());
-        let [served_st, served_rmd] = ports;
-        let serving = bench.serve(Some(served_st), Some(served_rmd)).unwrap();
+        let (bench, serving, st, rmd) = served(&format!("share-{name}"));
         let line = StLine::open(&st.parse().unwrap(), Default::default()).unwrap();
         let speaks = Speaks::St(Profile::Spec);
         let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
@@ -50,7 +46,7 @@ impl Share {
         let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
         let engine = Acquisition::new(Box::new(line.unwrap()));
         let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
-        let socket = path("socket");
+        let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         let ends = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&ends);
