@@ -60,7 +60,7 @@ impl Screen {
             self.suspend()?;
             return Ok(true);
         }
-        // After SIGSTOP, which nobody can handle, a shell may have changed the terminal.
+        // SIGSTOP cannot be handled: after it, a shell may have changed the terminal.
         let goes_on = self.go_on.swap(false, Ordering::SeqCst);
         if goes_on {
             self.take_again()?;
@@ -112,7 +112,7 @@ fn end_without_terminal() {
     std::process::exit(128 + SIGHUP);
 }
 
-/// What came of waiting for keys.
+/// How a wait for keys ended.
 pub enum Wait {
     Nothing,
     Keys,

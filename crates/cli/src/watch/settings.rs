@@ -21,7 +21,7 @@ use super::values::Units;
 use crate::failure::Failure;
 use crate::rmd::{GainChange, wanted};
 
-/// A command that waits longer is refused: nobody waits for it any more.
+/// A command that waits longer is refused.
 pub const TIME_TO_LIVE: Micros = Micros(2_000_000);
 
 /// What can be read, and perhaps written.
