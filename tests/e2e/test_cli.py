@@ -119,7 +119,7 @@ def test_bash_takes_the_completions(run):
         input=f'{script}\n{ask}; echo "${{COMPREPLY[@]}}"\n',
         capture_output=True,
         text=True,
-        timeout=10,
+        timeout=60,
     )
     assert done.stdout.split() == ["revup-data", "revup"], done.stderr
 

@@ -68,7 +68,7 @@ def test_a_full_disk_ends_a_recording_with_3(motorlink, csv_to):
     words = ["st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--csv", csv_to]
     with open("/dev/full" if csv_to == "-" else os.devnull, "w") as out:
         done = subprocess.run(
-            [motorlink, *words], stdout=out, stderr=subprocess.PIPE, text=True, timeout=20, env=environment()
+            [motorlink, *words], stdout=out, stderr=subprocess.PIPE, text=True, timeout=60, env=environment()
         )
     assert done.returncode == 3 and "No space left" in done.stderr, done.stderr
 

@@ -129,7 +129,7 @@ def test_fish_completes_the_same(run, tmp_path, typed, completed):
     script = run("completions", "fish").ended(0).out
     ask = f'complete -C "motorlink {typed}"'
     done = subprocess.run(
-        ["fish", "--no-config"], input=f"{script}\n{ask}\n", capture_output=True, text=True, timeout=20,
+        ["fish", "--no-config"], input=f"{script}\n{ask}\n", capture_output=True, text=True, timeout=60,
         env={**os.environ, "HOME": str(tmp_path)}, cwd=tmp_path,
     )
     offered = {line.split("\t")[0] for line in done.stdout.splitlines()}

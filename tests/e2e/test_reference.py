@@ -96,7 +96,7 @@ def simulate(motorlink, plants):
             stdout=subprocess.PIPE,
             check=True,
             text=True,
-            timeout=20,
+            timeout=60,
         )
         return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1).T
 

@@ -15,7 +15,8 @@ class Slcan:
     """RMD motor 1 on an slcan adapter, byte by byte."""
 
     def __init__(self, path):
-        self.port = serial.Serial(path, timeout=5)
+        # A write to ROM waits for the disk.
+        self.port = serial.Serial(path, timeout=60)
         self.port.write(b"C\rS8\rO\r")
         for _ in range(3):
             assert self.port.read(1) in (b"\r", b"\x07")
