@@ -396,12 +396,12 @@ impl Acquisition {
     ) {
         let Some(poll) = self.polls.get(&id).cloned() else { return };
         if !result.as_ref().is_err_and(LineError::is_line_failure) {
-            self.answered(lane, poll.motor);
+            self.answered(lane);
         }
         match result {
             Ok(Reply::Confirmed) => {
                 self.confirmed.insert(lane, requested);
-                self.tell(What::Confirmed(poll.motor, requested));
+                self.tell_each(lane, |motor| What::Confirmed(motor, requested));
             }
             Ok(reply) => match self.line.samples(&poll, &reply) {
                 Some(samples) => {
@@ -422,7 +422,7 @@ impl Acquisition {
             },
             Err(error) if poll.read == Read::Confirm && error.is_unconfirmed() => {
                 let since = self.confirmed.get(&lane).copied().unwrap_or_default();
-                self.tell(What::Doubtful(poll.motor, since));
+                self.tell_each(lane, |motor| What::Doubtful(motor, since));
                 self.distrust(lane);
                 if let Some(error) = error.unanswered_confirmation() {
                     self.failed(lane, poll.motor, error);
@@ -449,14 +449,17 @@ impl Acquisition {
         *failures += 1;
         match *failures {
             1 => self.tell(What::Unanswered(motor, Arc::new(why))),
-            2 => self.tell(What::Silent(motor, Arc::new(why))),
+            2 => {
+                let why = Arc::new(why);
+                self.tell_each(lane, |motor| What::Silent(motor, Arc::clone(&why)));
+            }
             _ => {}
         }
     }
 
-    fn answered(&mut self, lane: Lane, motor: Motor) {
+    fn answered(&mut self, lane: Lane) {
         if self.failures.remove(&lane).is_some_and(|failures| failures > 1) {
-            self.tell(What::Answers(motor));
+            self.tell_each(lane, What::Answers);
         }
     }
 
@@ -482,6 +485,15 @@ impl Acquisition {
         let event = Arc::new(Event { time: self.clock.now(), what });
         for consumer in self.consumers.values() {
             consumer.subscription.push(Record::Event(Arc::clone(&event)));
+        }
+    }
+
+    /// Tells something of all motors that share a lane.
+    fn tell_each(&mut self, lane: Lane, what: impl Fn(Motor) -> What) {
+        let polls = self.polls.values().filter(|poll| self.line.lane(&poll.request()) == lane);
+        let motors: BTreeSet<Motor> = polls.map(|poll| poll.motor).collect();
+        for motor in motors {
+            self.tell(what(motor));
         }
     }
 

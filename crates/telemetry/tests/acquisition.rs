@@ -16,6 +16,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{LineError, Reply, Request, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
+use motorlink_telemetry::rows::Rows;
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -404,6 +405,36 @@ fn an_absent_motor_is_said_once_and_slows_no_other() {
             if [first, motor] == [&rmd(9); 2]),
         "{silent:?}"
     );
+}
+
+#[test]
+fn two_motors_of_a_line_are_confirmed_and_fall_silent_together() {
+    let wanted: Vec<Signal> =
+        [1, 2].into_iter().flat_map(|n| signals(st(n), &["STATUS"])).collect();
+    let mut engine = Engine::st(&bench(), "");
+    let subscription = engine.subscribe(&wanted, CENTISECOND);
+    engine.run(SECOND);
+    let mut rows = Rows::new(wanted.clone());
+    std::iter::from_fn(|| subscription.take()).for_each(|record| rows.take(&record));
+    let rows = std::iter::from_fn(|| rows.next_item()).count();
+    assert!((85..=100).contains(&rows), "{rows}");
+
+    let mut engine = Engine::st(&bench(), "drop=0.02,seed=1");
+    let subscription = engine.subscribe(&wanted, CENTISECOND);
+    engine.run(Micros(20 * SECOND.0));
+    let got = Got::of(&subscription);
+    let of = |wanted: Motor| {
+        got.events()
+            .filter_map(|what| match what {
+                What::Silent(motor, _) | What::Answers(motor) | What::Doubtful(motor, _) => {
+                    (*motor == wanted).then(|| name(what))
+                }
+                _ => None,
+            })
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(of(st(1)), of(st(2)));
+    assert!(["Silent", "Answers"].iter().all(|it| of(st(1)).contains(it)), "{:?}", of(st(1)));
 }
 
 #[test]
