@@ -38,7 +38,7 @@ BEGIN = """
 def program(script: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """A Python program that is ready. It is killed at the end if it still runs."""
     words = [sys.executable, "-c", textwrap.dedent(BEGIN) + textwrap.dedent(script), *arguments]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout and process.stdout.readline() == "ready\n"
         yield process
@@ -94,6 +94,61 @@ def test_a_signal_stops_the_motors_and_ends_the_program(
         running.send_signal(number)
         assert running.wait(60) == -number
         eventually(lambda: not is_turning(served, kind), "a motor at rest")
+
+
+# As if the signal came just before the wait: the handler of Python's C code has run, and nothing ends
+# the wait.
+JUST_BEFORE_A_WAIT = """
+    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2])
+    start(bus)
+    ready()
+    def signal_this_thread():
+        sys.stdin.readline()
+        signal.pthread_kill(threading.get_ident(), int(sys.argv[3]))
+    threading.Thread(target=signal_this_thread, daemon=True).start()
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("kind", ["st", "rmd"])
+def test_a_signal_just_before_a_wait_stops_the_motors(
+    served: Served, kind: str, number: signal.Signals
+) -> None:
+    arguments = kind, port(served, kind), str(int(number))
+    with program(JUST_BEFORE_A_WAIT, *arguments) as running:
+        eventually(lambda: is_turning(served, kind), "a motor that turns")
+        running.communicate("\n", timeout=60)
+        assert running.returncode == -number
+        eventually(lambda: not is_turning(served, kind), "a motor at rest")
+
+
+FORKED = """
+    import os
+    bus = motorlink.st.open(sys.argv[2])
+    start(bus)
+    child = os.fork()
+    if not child:
+        signal.signal(signal.SIGTERM, lambda *_: os._exit(7))
+        print("ready", flush=True)
+        time.sleep(600)
+    sys.stdin.readline()
+    os.kill(child, signal.SIGTERM)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    print("parent", bus.motor(1).get("STATUS"), flush=True)
+    time.sleep(600)
+"""
+
+
+def test_the_signal_of_a_forked_program_is_not_its_parents(served: Served) -> None:
+    with program(FORKED, "st", served.st) as running:
+        assert running.stdin and running.stdout
+        running.stdin.write("\n")
+        running.stdin.flush()
+        assert running.stdout.readline().startswith("parent")
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(60) == -signal.SIGTERM
+        eventually(lambda: not is_turning(served, "st"), "a motor at rest")
 
 
 DEAF = """
