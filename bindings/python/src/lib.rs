@@ -60,6 +60,7 @@ mod _core {
         module.add("ST_ATTEMPTS", motorlink_proto::st::VERIFY_ATTEMPTS)?;
         module.add("RMD_TIMEOUT", seconds(motorlink_proto::rmd::DEFAULT_TIMEOUT))?;
         module.add("RMD_STOP_ATTEMPTS", motorlink::STOP_ATTEMPTS)?;
+        module.add("RMD_STOP_PATIENCE", motorlink::STOP_PATIENCE.as_secs_f64())?;
         module.add("RMD_STOP_PAUSE", seconds(motorlink::STOP_PAUSE))?;
         module.add("RMD_STOP_TIME", seconds(motorlink::STOP_TIME))?;
         module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;

@@ -25,5 +25,5 @@ mod turn;
 pub use motorlink_link::reopening::{BackOff, LinkState, Opener};
 pub use motorlink_link::{Clock, can, list, port, slcan, time};
 pub use motorlink_proto::Hex;
-pub use stopping::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
+pub use stopping::{STOP_ATTEMPTS, STOP_PATIENCE, STOP_PAUSE, STOP_TIME};
 pub use turn::LOOK;

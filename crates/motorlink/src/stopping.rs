@@ -11,7 +11,7 @@ pub const STOP_ATTEMPTS: u32 = 4;
 /// How long a stop of RMD motors is repeated, and at least [`STOP_ATTEMPTS`] times.
 pub const STOP_TIME: Micros = Micros::from_millis(2_000);
 /// The longest wait for a lost port before the next attempt.
-const PATIENCE: Duration = Duration::from_millis(500);
+pub const STOP_PATIENCE: Duration = Duration::from_millis(500);
 
 /// The pause before the next attempt on an open port. A reply that is still on its way arrives in it.
 pub const STOP_PAUSE: Micros = Micros::from_millis(10);
@@ -20,7 +20,7 @@ pub const STOP_PAUSE: Micros = Micros::from_millis(10);
 /// for long.
 pub(crate) fn await_retry(state: LinkState, clock: &Clock) {
     match state {
-        LinkState::Closed { retry_in } => std::thread::sleep(retry_in.min(PATIENCE)),
+        LinkState::Closed { retry_in } => std::thread::sleep(retry_in.min(STOP_PATIENCE)),
         LinkState::Open => clock.wait(clock.now() + STOP_PAUSE),
     }
 }

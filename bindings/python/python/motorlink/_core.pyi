@@ -18,6 +18,7 @@ __all__ = [
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
     "RMD_STOP_ATTEMPTS",
+    "RMD_STOP_PATIENCE",
     "RMD_STOP_PAUSE",
     "RMD_STOP_TIME",
     "RMD_TIMEOUT",
@@ -74,6 +75,7 @@ RMD_QUARANTINE: float
 RMD_SCAN_WIDTH: int
 #: How often a stop is sent at least, before it has failed.
 RMD_STOP_ATTEMPTS: int
+RMD_STOP_PATIENCE: float
 #: The pause before a stop is repeated, s.
 RMD_STOP_PAUSE: float
 #: How long a stop is repeated at least, s.

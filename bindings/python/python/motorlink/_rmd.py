@@ -384,8 +384,8 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
     def off(self) -> Exchanges[None]:
         """Switches the motor off (0x80): it forgets its command, and a load that it holds falls.
 
-        Repeats the request until the motor confirms it, at least 4 times and for 2 s. An exception means that
-        the motor may still turn.
+        Repeats the request until the motor confirms it, at least 4 times and for 2 s (4 times if the port
+        fails). An exception means that the motor may still turn.
         """
         yield from self._halted(Request.off())
 
@@ -393,10 +393,10 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
     def stop(self) -> Exchanges[None]:
         """Stops the motor (0x81): it holds still and keeps its command for :meth:`run`.
 
-        Repeats the request until the motor confirms it, at least 4 times and for 2 s. An exception means that
-        the motor may still turn. A motor with a blocked rotor may still push after a stop; :meth:`off` removes
-        the torque. With an acceleration limit a (°/s²) the stop takes v/a seconds from the speed v (°/s), and
-        v²/(2a) degrees.
+        Repeats the request until the motor confirms it, at least 4 times and for 2 s (4 times if the port
+        fails). An exception means that the motor may still turn. A motor with a blocked rotor may still push
+        after a stop; :meth:`off` removes the torque. With an acceleration limit a (°/s²) the stop takes v/a
+        seconds from the speed v (°/s), and v²/(2a) degrees.
         """
         yield from self._halted(Request.stop())
 
@@ -408,12 +408,11 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
             attempts += 1
             try:
                 yield self._exchange(request)
-            except PortError:
-                raise
-            except (LinkError, ReplyTimeoutError):
-                if attempts >= _core.RMD_STOP_ATTEMPTS and client._now() >= give_up:
+            except (LinkError, ReplyTimeoutError) as error:
+                is_lost = isinstance(error, PortError)
+                if attempts >= _core.RMD_STOP_ATTEMPTS and (is_lost or client._now() >= give_up):
                     raise
-                yield client._pause(_core.RMD_STOP_PAUSE)
+                yield client._pause(_core.RMD_STOP_PATIENCE if is_lost else _core.RMD_STOP_PAUSE)
             else:
                 return
 
