@@ -85,7 +85,7 @@ e2e: $(VENV)/ready ## 5 min: the program against independent clients
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## 8 min: proto and the C face without undefined behaviour
+miri: ## 3 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \

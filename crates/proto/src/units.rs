@@ -372,6 +372,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_torque_current_is_rounded_towards_0_as_its_limit_is() {
         for thousandths in -32_000..=32_000 {
             let amps = f64::from(thousandths) / 1000.0;

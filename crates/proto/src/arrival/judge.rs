@@ -181,6 +181,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_motor_that_passes_through_its_target_has_not_arrived() {
         let wide = Criteria { tolerance: 20.0, ..CRITERIA };
         for speed in [0.5, 1.0, 5.0, 100.0, 10_000.0] {

@@ -320,6 +320,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_full_turn_is_followed_from_a_motor_that_begins_slowly() {
         for acceleration in [1.0, 20.0, 50.0, 1_000.0] {
             for (from, way) in [(0.06, 359.94), (720.05, 359.95), (0.0, 360.0), (-0.06, 360.06)] {
@@ -335,6 +336,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_wide_tolerance_makes_no_arrival_before_the_full_turn() {
         let motor = accelerated(0.05, 359.95, 20.0);
         let (arrived, ms) = followed(ZERO_CW, CentiDegrees(30), &motor);

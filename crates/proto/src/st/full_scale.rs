@@ -90,6 +90,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_requested_current_is_rounded_towards_0_and_never_cut() {
         let scale = FullScale::from_amps(8.25).unwrap().scale();
         for thousandths in -8250..=8250 {
@@ -104,6 +105,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_current_equal_to_its_limit_is_within_the_limit() {
         let full_scale = FullScale::from_amps(8.25).unwrap();
         for thousandths in 0..=8250 {
