@@ -10,7 +10,7 @@ use motorlink::{Clock, LinkState};
 use motorlink_proto::time::{Instant, Micros};
 
 use crate::event::{CommandError, Event, What};
-use crate::line::{Line, LineError, Reply, Request, Stopped, may_move};
+use crate::line::{Line, LineError, Over, Reply, Request, Shows, Stopped, may_move};
 use crate::plan::{Poll, Read, Wants};
 use crate::sample::{Samples, Values};
 use crate::schedule::{
@@ -21,7 +21,7 @@ use crate::subscription::{Consumer, Record, Subscription};
 
 /// The time between two confirmations of a motor's values, if they are read more often.
 const CONFIRMATION: Micros = Micros::from_millis(100);
-/// For this time after a failure or a doubt, the values of each instant are confirmed: one more takes
+/// For this time after a doubt, the values of each instant are confirmed: one more takes
 /// only those of its instant.
 const CAREFUL: Micros = Micros::from_millis(10_000);
 
@@ -253,12 +253,12 @@ impl Acquisition {
             let until = self.begin_all(ended);
             let mut over = Vec::new();
             let moved = match self.is_open {
-                true => self.line.advance(&mut |lane, result| over.push((lane, result))),
+                true => self.line.advance(&mut |one| over.push(one)),
                 false => Ok(None),
             };
             let is_over = !over.is_empty();
-            for (lane, result) in over {
-                self.over(lane, result, ended);
+            for one in over {
+                self.over(one, ended);
             }
             let wait = match moved {
                 Ok(wait) if self.line.link_state() == LinkState::Open => wait,
@@ -349,24 +349,36 @@ impl Acquisition {
         };
         let begun = request.map_or(Err(LineError::Protocol), |it| self.line.begin(lane, &it));
         if let Err(error) = begun {
-            self.over(lane, Err(error), ended);
+            let sent = self.clock.now();
+            self.over(Over { lane, result: Err(error), sent, shows: Shows::Nothing }, ended);
         }
     }
 
     /// The exchange of a lane is over.
-    fn over(&mut self, lane: Lane, result: Result<Reply, LineError>, ended: &mut Ended<'_>) {
+    fn over(&mut self, over: Over, ended: &mut Ended<'_>) {
+        let Over { lane, result, sent, shows } = over;
         let now = self.clock.now();
         let outcome = match &result {
             Ok(_) => Outcome::Answered,
             // The motor answered, and the lane is in sync again.
-            Err(error) if error.is_unconfirmed() && error.unanswered_confirmation().is_none() => {
-                Outcome::Answered
-            }
+            Err(error) if error.is_unconfirmed() => Outcome::Answered,
             Err(error) if error.is_line_failure() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
+        match shows {
+            Shows::Nothing => {}
+            Shows::Match => {
+                self.confirmed.insert(lane, sent);
+                self.tell_each(lane, |motor| What::Confirmed(motor, sent));
+            }
+            Shows::Doubt => {
+                let since = self.confirmed.get(&lane).copied().unwrap_or_default();
+                self.tell_each(lane, |motor| What::Doubtful(motor, since));
+                self.distrust(lane);
+            }
+        }
         match self.schedule.ended(now, lane, outcome) {
-            Some(Verdict::Poll(id, began)) => self.polled(lane, id, began, result),
+            Some(Verdict::Poll(id)) => self.polled(lane, id, sent, result),
             Some(Verdict::Command(id)) => ended(id, result.map_err(CommandError::Line)),
             Some(Verdict::Stopped(id)) => {
                 self.tell(What::Stopped(id));
@@ -399,10 +411,7 @@ impl Acquisition {
             self.answered(lane);
         }
         match result {
-            Ok(Reply::Confirmed) => {
-                self.confirmed.insert(lane, requested);
-                self.tell_each(lane, |motor| What::Confirmed(motor, requested));
-            }
+            Ok(Reply::Confirmed) => {}
             Ok(reply) => match self.line.samples(&poll, &reply) {
                 Some(samples) => {
                     match implausible(&poll, &samples) {
@@ -420,14 +429,7 @@ impl Acquisition {
                     self.refuse(id, poll.signals.clone(), LineError::Reply);
                 }
             },
-            Err(error) if poll.read == Read::Confirm && error.is_unconfirmed() => {
-                let since = self.confirmed.get(&lane).copied().unwrap_or_default();
-                self.tell_each(lane, |motor| What::Doubtful(motor, since));
-                self.distrust(lane);
-                if let Some(error) = error.unanswered_confirmation() {
-                    self.failed(lane, poll.motor, error);
-                }
-            }
+            Err(error) if error.is_unconfirmed() => {}
             Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, error),
             // The drive may have no data segments: then the plan is another.
             Err(error) if !self.replan() => {
@@ -444,7 +446,6 @@ impl Acquisition {
     }
 
     fn failed(&mut self, lane: Lane, motor: Motor, why: LineError) {
-        self.distrust(lane);
         let failures = self.failures.entry(lane).or_default();
         *failures += 1;
         match *failures {
@@ -474,7 +475,7 @@ impl Acquisition {
                     self.stop_failed(id, &CommandError::Closed);
                     ended(id, Err(CommandError::Closed));
                 }
-                Verdict::Poll(..) | Verdict::Stopped(_) | Verdict::StopAgain(_) => {}
+                Verdict::Poll(_) | Verdict::Stopped(_) | Verdict::StopAgain(_) => {}
             }
         }
         self.tell(What::Lost(Arc::new(why)));

@@ -26,15 +26,15 @@ pub enum What {
     Back,
     /// A motor has not answered once, after it had answered.
     Unanswered(Motor, Arc<LineError>),
-    /// A motor has not answered twice in a row. It is asked less often.
+    /// A motor has not answered twice in a row. If it goes on, the motor is asked less often.
     Silent(Motor, Arc<LineError>),
     /// A silent motor answers again.
     Answers(Motor),
     /// The drive refuses to give signals, or their values are not plausible. Said once, until they
     /// come.
     Refused(Vec<Signal>, Arc<LineError>),
-    /// A reply came twice or late. The values of this motor since this moment may be those of other
-    /// signals.
+    /// A reply came twice or late, or was damaged. The values of this motor since this moment may be
+    /// those of other signals.
     Doubtful(Motor, Instant),
     /// The values of this motor up to this moment belong to their signals.
     Confirmed(Motor, Instant),

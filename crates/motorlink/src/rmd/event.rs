@@ -7,6 +7,7 @@ use motorlink_link::Clock;
 use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
+use motorlink_proto::time::Instant;
 
 use super::client::Driven;
 use super::session::SessionOutput;
@@ -22,6 +23,8 @@ const STEP: usize = 64;
 /// different motors overlap; a motor has one at a time.
 pub struct EventClient {
     driven: Driven<Box<dyn EventCan>>,
+    /// When the last frame to each motor was sent.
+    sent: [Instant; MotorId::COUNT],
 }
 
 impl EventClient {
@@ -53,12 +56,16 @@ impl EventClient {
         options: Options,
     ) -> Result<Self, Error> {
         let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventClient { driven: Driven::new(port, &options) })
+        Ok(Self::driving(port, &options))
     }
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn EventCan>, options: Options) -> Self {
-        EventClient { driven: Driven::new(Reopening::over(name, link), &options) }
+        Self::driving(Reopening::over(name, link), &options)
+    }
+
+    fn driving(port: Reopening<Box<dyn EventCan>>, options: &Options) -> Self {
+        EventClient { driven: Driven::new(port, options), sent: [Instant(0); MotorId::COUNT] }
     }
 
     /// Whether the port is open.
@@ -83,6 +90,12 @@ impl EventClient {
     /// The clock of the port.
     pub fn clock(&self) -> Clock {
         self.driven.port.clock()
+    }
+
+    /// When the last frame to a motor was sent. Behind an exchange that is over, it is that of its
+    /// request, not of a question before it.
+    pub fn sent(&self, id: MotorId) -> Instant {
+        self.sent[id.index()]
     }
 
     /// Why frames may not get to the bus, as far as its adapter tells.
@@ -205,14 +218,21 @@ impl EventClient {
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let Driven { port, session, .. } = &mut self.driven;
+        let EventClient { driven: Driven { port, session, .. }, sent } = self;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(None) };
         let mut listens = STEP;
         loop {
             let now = clock.now();
             match session.poll(now) {
-                SessionOutput::Transmit(frame) => link.send(&frame)?,
+                SessionOutput::Transmit(frame) => {
+                    link.send(&frame)?;
+                    let id =
+                        frame.eight_bytes().and_then(|(id, _)| MotorId::from_can_id(id.into()));
+                    if let Some(id) = id {
+                        sent[id.index()] = now;
+                    }
+                }
                 SessionOutput::Done(id, result) => {
                     each(id, result.map_err(|error| error.behind(link.as_ref())));
                 }

@@ -9,6 +9,7 @@ use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::st::{
     Confirmation, Counters, MotorNumber, Output, Profile, Request, SyncState,
 };
+use motorlink_proto::time::Instant;
 
 use super::client::Driven;
 use super::{Client, Error, Options};
@@ -20,6 +21,7 @@ use super::{Client, Error, Options};
 /// that is abandoned loses the line, and the next one recovers it.
 pub struct EventClient {
     driven: Driven<Box<dyn EventBytes>>,
+    sent: Instant,
 }
 
 /// How far an exchange is.
@@ -61,7 +63,7 @@ impl EventClient {
         options: Options,
     ) -> Result<Self, Error> {
         let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventClient { driven: Driven::new(port, &options) })
+        Ok(EventClient { driven: Driven::new(port, &options), sent: Instant(0) })
     }
 
     /// Whether the port is open.
@@ -96,6 +98,12 @@ impl EventClient {
     /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
         self.driven.session.sync_state()
+    }
+
+    /// When the last frame was sent. Behind an exchange that is over, it is that of its request, not of
+    /// a recovery before it.
+    pub fn sent(&self) -> Instant {
+        self.sent
     }
 
     /// What came without being asked for.
@@ -186,7 +194,7 @@ impl EventClient {
         &mut self,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<Progress<T>, PortError> {
-        let Driven { port, session, received, .. } = &mut self.driven;
+        let EventClient { driven: Driven { port, session, received, .. }, sent } = self;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(Progress::Wait(None)) };
         // What is left in the port wakes the loop again; it has others to serve.
@@ -196,6 +204,7 @@ impl EventClient {
             match session.poll(now) {
                 Output::Transmit(bytes) => {
                     link.write(bytes)?;
+                    *sent = now;
                     listens = link.descriptor().is_none();
                 }
                 Output::Wait(until) => {

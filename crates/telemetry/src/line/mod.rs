@@ -10,6 +10,7 @@ use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Code, MotorId};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
+use motorlink_proto::time::Instant;
 
 use crate::plan::{Poll, Read, Wants};
 use crate::sample::Samples;
@@ -82,18 +83,7 @@ impl LineError {
         }
     }
 
-    /// What came in place of the answer to a confirmation; `None` if there was an answer, or if this
-    /// is not about a confirmation.
-    pub(crate) fn unanswered_confirmation(&self) -> Option<LineError> {
-        match self {
-            LineError::St(motorlink::st::Error::Unconfirmed { why, .. }) => {
-                why.as_deref().cloned().map(LineError::St)
-            }
-            _ => None,
-        }
-    }
-
-    /// Whether replies and requests did not go together.
+    /// Whether the motor answered a confirmation, and replies before it did not match their requests.
     pub(crate) fn is_unconfirmed(&self) -> bool {
         use motorlink::{rmd, st};
         matches!(
@@ -113,8 +103,32 @@ pub struct Stopped {
     pub result: Result<(), LineError>,
 }
 
+/// An exchange that is over.
+#[derive(Debug)]
+pub struct Over {
+    /// Its lane.
+    pub lane: Lane,
+    /// The reply, or why there is none.
+    pub result: Result<Reply, LineError>,
+    /// When the request was sent: after the lane was brought in sync.
+    pub sent: Instant,
+    /// What it shows about the replies before it.
+    pub shows: Shows,
+}
+
+/// What an exchange shows about the replies since the last confirmation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shows {
+    /// Nothing.
+    Nothing,
+    /// They belong to their requests.
+    Match,
+    /// They may belong to other requests.
+    Doubt,
+}
+
 /// What an exchange that is over calls.
-pub type Done<'a> = dyn FnMut(Lane, Result<Reply, LineError>) + 'a;
+pub type Done<'a> = dyn FnMut(Over) + 'a;
 
 /// A client of one port, driven in steps.
 pub trait Line: Send {

@@ -7,7 +7,7 @@ use motorlink::rmd::{Error, EventClient, Options};
 use motorlink::{Clock, LinkState, port::PortName};
 use motorlink_proto::rmd::{Command, MotorId, MotorSet};
 
-use super::{Done, Line, LineError, Reply, Request, Stopped};
+use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
 use crate::plan::{Poll, Read, Wants, rmd_polls};
 use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
@@ -18,6 +18,8 @@ pub struct RmdLine {
     client: EventClient,
     /// Motors whose exchange is a confirmation.
     confirming: MotorSet,
+    /// Motors with a cancelled exchange. They had sent a reply without a request before it.
+    strayed: MotorSet,
 }
 
 impl RmdLine {
@@ -31,7 +33,7 @@ impl RmdLine {
 
     /// Uses a client that is open.
     pub fn new(client: EventClient) -> Self {
-        RmdLine { client, confirming: MotorSet::EMPTY }
+        RmdLine { client, confirming: MotorSet::EMPTY, strayed: MotorSet::EMPTY }
     }
 }
 
@@ -80,25 +82,35 @@ impl Line for RmdLine {
     fn cancel(&mut self, lane: Lane) {
         if let Some(id) = MotorId::new(lane.0) {
             self.confirming.remove(id);
+            if self.client.confirmed(id).is_err() {
+                self.strayed.insert(id);
+            }
             self.client.cancel(id);
         }
     }
 
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
-        let mut confirmed = MotorSet::EMPTY;
-        let confirming = &mut self.confirming;
-        let wait = self.client.advance(|id, result| {
-            if confirming.contains(id) {
-                confirming.remove(id);
-                if result.is_ok() {
-                    return confirmed.insert(id);
+        let mut over = Vec::new();
+        let wait = self.client.advance(|id, result| over.push((id, result)));
+        for (id, result) in over {
+            let is_confirmation = self.confirming.contains(id);
+            self.confirming.remove(id);
+            let mut shows = Shows::Nothing;
+            let mut result = result.map(Reply::Rmd).map_err(LineError::from);
+            // A motor whose replies were shifted by one sends one that is not expected if it is asked
+            // something else, or if it does not receive a request.
+            if is_confirmation || result.is_err() {
+                let judged = self.client.confirmed(id);
+                shows = if judged.is_ok() { Shows::Match } else { Shows::Doubt };
+                if is_confirmation && result.is_ok() {
+                    result = judged.map(|()| Reply::Confirmed).map_err(LineError::from);
                 }
             }
-            done(lane(id), result.map(Reply::Rmd).map_err(LineError::from));
-        });
-        for id in confirmed {
-            let result = self.client.confirmed(id);
-            done(lane(id), result.map(|()| Reply::Confirmed).map_err(LineError::from));
+            if self.strayed.contains(id) {
+                shows = Shows::Doubt;
+            }
+            self.strayed.remove(id);
+            done(Over { lane: lane(id), result, sent: self.client.sent(id), shows });
         }
         if wait.is_err() {
             self.confirming = MotorSet::EMPTY;

@@ -10,7 +10,7 @@ use motorlink_proto::st::{
     Confirmation, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
 };
 
-use super::{Done, Line, LineError, Reply, Request, Stopped};
+use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
 use crate::plan::{Poll, Read, Wants, st_polls};
 use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
@@ -26,6 +26,10 @@ pub struct StLine {
     /// The registers of each data segment that this line configured.
     configured: [Option<Vec<RegisterId>>; SEGMENTS],
     segments: Vec<u8>,
+    /// How often the line had been lost when the exchange began.
+    losses: u32,
+    /// How often it had been lost when the replies were judged last.
+    judged: u32,
 }
 
 /// How far the exchange is.
@@ -64,7 +68,8 @@ impl StLine {
             Profile::Spec => (0..SEGMENTS as u8).rev().collect(),
             Profile::Mcsdk54 => Vec::new(),
         };
-        StLine { client, step: Step::Idle, configured: Default::default(), segments }
+        let (step, configured) = (Step::Idle, Default::default());
+        StLine { client, step, configured, segments, losses: 0, judged: 0 }
     }
 
     /// Uses this data segment only, and none in the profile that has none.
@@ -118,6 +123,38 @@ impl StLine {
             (_, result) => Err(result.map(Reply::St)),
         }
     }
+
+    /// What an exchange that is over shows about the replies before it.
+    ///
+    /// A reply that came twice shifts all later ones by one. Then a whole reply comes for a request
+    /// even if the drive did not receive it, or if its own reply is damaged. So if none came, the
+    /// replies before match their requests. A drive that did not understand may have received the rest
+    /// of an earlier request.
+    fn judge(&mut self, result: Result<Reply, Error>) -> Over {
+        let result = match result {
+            Err(Error::Unconfirmed { why: Some(why), .. }) if why.is_line_failure() => Err(*why),
+            result => result,
+        };
+        let was_lost = self.losses != self.judged;
+        let shows = match &result {
+            Ok(Reply::Confirmed) => Shows::Match,
+            Err(error) if !was_lost && shows_no_reply(error) => Shows::Match,
+            Err(error) if error.is_line_failure() => Shows::Doubt,
+            _ => Shows::Nothing,
+        };
+        if shows != Shows::Nothing {
+            self.judged = self.client.counters().losses;
+        }
+        let result = result.map_err(LineError::from);
+        Over { lane: LANE, result, sent: self.client.sent(), shows }
+    }
+}
+
+/// Whether no whole reply came for the request, or it was not sent because the line was lost before.
+fn shows_no_reply(error: &Error) -> bool {
+    use proto::Failure::{Echo, Incomplete, Lost, Noise, Timeout};
+    let Error::Failed { failure, .. } = error else { return false };
+    matches!(failure, Timeout | Incomplete { .. } | Lost | Noise | Echo)
 }
 
 impl Line for StLine {
@@ -140,6 +177,7 @@ impl Line for StLine {
     fn reopen(&mut self) -> Result<(), LineError> {
         self.client.reopen()?;
         self.configured = Default::default();
+        self.judged = self.client.counters().losses;
         Ok(())
     }
 
@@ -148,6 +186,7 @@ impl Line for StLine {
     }
 
     fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
+        self.losses = self.client.counters().losses;
         self.step = match request {
             Request::St(motor, request) => {
                 self.client.begin(*motor, &request.request())?;
@@ -194,15 +233,17 @@ impl Line for StLine {
                 }
                 Progress::Done(result) => result,
             };
-            match std::mem::replace(&mut self.step, Step::Idle) {
-                Step::Confirming(_) => {
-                    done(LANE, result.map(|_| Reply::Confirmed).map_err(LineError::from));
-                }
+            let over = match std::mem::replace(&mut self.step, Step::Idle) {
+                Step::Confirming(_) => result.map(|_| Reply::Confirmed),
                 step => match self.after(step, result) {
-                    Ok(step) => self.step = step,
-                    Err(result) => done(LANE, result.map_err(LineError::from)),
+                    Ok(step) => {
+                        self.step = step;
+                        continue;
+                    }
+                    Err(result) => result,
                 },
-            }
+            };
+            done(self.judge(over));
         }
     }
 

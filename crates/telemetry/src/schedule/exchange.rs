@@ -39,8 +39,8 @@ pub enum Outcome {
 /// What an exchange was that is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// A poll, begun at this moment.
-    Poll(PollId, Instant),
+    /// A poll.
+    Poll(PollId),
     /// A command.
     Command(CommandId),
     /// A stop that the drive confirmed.

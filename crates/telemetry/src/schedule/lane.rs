@@ -7,10 +7,11 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::exchange::{CommandId, Kind, Outcome, UnderWay, Verdict};
 
-/// The pause before the next poll after the second failure in a row. It doubles with each more.
-const FIRST_PAUSE: Micros = Micros::from_millis(100);
-/// The longest pause.
-const LONGEST_PAUSE: Micros = Micros::from_millis(2_000);
+/// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
+/// silence: on a line that loses bytes they are common.
+const PATIENCE: Micros = Micros::from_millis(2_000);
+/// The pause before its next poll.
+const PAUSE: Micros = Micros::from_millis(500);
 
 #[derive(Debug)]
 struct Stop<C> {
@@ -30,8 +31,12 @@ pub(super) struct LaneState<C> {
     pub(super) commands_in_a_row: u32,
     /// Whether the last exchange was answered.
     pub(super) in_sync: bool,
-    /// Polls in a row that failed.
+    /// Whether an exchange was answered since the line was opened.
+    pub(super) is_known: bool,
+    /// Exchanges in a row that failed.
     failures: u32,
+    /// When the first of them began.
+    silent_since: Instant,
     quiet_until: Instant,
 }
 
@@ -43,7 +48,9 @@ impl<C> Default for LaneState<C> {
             commands: VecDeque::new(),
             commands_in_a_row: 0,
             in_sync: false,
+            is_known: false,
             failures: 0,
+            silent_since: Instant(0),
             quiet_until: Instant(0),
         }
     }
@@ -120,8 +127,14 @@ impl<C: Clone> LaneState<C> {
         self.failures > 1
     }
 
-    /// Expects answers again.
-    pub(super) fn trust(&mut self) {
+    /// The line was opened again.
+    pub(super) fn reopened(&mut self) {
+        (self.in_sync, self.is_known) = (false, false);
+        self.trust();
+    }
+
+    /// Expects answers.
+    fn trust(&mut self) {
         (self.failures, self.quiet_until) = (0, Instant(0));
     }
 
@@ -134,22 +147,28 @@ impl<C: Clone> LaneState<C> {
     pub(super) fn judge(&mut self, now: Instant, exchange: UnderWay, outcome: Outcome) -> Verdict {
         self.in_sync = matches!(outcome, Outcome::Answered | Outcome::Refused);
         match outcome {
-            Outcome::Answered | Outcome::Refused => self.trust(),
-            Outcome::Failed => self.failed(now),
+            Outcome::Answered | Outcome::Refused => {
+                self.is_known = true;
+                self.trust();
+            }
+            Outcome::Failed => self.failed(now, exchange.since),
             Outcome::Closed => {}
         }
         match exchange.kind {
-            Kind::Poll(poll) => Verdict::Poll(poll, exchange.since),
+            Kind::Poll(poll) => Verdict::Poll(poll),
             Kind::Command(id) => Verdict::Command(id),
             Kind::Stop(id) => self.judge_stop(now, id, outcome),
         }
     }
 
-    fn failed(&mut self, now: Instant) {
+    fn failed(&mut self, now: Instant, began: Instant) {
+        if self.failures == 0 {
+            self.silent_since = began;
+        }
         self.failures = self.failures.saturating_add(1);
-        let Some(doublings) = self.failures.checked_sub(2) else { return };
-        let pause = FIRST_PAUSE.0.saturating_mul(1 << doublings.min(16));
-        self.quiet_until = now + Micros(pause).min(LONGEST_PAUSE);
+        if now.since(self.silent_since) >= PATIENCE {
+            self.quiet_until = now + PAUSE;
+        }
     }
 
     fn judge_stop(&mut self, now: Instant, id: CommandId, outcome: Outcome) -> Verdict {

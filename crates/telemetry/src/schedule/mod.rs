@@ -17,7 +17,8 @@
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
 //! ahead of it.
 //!
-//! **Silence.** A lane that does not answer is asked less and less often, with one poll at a time.
+//! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
+//! little of the line.
 
 mod exchange;
 mod lane;
@@ -162,8 +163,8 @@ impl<C: Clone> Schedule<C> {
         self.load.decide_anew();
     }
 
-    /// The polls that go first in a lane at the beginning and after a failure: they take the time in
-    /// which the line is brought in sync, so that the polls behind them are on time.
+    /// The polls that go first in a lane after the line was opened: they take the time in which the
+    /// line is brought in sync, so that the polls behind them are on time.
     pub fn set_openers(&mut self, openers: BTreeMap<Lane, PollId>) {
         self.openers = openers;
     }
@@ -287,7 +288,7 @@ impl<C: Clone> Schedule<C> {
         })?;
         let (lane, instant) = (group.lane, group.due);
         let state = self.lanes.get_mut(&lane)?;
-        let opener = self.openers.get(&lane).copied().filter(|_| !state.in_sync);
+        let opener = self.openers.get(&lane).copied().filter(|_| !state.is_known);
         let poll = opener.unwrap_or_else(|| {
             let poll = group.next_poll();
             group.position += 1;
@@ -332,7 +333,7 @@ impl<C: Clone> Schedule<C> {
         self.under_way -= 1;
         self.load.ended(now, &exchange, outcome);
         let verdict = state.judge(now, exchange, outcome);
-        if !self.is_started && matches!(verdict, Verdict::Poll(..)) {
+        if !self.is_started && matches!(verdict, Verdict::Poll(_)) {
             self.start(now);
         }
         Some(verdict)
@@ -357,7 +358,7 @@ impl<C: Clone> Schedule<C> {
     /// The line is open again.
     pub fn reopened(&mut self, now: Instant) {
         self.is_open = true;
-        self.lanes.values_mut().for_each(LaneState::trust);
+        self.lanes.values_mut().for_each(LaneState::reopened);
         let anchor = self.anchor.unwrap_or(now);
         for group in &mut self.groups {
             group.due = group.due.max(last_on_grid(anchor, group.period, now));
