@@ -2,9 +2,12 @@
 
 mod engine;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use motorlink_proto::rmd::{MotorId, Off, ReadStatus, SetSpeed, Stop};
+use motorlink::port::{Direction, TapBytes, TapCan};
+use motorlink_link::fault::Faults;
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, SetSpeed, Stop};
 use motorlink_proto::st::{self, Profile, RegisterId};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::CentiDps;
@@ -24,6 +27,11 @@ const CENTISECOND: Micros = Micros(10_000);
 /// The engine of the line to the ST drive of a bench.
 fn st_engine(bench: &Bench, faults: &str) -> Engine {
     Engine::st(bench.bytes(&spec(faults)), st_options(bench.profile()))
+}
+
+/// The engine of the bus of a bench.
+fn rmd_engine(bench: &Bench, faults: &str) -> Engine {
+    Engine::rmd(bench.can(&spec(faults)))
 }
 
 impl Engine {
@@ -75,7 +83,7 @@ impl Got {
 #[test]
 fn four_motors_are_read_at_100_hz_without_a_gap() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let wanted: Vec<Signal> = (1..=4)
         .flat_map(|id| {
             signals(
@@ -110,7 +118,7 @@ fn four_motors_are_read_at_100_hz_without_a_gap() {
 #[test]
 fn two_consumers_of_one_signal_cost_one_exchange() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let speed = signals(rmd(1), &["speed_dps"]);
     let fast = engine.subscribe(&speed, CENTISECOND);
     let slow = engine.subscribe(&speed, Micros(100_000));
@@ -123,7 +131,7 @@ fn two_consumers_of_one_signal_cost_one_exchange() {
 #[test]
 fn a_consumer_that_leaves_is_not_read_for_any_more() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let subscription = Subscription::new(10, Full::DropOldest);
     let wants = Wants::from([(signals(rmd(1), &["speed_dps"])[0], CENTISECOND)]);
     let id = engine.acquisition.subscribe(subscription.clone(), wants);
@@ -187,7 +195,7 @@ fn a_line_that_is_too_slow_says_so_and_slows_all() {
 #[test]
 fn a_motor_is_commanded_watched_and_stopped() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let speed = signals(rmd(2), &["speed_dps"]);
     let subscription = engine.subscribe(&speed, CENTISECOND);
     engine.run(Micros(100_000));
@@ -280,7 +288,7 @@ fn a_command_beyond_a_limit_is_refused_and_nothing_is_sent() {
 #[test]
 fn an_absent_motor_is_said_once_and_slows_no_other() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let mut wanted = signals(rmd(1), &["speed_dps"]);
     wanted.extend(signals(rmd(9), &["speed_dps"]));
     let subscription = engine.subscribe(&wanted, CENTISECOND);
@@ -371,7 +379,7 @@ fn a_value_of_the_other_profile_is_no_value() {
 fn a_stop_gets_through_a_bad_line() {
     for seed in 0..8 {
         let bench = bench();
-        let mut engine = Engine::rmd(&bench, &format!("drop=0.2,seed={seed}"));
+        let mut engine = rmd_engine(&bench, &format!("drop=0.2,seed={seed}"));
         let wanted = signals(rmd(1), &["speed_dps"]);
         engine.subscribe(&wanted, CENTISECOND);
         let id = MotorId::new(1).unwrap();
@@ -393,7 +401,7 @@ fn a_stop_gets_through_a_bad_line() {
 #[test]
 fn the_sender_of_a_command_is_named_in_an_event() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let subscription = engine.subscribe(&[], CENTISECOND);
     let by: Arc<str> = "arm".into();
     let id = MotorId::new(1).unwrap();
@@ -409,7 +417,7 @@ fn the_sender_of_a_command_is_named_in_an_event() {
 #[test]
 fn a_latch_holds_for_a_command_that_waits() {
     let bench = bench();
-    let mut engine = Engine::rmd(&bench, "");
+    let mut engine = rmd_engine(&bench, "");
     let motor = MotorId::new(1).unwrap();
     let turn = Request::rmd(motor, &SetSpeed { speed: CentiDps::from_dps(360.0) });
     let reading = engine.command(Request::rmd(motor, &ReadStatus)).unwrap();
@@ -439,4 +447,74 @@ fn a_stop_overtakes_the_commands_of_its_own_motor_only() {
     assert!(matches!(overtaken, Some(Err(CommandError::Overtaken))), "{:?}", engine.ended);
     assert!(matches!(engine.result(second), Some(Ok(_))), "{:?}", engine.ended);
     assert!(matches!(engine.result(stop), Some(Ok(_))), "{:?}", engine.ended);
+}
+
+/// What went out since it was cleared: whether each request is the stop.
+type Wire = Arc<Mutex<Vec<bool>>>;
+
+/// Stops a motor again and again while polling is saturated. Gives the most requests that went out
+/// before a stop, and the longest time that it took, as a part of the median exchange.
+fn stopped_on_a_saturated_line(engine: &mut Engine, wire: &Wire, stop: &Request) -> (usize, f64) {
+    engine.run(SECOND);
+    let exchange = engine.acquisition.load().durations().unwrap().median;
+    let (mut ahead, mut longest) = (0, Micros(0));
+    for round in 0..30 {
+        engine.run(Micros(20_000 + 370 * round));
+        wire.lock().unwrap().clear();
+        let asked = engine.clock.now();
+        let id = engine.stop(stop.clone());
+        while !wire.lock().unwrap().contains(&true) {
+            engine.run(engine.step);
+        }
+        longest = longest.max(engine.clock.now().since(asked));
+        let others = wire.lock().unwrap().iter().position(|is_stop| *is_stop);
+        ahead = ahead.max(others.unwrap());
+        engine.run(CENTISECOND);
+        assert!(matches!(engine.result(id), Some(Ok(_))), "{:?}", engine.ended);
+    }
+    (ahead, longest.0 as f64 / exchange.0 as f64)
+}
+
+/// Records what a link sends.
+fn record(wire: &Wire, is_stop: bool, way: Direction) {
+    if way == Direction::Sent {
+        wire.lock().unwrap().push(is_stop);
+    }
+}
+
+#[test]
+fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
+    let bench = bench();
+    let wire = Wire::default();
+    let seen = Arc::clone(&wire);
+    // EXECUTE_CMD of motor 1.
+    let tap = TapBytes::new(bench.bytes(&Faults::NONE), move |way, _, bytes: &[u8]| {
+        record(&seen, bytes[0] & 0x1F == 0x03, way);
+    });
+    let mut engine = Engine::st(tap, st_options(bench.profile()));
+    engine.subscribe(&signals(st(1), &["SPEED_MEAS", "BUS_VOLTAGE", "STATUS"]), Micros(500));
+    let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
+    let (ahead, exchanges) = stopped_on_a_saturated_line(&mut engine, &wire, &stop);
+    // The exchange that was under way goes on; none begins.
+    assert_eq!(ahead, 0);
+    assert!(exchanges < 1.5, "{exchanges}");
+}
+
+#[test]
+fn a_stop_goes_out_at_once_on_a_saturated_bus() {
+    let bench = bench();
+    let wire = Wire::default();
+    let seen = Arc::clone(&wire);
+    let tap = TapCan::new(bench.can(&Faults::NONE), move |way, _, frame: &CanFrame| {
+        let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
+        record(&seen, code == Some(Code::Stop), way);
+    });
+    let mut engine = Engine::rmd(tap);
+    let wanted: Vec<Signal> =
+        (1..=4).flat_map(|id| signals(rmd(id), &["speed_dps", "voltage_volts"])).collect();
+    engine.subscribe(&wanted, Micros(500));
+    let stop = Request::rmd(MotorId::new(3).unwrap(), &Stop);
+    let (ahead, exchanges) = stopped_on_a_saturated_line(&mut engine, &wire, &stop);
+    assert_eq!(ahead, 0);
+    assert!(exchanges < 0.5, "{exchanges}");
 }

@@ -52,8 +52,8 @@ fn a_serial_line_that_loses_bytes_gives_rows_when_it_can() {
 fn a_bus_that_loses_frames_gives_rows_when_it_can() {
     let rows = |period: Micros| {
         rows(period, |seed| {
-            let engine = Engine::rmd(&bench(), &format!("drop=0.05,seed={seed}"));
-            (engine, signals(rmd(1), &["speed_dps", "voltage_volts"]))
+            let link = bench().can(&spec(&format!("drop=0.05,seed={seed}")));
+            (Engine::rmd(link), signals(rmd(1), &["speed_dps", "voltage_volts"]))
         })
     };
     let (slow, fast) = (rows(Micros(100_000)), rows(Micros(10_000)));

@@ -104,9 +104,15 @@ impl<C: Clone> LaneState<C> {
         Some(stop.not_before)
     }
 
-    /// Whether the exchange that is under way gives way to a stop.
-    pub(super) fn may_be_displaced(&self) -> bool {
-        self.under_way.is_some_and(|exchange| !matches!(exchange.kind, Kind::Stop(_)))
+    /// Whether a stop waits that may begin at this time.
+    pub(super) fn is_stop_due(&self, now: Instant) -> bool {
+        self.stops.front().is_some_and(|stop| stop.not_before <= now)
+    }
+
+    /// Whether a stop may begin: nothing is under way, or what gives way to it.
+    pub(super) fn may_stop(&self, preempts: bool) -> bool {
+        let gives_way = |exchange: UnderWay| preempts && !matches!(exchange.kind, Kind::Stop(_));
+        self.under_way.is_none_or(gives_way)
     }
 
     /// Whether a command or a poll may begin: nothing is under way, and no stop is due.

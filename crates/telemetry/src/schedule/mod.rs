@@ -230,10 +230,17 @@ impl<C: Clone> Schedule<C> {
             .map_or_else(|| Next::Wait(self.until(now)), |(lane, job)| Next::Begin(lane, job))
     }
 
+    /// Whether [`next`](Self::next) gives a stop now.
+    pub fn has_stop(&self, now: Instant) -> bool {
+        let preempts = self.rules.stop_preempts;
+        self.is_open
+            && self.lanes.values().any(|lane| lane.may_stop(preempts) && lane.is_stop_due(now))
+    }
+
     fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
         let preempts = self.rules.stop_preempts;
         for (&lane, state) in &mut self.lanes {
-            if state.under_way.is_some() && !(preempts && state.may_be_displaced()) {
+            if !state.may_stop(preempts) {
                 continue;
             }
             if let Some((id, command)) = state.next_stop(now) {

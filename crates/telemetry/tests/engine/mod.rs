@@ -86,9 +86,10 @@ impl Engine {
         Engine::new(Acquisition::new(Box::new(StLine::new(client))))
     }
 
-    pub fn rmd(bench: &Bench, faults: &str) -> Self {
-        let link = Polled(bench.can(&spec(faults)));
-        let client = motorlink::rmd::EventClient::over("rmd", Box::new(link), Default::default());
+    /// With RMD motors on the bus.
+    pub fn rmd(link: impl CanLink + 'static) -> Self {
+        let link = Box::new(Polled(link));
+        let client = motorlink::rmd::EventClient::over("rmd", link, Default::default());
         Engine::new(Acquisition::new(Box::new(RmdLine::new(client))))
     }
 
