@@ -240,33 +240,30 @@ impl Acquisition {
 
     /// Sends and receives what can be sent and received without waiting. `ended` receives the
     /// commands that are over. Gives the time after which to call again if the descriptor is not
-    /// readable before; `None`: nothing is planned.
+    /// readable before; `None`: nothing is planned. It is zero when exchanges ended: a stop can come
+    /// between the calls, however fast the drives answer.
     pub fn advance(&mut self, ended: &mut Ended<'_>) -> Option<Duration> {
-        loop {
-            self.reopen_if_due();
-            self.trust_again();
-            let until = self.begin_all(ended);
-            let mut over = Vec::new();
-            let moved = match self.is_open {
-                true => self.line.advance(&mut |one| over.push(one)),
-                false => Ok(None),
-            };
-            let is_over = !over.is_empty();
-            for one in over {
-                self.over(one, ended);
-            }
-            let wait = match moved {
-                Ok(wait) if self.line.link_state() == LinkState::Open => wait,
-                Ok(_) if !self.is_open => None,
-                Ok(_) => self.closed(LineError::Closed, ended),
-                Err(error) => self.closed(error, ended),
-            };
-            if !is_over {
-                let now = self.clock.now();
-                let planned = until.map(|until| until.since(now).into());
-                return [wait, planned, self.retry_in()].into_iter().flatten().min();
-            }
+        self.reopen_if_due();
+        self.trust_again();
+        let until = self.begin_all(ended);
+        let mut over = Vec::new();
+        let moved = match self.is_open {
+            true => self.line.advance(&mut |one| over.push(one)),
+            false => Ok(None),
+        };
+        let again = (!over.is_empty()).then_some(Duration::ZERO);
+        for one in over {
+            self.over(one, ended);
         }
+        let wait = match moved {
+            Ok(wait) if self.line.link_state() == LinkState::Open => wait,
+            Ok(_) if !self.is_open => None,
+            Ok(_) => self.closed(LineError::Closed, ended),
+            Err(error) => self.closed(error, ended),
+        };
+        let now = self.clock.now();
+        let planned = until.map(|until| until.since(now).into());
+        [wait, planned, self.retry_in(), again].into_iter().flatten().min()
     }
 
     fn reopen_if_due(&mut self) {

@@ -3,8 +3,9 @@
 mod engine;
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
-use motorlink::port::{Direction, TapBytes, TapCan};
+use motorlink::port::{ByteLink, Direction, Link, PortError, TapBytes, TapCan};
 use motorlink_link::fault::Faults;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, SetSpeed, Stop};
@@ -479,6 +480,45 @@ fn stopped_on_a_saturated_line(engine: &mut Engine, wire: &Wire, stop: &Request)
 fn record(wire: &Wire, is_stop: bool, way: Direction) {
     if way == Direction::Sent {
         wire.lock().unwrap().push(is_stop);
+    }
+}
+
+/// A line whose drive answers while the engine reads, this number of times.
+struct Answering<L>(L, u32);
+
+impl<L: Link> Link for Answering<L> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.0)
+    }
+}
+
+impl<L: ByteLink> ByteLink for Answering<L> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.0.write(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], _: Option<Duration>) -> Result<usize, PortError> {
+        self.1 = self.1.saturating_sub(1);
+        let time = if self.1 > 0 { Duration::from_millis(10) } else { Duration::ZERO };
+        self.0.read(buffer, Some(time))
+    }
+}
+
+#[test]
+fn a_stop_can_come_between_two_exchanges_that_are_answered_at_once() {
+    let bench = bench();
+    let wire = Wire::default();
+    let seen = Arc::clone(&wire);
+    let link = Answering(bench.bytes(&Faults::NONE), 10_000);
+    let tap = TapBytes::new(link, move |way, _, _: &[u8]| record(&seen, false, way));
+    let mut engine = Engine::st(tap, st_options(bench.profile()));
+    engine.subscribe(&signals(st(1), &["BUS_VOLTAGE"]), Micros(500));
+    engine.run(SECOND);
+    for _ in 0..100 {
+        wire.lock().unwrap().clear();
+        engine.advance();
+        let sent = wire.lock().unwrap().len();
+        assert!(sent <= 1, "{sent}");
     }
 }
 

@@ -93,11 +93,16 @@ impl Engine {
         Engine::new(Acquisition::new(Box::new(RmdLine::new(client))))
     }
 
+    pub fn advance(&mut self) -> Option<Duration> {
+        self.acquisition.advance(&mut |id, result| self.ended.push((id, result)))
+    }
+
     pub fn run(&mut self, span: Micros) {
         let end = self.clock.now() + span;
         while self.clock.now() < end {
-            self.acquisition.advance(&mut |id, result| self.ended.push((id, result)));
-            self.clock.wait(self.clock.now() + self.step);
+            if self.advance() != Some(Duration::ZERO) {
+                self.clock.wait(self.clock.now() + self.step);
+            }
         }
     }
 
