@@ -3,6 +3,7 @@
 
 mod can;
 mod codec;
+mod engine;
 mod exchange;
 mod kernel;
 mod line;
@@ -38,6 +39,12 @@ enum What {
     Line,
     /// Cycles on a simulated 1 Mbit/s CAN bus, against the wire's ceiling
     Can,
+    /// The engine: 36 motors at 100 Hz, and stops on saturated ports
+    Engine {
+        /// How long to read the motors, s
+        #[arg(long, default_value_t = ENGINE_SECONDS)]
+        seconds: u32,
+    },
     /// Instructions of an ST exchange, master and slave together
     Exchange,
     /// Exchanges per second through Python, compared with pyserial
@@ -53,32 +60,46 @@ enum What {
     /// Replies on this number of ptys until the end of standard input
     #[command(hide = true)]
     Respond { count: u32 },
+    /// Serves the drives of the engine until the end of standard input
+    #[command(hide = true)]
+    Drives,
 }
 
+/// How long the engine reads its motors, s.
+const ENGINE_SECONDS: u32 = 10;
+
 /// One part of the benchmark: its tables, and the results of its goals.
-type Part = fn() -> Result<(Vec<Section>, Vec<Goal>)>;
+type Part<'a> = &'a dyn Fn() -> Result<(Vec<Section>, Vec<Goal>)>;
 
 fn main() -> Result<()> {
     let args = Args::parse();
     let style = if args.markdown { Style::Markdown } else { Style::Plain };
-    let parts: &[Part] = match args.what {
+    let seconds = match args.what {
+        What::Engine { seconds } => seconds,
+        _ => ENGINE_SECONDS,
+    };
+    let engine = || engine::measure(seconds);
+    let parts: &[Part<'_>] = match args.what {
         What::All => &[
-            codec::measure,
-            line::measure,
-            python::measure,
-            can::measure,
-            exchange::measure,
-            simulation::measure,
+            &codec::measure,
+            &line::measure,
+            &python::measure,
+            &can::measure,
+            &engine,
+            &exchange::measure,
+            &simulation::measure,
         ],
-        What::Codec => &[codec::measure],
-        What::Line => &[line::measure],
-        What::Can => &[can::measure],
-        What::Exchange => &[exchange::measure],
-        What::Python => &[python::measure],
-        What::Simulation => &[simulation::measure],
+        What::Codec => &[&codec::measure],
+        What::Line => &[&line::measure],
+        What::Can => &[&can::measure],
+        What::Engine { .. } => &[&engine],
+        What::Exchange => &[&exchange::measure],
+        What::Python => &[&python::measure],
+        What::Simulation => &[&simulation::measure],
         What::Kernel { name, count } => return repeat(&name, count),
         What::Sitting { line } => return line::sitting(&line),
         What::Respond { count } => return line::respond(count),
+        What::Drives => return engine::serve(),
     };
     machine::describe(style);
     let mut goals = Vec::new();

@@ -121,7 +121,7 @@ pub fn respond(count: u32) -> Result<()> {
 pub struct Spread {
     least: f64,
     pub median: f64,
-    most: f64,
+    pub most: f64,
 }
 
 impl Spread {

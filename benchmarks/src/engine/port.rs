@@ -1,0 +1,244 @@
+//! The engine of one port, with a tap that sees what goes out.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use motorlink::port::{Direction, PortName, TapBytes, TapCan};
+use motorlink::time::{Instant as Moment, Micros};
+use motorlink::{rmd, st};
+use motorlink_proto::rmd::{Code, MotorId, Stop};
+use motorlink_proto::st::{Command, Frame, MotorNumber, Parse, Profile, Request as StRequest};
+use motorlink_telemetry::acquisition::{Acquisition, ConsumerId};
+use motorlink_telemetry::event::What;
+use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
+use motorlink_telemetry::plan::Wants;
+use motorlink_telemetry::runner::{Remote, Runner};
+use motorlink_telemetry::signal::{Motor, Signal};
+use motorlink_telemetry::subscription::{Full, Record, Subscription};
+
+use super::motors::{BUSES, MOTORS_OF_BUS, MOTORS_OF_LINE, QUANTITIES, REGISTERS};
+use crate::result::Result;
+
+/// Records that wait until they are counted.
+const QUEUE: usize = 100_000;
+/// How long a stop may take.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// A port with its engine.
+pub(super) struct Port {
+    pub(super) name: String,
+    pub(super) signals: Vec<Signal>,
+    motors: usize,
+    stops: Vec<Request>,
+    runner: Runner,
+    wire: Arc<Mutex<Wire>>,
+}
+
+/// What went out since the engine was told to stop.
+#[derive(Default)]
+struct Wire {
+    /// Requests before the last of the stops.
+    ahead: u32,
+    others: u32,
+    /// When each stop went out.
+    stops: Vec<Instant>,
+}
+
+impl Wire {
+    fn sent(&mut self, is_stop: bool) {
+        if is_stop {
+            self.ahead = self.others;
+            self.stops.push(Instant::now());
+        } else {
+            self.others += 1;
+        }
+    }
+}
+
+/// How a stop of all motors of a port went.
+pub(super) struct Stopped {
+    pub(super) first: Duration,
+    pub(super) last: Duration,
+    /// Other requests that went out before the last stop.
+    pub(super) ahead: u32,
+}
+
+/// What a consumer got.
+#[derive(Default)]
+pub(super) struct Counted {
+    pub(super) replies: u64,
+    /// Values of each signal.
+    pub(super) values: BTreeMap<Signal, u64>,
+    /// Instants without a reply.
+    pub(super) missing: u64,
+    /// Records that the consumer lost, and moments without certain values.
+    pub(super) lost: u64,
+}
+
+impl Port {
+    /// Opens the port at an address. The buses come first.
+    pub(super) fn open(number: usize, address: &str) -> Result<Self> {
+        let wire = Arc::new(Mutex::new(Wire::default()));
+        let is_bus = number < BUSES;
+        let name = match is_bus {
+            true => format!("bus {}", number + 1),
+            false => format!("line {}", number + 1 - BUSES),
+        };
+        let (line, signals, stops) = match is_bus {
+            true => bus(address, &wire)?,
+            false => line(address, &wire)?,
+        };
+        let motors = stops.len();
+        let runner = Runner::start(&name, Acquisition::new(line))?;
+        Ok(Port { name, signals, motors, stops, runner, wire })
+    }
+
+    pub(super) fn motors(&self) -> usize {
+        self.motors
+    }
+
+    pub(super) fn remote(&self) -> &Remote {
+        self.runner.remote()
+    }
+
+    /// Wants all signals at this period.
+    pub(super) fn subscribe(
+        &self,
+        period: Micros,
+        full: Full,
+    ) -> Result<(ConsumerId, Subscription)> {
+        let wants: Wants = self.signals.iter().map(|signal| (*signal, period)).collect();
+        Ok(self.remote().subscribe(wants, QUEUE, full)?)
+    }
+
+    /// Median and 99th percentile of the durations of exchanges.
+    pub(super) fn durations(&self) -> Result<(Micros, Micros)> {
+        let durations = self.remote().with(|engine| engine.load().durations())?;
+        let durations = durations.ok_or_else(|| format!("{} has not answered", self.name))?;
+        Ok((durations.median, durations.p99))
+    }
+
+    /// Stops all motors, and waits until the drives confirm it to the subscription.
+    pub(super) fn stop_all(&self, subscription: &Subscription) -> Result<Stopped> {
+        let (stops, wire) = (self.stops.clone(), Arc::clone(&self.wire));
+        let asked = Instant::now();
+        self.remote().post(move |engine| {
+            *lock(&wire) = Wire::default();
+            for stop in stops {
+                engine.stop(&"bench".into(), stop, &mut |_, _| {});
+            }
+        })?;
+        let mut confirmed = 0;
+        while confirmed < self.stops.len() {
+            match subscription.wait(PATIENCE).ok_or("no stop is confirmed")? {
+                Record::Event(event) => match &event.what {
+                    What::Stopped(_) => confirmed += 1,
+                    What::StopFailed(_, why) => return Err(why.as_ref().into()),
+                    _ => {}
+                },
+                Record::Values(_) | Record::Lost(_) => {}
+            }
+        }
+        let wire = lock(&self.wire);
+        let since = |at: Option<&Instant>| at.map(|at| at.duration_since(asked));
+        let (first, last) =
+            since(wire.stops.first()).zip(since(wire.stops.last())).ok_or("no stop")?;
+        Ok(Stopped { first, last, ahead: wire.ahead })
+    }
+}
+
+fn lock(wire: &Mutex<Wire>) -> MutexGuard<'_, Wire> {
+    wire.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Counts what comes from `begin` on, for this time.
+pub(super) fn count(
+    subscription: Subscription,
+    period: Micros,
+    begin: Moment,
+    span: Micros,
+) -> thread::JoinHandle<Counted> {
+    thread::spawn(move || {
+        let mut counted = Counted::default();
+        let mut last: BTreeMap<Vec<Signal>, Moment> = BTreeMap::new();
+        while let Some(record) = subscription.wait(PATIENCE) {
+            match record {
+                Record::Values(values) => {
+                    let Some(since) = values.instant.0.checked_sub(begin.0) else { continue };
+                    if since >= span.0 {
+                        break;
+                    }
+                    counted.replies += 1;
+                    for (signal, sample) in values.poll.signals.iter().zip(&values.samples) {
+                        *counted.values.entry(*signal).or_default() += u64::from(sample.is_ok());
+                    }
+                    let before = last.insert(values.poll.signals.clone(), values.instant);
+                    let periods = before.map_or(1, |at| values.instant.since(at).0 / period.0);
+                    counted.missing += periods.saturating_sub(1);
+                }
+                Record::Lost(count) => counted.lost += count,
+                Record::Event(_) => {}
+            }
+        }
+        counted
+    })
+}
+
+type Opened = (Box<dyn Line>, Vec<Signal>, Vec<Request>);
+
+/// An RMD bus behind an slcan adapter.
+fn bus(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
+    let port: PortName = format!("slcan:tcp:{address}").parse()?;
+    let wire = Arc::clone(wire);
+    let wrap = move |link| {
+        let wire = Arc::clone(&wire);
+        let tap = TapCan::new(link, move |way, _, frame: &motorlink::can::CanFrame| {
+            let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
+            sent(&wire, way, code == Some(Code::Stop));
+        });
+        Box::new(tap) as Box<dyn motorlink::port::EventCan>
+    };
+    let client = rmd::EventClient::open_wrapped(&port, wrap, rmd::Options::default())?;
+    let ids: Vec<MotorId> = (1..=MOTORS_OF_BUS).filter_map(MotorId::new).collect();
+    let mut signals = Vec::new();
+    for (id, name) in ids.iter().flat_map(|id| QUANTITIES.map(|name| (*id, name))) {
+        signals.push(Signal::named(Motor::Rmd(id), name)?);
+    }
+    let stops = ids.iter().map(|id| Request::rmd(*id, &Stop)).collect();
+    Ok((Box::new(RmdLine::new(client)), signals, stops))
+}
+
+/// The line to an ST drive.
+fn line(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
+    let port: PortName = format!("tcp:{address}").parse()?;
+    let wire = Arc::clone(wire);
+    let wrap = move |link| {
+        let wire = Arc::clone(&wire);
+        let tap = TapBytes::new(link, move |way, _, bytes: &[u8]| sent(&wire, way, is_stop(bytes)));
+        Box::new(tap) as Box<dyn motorlink::port::EventBytes>
+    };
+    let client = st::EventClient::open_wrapped(&port, wrap, st::Options::default())?;
+    let numbers = 1..=MOTORS_OF_LINE;
+    let mut signals = Vec::new();
+    for number in numbers.clone().filter_map(MotorNumber::new) {
+        for name in REGISTERS {
+            signals.push(Signal::named(Motor::St(number), name)?);
+        }
+    }
+    let stop = StRequest::ExecuteCommand(Command::StopMotor);
+    let stops = numbers.map(|number| Request::st(number, stop)).collect();
+    Ok((Box::new(StLine::new(client)), signals, stops))
+}
+
+fn sent(wire: &Mutex<Wire>, way: Direction, is_stop: bool) {
+    if way == Direction::Sent {
+        lock(wire).sent(is_stop);
+    }
+}
+
+fn is_stop(bytes: &[u8]) -> bool {
+    let Parse::Frame(frame, _) = Frame::parse(bytes) else { return false };
+    frame.request(Profile::Spec) == Ok(StRequest::ExecuteCommand(Command::StopMotor))
+}
