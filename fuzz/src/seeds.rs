@@ -23,6 +23,8 @@ const PORTS: &[&str] = &[
     "slcan:tcp:h:1?bitrate=500000",
     "slcan:serial:serial:x?echo=0",
     "socketcan:can0",
+    "share:./share/st0",
+    "share:/tmp/a share/rmd12",
     "sim:",
     "sim:bench.toml",
     "pty:./st0",

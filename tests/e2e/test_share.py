@@ -55,7 +55,9 @@ def drives(sim):
 def share(start, drives, tmp_path):
     """A share of these drives; its socket is `path`."""
     path = tmp_path / "share"
-    running = start("share", "-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--json")
+    # A busy machine may be late with a reply.
+    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "60s"]
+    running = start("share", *words, "--json")
     ready = json.loads(running.line(0))
     assert [line["line"] for line in ready["lines"]] == ["st0", "rmd0"]
     running.path = path

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use motorlink::port::PortError;
+use motorlink::port::{NotDone, PortError};
 use motorlink::st::{ErrorCode, Failure, Implausible, Target};
 use motorlink::{rmd, st};
 use pyo3::exceptions::PyException;
@@ -183,7 +183,19 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
 /// exceptions of other signal handlers are raised unchanged.
 pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     let raised = match error {
-        PortError::WrongKind { .. } => return invalid_value(py, error),
+        PortError::WrongKind { .. } | PortError::HeldInProfile { .. } => {
+            return invalid_value(py, error);
+        }
+        PortError::NotDone { port, motor, kind, .. } => {
+            let kind = match kind {
+                NotDone::Refused => Kind::Refused,
+                NotDone::Usage => Kind::InvalidValue,
+                NotDone::Silent => Kind::ReplyTimeout,
+                NotDone::Line => Kind::Link,
+            };
+            let motor = Some(*motor).filter(|motor| *motor != 0);
+            return kind.raise(py, error, Facts { port: Some(port), motor, ..Facts::default() });
+        }
         PortError::Io { source, .. } => source.get_ref().and_then(|raised| raised.downcast_ref()),
         _ => None,
     };

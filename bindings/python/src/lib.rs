@@ -53,6 +53,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         motorlink_testbench::register();
+        motorlink_telemetry::share::port::register();
         module.add("ST_SEGMENTS", motorlink_proto::st::SEGMENTS)?;
         module.add("ST_TIMEOUT", seconds(motorlink_proto::st::TIMEOUT))?;
         module.add("ST_BAUD_RATES", PyTuple::new(module.py(), motorlink::st::BAUD_RATES)?)?;

@@ -24,13 +24,19 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NotFound { .. } | PortError::NoSuchInterface { .. } => {
             Some("`motorlink ports` lists what is there")
         }
+        PortError::NoHolder { .. } => {
+            Some("start it with `motorlink share`, and stop motors that still turn")
+        }
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),
         _ => None,
     }
 }
 
-/// The name to try for a port of the other kind.
+/// What to write instead of a port of the other kind, or besides the port.
 pub fn port_kind(error: &PortError) -> Option<String> {
+    if let PortError::HeldInProfile { profile, .. } = error {
+        return Some(format!("add --profile {profile}"));
+    }
     let PortError::WrongKind { port, wanted, .. } = error else { return None };
     if *wanted == "CAN bus" {
         let line = port.strip_prefix("serial:").unwrap_or(port);

@@ -1,6 +1,6 @@
 //! Failures: kinds, exit codes, messages.
 
-use motorlink::port::{NameError, PortError};
+use motorlink::port::{NameError, NotDone, PortError};
 use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
@@ -382,7 +382,10 @@ impl From<PortError> for Failure {
 impl From<&PortError> for Failure {
     fn from(error: &PortError) -> Self {
         let kind = match error {
-            PortError::WrongKind { .. } => Kind::Usage,
+            PortError::WrongKind { .. }
+            | PortError::HeldInProfile { .. }
+            | PortError::NotDone { kind: NotDone::Usage, .. } => Kind::Usage,
+            PortError::NotDone { kind: NotDone::Refused, .. } => Kind::Refused,
             _ => Kind::Link,
         };
         let failure: Failure = Problem::of(kind, error, advice::port(error)).into();

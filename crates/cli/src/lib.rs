@@ -93,6 +93,7 @@ enum Command {
 pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
     motorlink_testbench::register();
+    motorlink_telemetry::share::port::register();
     let words = own_words(words);
     let is_shown = |word: &OsString| word.to_string_lossy().chars().all(is_printable);
     let has_control_characters = !words.iter().all(is_shown);

@@ -1,6 +1,7 @@
 //! `motorlink share`: holds ports and lets several programs use the drives at the same time.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use motorlink::port::PortName;
 use motorlink::st::Profile;
@@ -8,7 +9,7 @@ use motorlink::{rmd, st};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{Line, RmdLine, StLine, Stopped};
 use motorlink_telemetry::share::hub::{Held, Speaks};
-use motorlink_telemetry::share::message::Event;
+use motorlink_telemetry::share::message::{Event, Protocol};
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::json;
@@ -16,12 +17,13 @@ use serde_json::json;
 use crate::connection::missing_port;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
+use crate::span::span_up_to;
 use crate::{hint, output};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Why: a port has one program at a time. A share holds the ports, and other programs exchange messages \
-with it: samples, commands, stops. docs/SHARE-PROTOCOL.md describes the messages.
+Why: a port has one program at a time. A share holds the ports. Other programs use its lines as \
+ports, such as -p share:./share/st0, or exchange messages with it (docs/SHARE-PROTOCOL.md).
 
 Lines: st0, st1, .. are the ports with an ST drive; rmd0, rmd1, .. are those with RMD motors, in the \
 order of -p. A port that can have both, such as sim:, gives both.
@@ -46,6 +48,9 @@ pub struct Args {
     /// What the ST drives speak: the document, or the firmware of MCSDK 5.4
     #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", value_parser = hint::profile())]
     profile: Profile,
+    /// How long to wait for a reply, 1ms to 60s [default: 1s, on a CAN bus 50ms]
+    #[arg(long, value_name = "TIME", value_parser = span_up_to(Duration::from_secs(60)))]
+    timeout: Option<Duration>,
     /// Print JSON, one object per line
     #[arg(long)]
     json: bool,
@@ -55,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let path = path(&args.at)?;
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
-    let lines = open(&args.ports, args.profile)?;
+    let lines = open(&args.ports, args.profile, args.timeout)?;
     let share = format!("motorlink {}", env!("CARGO_PKG_VERSION"));
     let mut server = Server::open(&path, &share, lines)?;
     let mut outcome = ready(&server, args);
@@ -86,7 +91,11 @@ fn path(at: &str) -> Result<PathBuf, Failure> {
 }
 
 /// Opens each port, once for each protocol that it can have.
-fn open(ports: &[String], profile: Profile) -> Result<Vec<Held>, Failure> {
+fn open(
+    ports: &[String],
+    profile: Profile,
+    timeout: Option<Duration>,
+) -> Result<Vec<Held>, Failure> {
     let (mut held, mut st, mut rmd) = (Vec::new(), 0, 0);
     if ports.iter().all(String::is_empty) {
         return Err(missing_port());
@@ -94,14 +103,28 @@ fn open(ports: &[String], profile: Profile) -> Result<Vec<Held>, Failure> {
     for text in ports {
         let port: PortName = text.parse()?;
         if port.as_line().is_some() {
-            let options = st::Options { profile, ..st::Options::default() };
+            let defaults = st::Options::default();
+            let timeout = timeout.unwrap_or(defaults.timeout);
+            let options = st::Options { profile, timeout, ..defaults };
             let line = StLine::open(&port, options)?;
-            held.push(start(&format!("st{st}"), &port, Speaks::St(profile), Box::new(line))?);
+            held.push(start(
+                &format!("{}{st}", Protocol::St.word()),
+                &port,
+                Speaks::St(profile),
+                Box::new(line),
+            )?);
             st += 1;
         }
         if port.as_can().is_some() {
-            let line = RmdLine::open(&port, rmd::Options::default())?;
-            held.push(start(&format!("rmd{rmd}"), &port, Speaks::Rmd, Box::new(line))?);
+            let defaults = rmd::Options::default();
+            let timeout = timeout.unwrap_or(defaults.timeout);
+            let line = RmdLine::open(&port, rmd::Options { timeout, ..defaults })?;
+            held.push(start(
+                &format!("{}{rmd}", Protocol::Rmd.word()),
+                &port,
+                Speaks::Rmd,
+                Box::new(line),
+            )?);
             rmd += 1;
         }
     }

@@ -141,6 +141,11 @@ impl Acquisition {
         &self.clock
     }
 
+    /// How long a reply may take.
+    pub fn timeout(&self) -> Duration {
+        self.line.timeout()
+    }
+
     /// What is readable when there is something to receive.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.line.descriptor()

@@ -1,89 +1,25 @@
 //! A share at a Unix socket: programs that come, ask, read too slowly, and are gone.
 
 mod drives;
+mod shared;
 
 use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::path::Path;
 
-use drives::{path, served};
-use motorlink_proto::st::Profile;
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::hub::{Held, Speaks};
 use motorlink_telemetry::share::message::*;
-use motorlink_telemetry::share::server::Server;
-use motorlink_testbench::{Bench, Serving};
-
-const LIMIT: Duration = Duration::from_secs(30);
-
-/// A share of simulated drives on ptys: the line st0 and the line rmd0.
-struct Share {
-    bench: Bench,
-    path: PathBuf,
-    ends: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Vec<(String, Stopped)>>>,
-    _serving: Serving,
-}
+use shared::{LIMIT, Share};
 
 impl Share {
-    fn new(name: &str) -> Self {
-        let (bench, serving, st, rmd) = served(&format!("share-{name}"));
-        let line = StLine::open(&st.parse().unwrap(), Default::default()).unwrap();
-        let speaks = Speaks::St(Profile::Spec);
-        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
-        // A busy machine may be late with a reply.
-        let timeout = Duration::from_secs(5);
-        let options = motorlink::rmd::Options { timeout, ..Default::default() };
-        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
-        let engine = Acquisition::new(Box::new(line.unwrap()));
-        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
-        let socket = path(&format!("share-{name}"), "socket");
-        let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
-        let ends = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&ends);
-        let thread = std::thread::spawn(move || {
-            while !told.load(Ordering::SeqCst) {
-                server.turn().unwrap();
-            }
-            server.end("the test is over")
-        });
-        Share { bench, path: socket, ends, thread: Some(thread), _serving: serving }
-    }
-
     fn join(&self, name: &str) -> Program {
         let mut program = Program::connect(&self.path);
         let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
         assert!(matches!(program.ask(hello), Ok(Answer::Hello { .. })));
         program
-    }
-
-    fn end(&mut self) -> Vec<(String, Stopped)> {
-        self.ends.store(true, Ordering::SeqCst);
-        self.thread.take().map_or_else(Vec::new, |thread| thread.join().unwrap())
-    }
-
-    fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
-        let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
-        let end = Instant::now() + LIMIT;
-        while !what(self.bench.values()[at]) {
-            assert!(Instant::now() < end, "{signal} is {}", self.bench.values()[at]);
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-}
-
-impl Drop for Share {
-    fn drop(&mut self) {
-        self.end();
     }
 }
 
@@ -139,7 +75,7 @@ impl Program {
         loop {
             match self.receive() {
                 Got::Text(Text::Answer { id, answer }) if id == sent => return Ok(answer),
-                Got::Text(Text::Refusal { id, reason, message }) if id == sent => {
+                Got::Text(Text::Refusal { id, reason, message, .. }) if id == sent => {
                     return Err((reason, message));
                 }
                 Got::End => panic!("the connection has ended"),
@@ -333,7 +269,7 @@ fn requests_that_are_not_possible_are_refused_with_words() {
         ("st1", 1, &[3, 1], "no line `st1`; the lines are st0, rmd0"),
         ("st0", 0, &[3, 1], "number from 1 to 7"),
         ("st0", 1, &[], "frame code"),
-        ("st0", 1, &[0x0E, 0, 1], "subscribe"),
+        ("st0", 1, &[0x0D, 0], "configure it first"),
         ("rmd0", 33, &[0; 8], "1 to 32"),
         ("rmd0", 1, &[0x9A], "8 bytes, not 1"),
     ];

@@ -78,8 +78,8 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         For asyncio: ``async with open(...) as client``, or ``await open(...)``.
 
         ``port``
-            ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, ``sim:`` for simulated motors
-            inside the process, or a bus of python-can (:func:`motorlink.can.from_python_can`). The blocking
+            ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, ``share:PATH/rmd0`` for a line
+            of ``motorlink share``, ``sim:`` for simulated motors inside the process, or a bus of python-can (:func:`motorlink.can.from_python_can`). The blocking
             API also takes a bench of ``motorlink.sim``.
         ``timeout``
             Time to wait for a motor's reply, s.

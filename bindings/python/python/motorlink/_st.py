@@ -70,8 +70,8 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
         ``port``
             ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, ``unix:PATH``, the path
-            of a pty, or ``sim:`` for a simulated drive inside the process. The blocking API also takes a
-            bench of ``motorlink.sim``.
+            of a pty, ``share:PATH/st0`` for a line of ``motorlink share``, or ``sim:`` for a simulated drive
+            inside the process. The blocking API also takes a bench of ``motorlink.sim``.
         ``profile``
             ``spec``: the drive follows the document. ``mcsdk-5.4``: the drive follows the firmware that ST
             ships.

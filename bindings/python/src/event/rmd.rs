@@ -2,7 +2,7 @@
 
 use motorlink::LinkState;
 use motorlink::port::PortName;
-use motorlink::rmd::{EventClient, MotorId, ScanResult, StopAction};
+use motorlink::rmd::{Error, EventClient, MotorId, ScanResult, StopAction};
 use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -118,13 +118,18 @@ impl RmdEventClient {
         begun.map_err(|error| rmd_error(py, &error))
     }
 
-    /// The request that confirms a motor's replies.
-    fn question(&self, py: Python<'_>, id: i64) -> PyResult<RmdRequest> {
+    /// Begins the exchange that confirms a motor's replies.
+    fn begin_confirmation(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
-        self.driven.step(py, |motors| RmdRequest::for_bytes(motors.bus.question(id)))
+        let begun = self.driven.step(py, |motors| {
+            let question = motors.bus.begin_confirmation(id)?;
+            motors.expect(id, ReplyKind::Value(RmdRequest::for_bytes(question)));
+            Ok(())
+        })?;
+        begun.map_err(|error| rmd_error(py, &error))
     }
 
-    /// Checks, after the reply to `question`, that a motor's replies matched their requests.
+    /// Checks, after the exchange of `begin_confirmation`, that a motor's replies matched their requests.
     fn confirmed(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let confirmed = self.driven.step(py, |motors| motors.bus.confirmed(id))?;
@@ -170,8 +175,11 @@ impl RmdEventClient {
         let wait = wait.map_err(|error| rmd_error(py, &error))?;
         let value = |(id, asked, result)| {
             let value = match asked {
-                ReplyKind::ScanResult => ScanResult::of(id, result)
-                    .map_or_else(|| Ok(py.None()), |found| scan_result(py, found)),
+                ReplyKind::ScanResult => match result {
+                    Err(error @ Error::Port(_)) => Err(rmd_error(py, &error)),
+                    result => ScanResult::of(id, result)
+                        .map_or_else(|| Ok(py.None()), |found| scan_result(py, found)),
+                },
                 ReplyKind::Value(request) => result
                     .map_err(|error| rmd_error(py, &error))
                     .and_then(|reply| request.value(py, &reply)),

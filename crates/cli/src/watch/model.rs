@@ -6,7 +6,6 @@ use std::time::{Duration, Instant, SystemTime};
 
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::event::What;
-use motorlink_telemetry::line::Request;
 use motorlink_telemetry::sample::{Sample, Values};
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal, Source};
@@ -327,7 +326,7 @@ impl Model {
                 Some(("a reply came twice or late: values may be exchanged".to_owned(), true))
             }),
             What::Stopping(id, by, request) => {
-                if let Some(motor) = motor_of(request) {
+                if let Some(motor) = request.motor() {
                     self.ports[port].stops.insert(*id, motor);
                     let by = Arc::clone(by);
                     self.of_motor(port, motor, |row| {
@@ -369,17 +368,6 @@ impl Model {
             let text = format!("{}: {text}", self.rows[at].name);
             self.say(Some(at), text, is_bad);
         }
-    }
-}
-
-/// The motor of a request.
-fn motor_of(request: &Request) -> Option<Motor> {
-    match request {
-        Request::St(motor, _) | Request::Segment(motor, ..) => {
-            motorlink::st::MotorNumber::new(*motor).map(Motor::St)
-        }
-        Request::Rmd(id, _) => Some(Motor::Rmd(*id)),
-        Request::Confirm(motor) => Some(*motor),
     }
 }
 

@@ -236,6 +236,52 @@ pub enum PortError {
         /// The port.
         port: String,
     },
+    /// The program that holds the port did not get a reply, or did not send the request. The
+    /// connection to it stays open.
+    #[error("{why}")]
+    NotDone {
+        /// The port.
+        port: String,
+        /// The motor that the request was for.
+        motor: u8,
+        /// The kind of the reason.
+        kind: NotDone,
+        /// The reason.
+        why: String,
+    },
+    /// The program that holds the port does not answer.
+    #[error(
+        "`{port}`: the program that holds this port does not answer: is it stopped or overloaded? it \
+         is unknown whether the drive carried the request out"
+    )]
+    HolderSilent {
+        /// The port.
+        port: String,
+    },
+    /// The program that holds the port reads frames in another profile.
+    #[error("the program that holds `{port}` reads frames in profile {profile}; nothing was sent")]
+    HeldInProfile {
+        /// The port.
+        port: String,
+        /// Its profile.
+        profile: &'static str,
+    },
+    /// The program that holds the port is not there, or has ended.
+    #[error("`{port}`: {why}")]
+    NoHolder {
+        /// The port.
+        port: String,
+        /// What is known of it.
+        why: String,
+    },
+    /// The program that holds the port cannot be used.
+    #[error("`{port}`: {why}")]
+    Holder {
+        /// The port.
+        port: String,
+        /// The reason, and what to try.
+        why: String,
+    },
     /// Any other error of the system.
     #[error("`{port}` failed: {source}")]
     Io {
@@ -246,7 +292,33 @@ pub enum PortError {
     },
 }
 
+/// Why a program that holds a port has no reply to a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotDone {
+    /// It refuses the request now.
+    Refused,
+    /// The request is not possible.
+    Usage,
+    /// The motor does not answer.
+    Silent,
+    /// The line failed, or replies cannot be trusted.
+    Line,
+}
+
 impl PortError {
+    /// Whether the port stays open after this error.
+    pub fn leaves_open(&self) -> bool {
+        self.is_interruption()
+            || matches!(self, PortError::NotDone { .. } | PortError::HolderSilent { .. })
+    }
+
+    /// Whether nothing can be said about the drives, because the port failed.
+    pub fn is_line_failure(&self) -> bool {
+        let is_answered =
+            matches!(self, PortError::NotDone { kind: NotDone::Refused | NotDone::Usage, .. });
+        !self.is_interruption() && !is_answered
+    }
+
     /// Whether a wait was ended because the caller wants to do something else. The port stays open,
     /// and the exchange is abandoned.
     pub fn is_interruption(&self) -> bool {

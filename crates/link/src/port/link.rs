@@ -3,9 +3,21 @@
 use std::time::Duration;
 
 use motorlink_proto::can::CanFrame;
+use motorlink_proto::st::Profile;
 
 use super::error::PortError;
 use crate::clock::Clock;
+
+/// Another program that holds the port, and sends requests to the drives for this one. Its replies
+/// are always those of the last request to a motor. If there is none, it says why:
+/// [`PortError::NotDone`].
+#[derive(Debug, Clone, Copy)]
+pub struct Holder {
+    /// The longest time that it takes for a reply or a reason.
+    pub patience: Duration,
+    /// The profile in which it reads frames of ST's protocol.
+    pub profile: Option<Profile>,
+}
 
 /// The common functions of serial lines and CAN buses. A wrapper implements
 /// [`within`](Self::within); the other functions then forward to the wrapped link.
@@ -30,6 +42,19 @@ pub trait Link: Send {
     fn trouble(&self) -> Option<&'static str> {
         self.within()?.trouble()
     }
+
+    /// The program that holds the port, if it is not this one.
+    fn holder(&self) -> Option<Holder> {
+        self.within()?.holder()
+    }
+
+    /// The next request asks whether the replies so far belong to their requests. A program that
+    /// holds the port checks this for all requests on the line, also those of others.
+    fn confirm_next(&self) {
+        if let Some(within) = self.within() {
+            within.confirm_next();
+        }
+    }
 }
 
 impl<L: Link + ?Sized> Link for Box<L> {
@@ -43,6 +68,14 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn trouble(&self) -> Option<&'static str> {
         (**self).trouble()
+    }
+
+    fn holder(&self) -> Option<Holder> {
+        (**self).holder()
+    }
+
+    fn confirm_next(&self) {
+        (**self).confirm_next();
     }
 }
 

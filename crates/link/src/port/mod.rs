@@ -29,11 +29,11 @@ mod tap;
 
 pub use descriptors::open_descriptors;
 pub use echo::EchoCanceller;
-pub use error::PortError;
+pub use error::{NotDone, PortError};
 pub use event::{EventBytes, EventCan, Evented};
 pub use faulty::{FaultBytes, FaultCan};
 pub use fd::FdLink;
-pub use link::{ByteLink, CanLink, Link};
+pub use link::{ByteLink, CanLink, Holder, Link};
 pub use name::{Given, NameError};
 pub use registry::{register, schemes};
 pub use scheme::{CanPort, Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};

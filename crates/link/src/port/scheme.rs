@@ -110,6 +110,11 @@ pub trait Port: fmt::Debug + Send + Sync {
     fn is_in_process(&self) -> bool {
         false
     }
+
+    /// Whether another program holds the port, and stops the motors of its clients.
+    fn is_held(&self) -> bool {
+        false
+    }
 }
 
 /// A port that carries bytes.
@@ -179,6 +184,11 @@ impl PortName {
     /// As [`Port::is_in_process`].
     pub fn is_in_process(&self) -> bool {
         self.0.is_in_process()
+    }
+
+    /// As [`Port::is_held`].
+    pub fn is_held(&self) -> bool {
+        self.0.is_held()
     }
 
     /// As [`LinePort::baud`].

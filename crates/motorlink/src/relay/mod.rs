@@ -49,6 +49,12 @@ pub enum RelayError {
     /// The drives are inside the process.
     #[error("`{0}` names simulated drives inside this process, which end with it")]
     Simulated(PortName),
+    /// Another program holds the port.
+    #[error(
+        "`{0}` is held by a program that stops the motors of each of its clients itself: use it \
+         without a guard"
+    )]
+    Held(PortName),
 }
 
 /// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops
@@ -83,7 +89,7 @@ impl Relay {
     /// # Errors
     /// What keeps the port from being opened.
     pub fn st(port: &PortName, options: RelayOptions) -> Result<Self, RelayError> {
-        refuse_simulated(port)?;
+        refuse_unguardable(port)?;
         Ok(Self::over(Box::new(st::StHold::open(port)?), options))
     }
 
@@ -97,7 +103,7 @@ impl Relay {
         on_loss: StopAction,
         options: RelayOptions,
     ) -> Result<Self, RelayError> {
-        refuse_simulated(port)?;
+        refuse_unguardable(port)?;
         Ok(Self::over(Box::new(rmd::RmdHold::open(port, on_loss)?), options))
     }
 
@@ -232,9 +238,12 @@ impl Drop for Relay {
     }
 }
 
-fn refuse_simulated(port: &PortName) -> Result<(), RelayError> {
+fn refuse_unguardable(port: &PortName) -> Result<(), RelayError> {
     if port.is_in_process() {
         return Err(RelayError::Simulated(port.clone()));
+    }
+    if port.is_held() {
+        return Err(RelayError::Held(port.clone()));
     }
     Ok(())
 }

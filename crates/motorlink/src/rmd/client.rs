@@ -190,6 +190,15 @@ impl Client {
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut driven = self.turns.take();
         driven.ready([request])?;
+        self.exchange(driven, id, request)
+    }
+
+    fn exchange(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
+        id: MotorId,
+        request: [u8; 8],
+    ) -> Result<[u8; 8], Error> {
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
         let mut outcome = None;
@@ -204,8 +213,11 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read since the last confirmation may be older than it looks. Those
     /// of [`raw`](Self::raw).
     pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
-        let question = self.turns.take().session.question(id);
-        self.raw(id, question)?;
+        let mut driven = self.turns.take();
+        let question = driven.session.question(id);
+        driven.ready([question])?;
+        driven.confirm_next();
+        self.exchange(driven, id, question)?;
         self.turns.take().session.confirmed(id)
     }
 
@@ -296,9 +308,10 @@ impl Client {
         while !left.is_empty() {
             let asked = left.by_ref().take(SCAN_WIDTH);
             let requests: Vec<_> = asked.map(|id| (id, ReadStatus.encode())).collect();
-            let mut doubtful = MotorSet::EMPTY;
+            let (mut doubtful, mut failed) = (MotorSet::EMPTY, None);
             self.cycle(&requests, |id, outcome| match outcome {
                 Err(Error::Quarantined { .. }) => doubtful.insert(id),
+                Err(error @ Error::Port(_)) => failed = Some(error),
                 outcome => ScanResult::of(id, outcome).into_iter().for_each(&mut each),
             })?;
             for id in doubtful {
@@ -342,6 +355,10 @@ impl<L: CanLink> Driven<L> {
         if port.open_link().is_some_and(Link::is_fresh) {
             session.trust();
         }
+        if let Some(holder) = port.open_link().and_then(Link::holder) {
+            session.set_holder(holder);
+            session.trust();
+        }
         Driven { port, session, exchanges: 0 }
     }
 
@@ -383,14 +400,26 @@ impl<L: CanLink> Driven<L> {
                 self.session.trust();
             }
         }
+        let is_held = link.holder().is_some();
         loop {
             match self.port.link()?.0.receive(Some(Duration::ZERO)) {
                 // A bus that is never silent has to do: an Off must get through.
-                Ok(Some(_)) if self.port.now().since(now) > BABBLE => return Ok(()),
+                Ok(Some(_)) if self.port.now().since(now) > BABBLE => break,
                 Ok(Some(frame)) => self.session.receive(now, &frame),
-                Ok(None) => return Ok(()),
-                Err(error) => return Err(self.closed(error)),
+                Ok(None) => break,
+                Err(error) => self.failed(error)?,
             }
+        }
+        if is_held {
+            self.session.trust_idle();
+        }
+        Ok(())
+    }
+
+    /// Asks whether the replies of a motor went to their own requests.
+    pub(super) fn confirm_next(&mut self) {
+        if let Some(link) = self.port.open_link() {
+            link.confirm_next();
         }
     }
 
@@ -432,16 +461,40 @@ impl<L: CanLink> Driven<L> {
                     })
                 }
             };
-            moved.map_err(|error| self.closed(error))?;
+            if let Err(error) = moved {
+                self.failed(error)?;
+            }
+        }
+    }
+
+    /// The port failed, or the program that holds it has no reply.
+    fn failed(&mut self, error: PortError) -> Result<(), Error> {
+        match not_done(error) {
+            Ok((id, why)) => {
+                let now = self.port.now();
+                self.session.not_done(now, id, why);
+                Ok(())
+            }
+            Err(error) => Err(self.closed(error)),
         }
     }
 
     /// The port failed, or did not want to wait; the next call cancels what is under way.
     pub(super) fn closed(&mut self, error: PortError) -> Error {
-        if !error.is_interruption() {
+        if !error.leaves_open() {
             self.port.close();
         }
         error.into()
+    }
+}
+
+/// The motor whose request has no reply, and why, if the error is about one request.
+pub(super) fn not_done(error: PortError) -> Result<(MotorId, PortError), PortError> {
+    match error {
+        PortError::NotDone { motor, .. } => {
+            MotorId::new(motor).map(|id| (id, error.clone())).ok_or(error)
+        }
+        error => Err(error),
     }
 }
 

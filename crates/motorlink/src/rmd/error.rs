@@ -192,7 +192,7 @@ impl Error {
     /// Whether nothing can be said about the motor because it, or the line, was silent.
     pub fn is_line_failure(&self) -> bool {
         match self {
-            Error::Port(error) => !error.is_interruption(),
+            Error::Port(error) => error.is_line_failure(),
             Error::Timeout { .. }
             | Error::Adapter { .. }
             | Error::Foreign { .. }

@@ -9,7 +9,7 @@ use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
 
-use super::client::Driven;
+use super::client::{Driven, not_done};
 use super::session::SessionOutput;
 use super::{Client, Error, Options};
 
@@ -103,6 +103,11 @@ impl EventClient {
         self.driven.port.open_link().and_then(|link| link.trouble())
     }
 
+    /// How long a reply may take.
+    pub fn timeout(&self) -> Duration {
+        self.driven.session.timeout()
+    }
+
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
         self.driven.session.counters()
@@ -167,15 +172,23 @@ impl EventClient {
         self.driven.session.set_torque4(now, torques, expect)
     }
 
-    /// The request of a confirmation ([`Client::confirm`]), for [`ask`](Self::ask). Its code differs
-    /// from that of the last request. After the exchange [`confirmed`](Self::confirmed) gives the
+    /// Begins a confirmation ([`Client::confirm`]): asks a question whose code differs from that of
+    /// the last request, and gives it. After the exchange [`confirmed`](Self::confirmed) gives the
     /// result.
-    pub fn question(&self, id: MotorId) -> [u8; 8] {
-        self.driven.session.question(id)
+    ///
+    /// # Errors
+    /// Those of [`ask`](Self::ask).
+    pub fn begin_confirmation(&mut self, id: MotorId) -> Result<[u8; 8], Error> {
+        let question = self.driven.session.question(id);
+        self.driven.listen_for([question])?;
+        self.driven.confirm_next();
+        let now = self.driven.port.now();
+        self.driven.session.ask(now, id, question)?;
+        Ok(question)
     }
 
-    /// Whether the motor's replies went to their own requests, behind the answer to
-    /// [`question`](Self::question).
+    /// Whether the motor's replies went to their own requests, after
+    /// [`begin_confirmation`](Self::begin_confirmation).
     ///
     /// # Errors
     /// [`Error::Unconfirmed`].
@@ -226,7 +239,10 @@ impl EventClient {
             let now = clock.now();
             match session.poll(now) {
                 SessionOutput::Transmit(frame) => {
-                    link.send(&frame)?;
+                    if let Err(error) = link.send(&frame) {
+                        let (id, why) = not_done(error)?;
+                        session.not_done(now, id, why);
+                    }
                     let id =
                         frame.eight_bytes().and_then(|(id, _)| MotorId::from_can_id(id.into()));
                     if let Some(id) = id {
@@ -238,8 +254,16 @@ impl EventClient {
                 }
                 SessionOutput::Wait(until) => {
                     let came = match listens {
-                        0 => None,
-                        _ => link.receive(Some(Duration::ZERO))?,
+                        0 => Ok(None),
+                        _ => link.receive(Some(Duration::ZERO)),
+                    };
+                    let came = match came {
+                        Ok(came) => came,
+                        Err(error) => {
+                            let (id, why) = not_done(error)?;
+                            session.not_done(now, id, why);
+                            continue;
+                        }
                     };
                     let Some(frame) = came else {
                         let wait = until.map(|until| until.since(now).into());

@@ -1,8 +1,9 @@
 //! The host's end of a CAN bus without the bus: what the blocking client and event loops share.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use motorlink_link::port::PortError;
+use motorlink_link::port::{Holder, NotDone, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
@@ -45,6 +46,11 @@ pub(super) struct Session {
     unsent_for: Option<RequestError>,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
+    /// Whether another program holds the port.
+    is_held: bool,
+    timeout: Duration,
+    /// What the program that holds the port has no reply to, and why.
+    not_done: Vec<(MotorId, PortError)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -100,6 +106,35 @@ impl Session {
             unsent: MotorSet::EMPTY,
             unsent_for: None,
             is_retired: false,
+            is_held: false,
+            timeout: options.timeout,
+            not_done: Vec::new(),
+        }
+    }
+
+    /// How long a reply may take.
+    pub(super) fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    /// Another program holds the port. It gives a reply or a reason within its patience.
+    pub(super) fn set_holder(&mut self, holder: Holder) {
+        self.is_held = true;
+        self.timeout = holder.patience;
+        self.host.set_timeout(holder.patience.into());
+    }
+
+    /// No late reply comes to the motors that have no exchange under way.
+    pub(super) fn trust_idle(&mut self) {
+        self.host.trust(MotorSet::ALL.without(self.busy()));
+    }
+
+    /// The program that holds the port has no reply to the request of this motor.
+    pub(super) fn not_done(&mut self, now: Instant, id: MotorId, why: PortError) {
+        if self.busy().contains(id) {
+            self.cancel(now, id);
+            self.host.trust(id.into());
+            self.not_done.push((id, why));
         }
     }
 
@@ -137,7 +172,8 @@ impl Session {
     /// The motors with an exchange under way.
     pub(super) fn busy(&self) -> MotorSet {
         let held = if self.held.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };
-        self.host.busy().union(self.waiting).union(self.unsent).union(held)
+        let not_done = self.not_done.iter().map(|(id, _)| *id).collect();
+        self.host.busy().union(self.waiting).union(self.unsent).union(held).union(not_done)
     }
 
     /// Tells that the bus was opened anew.
@@ -239,6 +275,9 @@ impl Session {
 
     pub(super) fn poll(&mut self, now: Instant) -> SessionOutput {
         loop {
+            if let Some((id, why)) = self.not_done.pop() {
+                return SessionOutput::Done(id, Err(self.undone(id, why)));
+            }
             let mut again = self.send_held(now);
             if let Some(id) = self.unsent.next() {
                 return SessionOutput::Done(id, Err(self.why_unsent(id)));
@@ -369,6 +408,7 @@ impl Session {
         self.insisting.remove(id);
         self.waiting.remove(id);
         self.unsent.remove(id);
+        self.not_done.retain(|(other, _)| *other != id);
         if MotorSet::TORQUE4.contains(id) {
             self.drop_held(None);
             self.unsent.remove(id);
@@ -418,7 +458,22 @@ impl Session {
         }
     }
 
+    /// If the motor does not answer the other program, the error is that of a port of one's own.
+    fn undone(&self, id: MotorId, why: PortError) -> Error {
+        match why {
+            PortError::NotDone { kind: NotDone::Silent, .. } => {
+                let [code, ..] = self.pending[id.index()].request;
+                let port = Arc::clone(&self.port);
+                Error::Timeout { port, motor: id, request: Code::from(code) }
+            }
+            why => why.into(),
+        }
+    }
+
     fn failed(&self, id: MotorId, error: proto::Failure) -> Error {
+        if self.is_held && error == proto::Failure::Timeout {
+            return PortError::HolderSilent { port: self.port.to_string() }.into();
+        }
         let port = Arc::clone(&self.port);
         let [code, ..] = self.pending[id.index()].request;
         let code = Code::from(code);

@@ -238,7 +238,7 @@ fn id((id, _): &(MotorId, Error)) -> MotorId {
 /// Whether the same request may be answered otherwise.
 fn is_repeatable(error: &Error) -> bool {
     match error {
-        Error::Port(error) => !error.is_interruption(),
+        Error::Port(error) => error.is_line_failure(),
         Error::Altered { .. } | Error::Adapter { .. } => true,
         error => is_silence(error),
     }

@@ -97,6 +97,7 @@ impl Client {
         open: Opener<Box<dyn ByteLink>>,
         options: Options,
     ) -> Result<Self, Error> {
+        let open = of_profile(name, open, options.profile);
         Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
     }
 
@@ -342,12 +343,34 @@ impl Client {
     }
 }
 
+/// Opens a port. If another program holds it, that program has to read frames in the same profile:
+/// the same bytes may be other values in the other profile.
+pub(super) fn of_profile<L: ByteLink + 'static>(
+    name: &str,
+    mut open: Opener<L>,
+    profile: Profile,
+) -> Opener<L> {
+    let port = name.to_owned();
+    Box::new(move || {
+        let link = open()?;
+        match link.holder().and_then(|holder| holder.profile) {
+            Some(other) if other != profile => {
+                Err(PortError::HeldInProfile { port: port.clone(), profile: other.name() })
+            }
+            _ => Ok(link),
+        }
+    })
+}
+
 impl<L: ByteLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
         let mut session = Session::new(port.name.clone(), options);
         if port.open_link().is_some_and(Link::is_fresh) {
             session.trust_line();
+        }
+        if let Some(holder) = port.open_link().and_then(Link::holder) {
+            session.set_holder(holder);
         }
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
@@ -361,6 +384,9 @@ impl<L: ByteLink> Driven<L> {
     /// Begins the exchange of a confirmation.
     pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
         self.ready()?;
+        if let Some(link) = self.port.open_link() {
+            link.confirm_next();
+        }
         self.session.ask(confirmation)
     }
 
@@ -398,6 +424,8 @@ impl<L: ByteLink> Driven<L> {
         if idle {
             let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
                 Ok(size) => size,
+                // It is about a request that was abandoned.
+                Err(PortError::NotDone { .. }) => 0,
                 Err(error) => {
                     self.port.close();
                     return Err(error);
@@ -405,6 +433,9 @@ impl<L: ByteLink> Driven<L> {
             };
             let now = self.port.now();
             self.session.receive(now, &self.received[..size]);
+        }
+        if self.port.open_link().is_some_and(|link| link.holder().is_some()) {
+            self.session.trust_line();
         }
         Ok(())
     }
@@ -418,7 +449,7 @@ impl<L: ByteLink> Driven<L> {
     /// The port failed in the middle of an exchange, or did not want to wait for its end.
     pub(super) fn lost(&mut self, error: PortError) -> Error {
         self.session.failed();
-        if !error.is_interruption() {
+        if !error.leaves_open() {
             self.port.close();
         }
         error.into()

@@ -188,7 +188,7 @@ impl Error {
     /// Whether nothing can be said about the drive because the line failed.
     pub fn is_line_failure(&self) -> bool {
         match self {
-            Error::Port(error) => !error.is_interruption(),
+            Error::Port(error) => error.is_line_failure(),
             _ => matches!(
                 self,
                 Error::Failed { .. } | Error::Reply { .. } | Error::Unconfirmed { .. }

@@ -11,7 +11,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Instant;
 
-use super::client::Driven;
+use super::client::{Driven, of_profile};
 use super::{Client, Error, Options};
 
 /// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when
@@ -62,6 +62,7 @@ impl EventClient {
         open: Opener<Box<dyn EventBytes>>,
         options: Options,
     ) -> Result<Self, Error> {
+        let open = of_profile(name, open, options.profile);
         let port = Reopening::open(name, open, options.back_off)?;
         Ok(EventClient { driven: Driven::new(port, &options), sent: Instant(0) })
     }
@@ -93,6 +94,11 @@ impl EventClient {
     /// The profile that the drive is expected to follow.
     pub fn profile(&self) -> Profile {
         self.driven.session.rules().profile
+    }
+
+    /// How long a reply may take.
+    pub fn timeout(&self) -> Duration {
+        self.driven.session.timeout()
     }
 
     /// Whether the last exchange ended in sync.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink_link::port::PortName;
+use motorlink_link::port::{PortError, PortName};
 use motorlink_proto::st::{ErrorCode, Failure, Profile, Recovery};
 
 use super::{BoardInfo, Client, Error, Options};
@@ -35,13 +35,14 @@ pub enum ScanResult {
 /// What keeps the port from being opened.
 pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanResult, Error> {
     let port = port.at_baud(baud).unwrap_or_else(|| port.clone());
-    let options = Options {
-        profile: Profile::Spec,
-        timeout: patience,
-        recovery: Recovery::Pad,
-        ..Options::default()
+    let options = Options { timeout: patience, recovery: Recovery::Pad, ..Options::default() };
+    let open = |profile| Client::open(&port, Options { profile, ..options });
+    // The board information is the same in each profile.
+    let is_open = |opened: &Result<_, Error>| {
+        !matches!(opened, Err(Error::Port(PortError::HeldInProfile { .. })))
     };
-    let client = match Client::open(&port, options) {
+    let opened = Profile::ALL.into_iter().map(open).find(is_open);
+    let client = match opened.unwrap_or_else(|| open(Profile::Spec)) {
         Ok(client) => client,
         Err(error @ Error::Port(_)) => return Err(error),
         Err(_) => return Ok(ScanResult::Silence),

@@ -2,8 +2,9 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::Duration;
 
-use motorlink_link::port::PortError;
+use motorlink_link::port::{Holder, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_FRAME,
@@ -36,6 +37,9 @@ pub(super) struct Session {
     last: LastExchange,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
+    /// Whether another program holds the port.
+    is_held: bool,
+    timeout: Duration,
 }
 
 /// The request under way.
@@ -90,7 +94,21 @@ impl Session {
             pending: asked,
             last: LastExchange::default(),
             is_retired: false,
+            is_held: false,
+            timeout: options.timeout,
         }
+    }
+
+    /// How long a reply may take.
+    pub(super) fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    /// Another program holds the port. It gives a reply or a reason within its patience.
+    pub(super) fn set_holder(&mut self, holder: Holder) {
+        self.is_held = true;
+        self.timeout = holder.patience;
+        self.master.config_mut().timeout = holder.patience.into();
     }
 
     pub(super) fn rules(&self) -> Rules {
@@ -211,6 +229,10 @@ impl Session {
             Err(proto::ExchangeError::Refused(code)) => {
                 let what = what.to_string();
                 Err(Error::Refused { port, motor: target, request: what, code, hint: hint(code) })
+            }
+            Err(proto::ExchangeError::Failed(proto::Failure::Timeout)) if self.is_held => {
+                self.last.restart();
+                Err(PortError::HolderSilent { port: port.to_string() }.into())
             }
             Err(proto::ExchangeError::Failed(failure)) => {
                 self.last.restart();

@@ -25,6 +25,8 @@ pub use st::StLine;
 pub enum Request {
     /// A message to a motor of an ST drive.
     St(u8, OwnedRequest),
+    /// A frame code and a payload that the profile of an ST drive does not have.
+    Raw(u8, u8, Vec<u8>),
     /// Reads a data segment of an ST drive. It is configured with these registers before, if it is not.
     Segment(u8, u8, Vec<RegisterId>),
     /// Eight bytes for an RMD motor.
@@ -81,6 +83,16 @@ impl LineError {
             LineError::Closed => true,
             LineError::Protocol | LineError::Reply | LineError::Implausible(_) => false,
         }
+    }
+
+    /// Whether a motor did not answer.
+    pub(crate) fn is_silence(&self) -> bool {
+        use motorlink::{rmd, st};
+        matches!(
+            self,
+            LineError::St(st::Error::Failed { failure: proto::Failure::Timeout, .. })
+                | LineError::Rmd(rmd::Error::Timeout { .. } | rmd::Error::Adapter { .. })
+        )
     }
 
     /// Whether the motor answered a confirmation, and replies before it did not match their requests.
@@ -141,6 +153,9 @@ pub trait Line: Send {
     /// The clock of the port.
     fn clock(&self) -> Clock;
 
+    /// How long a reply may take.
+    fn timeout(&self) -> Duration;
+
     /// Whether the port is open.
     fn link_state(&self) -> LinkState;
 
@@ -184,7 +199,7 @@ impl Request {
     /// The motor that it is for; `None` for the current motor of an ST drive.
     pub fn motor(&self) -> Option<Motor> {
         match self {
-            Request::St(motor, _) | Request::Segment(motor, ..) => {
+            Request::St(motor, _) | Request::Raw(motor, ..) | Request::Segment(motor, ..) => {
                 MotorNumber::new(*motor).map(Motor::St)
             }
             Request::Rmd(id, _) => Some(Motor::Rmd(*id)),
@@ -200,6 +215,7 @@ impl Request {
                 Code::from(*code).info().is_some_and(|row| row.stem.starts_with("read_"))
             }
             Request::Segment(..) | Request::Confirm(_) => true,
+            Request::Raw(..) => false,
         }
     }
 }
@@ -235,6 +251,8 @@ pub(crate) fn may_move(request: &Request) -> bool {
                 )
         }
         Request::Rmd(_, [code, ..]) => Code::from(*code).may_move(),
+        // Its effect is unknown.
+        Request::Raw(..) => true,
         Request::Segment(..) | Request::Confirm(_) => false,
     }
 }

@@ -45,12 +45,18 @@ impl Line for RmdLine {
     fn lane(&self, request: &Request) -> Lane {
         match request {
             Request::Rmd(id, _) | Request::Confirm(Motor::Rmd(id)) => lane(*id),
-            Request::St(..) | Request::Segment(..) | Request::Confirm(_) => Lane(0),
+            Request::St(..) | Request::Raw(..) | Request::Segment(..) | Request::Confirm(_) => {
+                Lane(0)
+            }
         }
     }
 
     fn clock(&self) -> Clock {
         self.client.clock()
+    }
+
+    fn timeout(&self) -> Duration {
+        self.client.timeout()
     }
 
     fn link_state(&self) -> LinkState {
@@ -71,10 +77,12 @@ impl Line for RmdLine {
             // A motor whose late reply is awaited gets what stops it at once, and nothing else.
             Request::Rmd(_, request) => self.client.ask(id, *request)?,
             Request::Confirm(_) => {
-                self.client.ask(id, self.client.question(id))?;
+                self.client.begin_confirmation(id)?;
                 self.confirming.insert(id);
             }
-            Request::St(..) | Request::Segment(..) => return Err(LineError::Protocol),
+            Request::St(..) | Request::Raw(..) | Request::Segment(..) => {
+                return Err(LineError::Protocol);
+            }
         }
         Ok(())
     }

@@ -170,6 +170,10 @@ impl Line for StLine {
         self.client.clock()
     }
 
+    fn timeout(&self) -> Duration {
+        self.client.timeout()
+    }
+
     fn link_state(&self) -> LinkState {
         self.client.link_state()
     }
@@ -190,6 +194,10 @@ impl Line for StLine {
         self.step = match request {
             Request::St(motor, request) => {
                 self.client.begin(*motor, &request.request())?;
+                Step::Once
+            }
+            Request::Raw(motor, code, payload) => {
+                self.client.begin_raw(*motor, *code, payload)?;
                 Step::Once
             }
             Request::Segment(motor, number, registers) => {
@@ -227,7 +235,7 @@ impl Line for StLine {
             };
             let result = match progress {
                 Progress::Wait(wait) => return Ok(wait),
-                Progress::Done(Err(Error::Port(error))) => {
+                Progress::Done(Err(Error::Port(error))) if !error.leaves_open() => {
                     self.step = Step::Idle;
                     return Err(Error::Port(error).into());
                 }

@@ -69,6 +69,14 @@ pub enum Ask {
         /// The time to live in seconds: it is not sent later.
         time_to_live: f64,
     },
+    /// Asks whether the answers to this program's commands since the last confirmation belong to
+    /// them. Replies can come twice or late on a bad line.
+    Confirm {
+        /// The line.
+        line: String,
+        /// The motor.
+        motor: u8,
+    },
     /// Stops a motor, or all, ahead of all commands.
     Stop {
         /// The motor; all motors that were started or read, without it.
@@ -133,6 +141,9 @@ pub enum Text {
         reason: Reason,
         /// The reason in words.
         message: String,
+        /// The error code of an ST drive that refused.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        code: Option<u8>,
     },
     /// The columns of a group. It comes before its first data.
     Group(Group),
@@ -191,6 +202,8 @@ pub enum Answer {
         /// ST: the payload of the reply. RMD: the eight bytes.
         bytes: Vec<u8>,
     },
+    /// To confirm: they belong to them.
+    Confirm,
     /// To stop.
     Stop {
         /// The motors and how they took it.
@@ -216,6 +229,11 @@ pub struct Line {
     pub protocol: Protocol,
     /// The port that the share holds.
     pub port: String,
+    /// The profile in which the share reads the frames of an ST drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// How long the share waits for a reply, in seconds. A stop may take several times as long.
+    pub timeout: f64,
     /// The line's clock now, in seconds.
     pub t: f64,
     /// The wall clock at the same moment, in seconds since 1970.
@@ -230,6 +248,16 @@ pub enum Protocol {
     St,
     /// The RMD protocol.
     Rmd,
+}
+
+impl Protocol {
+    /// How the names of its lines begin.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Protocol::St => "st",
+            Protocol::Rmd => "rmd",
+        }
+    }
 }
 
 /// A signal with its unit.
@@ -364,6 +392,10 @@ pub enum Reason {
     Busy,
     /// The drive refused.
     Refused,
+    /// The motor does not answer. It is unknown whether it executed it.
+    Silent,
+    /// Answers may be those to other commands: a reply came twice or late.
+    Unconfirmed,
     /// The line failed. It is unknown whether the drive executed it.
     Line,
     /// A reason of a later version.

@@ -2,12 +2,13 @@
 //!
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
-//! [`server`] connects programs to it through a Unix socket.
+//! [`server`] connects programs to it through a Unix socket. [`port`] is a line of a share as a port.
 
 pub mod data;
 pub mod frame;
 pub mod hub;
 pub mod message;
+pub mod port;
 pub mod server;
 
 /// The version of the messages.

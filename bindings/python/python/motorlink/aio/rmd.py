@@ -58,18 +58,18 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
 
     async def _exchange(self, motor: int, request: RmdRequest) -> Any:
         async with self._turn(motor):
-            return await self._asked(motor, request)
+            return await self._asked(motor, lambda: self._core.ask(motor, request))
 
     async def _confirm(self, motor: int) -> None:
         async with self._turn(motor):
-            await self._asked(motor, self._core.question(motor))
+            await self._asked(motor, lambda: self._core.begin_confirmation(motor))
             self._core.confirmed(motor)
 
-    async def _asked(self, motor: int, request: RmdRequest) -> Any:
+    async def _asked(self, motor: int, begin: Callable[[], None]) -> Any:
         """One exchange, during the motor's turn."""
         await self._steps.ready()
         try:
-            self._core.ask(motor, request)
+            begin()
             answers = self._expect([motor])
             self._steps.take()
             await self._steps.turn()

@@ -12,8 +12,9 @@ use super::feed::Feed;
 use super::line::{Held, Motion};
 use super::place::{SessionId, Speaks};
 use super::session::Gathering;
-use super::{Hub, Work, reason};
+use super::{Hub, Sent, Work, reason};
 use crate::event::CommandError;
+use crate::line::Request;
 
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
@@ -26,6 +27,9 @@ use crate::subscription::Full;
 
 /// The shortest period of a subscription, in seconds.
 const SHORTEST_PERIOD: f64 = 1e-4;
+
+/// The time to live of a confirmation.
+const CONFIRMATION: Micros = Micros::from_millis(1_000);
 
 /// Why a request is refused at once.
 type Refused = (Reason, String);
@@ -136,6 +140,10 @@ impl Hub {
                 self.command(session, name, id, &MotorName { line, motor }, &bytes, time_to_live)?;
                 Ok(None)
             }
+            Ask::Confirm { line, motor } => {
+                self.confirm(session, name, id, &MotorName { line, motor })?;
+                Ok(None)
+            }
             Ask::Stop { motor } => self.stop_asked(session, name, id, motor.as_ref()),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
@@ -218,19 +226,26 @@ impl Hub {
         bytes: &[u8],
         time_to_live: f64,
     ) -> Result<(), Refused> {
-        let (line, motor) = self.motor(motor)?;
-        let request = self.lines[line].request(motor, bytes).map_err(usage)?;
+        let line = self.line(&motor.line)?;
+        let segments = |segment| {
+            let own = self.sessions.get(&session)?;
+            own.segments.get(&(line, segment)).cloned()
+        };
+        let request = self.lines[line].request(motor.motor, bytes, segments);
+        let (request, configures) = request.map_err(usage)?;
+        let motor = request.motor();
         let time_to_live = span("the time to live", time_to_live, 0.0)?;
         let motion = Motion::of(&request);
         let tell = self.teller(session, Some(id), line);
         let held = &mut self.lines[line];
-        held.known.insert(motor);
-        let before = match motion {
+        held.known.extend(motor);
+        let before = match (motor, motion) {
             // Noted before it is sent.
-            Motion::Starts => held.owners.insert(motor, session),
-            Motion::Stops | Motion::Keeps => None,
+            (Some(motor), Motion::Starts) => held.owners.insert(motor, session),
+            _ => None,
         };
-        let ended_with = move |result| tell(Work::Command { motor, motion, before, result });
+        let sent = Sent { motor, motion, before, configures };
+        let ended_with = move |result| tell(Work::Command(sent, result));
         let begun = match motion {
             Motion::Stops => held.remote().stop_then(name, request, ended_with),
             Motion::Starts | Motion::Keeps => {
@@ -238,6 +253,20 @@ impl Hub {
             }
         };
         begun.map_err(ended)
+    }
+
+    fn confirm(
+        &mut self,
+        session: SessionId,
+        name: &Arc<str>,
+        id: u32,
+        motor: &MotorName,
+    ) -> Result<(), Refused> {
+        let (line, motor) = self.motor(motor)?;
+        let tell = self.teller(session, Some(id), line);
+        let ended_with = move |result| tell(Work::Confirm { motor, result });
+        let remote = self.lines[line].remote();
+        remote.command_then(name, Request::Confirm(motor), CONFIRMATION, ended_with).map_err(ended)
     }
 
     fn stop_asked(

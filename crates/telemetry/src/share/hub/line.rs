@@ -3,16 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
+use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink_proto::rmd::{Code, MotorId, Stop};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, MotorNumber};
+use motorlink_proto::st::{Effect, Frame, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
 use super::place::{SessionId, Speaks, seconds, wall_now};
 use super::words::Words;
 use crate::acquisition::Acquisition;
+use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
@@ -28,6 +30,7 @@ pub struct Held {
     pub(super) name: String,
     port: String,
     pub(super) speaks: Speaks,
+    timeout: Duration,
     runner: Runner,
     clock: Clock,
     /// One moment by both clocks.
@@ -38,6 +41,12 @@ pub struct Held {
     pub(super) owners: BTreeMap<Motor, SessionId>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
+}
+
+/// A data segment that a command configures, for the program that sends it.
+pub(super) struct Configures {
+    pub(super) segment: u8,
+    pub(super) registers: Vec<RegisterId>,
 }
 
 /// What a command does to the motion of its motor.
@@ -67,6 +76,7 @@ impl Held {
             name: name.to_owned(),
             port: port.to_owned(),
             speaks,
+            timeout: acquisition.timeout(),
             anchor: (clock.now(), wall_now()),
             clock,
             events,
@@ -87,8 +97,13 @@ impl Held {
             Speaks::St(_) => Protocol::St,
             Speaks::Rmd => Protocol::Rmd,
         };
+        let profile = match self.speaks {
+            Speaks::St(profile) => Some(profile.name().to_owned()),
+            Speaks::Rmd => None,
+        };
         let (line, port) = (self.name.clone(), self.port.clone());
-        Line { line, protocol, port, t: seconds(now), wall: self.wall(now) }
+        let timeout = self.timeout.as_secs_f64();
+        Line { line, protocol, port, profile, timeout, t: seconds(now), wall: self.wall(now) }
     }
 
     /// The wall clock at a moment of the line's clock.
@@ -98,12 +113,24 @@ impl Held {
     }
 
     /// What happened since the last call; `None` after the end of the engine. `retry` receives the
-    /// motors whose stop should be tried again, because they or their port are back.
-    pub(super) fn take_events(&mut self, retry: &mut Vec<Motor>) -> Option<Vec<Event>> {
+    /// motors whose stop should be tried again, because they or their port are back. `doubts` receives
+    /// those whose answers may be those to other commands.
+    pub(super) fn take_events(
+        &mut self,
+        retry: &mut Vec<Motor>,
+        doubts: &mut Vec<Option<Motor>>,
+    ) -> Option<Vec<Event>> {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
             self.words.retries(&event.what, self.owners.keys(), retry);
+            match &event.what {
+                What::Lost(_) => doubts.push(None),
+                What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
+                    doubts.push(self.lane(*motor));
+                }
+                _ => {}
+            }
             let told = self.words.of(&self.name, self.speaks, &event.what);
             events.extend(told.map(|told| Event {
                 wall: self.wall(event.time),
@@ -116,39 +143,74 @@ impl Held {
         (!has_ended).then_some(events)
     }
 
+    /// The motor, if replies say which motor they are from; `None` means all motors of the line.
+    pub(super) fn lane(&self, motor: Motor) -> Option<Motor> {
+        match self.speaks {
+            Speaks::St(_) => None,
+            Speaks::Rmd => Some(motor),
+        }
+    }
+
     /// The motor of this number.
     pub(super) fn motor(&self, number: u8) -> Result<Motor, String> {
         match self.speaks {
             Speaks::St(_) => MotorNumber::new(number).map(Motor::St).ok_or_else(|| {
                 format!("{}: an ST motor of a share has a number from 1 to 7", self.name)
             }),
-            Speaks::Rmd => MotorId::new(number)
-                .map(Motor::Rmd)
-                .ok_or_else(|| format!("{}: an ID is 1 to {}", self.name, MotorId::COUNT)),
+            Speaks::Rmd => self.rmd_motor(number).map(Motor::Rmd),
         }
     }
 
-    /// The request of these bytes.
-    pub(super) fn request(&self, motor: Motor, bytes: &[u8]) -> Result<Request, String> {
-        match (motor, self.speaks) {
-            (Motor::Rmd(id), _) => match <[u8; 8]>::try_from(bytes) {
-                Ok(bytes) => Ok(Request::Rmd(id, bytes)),
-                Err(_) => Err(format!("a request has 8 bytes, not {}", bytes.len())),
-            },
-            (Motor::St(motor), Speaks::St(profile)) => {
-                let Some((code, payload)) = bytes.split_first() else {
-                    return Err("a request has at least its frame code".to_owned());
-                };
-                match proto::Request::decode(profile, *code, payload) {
-                    Ok(proto::Request::ConfigureSegment { .. }) => {
-                        Err("the share uses the data segments itself; subscribe to the signals"
-                            .to_owned())
-                    }
-                    Ok(request) => Ok(Request::st(motor.number(), request)),
-                    Err(error) => Err(format!("a drive refuses these bytes with {error}")),
-                }
+    fn rmd_motor(&self, id: u8) -> Result<MotorId, String> {
+        let refused = || format!("{}: an ID is 1 to {}", self.name, MotorId::COUNT);
+        MotorId::new(id).ok_or_else(refused)
+    }
+
+    /// The request of these bytes, and what it does besides. `segments` are the registers of the
+    /// data segments of the program.
+    pub(super) fn request(
+        &self,
+        motor: u8,
+        bytes: &[u8],
+        segments: impl Fn(u8) -> Option<Vec<RegisterId>>,
+    ) -> Result<(Request, Option<Configures>), String> {
+        let profile = match self.speaks {
+            Speaks::St(profile) => profile,
+            Speaks::Rmd => {
+                let id = self.rmd_motor(motor)?;
+                let bytes = <[u8; 8]>::try_from(bytes)
+                    .map_err(|_| format!("a request has 8 bytes, not {}", bytes.len()))?;
+                return Ok((Request::Rmd(id, bytes), None));
             }
-            (Motor::St(_), Speaks::Rmd) => Err("the line has RMD motors".to_owned()),
+        };
+        let Some((code, payload)) = bytes.split_first() else {
+            return Err("a request has at least its frame code".to_owned());
+        };
+        let request = proto::Request::decode(profile, *code, payload);
+        let is_about_drive = matches!(
+            request,
+            Ok(proto::Request::GetBoardInfo | proto::Request::GetFirmwareVersion)
+        );
+        if motor != 0 || !is_about_drive {
+            self.motor(motor)?;
+        }
+        match request {
+            Ok(proto::Request::ConfigureSegment { segment, registers }) => {
+                let registers: Vec<_> = registers.iter().copied().map(RegisterId).collect();
+                let request = Request::Segment(motor, segment, registers.clone());
+                Ok((request, Some(Configures { segment, registers })))
+            }
+            Ok(proto::Request::GetSegment(segment)) => match segments(segment) {
+                Some(registers) => Ok((Request::Segment(motor, segment, registers), None)),
+                None => Err(format!(
+                    "data segment {segment} has the registers of another program: configure it first"
+                )),
+            },
+            Ok(request) => Ok((Request::st(motor, request), None)),
+            Err(_) if Frame::header(*code, 0) != *code || payload.len() > MAX_PAYLOAD => {
+                Err("a frame code has 5 bits, and a payload at most 128 bytes".to_owned())
+            }
+            Err(_) => Ok((Request::Raw(motor, *code, payload.to_vec()), None)),
         }
     }
 
@@ -166,6 +228,13 @@ impl Motion {
                 Effect::Stops => Motion::Stops,
                 _ => Motion::Keeps,
             },
+            Request::Raw(motor, code, payload) => {
+                let frame = Frame { header: Frame::header(*code, *motor), payload };
+                match Effect::of_frame(&frame) {
+                    Effect::Starts => Motion::Starts,
+                    _ => Motion::Keeps,
+                }
+            }
             Request::Rmd(_, [code, ..]) if Code::from(*code).ends_motion() => Motion::Stops,
             _ if may_move(request) => Motion::Starts,
             _ => Motion::Keeps,

@@ -17,10 +17,10 @@ use super::frame::Frame;
 use super::message::{self, Event, Happening, MotorName, Reason, SignalName, SignalRate};
 use crate::acquisition::Rate;
 use crate::event::CommandError;
-use crate::line::{Reply, Stopped};
+use crate::line::{LineError, Reply, Stopped};
 use crate::runner::{CommandResult, Ended};
 use crate::signal::Motor;
-use line::Motion;
+use line::{Configures, Motion};
 use place::{number, wall_now};
 use session::Session;
 
@@ -31,6 +31,10 @@ pub use place::{SessionId, Speaks};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}: the engine of this line has ended")]
 pub struct LineEnded(pub String);
+
+/// Why answers are not confirmed.
+const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after the last \
+    confirmation: the answers so far may be those to other commands; ask again";
 
 /// Lines and the programs that use them.
 pub struct Hub {
@@ -55,9 +59,20 @@ struct Done {
 }
 
 enum Work {
-    Command { motor: Motor, motion: Motion, before: Option<SessionId>, result: CommandResult },
+    Command(Sent, CommandResult),
+    Confirm { motor: Motor, result: CommandResult },
     Stop { motor: Motor, result: CommandResult },
     Rates(Vec<Rate>),
+}
+
+/// A command that was handed to an engine.
+struct Sent {
+    /// `None`: it is about the drive.
+    motor: Option<Motor>,
+    motion: Motion,
+    /// Whose the motor was before.
+    before: Option<SessionId>,
+    configures: Option<Configures>,
 }
 
 impl Hub {
@@ -148,10 +163,13 @@ impl Hub {
 
     fn collect_events(&mut self) -> Result<(), LineEnded> {
         for line in 0..self.lines.len() {
-            let mut retry = Vec::new();
+            let (mut retry, mut doubts) = (Vec::new(), Vec::new());
             let held = &mut self.lines[line];
-            let events =
-                held.take_events(&mut retry).ok_or_else(|| LineEnded(held.name.clone()))?;
+            let events = held.take_events(&mut retry, &mut doubts);
+            let events = events.ok_or_else(|| LineEnded(held.name.clone()))?;
+            for motor in doubts {
+                self.doubt(line, motor);
+            }
             events.into_iter().for_each(|event| self.publish(event));
             for motor in retry {
                 self.stop_if_orphaned(line, motor);
@@ -196,12 +214,18 @@ impl Hub {
 
     fn finish(&mut self, Done { session, id, line, what }: Done) {
         match what {
-            Work::Command { motor, motion, before, result } => {
-                self.command_ended(session, line, motor, motion, before, &result);
+            Work::Command(sent, result) => self.command_over(session, id, line, sent, result),
+            Work::Confirm { motor, result } => {
+                self.told_of(line, motor, &result);
+                // What the engine found before it answered.
+                let _ = self.collect_events();
+                let lane = self.lines.get(line).and_then(|held| held.lane(motor));
                 let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
                 session.pending -= 1;
+                let is_certain = session.confirmed(line, lane);
                 match result {
-                    Ok(reply) => session.answer(id, answer(reply)),
+                    Ok(_) if is_certain => session.answer(id, message::Answer::Confirm),
+                    Ok(_) => session.refuse(id, Reason::Unconfirmed, UNCONFIRMED),
                     Err(error) => session.refuse(id, reason(&error), error.to_string()),
                 }
             }
@@ -230,6 +254,55 @@ impl Hub {
                 session.rates(id, rates.into_iter().map(named).collect());
             }
         }
+    }
+
+    fn command_over(
+        &mut self,
+        session: SessionId,
+        id: Option<u32>,
+        line: usize,
+        sent: Sent,
+        result: CommandResult,
+    ) {
+        let Sent { motor, motion, before, configures } = sent;
+        if let Some(motor) = motor {
+            self.command_ended(session, line, motor, motion, before, &result);
+            self.told_of(line, motor, &result);
+        }
+        let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+        session.pending -= 1;
+        match result {
+            Ok(reply) => {
+                if let Some(motor) = motor {
+                    session.answered(line, motor);
+                }
+                match configures {
+                    Some(Configures { segment, registers }) => {
+                        session.segments.insert((line, segment), registers);
+                        session.answer(id, message::Answer::Command { bytes: Vec::new() });
+                    }
+                    None => session.answer(id, answer(reply)),
+                }
+            }
+            Err(error) => {
+                session.refuse_with(id, reason(&error), error.to_string(), code(&error));
+            }
+        }
+    }
+
+    /// Answers from before a failure of the line are not confirmed any more.
+    fn told_of(&mut self, line: usize, motor: Motor, result: &CommandResult) {
+        let is_failure = result.as_ref().is_err_and(|error| match error {
+            CommandError::Line(error) => error.is_line_failure(),
+            _ => false,
+        });
+        if is_failure && let Some(held) = self.lines.get(line) {
+            self.doubt(line, held.lane(motor));
+        }
+    }
+
+    fn doubt(&mut self, line: usize, motor: Option<Motor>) {
+        self.sessions.values_mut().for_each(|session| session.doubt(line, motor));
     }
 
     /// Whose the motor is after a command.
@@ -326,13 +399,25 @@ fn reason(error: &CommandError) -> Reason {
         CommandError::Latched(_) => Reason::Latched,
         CommandError::TooMany => Reason::Busy,
         CommandError::Line(error) if !error.is_line_failure() => Reason::Refused,
+        CommandError::Line(error) if error.is_unconfirmed() => Reason::Unconfirmed,
+        CommandError::Line(error) if error.is_silence() => Reason::Silent,
         CommandError::Closed | CommandError::Ended | CommandError::Line(_) => Reason::Line,
+    }
+}
+
+/// The error code of a drive.
+fn code(error: &CommandError) -> Option<u8> {
+    match error {
+        CommandError::Line(LineError::St(motorlink::st::Error::Refused { code, .. })) => {
+            Some(u8::from(*code))
+        }
+        _ => None,
     }
 }
 
 /// Whether a drive may have executed a command that failed.
 fn may_be_executed(error: &CommandError) -> bool {
-    matches!(reason(error), Reason::Displaced | Reason::Line)
+    matches!(reason(error), Reason::Displaced | Reason::Silent | Reason::Unconfirmed | Reason::Line)
 }
 
 impl From<Ended> for CommandError {

@@ -3,12 +3,15 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+use motorlink_proto::st::RegisterId;
+
 use super::feed::Feed;
 use super::line::Held;
 use crate::share::frame::Frame;
 use crate::share::message::{
     self, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
 };
+use crate::signal::Motor;
 
 /// Events that wait for a program.
 const EVENTS: usize = 1000;
@@ -28,6 +31,10 @@ pub(super) struct Session {
     pub(super) gathering: BTreeMap<u32, Gathering>,
     pub(super) feeds: BTreeMap<u32, Feed>,
     pub(super) last_feed: u32,
+    /// Motors that have answered since their last confirmation, and whether the answers are doubtful.
+    unconfirmed: BTreeMap<(usize, Motor), bool>,
+    /// The registers of the data segments of a line that it configured.
+    pub(super) segments: BTreeMap<(usize, u8), Vec<RegisterId>>,
     last_group: u32,
     /// The feeds whose values are collected next.
     due: VecDeque<u32>,
@@ -59,7 +66,46 @@ impl Session {
     }
 
     pub(super) fn refuse(&mut self, id: u32, reason: Reason, message: impl Into<String>) {
-        self.answers.push_back(Text::Refusal { id, reason, message: message.into() });
+        self.refuse_with(id, reason, message, None);
+    }
+
+    /// As [`refuse`](Self::refuse), with the error code of a drive.
+    pub(super) fn refuse_with(
+        &mut self,
+        id: u32,
+        reason: Reason,
+        message: impl Into<String>,
+        code: Option<u8>,
+    ) {
+        self.answers.push_back(Text::Refusal { id, reason, message: message.into(), code });
+    }
+
+    /// A motor has answered. The answer is not confirmed yet.
+    pub(super) fn answered(&mut self, line: usize, motor: Motor) {
+        self.unconfirmed.entry((line, motor)).or_default();
+    }
+
+    /// The answers of a line so far, or of one of its motors, may be those to other commands.
+    pub(super) fn doubt(&mut self, line: usize, motor: Option<Motor>) {
+        let is_meant = |other: Motor| motor.is_none_or(|motor| motor == other);
+        for ((_, _), is_doubtful) in
+            self.unconfirmed.iter_mut().filter(|((of, other), _)| *of == line && is_meant(*other))
+        {
+            *is_doubtful = true;
+        }
+    }
+
+    /// The motor, or without it the whole line, was confirmed. Whether that holds for all answers
+    /// since the last time.
+    pub(super) fn confirmed(&mut self, line: usize, motor: Option<Motor>) -> bool {
+        let is_meant =
+            |(of, other): &(usize, Motor)| *of == line && motor.is_none_or(|motor| motor == *other);
+        let mut is_doubtful = false;
+        self.unconfirmed.retain(|place, doubt| {
+            is_doubtful |= is_meant(place) && *doubt;
+            !is_meant(place)
+        });
+        !is_doubtful
     }
 
     /// The program gets nothing but this after what waits already.

@@ -108,6 +108,12 @@ fn described(speaks: Speaks, request: &Request) -> String {
             let frame = Frame::command(*motor, &request.request(), &mut bytes);
             frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
         }
+        (Request::Raw(motor, code, payload), Speaks::St(profile)) => {
+            let mut bytes = [0; MAX_FRAME];
+            let frame = Frame { header: Frame::header(*code, *motor), payload };
+            let frame = frame.encode(&mut bytes);
+            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
+        }
         (Request::Rmd(id, data), _) => {
             describe(CanFrame::new(id.can_id(), *data), Direction::HostToDrive).to_string()
         }

@@ -1,0 +1,113 @@
+"""Lines of `motorlink share` as ports."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import motorlink
+from conftest import Served, eventually
+from motorlink import aio, errors
+
+
+class Share:
+    """A share of served drives."""
+
+    def __init__(self, command: str, drives: Served, folder: Path):
+        self.path = folder / "share"
+        self.st, self.rmd = f"share:{self.path}/st0", f"share:{self.path}/rmd0"
+        words = [command, "share", "-p", drives.st, "-p", drives.can, "--at", f"unix:{self.path}"]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout
+        assert self.process.stdout.readline().startswith("share at ")
+
+    def end(self) -> None:
+        """Ends the share."""
+        self.process.terminate()
+        self.process.communicate(timeout=60)
+
+
+@pytest.fixture
+def share(command: str, served: Served, tmp_path: Path) -> Iterator[Share]:
+    share = Share(command, served, tmp_path)
+    yield share
+    share.end()
+
+
+def speed(drives: Served) -> float:
+    """The real speed of the ST motor, rpm."""
+    return float(str(drives.motor("st", 1)["speed_rpm"]))
+
+
+TURNS = """
+import signal, sys, motorlink
+motor = motorlink.st.open(sys.argv[1]).motor(1)
+motor.set_ramp(1500, 0.1)
+motor.start()
+print("turning", flush=True)
+signal.pause()
+"""
+
+
+def test_two_programs_use_one_drive_and_each_motor_stops_with_its_program(
+    share: Share, served: Served
+) -> None:
+    with motorlink.st.open(share.st) as watches:
+        words = [sys.executable, "-c", TURNS, share.st]
+        turns = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        assert turns.stdout and turns.stdout.readline() == "turning\n"
+        eventually(lambda: speed(served) > 1000, "a motor that turns")
+        watches.motor(1).set("SPEED_KP", 111)
+        assert watches.motor(1).get("SPEED_KP") == 111
+        watches.confirm()
+        turns.kill()
+        turns.communicate()
+        eventually(lambda: abs(speed(served)) < 30, "a motor that stops")
+        assert watches.motor(1).get("SPEED_KP") == 111
+
+
+def test_refusals_are_exceptions_with_their_words(share: Share) -> None:
+    with motorlink.st.open(share.st) as client:
+        with pytest.raises(errors.RefusedError) as refused:
+            client.motor(5).get("STATUS")
+        assert refused.value.name == "BAD_MOTOR_SELECTED"
+        client.confirm()
+    with pytest.raises(errors.InvalidValueError, match="reads frames in profile spec"):
+        motorlink.st.open(share.st, profile="mcsdk-5.4")
+    with pytest.raises(errors.PortError, match="no share is at"):
+        motorlink.st.open(f"share:{share.path}x/st0")
+    with motorlink.rmd.open(share.rmd) as bus, pytest.raises(errors.ReplyTimeoutError):
+        bus.motor(9).status()
+
+
+def test_tasks_use_a_share(share: Share, served: Served) -> None:
+    async def main() -> None:
+        async with aio.st.open(share.st) as client, aio.rmd.open(share.rmd) as bus:
+            motor = client.motor(1)
+            await motor.set_ramp(1500, 0.1)
+            await motor.start()
+            for id in (1, 2, 3, 4):
+                await bus.motor(id).status()
+                await bus.confirm(id)
+            assert len(await bus.scan([1, 2, 3, 4])) == 4
+            while await motor.get("SPEED_MEAS") < 1000:
+                await asyncio.sleep(0.01)
+            await client.confirm()
+            await motor.stop()
+        eventually(lambda: abs(speed(served)) < 30, "a motor that stops")
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_the_end_of_a_share_is_told(share: Share) -> None:
+    with motorlink.st.open(share.st, on_close="nothing") as client:
+        client.motor(1).status()
+        share.process.kill()
+        share.process.communicate()
+        with pytest.raises(errors.PortError, match="the share is gone"):
+            client.motor(1).status()

@@ -1,0 +1,194 @@
+//! The connection of a port to its share.
+
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use motorlink::port::{ByteLink, FdLink, Holder, PortError};
+use motorlink::st::Profile;
+
+use super::place::{Place, Refusal};
+use crate::share::VERSION;
+use crate::share::frame::{self, Kind, Reader};
+use crate::share::message::{self, Answer, Ask, LONGEST_NAME, Line, Request, Text};
+
+/// How long a share may take for the answer to hello.
+const OPENING: Duration = Duration::from_secs(5);
+/// How long a share may take for any other answer, besides the waiting for replies.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Replies that a share may wait for until it answers: it repeats a stop, and recovers the line before.
+const REPLIES: u32 = 12;
+
+/// A request is not sent later than this after the program has made it, in seconds.
+pub(super) const TIME_TO_LIVE: f64 = 1.0;
+
+/// The connection to a share.
+pub(super) struct Connection {
+    port: Place,
+    socket: FdLink,
+    reader: Reader,
+    last_id: u32,
+    holder: Holder,
+    /// Why the share closes the connection.
+    closing: Option<String>,
+}
+
+/// The end of a request.
+pub(super) struct Ended {
+    pub(super) id: u32,
+    pub(super) result: Result<Answer, Refusal>,
+}
+
+impl Connection {
+    /// Connects to a share, and looks for the line there.
+    pub(super) fn open(port: &Place) -> Result<Self, PortError> {
+        let path = port.path.display();
+        let stream = UnixStream::connect(&port.path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
+                port.missing(format!("no share is at {path}"))
+            }
+            io::ErrorKind::PermissionDenied => {
+                port.failed("a share is only for the user who runs it")
+            }
+            _ => port.failed(format!("cannot connect to the share at {path}: {error}")),
+        })?;
+        let mut opened = Connection {
+            socket: FdLink::new(stream, port.name())?,
+            port: port.clone(),
+            reader: Reader::default(),
+            last_id: 0,
+            holder: Holder { patience: OPENING, profile: None },
+            closing: None,
+        };
+        opened.opening(Ask::Hello { protocol: VERSION, name: own_name() })?;
+        let Answer::Lines { lines, .. } = opened.opening(Ask::Lines)? else {
+            return Err(opened.no_share());
+        };
+        opened.holder = opened.holder_of(&lines)?;
+        Ok(opened)
+    }
+
+    /// The answer to a request before the first command.
+    fn opening(&mut self, ask: Ask) -> Result<Answer, PortError> {
+        let id = self.ask(ask)?;
+        let ended = self.receive(Some(OPENING))?.filter(|ended| ended.id == id);
+        let ended = ended.ok_or_else(|| self.no_share())?;
+        ended.result.map_err(|refusal| self.port.failed(refusal.message))
+    }
+
+    fn no_share(&self) -> PortError {
+        self.port.failed("nothing answers like a share: is this the socket of a share?")
+    }
+
+    /// What the share says of the line.
+    fn holder_of(&self, lines: &[Line]) -> Result<Holder, PortError> {
+        let own = |it: &&Line| it.line == self.port.line && it.protocol == self.port.protocol;
+        let Some(line) = lines.iter().find(own) else {
+            let names: Vec<_> = lines.iter().map(|it| it.line.as_str()).collect();
+            let why = format!("the share has no such line; its lines are {}", names.join(", "));
+            return Err(self.port.failed(why));
+        };
+        let timeout = Duration::try_from_secs_f64(line.timeout).unwrap_or_default();
+        let patience = PATIENCE.saturating_add(timeout.saturating_mul(REPLIES));
+        let Some(name) = &line.profile else { return Ok(Holder { patience, profile: None }) };
+        let profile = Profile::ALL.into_iter().find(|profile| profile.name() == name);
+        match profile {
+            Some(_) => Ok(Holder { patience, profile }),
+            None => Err(self.port.failed(format!("the share uses the unknown profile {name}"))),
+        }
+    }
+
+    pub(super) fn holder(&self) -> Holder {
+        self.holder
+    }
+
+    pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+
+    /// Sends a request; gives its id.
+    pub(super) fn ask(&mut self, ask: Ask) -> Result<u32, PortError> {
+        self.last_id = self.last_id.wrapping_add(1);
+        let id = self.last_id;
+        let mut stream = Vec::new();
+        frame::append(Kind::Text, &message::encode(&Request { id, ask }), &mut stream)
+            .map_err(|error| self.port.failed(error.to_string()))?;
+        match self.socket.write(&stream) {
+            Ok(()) => Ok(id),
+            // What came before the end says why.
+            Err(error @ PortError::Closed { .. }) => match self.receive(Some(Duration::ZERO)) {
+                Err(why) => Err(why),
+                Ok(_) => Err(error),
+            },
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The next end of a request. Waits at most `timeout`.
+    pub(super) fn receive(
+        &mut self,
+        timeout: Option<Duration>,
+    ) -> Result<Option<Ended>, PortError> {
+        let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
+        let mut bytes = [0; 4096];
+        loop {
+            while let Some(text) = self.take()? {
+                match text {
+                    Text::Answer { id, answer } => {
+                        return Ok(Some(Ended { id, result: Ok(answer) }));
+                    }
+                    Text::Refusal { id, reason, message, code } => {
+                        let result = Err(Refusal { reason, message, code });
+                        return Ok(Some(Ended { id, result }));
+                    }
+                    Text::Closing { message } => self.closing = Some(message),
+                    Text::Group(_) | Text::Event(_) | Text::Missed { .. } | Text::Later => {}
+                }
+            }
+            let left = deadline.map(|at| at.saturating_duration_since(Instant::now()));
+            match self.socket.read(&mut bytes, left) {
+                Ok(0) => return Ok(None),
+                Ok(size) => self.reader.push(&bytes[..size]),
+                Err(PortError::Closed { .. }) => return Err(self.gone()),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// The next text that has come.
+    fn take(&mut self) -> Result<Option<Text>, PortError> {
+        let damaged = |error: String| self.port.failed(error);
+        match self.reader.take().map_err(|error| damaged(error.to_string()))? {
+            Some(frame) if frame.kind == Kind::Text => {
+                let text = message::decode(&frame.payload);
+                text.map(Some).map_err(|error| damaged(error.to_string()))
+            }
+            Some(_) => Ok(Some(Text::Later)),
+            None => Ok(None),
+        }
+    }
+
+    fn gone(&self) -> PortError {
+        self.port.missing(match &self.closing {
+            Some(why) => format!("the share closed the connection: {why}"),
+            None => "the share is gone, and could not stop the motors that were started through it"
+                .to_owned(),
+        })
+    }
+}
+
+/// The name of this program in the log of the share.
+fn own_name() -> String {
+    let program = std::env::current_exe().ok();
+    let name = program.as_ref().and_then(|path| path.file_stem()?.to_str()).unwrap_or("program");
+    let id = format!(" {}", std::process::id());
+    let mut own = String::new();
+    for character in name.chars().filter(|it| motorlink_link::is_printable(*it)) {
+        if own.len() + character.len_utf8() + id.len() > LONGEST_NAME {
+            break;
+        }
+        own.push(character);
+    }
+    own + &id
+}

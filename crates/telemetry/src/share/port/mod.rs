@@ -1,0 +1,110 @@
+//! The port `share:`: a line of a running share.
+
+mod bus;
+mod connection;
+mod place;
+mod serial;
+
+use motorlink::port::{
+    self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
+    NameError, Port, PortError, PortName, Scheme,
+};
+
+use super::message::Protocol;
+use bus::ShareBus;
+use place::Place;
+use serial::ShareLine;
+
+/// Registers the port `share:` in this process.
+pub fn register() {
+    port::register(&Share);
+}
+
+/// `share:PATH/LINE`.
+struct Share;
+
+impl Scheme for Share {
+    fn name(&self) -> &'static str {
+        "share"
+    }
+
+    fn forms(&self) -> &'static [Form] {
+        &[Form {
+            text: "share:PATH/LINE",
+            help: "a line of a running share",
+            carries: Carries::Both,
+        }]
+    }
+
+    fn parse(
+        &self,
+        rest: &str,
+        given: &mut Given<'_>,
+        _: &[&'static dyn Scheme],
+    ) -> Result<PortName, NameError> {
+        const EXAMPLE: &str = "share:./share/st0";
+        let (path, line) = rest.rsplit_once('/').unwrap_or((rest, ""));
+        given.present(path, "the path of the share's socket", EXAMPLE)?;
+        let protocol = [Protocol::St, Protocol::Rmd]
+            .into_iter()
+            .find(|protocol| line.starts_with(protocol.word()));
+        let lacks_line = || NameError::Incomplete {
+            name: given.name.to_owned(),
+            what: "the line behind the path: st0, st1, .. or rmd0, rmd1, ..",
+            example: EXAMPLE,
+        };
+        let protocol = protocol.ok_or_else(lacks_line)?;
+        let line = line.to_owned();
+        Ok(PortName::new(SharePort(Place { path: path.into(), line, protocol })))
+    }
+}
+
+/// A line of a share.
+#[derive(Debug)]
+struct SharePort(Place);
+
+impl Port for SharePort {
+    fn body(&self) -> String {
+        self.0.name()
+    }
+
+    fn as_line(&self) -> Option<&dyn LinePort> {
+        (self.0.protocol == Protocol::St).then_some(self)
+    }
+
+    fn as_can(&self) -> Option<&dyn CanPort> {
+        (self.0.protocol == Protocol::Rmd).then_some(self)
+    }
+
+    fn is_held(&self) -> bool {
+        true
+    }
+}
+
+impl LinePort for SharePort {
+    fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
+        Ok(Box::new(ShareLine::open(&self.0)?))
+    }
+
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
+        Ok(Box::new(ShareLine::open(&self.0)?))
+    }
+
+    fn label(&self) -> String {
+        self.name()
+    }
+}
+
+impl CanPort for SharePort {
+    fn open(&self) -> Result<Box<dyn CanLink>, PortError> {
+        Ok(Box::new(ShareBus::open(&self.0)?))
+    }
+
+    fn open_event(&self) -> Result<Box<dyn EventCan>, PortError> {
+        Ok(Box::new(ShareBus::open(&self.0)?))
+    }
+
+    fn is_paced(&self) -> bool {
+        true
+    }
+}

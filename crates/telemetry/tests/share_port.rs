@@ -1,0 +1,287 @@
+//! A line of a share as a port: clients of both protocols, alone and beside others.
+
+mod drives;
+mod shared;
+
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use motorlink::port::{FaultBytes, NotDone, PortError, PortName};
+use motorlink::st::{self, Profile, RegisterId};
+use motorlink::{LinkState, rmd};
+use motorlink_link::fault::Faults;
+use motorlink_proto::rmd::{MotorId, ReadStatus, SetSpeed, SetTorque4};
+use motorlink_proto::st::{Command, ErrorCode, MotorNumber, Ramp, Request};
+use motorlink_proto::time::Micros;
+use motorlink_proto::units::{CentiDps, IqCommand, Quantity};
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{self, StLine};
+use motorlink_telemetry::plan::Wants;
+use motorlink_telemetry::share::frame::{self, Kind, Reader};
+use motorlink_telemetry::share::message::{self, Ask, Text, decode, encode};
+use motorlink_telemetry::share::{VERSION, port};
+use motorlink_telemetry::signal::{Motor, Signal};
+use motorlink_telemetry::subscription::{Full, Record, Subscription};
+use shared::{LIMIT, Share};
+
+impl Share {
+    fn port(&self, line: &str) -> PortName {
+        port::register();
+        format!("share:{}/{line}", self.path.display()).parse().unwrap()
+    }
+
+    fn st(&self) -> st::Client {
+        st::Client::open(&self.port("st0"), Default::default()).unwrap()
+    }
+
+    fn rmd(&self) -> rmd::Client {
+        rmd::Client::open(&self.port("rmd0"), Default::default()).unwrap()
+    }
+}
+
+/// A program that speaks the messages of the share.
+struct Operator(UnixStream);
+
+impl Operator {
+    /// Joins a share, and latches it.
+    fn at(share: &Share) -> Self {
+        let mut operator = Operator(UnixStream::connect(&share.path).unwrap());
+        operator.ask(Ask::Hello { protocol: VERSION, name: "operator".to_owned() });
+        operator.ask(Ask::Latch);
+        operator
+    }
+
+    fn ask(&mut self, ask: Ask) {
+        let mut bytes = Vec::new();
+        frame::append(Kind::Text, &encode(&message::Request { id: 1, ask }), &mut bytes).unwrap();
+        self.0.write_all(&bytes).unwrap();
+        let mut reader = Reader::default();
+        loop {
+            let mut bytes = [0; 4096];
+            let size = self.0.read(&mut bytes).unwrap();
+            reader.push(&bytes[..size]);
+            while let Some(frame) = reader.take().unwrap() {
+                if matches!(decode(&frame.payload).unwrap(), Text::Answer { .. }) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+fn start(client: &st::Client) {
+    let motor = client.motor(1).unwrap();
+    motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 100 }).unwrap();
+    motor.start().unwrap();
+}
+
+fn not_done(error: st::Error) -> (NotDone, String) {
+    match error {
+        st::Error::Port(PortError::NotDone { kind, why, .. }) => (kind, why),
+        other => panic!("{other}"),
+    }
+}
+
+fn id(number: u8) -> MotorId {
+    MotorId::new(number).unwrap()
+}
+
+#[test]
+fn an_st_client_reads_writes_and_is_refused_as_on_a_port_of_its_own() {
+    let share = Share::new("st");
+    let client = share.st();
+    let read =
+        |register| client.exchange(1, &Request::GetRegister(register), |it| Some(it.to_vec()));
+    client.confirm().unwrap();
+    let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[77, 0] };
+    client.exchange(1, &write, |_| Some(())).unwrap();
+    assert_eq!(read(RegisterId::SPEED_KP).unwrap(), [77, 0]);
+    client.confirm().unwrap();
+    assert_eq!(client.board_info().unwrap().profile, Profile::Spec);
+    let refused = client.raw(5, 2, &[RegisterId::STATUS.0]).unwrap_err();
+    assert!(
+        matches!(&refused, st::Error::Refused { code: ErrorCode::BadMotorSelected, .. }),
+        "{refused}"
+    );
+    // A frame code that no profile has.
+    let refused = client.raw(1, 0x1F, &[]).unwrap_err();
+    assert!(
+        matches!(&refused, st::Error::Refused { code: ErrorCode::BadFrameId, .. }),
+        "{refused}"
+    );
+    // The last request of any program has selected this motor.
+    let (kind, why) = not_done(client.raw(0, 2, &[RegisterId::SPEED_MEAS.0]).unwrap_err());
+    assert_eq!(kind, NotDone::Usage);
+    assert!(why.contains("a number from 1 to 7"), "{why}");
+    assert_eq!(client.link_state(), LinkState::Open);
+    client.confirm().unwrap();
+}
+
+#[test]
+fn a_motor_turns_as_long_as_its_client_is_there() {
+    let share = Share::new("turns");
+    let (mine, other) = (share.st(), share.st());
+    start(&mine);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1000.0);
+    other.confirm().unwrap();
+    drop(other);
+    let bus = share.rmd();
+    bus.ask(id(2), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap();
+    share.reaches("rmd2.speed_dps", |dps| dps > 100.0);
+    drop(bus);
+    share.reaches("rmd2.speed_dps", |dps| dps < 5.0);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    drop(mine);
+    share.reaches("st1.speed_rpm", |rpm| rpm < 30.0);
+}
+
+#[test]
+fn a_refusal_of_the_share_is_told_in_words_and_leaves_the_connection_open() {
+    let share = Share::new("latch");
+    let (mine, other) = (share.st(), share.st());
+    start(&mine);
+    let mut program = Operator::at(&share);
+    let motor = other.motor(1).unwrap();
+    for _ in 0..2 {
+        let (kind, why) = not_done(motor.start().unwrap_err());
+        assert_eq!(kind, NotDone::Refused);
+        assert!(why.contains("no motion until the latch is released"), "{why}");
+    }
+    other.confirm().unwrap();
+    // The client that started the motor is refused, too, and its connection stays.
+    not_done(mine.motor(1).unwrap().start().unwrap_err());
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    motor.stop_until_confirmed().unwrap();
+    share.reaches("st1.speed_rpm", |rpm| rpm < 30.0);
+    program.ask(Ask::Release);
+    start(&other);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1000.0);
+}
+
+#[test]
+fn rmd_motors_answer_and_a_missing_one_is_silent() {
+    let share = Share::new("rmd");
+    let bus = share.rmd();
+    bus.ask(id(1), &ReadStatus).unwrap();
+    bus.confirm(id(1)).unwrap();
+    let mut found = Vec::new();
+    let ids = (1..=6).map(id).collect();
+    bus.scan(ids, |it| found.push(it), |_| {}).unwrap();
+    assert_eq!(found.len(), 4);
+    let missing = bus.ask(id(9), &ReadStatus).unwrap_err();
+    assert!(matches!(&missing, rmd::Error::Timeout { .. }), "{missing}");
+    let torques = SetTorque4([20, 0, 0, 20].map(IqCommand::from_digits));
+    let replies = bus.set_torque4(torques, [id(1), id(4)].into_iter().collect()).unwrap();
+    let answered: Vec<_> = replies.iter().map(|it| it.as_ref().map(|it| it.is_ok())).collect();
+    assert_eq!(answered, [Some(true), None, None, Some(true)]);
+    share.reaches("rmd4.speed_dps", |dps| dps > 5.0);
+    bus.confirm(id(4)).unwrap();
+    drop(bus);
+    share.reaches("rmd4.speed_dps", |dps| dps < 5.0);
+}
+
+#[test]
+fn the_other_profile_is_refused_before_anything_is_sent() {
+    let share = Share::new("profile");
+    let options = st::Options { profile: Profile::Mcsdk54, ..Default::default() };
+    let Err(error) = st::Client::open(&share.port("st0"), options) else { panic!("it is open") };
+    assert!(
+        matches!(&error, st::Error::Port(PortError::HeldInProfile { profile: "spec", .. })),
+        "{error}"
+    );
+    let Err(error) = st::EventClient::open(&share.port("st0"), options) else { panic!("open") };
+    assert!(error.to_string().contains("profile spec"), "{error}");
+}
+
+#[test]
+fn each_client_has_its_own_data_segments() {
+    let share = Share::new("segments");
+    let (one, other) = (share.st(), share.st());
+    let configure = |client: &st::Client, registers: &[u8]| {
+        let segment = Request::ConfigureSegment { segment: 0, registers };
+        client.exchange(1, &segment, |_| Some(())).unwrap();
+    };
+    let read = |client: &st::Client| {
+        client.exchange(1, &Request::GetSegment(0), |payload| Some(payload.len()))
+    };
+    configure(&one, &[RegisterId::SPEED_MEAS.0]);
+    read(&other).unwrap_err();
+    configure(&other, &[RegisterId::STATUS.0]);
+    for _ in 0..3 {
+        assert_eq!((read(&one).unwrap(), read(&other).unwrap()), (4, 1));
+    }
+}
+
+#[test]
+fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
+    let share = Share::new("engine");
+    let port = share.port("st0");
+    let line = StLine::open(&port, Default::default()).unwrap();
+    let mut engine = Acquisition::new(Box::new(line));
+    let motor = Motor::St(MotorNumber::new(1).unwrap());
+    let signals = ["SPEED_MEAS", "STATUS"].map(|name| Signal::named(motor, name).unwrap());
+    let wants: Wants = signals.iter().map(|signal| (*signal, Micros(5_000))).collect();
+    let subscription = Subscription::new(10_000, Full::DropOldest);
+    engine.subscribe(subscription.clone(), wants);
+    let program = Operator::at(&share);
+    let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
+    let command = engine.command(&"test".into(), start, Micros::from_millis(5_000)).unwrap();
+    let (mut refused, mut values) = (None, 0);
+    let end = Instant::now() + LIMIT;
+    while refused.is_none() || values < 50 {
+        assert!(Instant::now() < end, "{refused:?} {values}");
+        let wait = engine.advance(&mut |id, result| {
+            if id == command {
+                refused = Some(result.unwrap_err().to_string());
+            }
+        });
+        while let Some(record) = subscription.take() {
+            values += usize::from(matches!(record, Record::Values(_)));
+        }
+        std::thread::sleep(wait.unwrap_or_default().min(Duration::from_millis(2)));
+    }
+    let refused = refused.unwrap();
+    assert!(refused.contains("no motion until the latch is released"), "{refused}");
+    drop(program);
+}
+
+#[test]
+fn the_end_of_a_share_is_told_at_once() {
+    let mut share = Share::new("end");
+    let client = share.st();
+    start(&client);
+    let ended = share.end();
+    assert!(ended.iter().all(|(_, one)| one.result.is_ok()), "{ended:?}");
+    let began = Instant::now();
+    let error = client.confirm().unwrap_err().to_string();
+    assert!(error.contains("the share closed the connection: the test is over"), "{error}");
+    let error = client.confirm().unwrap_err().to_string();
+    assert!(error.contains("no share is at"), "{error}");
+    assert!(began.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
+    let faults: Faults = "dup=0.02".parse().unwrap();
+    let mut faults = faults.on_serial().unwrap();
+    let share = Share::with("repeats", move |link| {
+        faults.seed += 1;
+        Box::new(FaultBytes::new(link, &faults))
+    });
+    let (client, other) = (share.st(), share.st());
+    let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI, RegisterId::TORQUE_KP];
+    let mut confirmed = 0;
+    for round in 0..20u8 {
+        let register = registers[usize::from(round) % 3];
+        let value = [round, 0];
+        let write = Request::SetRegister { register, value: &value };
+        let written = client.exchange(1, &write, |_| Some(()));
+        let _ = other.motor(1).unwrap().status();
+        let read = client.exchange(1, &Request::GetRegister(register), |it| Some(it.to_vec()));
+        let (Ok(()), Ok(read), Ok(())) = (written, read, client.confirm()) else { continue };
+        assert_eq!(read, value, "round {round}");
+        confirmed += 1;
+    }
+    assert!(confirmed > 1, "{confirmed}");
+}

@@ -1,0 +1,84 @@
+//! A share in a thread.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use motorlink::port::EventBytes;
+use motorlink::st::{EventClient, Options};
+use motorlink_proto::st::Profile;
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
+use motorlink_telemetry::share::hub::{Held, Speaks};
+use motorlink_telemetry::share::server::Server;
+use motorlink_testbench::{Bench, Serving};
+
+use crate::drives::{path, served};
+
+pub const LIMIT: Duration = Duration::from_secs(30);
+
+/// A share of simulated drives on ptys: the line st0 and the line rmd0.
+pub struct Share {
+    pub bench: Bench,
+    pub path: PathBuf,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Vec<(String, Stopped)>>>,
+    _serving: Serving,
+}
+
+impl Share {
+    pub fn new(name: &str) -> Self {
+        Self::with(name, |link| link)
+    }
+
+    /// As [`new`](Self::new), with something around the serial line.
+    pub fn with(
+        name: &str,
+        around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+    ) -> Self {
+        let (bench, serving, st, rmd) = served(&format!("share-{name}"));
+        let client = EventClient::open_wrapped(&st.parse().unwrap(), around, Options::default());
+        let line = StLine::new(client.unwrap());
+        let speaks = Speaks::St(Profile::Spec);
+        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
+        // A busy machine may be late with a reply.
+        let timeout = Duration::from_secs(5);
+        let options = motorlink::rmd::Options { timeout, ..Default::default() };
+        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
+        let engine = Acquisition::new(Box::new(line.unwrap()));
+        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
+        let socket = path(&format!("share-{name}"), "socket");
+        let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
+        let ends = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&ends);
+        let thread = std::thread::spawn(move || {
+            while !told.load(Ordering::SeqCst) {
+                server.turn().unwrap();
+            }
+            server.end("the test is over")
+        });
+        Share { bench, path: socket, ends, thread: Some(thread), _serving: serving }
+    }
+
+    pub fn end(&mut self) -> Vec<(String, Stopped)> {
+        self.ends.store(true, Ordering::SeqCst);
+        self.thread.take().map_or_else(Vec::new, |thread| thread.join().unwrap())
+    }
+
+    pub fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
+        let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
+        let end = Instant::now() + LIMIT;
+        while !what(self.bench.values()[at]) {
+            assert!(Instant::now() < end, "{signal} is {}", self.bench.values()[at]);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Share {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

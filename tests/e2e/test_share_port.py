@@ -1,0 +1,231 @@
+"""`-p share:PATH/LINE`: the command line on a drive that other programs use at the same time."""
+
+import csv
+import os
+import signal
+import struct
+
+import pytest
+
+from program import eventually
+from sharing import Client, event
+from terminal import Terminal
+
+#: Programs that are killed. ROUNDS=50 for more.
+ROUNDS = int(os.environ.get("ROUNDS", "3"))
+PERIOD = 0.01
+
+
+@pytest.fixture
+def drives(sim):
+    """Simulated drives on a port of each kind."""
+    return sim()
+
+
+@pytest.fixture
+def share(start, drives, tmp_path):
+    """A share of these drives: `st` and `rmd` are its lines as ports, `path` is its socket."""
+    path = tmp_path / "share"
+    # A busy machine may be late with a reply.
+    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "2s"]
+    running = start("share", *words, "--json")
+    running.line(0)
+    running.path, running.st, running.rmd = path, f"share:{path}/st0", f"share:{path}/rmd0"
+    return running
+
+
+@pytest.fixture
+def direct(share):
+    """A program that speaks the messages, to look at the drives."""
+    return Client(share.path, "looks")
+
+
+def rpm(client, motor=1):
+    """The speed of an ST motor, rpm."""
+    return struct.unpack("<i", bytes(client.command("st0", motor, 2, 30)["bytes"]))[0]
+
+
+def is_idle(client, motor=1):
+    """Whether an ST motor rests and can be started."""
+    return client.command("st0", motor, 2, 2)["bytes"] == [0]
+
+
+def dps(client, motor):
+    """The speed of an RMD motor, °/s."""
+    return struct.unpack_from("<h", bytes(client.command("rmd0", motor, 0x9C, *7 * [0])["bytes"]), 4)[0]
+
+
+def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
+    st = ["st", "-p", share.st]
+    assert run(*st, "get", "STATUS", "--json").values["STATUS"] == 0
+    run(*st, "set", "SPEED_KP", "123").ended(0)
+    assert run(*st, "get", "SPEED_KP", "--json").values["SPEED_KP"] == 123
+    assert "SDK" in run(*st, "info").ended(0).out
+    assert "SDK" in run(*st, "scan").ended(0).out
+    run(*st, "segment", "0", "SPEED_MEAS", "STATUS").ended(0)
+    run(*st, "dump", str(tmp_path / "m.toml")).ended(0)
+    run(*st, "set", "SPEED_KP", "124").ended(0)
+    run(*st, "diff", str(tmp_path / "m.toml")).ended(1)
+    run(*st, "restore", str(tmp_path / "m.toml")).ended(0)
+    assert run(*st, "get", "SPEED_KP", "--json").values["SPEED_KP"] == 123
+    samples = run(*st, "get", "SPEED_MEAS", "STATUS", "--every", "10ms", "--count", "20", "--json").ended(0)
+    assert len(samples.lines) >= 20
+    refused = run(*st, "-m", "5", "stop").ended(1)
+    assert "BAD_MOTOR_SELECTED" in refused.err
+    assert "BAD_FRAME_ID" in run(*st, "raw", "0x1f").ended(1).err
+
+
+def test_rmd_commands_work_as_on_a_port_of_their_own(share, run, direct):
+    rmd = ["rmd", "-p", share.rmd]
+    assert len(run(*rmd, "scan", "--json").ended(0).lines) == 4
+    run(*rmd, "--id", "2", "status").ended(0)
+    run(*rmd, "--id", "2", "pid").ended(0)
+    run(*rmd, "--id", "2", "dump").ended(0)
+    run(*rmd, "torque4", "0", "0", "0", "0.1").ended(0)
+    run(*rmd, "status", "--every", "20ms", "--count", "10").ended(0)
+    assert "does not answer" in run(*rmd, "--id", "9", "status").ended(3).err
+    eventually(lambda: all(abs(dps(direct, motor)) < 5 for motor in (1, 2, 3, 4)), "motors that stop")
+
+
+def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path, start, drives):
+    def error(port, code, *more):
+        return run("st", "-p", port, *more, "get", "STATUS").ended(code).err
+
+    assert "lacks the line behind the path" in error(f"share:{share.path}", 2)
+    assert "no share is at" in error(f"share:{tmp_path}/none/st0", 3)
+    assert "its lines are st0, rmd0" in error(f"share:{share.path}/st1", 3)
+    assert "cannot be used as a serial line" in error(share.rmd, 2)
+    other = error(share.st, 2, "--profile", "mcsdk-5.4")
+    assert "profile spec; nothing was sent" in other and "--profile spec" in other
+
+
+def test_a_latch_refuses_motion_and_the_readers_go_on(share, run, start, direct):
+    reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms", "--json")
+    reads.line(3)
+    direct.ask("latch")
+    for command in (["start"], ["ramp", "1000", "100"]):
+        refused = run("st", "-p", share.st, *command).ended(1)
+        assert "looks stopped the motors: no motion until the latch is released" in refused.err
+    turned = run("rmd", "-p", share.rmd, "--id", "1", "speed", "100").ended(1)
+    assert "no motion until the latch is released" in turned.err
+    run("st", "-p", share.st, "stop").ended(0)
+    direct.ask("release")
+    run("st", "-p", share.st, "start").ended(0)
+    reads.more_lines()
+    reads.interrupt()
+    assert reads.wait() in (0, 130)
+
+
+def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, direct):
+    run("st", "-p", share.st, "start", "--ramp", "1500", "100").ended(0)
+    direct.until(event("stopped", line="st0", motor=1))
+    run("rmd", "-p", share.rmd, "--id", "3", "speed", "300").ended(0)
+    direct.until(event("stopped", line="rmd0", motor=3))
+    eventually(lambda: abs(rpm(direct)) < 30 and abs(dps(direct, 3)) < 5, "motors that stop")
+
+
+def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start, run, drives):
+    reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms")
+    reads.line(3)
+    share.process.send_signal(signal.SIGKILL)
+    share.wait()
+    reads.until(lambda: any("the share is gone" in line for line in reads.err), "why it does not read")
+    new = start("share", "-p", drives.st, "--at", f"unix:{share.path}")
+    new.line(0)
+    reads.more_lines()
+    reads.interrupt()
+    reads.wait()
+
+
+def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path):
+    words = ["-p", drives.st, "--at", f"unix:{tmp_path}/share", "--timeout", "100ms"]
+    share = start("share", *words)
+    share.line(0)
+    reads = start("st", "-p", f"share:{tmp_path}/share/st0", "get", "STATUS", "--every", "10ms")
+    reads.line(3)
+    share.process.send_signal(signal.SIGSTOP)
+    try:
+        reads.until(
+            lambda: any("does not answer: is it stopped" in line for line in reads.err), "why", within=30
+        )
+    finally:
+        share.process.send_signal(signal.SIGCONT)
+    reads.more_lines()
+
+
+def test_a_guard_is_refused_in_front_of_a_share(share, run, tmp_path):
+    guard = run("guard", "st", "-p", share.st, "--serve", f"pty:{tmp_path}/guarded").ended(2)
+    assert "use it without a guard" in guard.err
+
+
+def test_watch_shows_and_stops_motors_of_a_share(share, motorlink, direct):
+    direct.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
+    direct.command("st0", 1, 3, 1)
+    eventually(lambda: rpm(direct) > 1000, "a motor that turns")
+    terminal = Terminal([motorlink, "watch", "-p", share.st, "-p", share.rmd], 80, 24)
+    try:
+        terminal.shows("st0:1", "rmd0:2", "RUN", "6 motors on 2 ports")
+        terminal.press("space")
+        eventually(lambda: is_idle(direct), "a motor that stops")
+        terminal.press("q")
+        assert terminal.wait() == 0
+    finally:
+        terminal.end()
+
+
+def read_times(path):
+    """The times of the samples of a CSV file, s."""
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [float(row["t [s]"]) for row in rows]
+
+
+def gaps(times):
+    """The times between samples, s."""
+    return sorted(b - a for a, b in zip(times, times[1:]))
+
+
+def test_each_program_can_be_killed_and_the_others_go_on(share, start, direct, tmp_path):
+    every = ["--every", f"{PERIOD * 1000:.0f}ms"]
+    st = ["st", "-p", share.st, "get", "SPEED_MEAS", "TORQUE_MEAS", "SPEED_KP"]
+
+    def watches():
+        viewer = start(*st, *every, "--json")
+        viewer.line(2)
+        return viewer
+
+    def records(name):
+        path = tmp_path / f"{name}.csv"
+        recorder = start(*st, *every, "--csv", str(path))
+        recorder.line(3)
+        return recorder, path
+
+    def tunes():
+        client = Client(share.path, "tuner")
+        gain = client.command("st0", 1, 1, 5, *struct.pack("<h", 200))
+        ramp = client.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
+        start = client.command("st0", 1, 3, 1)
+        assert {it["kind"] for it in (gain, ramp, start)} == {"answer"}, (gain, ramp, start)
+        return client
+
+    recorder, path = records("all")
+    viewer, tuner = watches(), tunes()
+    for turn in range(ROUNDS):
+        eventually(lambda: rpm(direct) > 1000, "a motor that turns")
+        # A program that only looks is killed: the motor turns on.
+        other, _ = records(f"killed-{turn}")
+        other.process.kill()
+        viewer.process.kill()
+        viewer.wait()
+        viewer = watches()
+        assert rpm(direct) > 1000
+        # The tuner leaves: its motor stops, and the recorder continues.
+        tuner.socket.close()
+        eventually(lambda: is_idle(direct), "a motor that stops")
+        tuner = tunes()
+    recorder.interrupt()
+    recorder.wait()
+    times = gaps(read_times(path))
+    assert len(times) > 50 * ROUNDS
+    late = sum(gap > 2 * PERIOD for gap in times)
+    print(f"{ROUNDS} rounds, {len(times)} gaps, {late} above {2 * PERIOD} s, longest {times[-1]:.3f} s")
