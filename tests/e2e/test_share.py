@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import signal
 import struct
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from badline import BadLine, slcan_messages
 from program import eventually
 from sharing import Client, event
 
@@ -128,6 +130,21 @@ def test_a_killed_viewer_disturbs_nobody(share):
         eventually(lambda: tuner.command("st0", 1, 2, 2)["bytes"] == [RUNNING], "a motor that runs")
         assert tuner.command("st0", 1, *STOP)["kind"] == "answer"
         eventually(lambda: are_still(tuner), "motors that stop")
+
+
+def test_the_stop_of_a_program_that_left_is_repeated_until_the_drive_confirms_it(start, sim, tmp_path):
+    host, port = sim(st=(), rmd=("tcp",)).can_address.rsplit(":", 1)
+    with BadLine((host, int(port)), slcan_messages, random.Random(1)) as line:
+        path = tmp_path / "share"
+        running = start("share", "-p", f"slcan:{line.port}", "--at", f"unix:{path}")
+        running.line(0)
+        watcher, owner = Client(path, "watcher"), Client(path, "owner")
+        owner.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+        line.fate.lost = 1.0
+        owner.socket.close()
+        watcher.until(event("stop-failed"))
+        line.fate.lost = 0.0
+        watcher.until(event("stopped"))
 
 
 def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, drives, run):

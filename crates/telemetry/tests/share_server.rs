@@ -232,6 +232,29 @@ fn the_motors_of_a_program_that_goes_stop_and_no_others() {
 }
 
 #[test]
+fn refused_starts_take_a_motor_from_nobody() {
+    let share = Share::new("refused");
+    let mut operator = share.join("operator");
+    for _ in 0..5 {
+        let (mut owner, mut one, mut other) =
+            (share.join("owner"), share.join("one"), share.join("other"));
+        owner.turn(1, 360);
+        operator.ask(Ask::Latch).unwrap();
+        let start = |program: &mut Program| {
+            let (line, bytes) = ("rmd0".to_owned(), vec![0xA2, 0, 0, 0, 1, 1, 0, 0]);
+            program.send(Ask::Command { line, motor: 1, bytes, time_to_live: 1.0 })
+        };
+        let sent = [start(&mut one), start(&mut other)];
+        for (program, sent) in [&mut one, &mut other].into_iter().zip(sent) {
+            while !matches!(program.receive(), Got::Text(Text::Refusal { id, .. }) if id == sent) {}
+        }
+        drop(owner);
+        share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
+        operator.ask(Ask::Release).unwrap();
+    }
+}
+
+#[test]
 fn a_stop_of_all_and_a_latch_hold_for_all_programs() {
     let share = Share::new("latch");
     let (mut operator, mut arm) = (share.join("operator"), share.join("arm"));

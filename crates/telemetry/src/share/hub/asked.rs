@@ -239,12 +239,10 @@ impl Hub {
         let tell = self.teller(session, Some(id), line);
         let held = &mut self.lines[line];
         held.known.extend(motor);
-        let before = match (motor, motion) {
-            // Noted before it is sent.
-            (Some(motor), Motion::Starts) => held.owners.insert(motor, session),
-            _ => None,
-        };
-        let sent = Sent { motor, motion, before, configures };
+        if let (Some(motor), Motion::Starts) = (motor, motion) {
+            held.starting.push((motor, session));
+        }
+        let sent = Sent { motor, motion, configures };
         let ended_with = move |result| tell(Work::Command(sent, result));
         let begun = match motion {
             Motion::Stops => held.remote().stop_then(name, request, ended_with),

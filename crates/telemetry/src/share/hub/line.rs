@@ -39,6 +39,8 @@ pub struct Held {
     words: Words,
     /// Who turned a motor last. They may have left; then its stop is not confirmed.
     pub(super) owners: BTreeMap<Motor, SessionId>,
+    /// Starts that the engine has not finished, and who sent them.
+    pub(super) starting: Vec<(Motor, SessionId)>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
 }
@@ -82,6 +84,7 @@ impl Held {
             events,
             words: Words::default(),
             owners: BTreeMap::new(),
+            starting: Vec::new(),
             known: BTreeSet::new(),
             runner: Runner::start(name, acquisition)?,
         })

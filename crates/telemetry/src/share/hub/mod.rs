@@ -9,9 +9,10 @@ mod place;
 mod session;
 mod words;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::time::{Duration, Instant};
 
 use super::frame::Frame;
 use super::message::{self, Event, Happening, MotorName, Reason, SignalName, SignalRate};
@@ -36,6 +37,9 @@ pub struct LineEnded(pub String);
 const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after the last \
     confirmation: the answers so far may be those to other commands; ask again";
 
+/// The pause before a stop that failed is repeated, if the program of the motor has gone.
+const AGAIN: Duration = Duration::from_secs(1);
+
 /// Lines and the programs that use them.
 pub struct Hub {
     share: String,
@@ -44,6 +48,8 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
+    /// Motors whose stop failed, and when it is repeated if nobody owns them.
+    again: BTreeMap<(usize, Motor), Instant>,
     done: Sender<Done>,
     ended: Receiver<Done>,
     wake: Arc<dyn Fn() + Send + Sync>,
@@ -70,8 +76,6 @@ struct Sent {
     /// `None`: it is about the drive.
     motor: Option<Motor>,
     motion: Motion,
-    /// Whose the motor was before.
-    before: Option<SessionId>,
     configures: Option<Configures>,
 }
 
@@ -87,6 +91,7 @@ impl Hub {
             last_session: 0,
             latch: None,
             log: VecDeque::new(),
+            again: BTreeMap::new(),
             done,
             ended,
             wake: Arc::new(wake),
@@ -116,13 +121,21 @@ impl Hub {
         self.say(Happening::Left, &name, format!("{name} left"));
         let by = line::after(&name);
         for line in 0..self.lines.len() {
-            let owners = self.lines[line].owners.iter();
-            let orphans: Vec<Motor> =
-                owners.filter(|(_, owner)| **owner == id).map(|(motor, _)| *motor).collect();
-            for motor in orphans {
+            for motor in self.orphans(line, id) {
                 self.stop(line, motor, id, None, &by);
             }
         }
+    }
+
+    /// The motors of a program that has gone. If another program has sent a start, its end decides.
+    fn orphans(&self, line: usize, gone: SessionId) -> BTreeSet<Motor> {
+        let Held { owners, starting, .. } = &self.lines[line];
+        let owned = owners.iter().filter(|(_, owner)| **owner == gone).map(|(motor, _)| *motor);
+        let started = starting.iter().filter(|(_, by)| *by == gone).map(|(motor, _)| *motor);
+        let is_taken = |motor: &Motor| {
+            starting.iter().any(|(it, by)| it == motor && self.sessions.contains_key(by))
+        };
+        owned.chain(started).filter(|motor| !is_taken(motor)).collect()
     }
 
     /// Whether a program may send more requests now.
@@ -158,7 +171,19 @@ impl Hub {
     /// An engine has ended.
     pub fn collect(&mut self) -> Result<(), LineEnded> {
         self.sessions.values_mut().for_each(Session::collect);
+        self.stop_again();
         self.collect_events()
+    }
+
+    /// Repeats stops that no drive has confirmed.
+    fn stop_again(&mut self) {
+        let now = Instant::now();
+        let due: Vec<_> =
+            self.again.iter().filter(|(_, at)| **at <= now).map(|(place, _)| *place).collect();
+        for (line, motor) in due {
+            self.again.remove(&(line, motor));
+            self.stop_if_orphaned(line, motor);
+        }
     }
 
     fn collect_events(&mut self) -> Result<(), LineEnded> {
@@ -231,8 +256,11 @@ impl Hub {
             }
             Work::Stop { motor, result } => {
                 let Some(held) = self.lines.get_mut(line) else { return };
-                if result.is_ok() {
-                    held.owners.remove(&motor);
+                match &result {
+                    Ok(_) => drop(held.owners.remove(&motor)),
+                    // The end of these is an event.
+                    Err(CommandError::Closed | CommandError::Ended) => {}
+                    Err(_) => drop(self.again.insert((line, motor), Instant::now() + AGAIN)),
                 }
                 let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
                 let motor = MotorName { line: held.name.clone(), motor: number(motor) };
@@ -264,9 +292,9 @@ impl Hub {
         sent: Sent,
         result: CommandResult,
     ) {
-        let Sent { motor, motion, before, configures } = sent;
+        let Sent { motor, motion, configures } = sent;
         if let Some(motor) = motor {
-            self.command_ended(session, line, motor, motion, before, &result);
+            self.command_ended(session, line, motor, motion, &result);
             self.told_of(line, motor, &result);
         }
         let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
@@ -312,23 +340,17 @@ impl Hub {
         line: usize,
         motor: Motor,
         motion: Motion,
-        before: Option<SessionId>,
         result: &CommandResult,
     ) {
-        let is_here = |id: &SessionId| self.sessions.contains_key(id);
-        let (is_alive, before) = (is_here(&session), before.filter(is_here));
         let Some(held) = self.lines.get_mut(line) else { return };
+        if let Some(at) = held.starting.iter().position(|it| *it == (motor, session)) {
+            held.starting.remove(at);
+        }
         match (motion, result) {
             (Motion::Stops, Ok(_)) => drop(held.owners.remove(&motor)),
-            (Motion::Starts, Err(error)) if !may_be_executed(error) => {
+            (Motion::Starts, result) => {
                 // A refused start takes the motor from nobody.
-                if let Some(before) = before.filter(|_| held.owners.get(&motor) == Some(&session)) {
-                    held.owners.insert(motor, before);
-                }
-            }
-            (Motion::Starts, _) => {
-                // A stop may have been confirmed since.
-                if is_alive || !held.owners.contains_key(&motor) {
+                if result.as_ref().err().is_none_or(may_be_executed) {
                     held.owners.insert(motor, session);
                 }
                 self.stop_if_orphaned(line, motor);
