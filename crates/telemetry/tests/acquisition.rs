@@ -2,13 +2,9 @@
 
 mod engine;
 
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::sync::Arc;
 
-use motorlink::port::{ByteLink, Direction, Link, PortError, TapBytes, TapCan};
-use motorlink_link::fault::Faults;
-use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, SetSpeed, Stop};
+use motorlink_proto::rmd::{MotorId, Off, ReadStatus, SetSpeed, Stop};
 use motorlink_proto::st::{self, Profile, RegisterId};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::CentiDps;
@@ -448,113 +444,4 @@ fn a_stop_overtakes_the_commands_of_its_own_motor_only() {
     assert!(matches!(overtaken, Some(Err(CommandError::Overtaken))), "{:?}", engine.ended);
     assert!(matches!(engine.result(second), Some(Ok(_))), "{:?}", engine.ended);
     assert!(matches!(engine.result(stop), Some(Ok(_))), "{:?}", engine.ended);
-}
-
-/// What went out since it was cleared: whether each request is the stop.
-type Wire = Arc<Mutex<Vec<bool>>>;
-
-/// Stops a motor again and again while polling is saturated. Gives the most requests that went out
-/// before a stop, and the longest time that it took, as a part of the median exchange.
-fn stopped_on_a_saturated_line(engine: &mut Engine, wire: &Wire, stop: &Request) -> (usize, f64) {
-    engine.run(SECOND);
-    let exchange = engine.acquisition.load().durations().unwrap().median;
-    let (mut ahead, mut longest) = (0, Micros(0));
-    for round in 0..30 {
-        engine.run(Micros(20_000 + 370 * round));
-        wire.lock().unwrap().clear();
-        let asked = engine.clock.now();
-        let id = engine.stop(stop.clone());
-        while !wire.lock().unwrap().contains(&true) {
-            engine.run(engine.step);
-        }
-        longest = longest.max(engine.clock.now().since(asked));
-        let others = wire.lock().unwrap().iter().position(|is_stop| *is_stop);
-        ahead = ahead.max(others.unwrap());
-        engine.run(CENTISECOND);
-        assert!(matches!(engine.result(id), Some(Ok(_))), "{:?}", engine.ended);
-    }
-    (ahead, longest.0 as f64 / exchange.0 as f64)
-}
-
-/// Records what a link sends.
-fn record(wire: &Wire, is_stop: bool, way: Direction) {
-    if way == Direction::Sent {
-        wire.lock().unwrap().push(is_stop);
-    }
-}
-
-/// A line whose drive answers while the engine reads, this number of times.
-struct Answering<L>(L, u32);
-
-impl<L: Link> Link for Answering<L> {
-    fn within(&self) -> Option<&dyn Link> {
-        Some(&self.0)
-    }
-}
-
-impl<L: ByteLink> ByteLink for Answering<L> {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.0.write(bytes)
-    }
-
-    fn read(&mut self, buffer: &mut [u8], _: Option<Duration>) -> Result<usize, PortError> {
-        self.1 = self.1.saturating_sub(1);
-        let time = if self.1 > 0 { Duration::from_millis(10) } else { Duration::ZERO };
-        self.0.read(buffer, Some(time))
-    }
-}
-
-#[test]
-fn a_stop_can_come_between_two_exchanges_that_are_answered_at_once() {
-    let bench = bench();
-    let wire = Wire::default();
-    let seen = Arc::clone(&wire);
-    let link = Answering(bench.bytes(&Faults::NONE), 10_000);
-    let tap = TapBytes::new(link, move |way, _, _: &[u8]| record(&seen, false, way));
-    let mut engine = Engine::st(tap, st_options(bench.profile()));
-    engine.subscribe(&signals(st(1), &["BUS_VOLTAGE"]), Micros(500));
-    engine.run(SECOND);
-    for _ in 0..100 {
-        wire.lock().unwrap().clear();
-        engine.advance();
-        let sent = wire.lock().unwrap().len();
-        assert!(sent <= 1, "{sent}");
-    }
-}
-
-#[test]
-fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
-    let bench = bench();
-    let wire = Wire::default();
-    let seen = Arc::clone(&wire);
-    // EXECUTE_CMD of motor 1.
-    let tap = TapBytes::new(bench.bytes(&Faults::NONE), move |way, _, bytes: &[u8]| {
-        record(&seen, bytes[0] & 0x1F == 0x03, way);
-    });
-    let mut engine = Engine::st(tap, st_options(bench.profile()));
-    engine.subscribe(&signals(st(1), &["SPEED_MEAS", "BUS_VOLTAGE", "STATUS"]), Micros(500));
-    let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
-    let (ahead, exchanges) = stopped_on_a_saturated_line(&mut engine, &wire, &stop);
-    // The exchange that was under way goes on; none begins.
-    assert_eq!(ahead, 0);
-    assert!(exchanges < 1.5, "{exchanges}");
-}
-
-#[test]
-fn a_stop_goes_out_at_once_on_a_saturated_bus() {
-    let bench = bench();
-    let wire = Wire::default();
-    let seen = Arc::clone(&wire);
-    let tap = TapCan::new(bench.can(&Faults::NONE), move |way, _, frame: &CanFrame| {
-        let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
-        record(&seen, code == Some(Code::Stop), way);
-    });
-    let mut engine = Engine::rmd(tap);
-    let wanted: Vec<Signal> =
-        (1..=4).flat_map(|id| signals(rmd(id), &["speed_dps", "voltage_volts"])).collect();
-    engine.subscribe(&wanted, Micros(500));
-    let stop = Request::rmd(MotorId::new(3).unwrap(), &Stop);
-    let (ahead, exchanges) = stopped_on_a_saturated_line(&mut engine, &wire, &stop);
-    assert_eq!(ahead, 0);
-    assert!(exchanges < 0.5, "{exchanges}");
 }
