@@ -1,8 +1,10 @@
 """What else may be at the far end of a serial line: nothing, noise, other protocols."""
 
+import contextlib
 import os
 import random
 import select
+import socket
 import threading
 import tty
 from contextlib import contextmanager
@@ -64,3 +66,42 @@ def slcan_adapter(deliver):
         return reply
 
     return answer
+
+
+class Plug:
+    """A cable to a drive at HOST:PORT that can be unplugged and plugged in again. `port` is what -p takes."""
+
+    def __init__(self, address):
+        host, port = address.rsplit(":", 1)
+        self._drive = (host, int(port))
+        self._ours = ("127.0.0.1", 0)
+        self.plug_in()
+        self._ours = self._listener.getsockname()
+        self.port = "tcp:{}:{}".format(*self._ours)
+
+    def plug_in(self):
+        self._listener = socket.create_server(self._ours)
+        self._ends = []
+        threading.Thread(target=self._serve, args=(self._listener, self._ends), daemon=True).start()
+
+    def unplug(self):
+        for end in [self._listener, *self._ends]:
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+
+    def _serve(self, listener, ends):
+        with contextlib.suppress(OSError):
+            while True:
+                client, _ = listener.accept()
+                drive = socket.create_connection(self._drive)
+                ends += [client, drive]
+                for source, sink in ((client, drive), (drive, client)):
+                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+
+    @staticmethod
+    def _carry(source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(4096):
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_RDWR)

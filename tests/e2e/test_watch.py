@@ -4,8 +4,34 @@ import signal
 
 import pytest
 
+from peers import Plug
 from program import eventually
 from terminal import Terminal
+
+#: A busy machine may be late with a reply.
+PATIENT = ("--timeout", "1s")
+#: The keys from the list of motors to each view, and what is in it.
+VIEWS = {
+    "motors": ((), "got/asked"),
+    "details": (("enter",), "line has"),
+    "registers": (("r",), "of 68 registers"),
+    "help": (("?",), "any key closes"),
+}
+
+
+def go_to(terminal, view):
+    """Goes from the list of motors to a view. Gives a text of the view."""
+    keys, text = VIEWS[view]
+    terminal.shows("got/asked")
+    terminal.press(*keys)
+    terminal.shows(text)
+    return text
+
+
+def go_back(terminal, view):
+    if view != "motors":
+        terminal.press("esc")
+    terminal.shows("got/asked")
 
 
 @pytest.fixture
@@ -14,8 +40,7 @@ def watch(motorlink, tmp_path):
     started = []
 
     def watch(*words, columns=80, lines=24, **variables):
-        # A busy machine may be late with a reply.
-        words = ["watch", "--timeout", "1s", *map(str, words)]
+        words = ["watch", *PATIENT, *map(str, words)]
         terminal = Terminal([motorlink, *words], columns, lines, **variables)
         started.append(terminal)
         return terminal
@@ -36,8 +61,8 @@ def bench(sim, run):
             self.ports = ("-p", self.st, "-p", self.can)
 
         def turn(self):
-            run("st", "-p", self.st, "start").ended(0)
-            run("rmd", "-p", self.can, "--id", 2, "speed", 360).ended(0)
+            run("st", "-p", self.st, *PATIENT, "start").ended(0)
+            run("rmd", "-p", self.can, *PATIENT, "--id", 2, "speed", 360).ended(0)
             eventually(lambda: self.speed("st") > 300 and self.speed("rmd") > 10, "two motors that turn")
 
         def speed(self, kind):
@@ -136,7 +161,7 @@ def test_a_register_is_written_and_read_back(bench, watch, run):
     assert terminal.bold("NOT WRITTEN")
     terminal.press("q")
     assert terminal.wait() == 0
-    assert "777" in run("st", "-p", bench.st, "get", "SPEED_KP").ended(0).out
+    assert "777" in run("st", "-p", bench.st, *PATIENT, "get", "SPEED_KP").ended(0).out
 
 
 def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run):
@@ -154,14 +179,14 @@ def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run
     terminal.shows("is 1500 °/s² (read back)")
     terminal.press("ctrl-c")
     assert terminal.wait() == 0
-    assert "77" in run("rmd", "-p", bench.can, "--id", 3, "pid").ended(0).out
+    assert "77" in run("rmd", "-p", bench.can, *PATIENT, "--id", 3, "pid").ended(0).out
 
 
 def test_a_register_that_moves_the_motor_is_refused(bench, watch):
     terminal = watch("-p", bench.st, "--motor", 1)
     terminal.shows("IDLE")
     terminal.press("r", "/", "CONTROL_MODE", "enter", "e")
-    terminal.shows("CONTROL_MODE makes the motor act: this view starts and moves nothing")
+    terminal.shows("CONTROL_MODE makes the drive act: use `motorlink st set`")
     assert "new value" not in terminal.text
 
 
@@ -170,13 +195,15 @@ def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
     terminal.shows("can0:4")
     terminal.press("?")
     terminal.shows("any key closes this help")
-    for key in ("SPACE ! F12 Ctrl-X", "up down j k", "Enter", "/", "e Enter", "r ", "s ", "u ", "Esc", "?", "Ctrl-Z"):
-        assert terminal.line_of(key), key
+    terminal.shows("SPACE ! F12 Ctrl-X", "up down j k", "Enter", "e Enter", "r ", "s ", "u ", "n ", "Esc", "Ctrl-Z", "q Ctrl-C")
+    assert "…" not in terminal.text
     terminal.press("esc")
     terminal.shows_no("any key closes this help")
-    for key, name in (("down", "st0:2"), ("j", "can0:1"), ("up", "st0:2"), ("k", "st0:1"), ("end", "can0:4"), ("home", "st0:1")):
+    ways = (("down", 1), ("j", 2), ("up", 1), ("k", 0), ("end", 5), ("home", 0), ("page-down", 5), ("page-up", 0))
+    names = ("st0:1", "st0:2", "can0:1", "can0:2", "can0:3", "can0:4")
+    for key, row in ways:
         terminal.press(key)
-        terminal.shows(f">{name}")
+        terminal.shows(f">{names[row]}")
     terminal.press("enter")
     terminal.shows("st0:1  IDLE", "CONTROL_MODE", "SPEED (0x1)", "MOTOR_POWER", "replies")
     terminal.press("down")
@@ -185,23 +212,96 @@ def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
     terminal.shows("got/asked")
     terminal.press("end", "enter")
     terminal.shows("can0:4  at rest", "multi_turn_angle_degrees", "phase_a_amps", "0.00 °")
+    terminal.press("r")
+    terminal.shows("can0:4  at rest", ">position_kp", "7 of 7 registers")
+    for key, name in (("down", "position_ki"), ("j", "speed_kp"), ("up", "position_ki"), ("k", "position_kp"), ("end", "acceleration"), ("home", "position_kp")):
+        terminal.press(key)
+        terminal.shows(f">{name}")
+    terminal.press("/", "torque")
+    terminal.shows("2 of 7 registers")
+    terminal.press("r")
+    terminal.shows("search: torquer_")
+    terminal.press("esc")
+    terminal.shows("7 of 7 registers")
     terminal.press("esc")
     terminal.shows(">can0:4")
 
 
-def test_a_port_that_goes_away_and_comes_back_is_said(sim, watch):
-    drives = sim(rmd=())
-    terminal = watch("-p", drives.st)
-    terminal.shows("IDLE")
-    drives.kill()
-    terminal.shows("PORT GONE", "st0: port gone for")
+def test_motors_that_appear_later_are_found(bench, watch):
+    terminal = watch("-p", bench.st, "-p", bench.can, "--motor", 1, "--id", 2)
+    terminal.shows("2 motors on 2 ports", "st0:1", "can0:2")
+    terminal.press("n")
+    terminal.shows("6 motors on 2 ports", "st0: 1 more motors", "can0: 3 more motors")
+    for name in ("st0:2", "can0:1", "can0:3", "can0:4"):
+        eventually(lambda: "/10.0" in terminal.line_of(f"{name} "), f"the rate of {name}", 30)
+    terminal.press("n")
+    terminal.shows("st0: 0 more motors", "can0: 0 more motors")
+    terminal.press("end")
+    terminal.shows(">can0:4")
     terminal.press("!")
-    terminal.shows("NOT CONFIRMED, may still be turning: st0:1 st0:2")
-    assert terminal.bold("NOT CONFIRMED, may")
-    sim(rmd=())
-    terminal.shows("the port is back after", "°C", within=30)
+    terminal.shows("stop confirmed by all 6 motors")
+
+
+@pytest.fixture
+def cable(sim, run):
+    """An ST drive whose motor 1 turns, on a cable that can be unplugged."""
+    drives = sim(st=("tcp",), rmd=())
+    run("st", "-p", f"tcp:{drives.st_address}", *PATIENT, "start").ended(0)
+    cable = Plug(drives.st_address)
+    cable.speed = lambda: abs(drives.motor(1)["speed_rpm"])
+    eventually(lambda: cable.speed() > 300, "a motor that turns")
+    yield cable
+    cable.unplug()
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_port_that_goes_away_and_comes_back_is_said(cable, watch, view):
+    terminal = watch("-p", cable.port)
+    text = go_to(terminal, view)
+    cable.unplug()
+    if view != "help":
+        terminal.shows("PORT GONE", "port gone" if view != "registers" else text)
+    cable.plug_in()
+    go_back(terminal, view)
+    terminal.shows("the port is back after", "RUN", "°C", within=30)
+    assert cable.speed() > 300
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_stop_while_the_port_is_gone_is_loud_and_is_repeated_when_it_is_back(cable, watch, view):
+    terminal = watch("-p", cable.port)
+    text = go_to(terminal, view)
+    cable.unplug()
     terminal.press("!")
-    terminal.shows("stop confirmed by all 2")
+    loud = "stop NOT CONFIRMED, may still be turning:"
+    terminal.shows("LATCHED", loud, text)
+    assert terminal.bold(loud)
+    assert cable.speed() > 300
+    cable.plug_in()
+    eventually(lambda: cable.speed() < 1, "a motor at rest", 30)
+    terminal.shows_no(loud)
+    go_back(terminal, view)
+    terminal.shows("stop confirmed by all 2 motors", "LATCHED")
+
+
+def test_a_stop_that_is_not_confirmed_at_the_end_is_an_error(cable, watch):
+    terminal = watch("-p", cable.port)
+    terminal.shows("RUN")
+    cable.unplug()
+    terminal.shows("PORT GONE")
+    terminal.press("!", "q")
+    assert terminal.wait() == 3
+    said = "did not confirm the stop and may still be turning"
+    eventually(lambda: said in terminal.text.replace("\n", ""), said)
+
+
+def test_the_end_waits_for_a_stop_that_is_under_way(bench, watch):
+    bench.turn()
+    terminal = watch(*bench.ports)
+    terminal.shows("RUN", "turning")
+    terminal.press("!q")
+    assert terminal.wait() == 0
+    bench.rests()
 
 
 def test_a_motor_that_becomes_silent_is_said(sim, watch):
@@ -232,6 +332,25 @@ def test_the_view_follows_the_size_of_the_terminal(bench, watch):
     terminal.shows("got/asked", "can0:4")
     terminal.press("q")
     assert terminal.wait() == 0
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_tiny_terminal_still_stops_all(bench, watch, view):
+    bench.turn()
+    terminal = watch(*bench.ports)
+    text = go_to(terminal, view)
+    for columns, lines in ((200, 60), (20, 5), (1, 1), (20, 5)):
+        terminal.resize(columns, lines)
+        if lines > 1:
+            eventually(lambda: terminal.line_of("SPACE STOP ALL"), "the key of the stop")
+    terminal.resize(1, 1)
+    terminal.press("space")
+    bench.rests()
+    terminal.resize(80, 24)
+    terminal.shows("LATCHED", text)
+    terminal.press("ctrl-c")
+    assert terminal.wait() == 0
+    eventually(lambda: terminal.is_as_before, "the terminal as before")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -1,4 +1,4 @@
-//! What `motorlink watch` takes.
+//! The arguments of `motorlink watch`.
 
 use std::time::Duration;
 

@@ -1,10 +1,10 @@
-//! What the keys do.
+//! The keys and their actions.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use super::settings::Item;
 
-/// What fills the screen.
+/// The page on the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum View {
     Motors,
@@ -12,7 +12,7 @@ pub enum View {
     Settings,
 }
 
-/// What is typed into.
+/// The field that receives typed text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Field {
     None,
@@ -20,23 +20,25 @@ pub enum Field {
     Search,
     /// A value for an item.
     Edit(Item, String),
-    /// The question whether the latch is to be released.
+    /// The question: release the latch?
     Release,
 }
 
-/// What a key asks for, beyond the view itself.
+/// The action of a key outside the view: on motors, on the terminal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ask {
     StopAll,
     /// Stops the motor of the selected row.
     Stop,
     Release,
+    /// Looks for more motors.
+    Find,
     Write(Item, String),
     Suspend,
     Quit,
 }
 
-/// Where the user is.
+/// The page, the selection and the typed text.
 pub struct Place {
     pub view: View,
     pub field: Field,
@@ -44,16 +46,16 @@ pub struct Place {
     /// The selected row.
     pub row: usize,
     pub rows: usize,
-    /// The list of registers of the motor, and the part of it that the search leaves.
+    /// The registers of the motor, and the text of the search in them.
     pub items: Vec<Item>,
     pub search: String,
-    /// The selected one of those that are left.
+    /// The selected register of those with this text.
     pub item: usize,
-    /// What the last edit came to, and whether it failed.
+    /// The result of the last edit, and whether it failed.
     pub message: Option<(String, bool)>,
 }
 
-/// A key of the help: where it works, its name, what it does, and a short form for the last line.
+/// A key of the help: its page (`None`: all), name and action, and a short form for the last line.
 pub struct Help {
     pub view: Option<View>,
     pub key: &'static str,
@@ -72,16 +74,17 @@ const fn key(
 
 /// All keys, in the order of the help.
 pub const HELP: &[Help] = &[
-    key(None, "SPACE ! F12 Ctrl-X", "stop all motors, and latch; also while typing", "STOP ALL"),
-    key(Some(View::Motors), "up down j k", "select a motor", "select"),
+    key(None, "SPACE ! F12 Ctrl-X", "stop all motors, and latch; while typing, too", "STOP ALL"),
+    key(Some(View::Motors), "up down j k", "select a motor; also PgUp PgDn Home End", "select"),
     key(Some(View::Motors), "Enter", "details of the motor", "details"),
     key(Some(View::Details), "up down j k", "the motor above, below", "motor"),
-    key(Some(View::Settings), "up down j k", "select a register (RMD: a gain)", "select"),
+    key(Some(View::Settings), "up down j k", "select; also PgUp PgDn Home End", "select"),
     key(Some(View::Settings), "/", "search; Enter keeps the search, Esc ends it", "search"),
     key(Some(View::Settings), "e Enter", "type a value; it is written and read back", "edit"),
-    key(None, "r", "registers of the motor (RMD: gains)", "registers"),
+    key(None, "r", "all registers of the motor (RMD: gains)", "registers"),
     key(None, "s", "stop the selected motor, without the latch", "stop"),
     key(None, "u", "release the latch, after a y", "unlatch"),
+    key(None, "n", "look for more motors on all ports", "new motors"),
     key(None, "Esc", "back", "back"),
     key(None, "?", "this help", "help"),
     key(None, "Ctrl-Z", "suspend; `fg` goes on", ""),
@@ -103,7 +106,7 @@ impl Place {
         }
     }
 
-    /// The registers that the search leaves.
+    /// The registers whose name or meaning has the text of the search.
     pub fn found(&self) -> Vec<Item> {
         let search = self.search.to_lowercase();
         let is_found = |item: &&Item| {
@@ -113,15 +116,15 @@ impl Place {
         self.items.iter().filter(is_found).copied().collect()
     }
 
-    /// Goes to the list of registers.
+    /// Shows the list of registers.
     pub fn list(&mut self, items: Vec<Item>) {
         (self.items, self.item, self.message) = (items, 0, None);
         self.search.clear();
         self.view = View::Settings;
     }
 
-    /// Takes a key. `list` gives the registers of the selected motor, `unwritable` why one of them is
-    /// not written.
+    /// Handles a key. `list` returns the registers of the motor of a row. `unwritable` returns the reason
+    /// why a register cannot be edited.
     pub fn press(
         &mut self,
         key: KeyEvent,
@@ -132,7 +135,7 @@ impl Place {
             return None;
         }
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
-        // These work wherever the user is. Neither a name nor a value has a space or an `!`.
+        // These work on every page, also while typing: no name and no value has a space or an `!`.
         match key.code {
             KeyCode::Char(' ' | '!') | KeyCode::F(12) => return Some(Ask::StopAll),
             KeyCode::Char('x') if is_control => return Some(Ask::StopAll),
@@ -153,11 +156,11 @@ impl Place {
             (_, KeyCode::Char('?')) => self.shows_help = true,
             (_, KeyCode::Char('s')) => return Some(Ask::Stop),
             (_, KeyCode::Char('u')) => self.field = Field::Release,
-            (View::Motors | View::Details, KeyCode::Char('r')) => {
+            (_, KeyCode::Char('n')) => return Some(Ask::Find),
+            (_, KeyCode::Char('r')) => {
                 let items = list(self.row);
                 self.list(items);
             }
-            (View::Settings, KeyCode::Char('r')) => {}
             (View::Settings, KeyCode::Esc) if !self.search.is_empty() => {
                 self.search.clear();
                 self.item = 0;
@@ -238,7 +241,7 @@ impl Place {
     }
 }
 
-/// Rows of a page.
+/// Rows that PgUp and PgDn move.
 const PAGE: usize = 10;
-/// Letters of a name or a value.
+/// The longest name or value that can be typed, in characters.
 const LONGEST: usize = 40;

@@ -1,4 +1,4 @@
-//! `motorlink watch`: a terminal view of motors, on the engine of each port.
+//! `motorlink watch`: a terminal view of motors. Each port has an engine.
 
 mod args;
 mod keys;
@@ -23,6 +23,7 @@ use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::Subscription;
 use ratatui::crossterm::event::{self, Event, KeyEvent};
 
+use crate::advice::STOP_AGAIN;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::RmdUnits;
@@ -34,15 +35,15 @@ use model::{Model, Port, Row};
 use screen::{Screen, Wait};
 use settings::{Access, Item};
 use values::Units;
-use work::{Done, Work};
+use work::{Done, Stopping, Work};
 
-/// How long to wait for a key.
+/// The longest wait for a key.
 const TICK: Duration = Duration::from_millis(50);
-/// Between two pictures.
+/// Least time between two drawings of the screen.
 const PICTURE: Duration = Duration::from_millis(66);
-/// Values that nobody writes are read again after this time.
+/// Registers in view are read again after this time.
 const READ_AGAIN: Duration = Duration::from_secs(1);
-/// Ages are shown in seconds.
+/// The screen is drawn at least this often: ages change each second.
 const SECOND: Duration = Duration::from_secs(1);
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -57,31 +58,34 @@ pub fn run(args: Args) -> Result<(), Failure> {
     interrupt::take_over();
     interrupt::hold_on(true);
     let shown = Screen::enter().and_then(|mut screen| watch.show(&mut screen));
-    // The terminal is as before. If a stop hangs, another signal ends it.
+    // The terminal is restored now. If a stop hangs, a second signal ends the program.
     interrupt::hold_on(false);
+    watch.await_stops();
     let left = watch.leave();
     shown.and(left)
 }
 
-/// The view with its engines.
+/// The view and the engines of its ports.
 struct Watch {
     runners: Vec<Runner>,
     subscriptions: Vec<Subscription>,
+    /// Subscriptions for motors that were found later, each with its port.
+    added: Vec<(usize, Subscription)>,
     details: Option<Details>,
     work: Work,
     model: Model,
     place: Place,
-    /// Values of the list of registers.
+    /// Values of registers, or why there is none.
     read: BTreeMap<(usize, Item), Result<String, String>>,
-    /// When the list was read, and whether it is being read.
+    /// When registers were last read, and whether a read is in progress.
     reading: (Option<Instant>, bool),
     has_changed: bool,
 }
 
-/// The signals of the details of a motor.
+/// The subscription to all signals of one motor.
 struct Details {
     row: usize,
-    /// None until the engine has subscribed.
+    /// `None` until the engine has confirmed the subscription.
     records: Option<(ConsumerId, Subscription)>,
 }
 
@@ -102,14 +106,8 @@ impl Watch {
             let records = work::subscribe(remote, &port.motors, args.rate);
             subscriptions.push(records.map_err(|ended| Failure::link(ended.to_string()))?);
             work.rates(remote, at);
-            rows.extend(port.motors.iter().map(|&motor| {
-                let number = match motor {
-                    Motor::St(number) => number.number(),
-                    Motor::Rmd(id) => id.number(),
-                };
-                Row::new(at, motor, format!("{label}:{number}"), args.rate)
-            }));
-            ports.push(Port::new(label, port.name));
+            rows.extend(port.motors.iter().map(|&motor| row(at, motor, &label, args.rate)));
+            ports.push(Port::new(label, port.name, port.protocol));
             runners.push(port.runner);
         }
         let units = Units {
@@ -117,10 +115,11 @@ impl Watch {
             rmd: RmdUnits { raw: false, gear: args.gear_ratio, encoder_bits: None },
         };
         let place = Place::new(rows.len());
-        let model = Model::new(units, ports, rows, args.rate);
+        let model = Model::new(by, units, ports, rows, args.rate);
         Ok(Watch {
             runners,
             subscriptions,
+            added: Vec::new(),
             details: None,
             work,
             model,
@@ -131,7 +130,7 @@ impl Watch {
         })
     }
 
-    /// Shows the motors until the user or a signal ends it.
+    /// Shows the motors until a key or a signal ends the program.
     fn show(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let mut drawn = Instant::now();
         let theme = view::Theme::of_terminal();
@@ -147,7 +146,7 @@ impl Watch {
             if let Wait::Gone = waited {
                 return Ok(());
             }
-            // A resize comes without a key.
+            // A resize is an event without input on stdin.
             while event::poll(Duration::ZERO)? {
                 match event::read()? {
                     Event::Key(key) => match self.press(key) {
@@ -155,18 +154,20 @@ impl Watch {
                         Some(Ask::Suspend) => screen.suspend()?,
                         _ => {}
                     },
-                    Event::Resize(..) => {}
+                    // Needed even if the size is as before: the terminal may have lost text meanwhile.
+                    Event::Resize(..) => screen.clear()?,
                     _ => continue,
                 }
                 self.has_changed = true;
             }
             self.receive()?;
+            self.repeat_stops();
             self.read_registers();
         }
         Ok(())
     }
 
-    /// Takes a key, and does what it asks for. What only the screen can do is returned.
+    /// Handles a key. Returns actions for the screen.
     fn press(&mut self, key: KeyEvent) -> Option<Ask> {
         let (model, before) = (&self.model, (self.place.view, self.place.row));
         let list = |row: usize| Item::of(model.rows[row].motor, &model.units);
@@ -177,10 +178,14 @@ impl Watch {
         let row = self.place.row;
         match asked? {
             Ask::StopAll => self.stop_all(),
-            Ask::Stop => {
-                let (port, motor) = (self.model.rows[row].port, self.model.rows[row].motor);
-                self.model.stopping(row);
-                self.work.stop(self.runners[port].remote(), row, motor);
+            Ask::Stop => self.stop(row),
+            Ask::Find => {
+                self.model.say(None, "looking for more motors ...", false);
+                for (port, runner) in self.runners.iter().enumerate() {
+                    let known = self.model.motors(port);
+                    let protocol = self.model.ports[port].protocol;
+                    self.work.find(runner.remote(), port, protocol, known, self.model.period);
+                }
             }
             Ask::Release => {
                 self.runners.iter().for_each(|runner| self.work.release(runner.remote()));
@@ -193,15 +198,41 @@ impl Watch {
 
     fn stop_all(&mut self) {
         for (port, runner) in self.runners.iter().enumerate() {
-            let rows = self.model.rows.iter().enumerate();
-            let of_port = rows.filter(|(_, row)| row.port == port);
-            let motors: Vec<_> = of_port.map(|(at, row)| (at, row.motor)).collect();
-            self.work.stop_all(runner.remote(), motors);
+            let rows = 0..self.model.rows.len();
+            let of_port: Vec<_> = rows.filter(|&row| self.model.rows[row].port == port).collect();
+            let stops = of_port.into_iter().map(|row| stopping(&mut self.model, row)).collect();
+            self.work.stop_all(runner.remote(), stops);
         }
-        (0..self.model.rows.len()).for_each(|row| self.model.stopping(row));
     }
 
-    /// The view or the motor is another now.
+    fn stop(&mut self, row: usize) {
+        let stop = stopping(&mut self.model, row);
+        self.work.stop(self.remote(row), stop);
+    }
+
+    /// Stops the motors again that did not confirm a stop and reply again.
+    fn repeat_stops(&mut self) {
+        for row in self.model.due_stops(Instant::now()) {
+            self.stop(row);
+        }
+    }
+
+    /// Waits for the stops in progress. The time of each is bounded.
+    fn await_stops(&mut self) {
+        let motors = self.model.being_stopped();
+        if motors.is_empty() {
+            return;
+        }
+        note(format!("waiting until {motors} confirms the stop"));
+        interrupt::complete_stop(motors);
+        while !self.model.being_stopped().is_empty() {
+            let Ok(done) = self.work.done.recv() else { break };
+            self.take(done);
+        }
+        interrupt::stop_is_complete();
+    }
+
+    /// Changes the subscription to details after a change of page or motor.
     fn went(&mut self) {
         let wanted = (self.place.view == View::Details).then_some(self.place.row);
         if self.details.as_ref().map(|details| details.row) != wanted {
@@ -231,7 +262,7 @@ impl Watch {
         Access { remote, by, motor: self.model.rows[row].motor, units: self.model.units }
     }
 
-    /// Takes what the engines and the threads have.
+    /// Handles records of the engines and results of the threads.
     fn receive(&mut self) -> Result<(), Failure> {
         for (port, records) in self.subscriptions.iter().enumerate() {
             while let Some(record) = records.take() {
@@ -241,6 +272,12 @@ impl Watch {
             if records.is_closed() {
                 let name = &self.model.ports[port].name;
                 return Err(Failure::link(format!("{name}: the engine of this port has ended")));
+            }
+        }
+        for (port, records) in &self.added {
+            while let Some(record) = records.take() {
+                self.model.take_added(*port, &record);
+                self.has_changed = true;
             }
         }
         if let Some(Details { row, records: Some((_, records)) }) = &self.details {
@@ -259,12 +296,13 @@ impl Watch {
     fn take(&mut self, done: Done) {
         match done {
             Done::Rates(port, rates) => self.model.rates(port, &rates),
-            Done::Stopped(row, result) => self.model.stopped(row, result),
+            Done::Stopped(stop, result) => self.model.stopped(stop.row, stop.number, result),
+            Done::Found(port, found) => self.found(port, found),
             Done::Details(row, id, records) => match &mut self.details {
                 Some(details) if details.row == row && details.records.is_none() => {
                     details.records = Some((id, records));
                 }
-                // The user has gone on meanwhile.
+                // The page or the motor has changed meanwhile.
                 _ => self.work.unwatch(self.remote(row), id),
             },
             Done::Read(row, item, value) => drop(self.read.insert((row, item), value)),
@@ -282,7 +320,27 @@ impl Watch {
         }
     }
 
-    /// Reads the registers that are in view, from time to time.
+    /// Adds rows for the motors that a search found.
+    fn found(&mut self, port: usize, found: Result<(Vec<Motor>, Subscription), String>) {
+        let label = self.model.ports[port].label.clone();
+        match found {
+            Ok((motors, records)) => {
+                // An earlier search may have added them.
+                let is_new = |motor: &Motor| self.model.find(port, *motor).is_none();
+                let motors: Vec<Motor> = motors.into_iter().filter(is_new).collect();
+                self.model.say(None, format!("{label}: {} more motors", motors.len()), false);
+                let rows = motors.into_iter().map(|it| row(port, it, &label, self.model.period));
+                self.model.rows.extend(rows);
+                self.place.rows = self.model.rows.len();
+                self.added.push((port, records));
+            }
+            Err(why) => {
+                self.model.say(None, format!("{label}: no motors were looked for: {why}"), true);
+            }
+        }
+    }
+
+    /// Reads the registers in view again when they are due.
     fn read_registers(&mut self) {
         let (since, is_reading) = self.reading;
         let is_due = since.is_none_or(|since| since.elapsed() >= READ_AGAIN);
@@ -295,22 +353,42 @@ impl Watch {
         self.work.read(self.access(row), row, items);
     }
 
-    /// Ends the engines: they stop the motors that were started through them, and say which.
+    /// Ends the engines and reports the motors that may still be turning.
     fn leave(self) -> Result<(), Failure> {
-        let mut result = Ok(());
+        let mut turning: Vec<(String, String)> = Vec::new();
+        for row in &self.model.rows {
+            turning.extend(row.unconfirmed.clone().map(|why| (row.name.clone(), why)));
+        }
         for (runner, port) in self.runners.into_iter().zip(&self.model.ports) {
             for stopped in runner.end() {
                 let at = self.model.rows.iter().find(|row| row.motor == stopped.motor);
                 let name = at.map_or(port.label.as_str(), |row| &row.name);
                 match stopped.result {
                     Ok(()) => note(format!("{name} was stopped")),
-                    Err(why) => {
-                        let text = format!("{name} did not confirm its stop and may still turn");
-                        result = Err(Failure::link(format!("{text}: {why}")));
-                    }
+                    Err(why) => turning.push((name.to_owned(), why.to_string())),
                 }
             }
         }
-        result
+        let Some((_, why)) = turning.first() else { return Ok(()) };
+        let names: Vec<&str> = turning.iter().map(|(name, _)| name.as_str()).collect();
+        Err(Failure::link(format!(
+            "{} did not confirm the stop and may still be turning: {why}",
+            names.join(" ")
+        ))
+        .trying(STOP_AGAIN))
     }
+}
+
+/// The row of a motor, without values yet.
+fn row(port: usize, motor: Motor, label: &str, period: Duration) -> Row {
+    let number = match motor {
+        Motor::St(number) => number.number(),
+        Motor::Rmd(id) => id.number(),
+    };
+    Row::new(port, motor, format!("{label}:{number}"), period)
+}
+
+/// Begins a stop in the model.
+fn stopping(model: &mut Model, row: usize) -> Stopping {
+    Stopping { row, motor: model.rows[row].motor, number: model.stopping(row) }
 }

@@ -1,4 +1,4 @@
-//! What is known of the ports and motors.
+//! The state of ports and motors, from the records of the engines.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -11,42 +11,46 @@ use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal, Source};
 use motorlink_telemetry::subscription::Record;
 
+use super::ports::Protocol;
 use super::values::{self, Main, Units};
 
 /// Values of a sparkline.
 const HISTORY: usize = 200;
 /// Events that are kept.
 const EVENTS: usize = 200;
-/// A value that was not read for this long, or for three periods, is not shown as the present one.
+/// An older value is not shown; nor one that is older than three periods, if that is longer.
 const STALE: Duration = Duration::from_secs(3);
 /// How long a confirmed stop is shown, at least.
 const CONFIRMED: Duration = Duration::from_secs(30);
+/// Least time between a stop that was not confirmed and its repeat.
+const REPEAT: Duration = Duration::from_secs(1);
 
 /// A port with its engine.
 pub struct Port {
-    /// Short, for rows.
+    /// A short name, for rows.
     pub label: String,
-    /// As -p takes it.
+    /// The argument of -p.
     pub name: String,
-    /// Since when it is gone, and why.
+    pub protocol: Protocol,
+    /// When the port was lost, and why.
     pub gone: Option<(Instant, Arc<str>)>,
-    /// Who stopped the motors.
+    /// The program that set the latch.
     pub latched: Option<Arc<str>>,
-    /// Records that came faster than they could be shown.
+    /// Records that were lost because the view was too slow.
     pub lost: u64,
-    /// Stops under way, with their motor.
+    /// Stops of other programs in progress, with their motor.
     stops: BTreeMap<CommandId, Motor>,
 }
 
-/// How the last stop of a motor ended.
-#[derive(Debug, Clone, PartialEq)]
+/// The last stop of a motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stop {
     None,
     UnderWay,
-    /// When.
+    /// Confirmed at this time.
     Confirmed(Instant),
-    /// Why it is not confirmed.
-    NotConfirmed(String),
+    /// Failed at this time.
+    NotConfirmed(Instant),
 }
 
 /// A motor.
@@ -56,35 +60,43 @@ pub struct Row {
     pub name: String,
     pub main: Main,
     pub stop: Stop,
-    /// Since when it does not answer, and why.
+    /// Why a stop was not confirmed. `None` again after a confirmed one.
+    pub unconfirmed: Option<String>,
+    /// When it stopped replying, and why.
     pub silent: Option<(Instant, Arc<str>)>,
-    pub speeds: VecDeque<f64>,
-    pub currents: VecDeque<f64>,
+    pub speeds: VecDeque<Sample>,
+    pub currents: VecDeque<Sample>,
     /// Signals with their rates.
     pub rates: Vec<Rate>,
     /// Replies with values.
     pub replies: u64,
-    /// How often it became silent.
+    /// How many times it stopped replying.
     pub silences: u64,
-    /// Signals that the drive refuses to give, or whose values are not plausible.
+    /// Signals that the drive refuses to send, or whose values are not plausible.
     pub refused: BTreeMap<Source, Arc<str>>,
-    /// How long a value is the present one.
+    /// The number of stops that this program began.
+    stop_number: u64,
+    /// The time of the last reply with values.
+    answered: Option<Instant>,
+    /// How long a value is shown.
     valid: Duration,
     values: BTreeMap<Source, (Sample, Instant)>,
 }
 
-/// Something that happened, for people.
+/// A line of the event log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Said {
     /// UTC.
     pub time: String,
-    /// The row that it is about; `None`: all.
+    /// Its row; `None`: it concerns a port or all motors.
     pub row: Option<usize>,
     pub text: String,
     pub is_bad: bool,
 }
 
 pub struct Model {
+    /// The name of this program in the events of the engines.
+    by: Arc<str>,
     pub units: Units,
     pub ports: Vec<Port>,
     pub rows: Vec<Row>,
@@ -94,8 +106,8 @@ pub struct Model {
 }
 
 impl Port {
-    pub fn new(label: String, name: String) -> Self {
-        Port { label, name, gone: None, latched: None, lost: 0, stops: BTreeMap::new() }
+    pub fn new(label: String, name: String, protocol: Protocol) -> Self {
+        Port { label, name, protocol, gone: None, latched: None, lost: 0, stops: BTreeMap::new() }
     }
 }
 
@@ -107,6 +119,7 @@ impl Row {
             name,
             main: Main::of(motor),
             stop: Stop::None,
+            unconfirmed: None,
             silent: None,
             speeds: VecDeque::new(),
             currents: VecDeque::new(),
@@ -114,24 +127,41 @@ impl Row {
             replies: 0,
             silences: 0,
             refused: BTreeMap::new(),
+            stop_number: 0,
+            answered: None,
             valid: STALE.max(period * 3),
             values: BTreeMap::new(),
         }
     }
 
-    /// The present value of a signal.
+    /// The value of a signal, if it is recent.
     pub fn value(&self, source: Source) -> Option<Sample> {
         let (sample, at) = self.values.get(&source)?;
         (at.elapsed() < self.valid && self.silent.is_none()).then_some(*sample)
     }
 
-    /// The rates of the speed: asked for, and had.
+    /// The time since a signal was read.
+    pub fn age(&self, source: Source) -> Option<Duration> {
+        self.values.get(&source).map(|(_, at)| at.elapsed())
+    }
+
+    /// Whether to repeat a stop that was not confirmed: the motor replies again.
+    fn is_stop_due(&self, now: Instant) -> bool {
+        match self.stop {
+            Stop::NotConfirmed(since) => {
+                self.answered.is_some_and(|at| at > since) && now.duration_since(since) >= REPEAT
+            }
+            _ => false,
+        }
+    }
+
+    /// The rates of the speed signal: requested and achieved, Hz.
     pub fn rate(&self) -> Option<(f64, f64)> {
         let rate = self.rates.iter().find(|rate| rate.signal.source == self.main.speed)?;
         Some((hertz(rate.asked), rate.achieved))
     }
 
-    /// Keeps the values of a reply. Gives why some are none, once.
+    /// Stores the values of a reply. Returns the reason for each missing value, once.
     fn keep(&mut self, values: &Values) -> Vec<String> {
         let now = Instant::now();
         let mut news = Vec::new();
@@ -155,18 +185,19 @@ impl Row {
 
     fn received(&mut self, values: &Values) -> Vec<String> {
         self.replies += 1;
+        self.answered = Some(Instant::now());
         let sparklines =
             [(self.main.speed, &mut self.speeds), (self.main.current, &mut self.currents)];
         for (source, history) in sparklines {
             if let Some(sample) = values.get(Signal { motor: self.motor, source }) {
-                remember(history, sample.value, HISTORY);
+                remember(history, sample, HISTORY);
             }
         }
         self.keep(values)
     }
 }
 
-/// A period as a rate.
+/// The rate of a period, Hz.
 pub fn hertz(period: motorlink::time::Micros) -> f64 {
     1.0 / Duration::from(period).as_secs_f64()
 }
@@ -179,26 +210,45 @@ fn remember<T>(all: &mut VecDeque<T>, new: T, most: usize) {
 }
 
 impl Model {
-    pub fn new(units: Units, ports: Vec<Port>, rows: Vec<Row>, period: Duration) -> Self {
-        Model { units, ports, rows, events: VecDeque::new(), period }
+    pub fn new(
+        by: Arc<str>,
+        units: Units,
+        ports: Vec<Port>,
+        rows: Vec<Row>,
+        period: Duration,
+    ) -> Self {
+        Model { by, units, ports, rows, events: VecDeque::new(), period }
     }
 
-    /// The row of a motor.
+    /// The index of the row of a motor.
     pub fn find(&self, port: usize, motor: Motor) -> Option<usize> {
         self.rows.iter().position(|row| row.port == port && row.motor == motor)
     }
 
-    /// Why the motors refuse motion, if they do.
-    pub fn latched(&self) -> Option<&Arc<str>> {
-        self.ports.iter().find_map(|port| port.latched.as_ref())
+    /// The motors of a port.
+    pub fn motors(&self, port: usize) -> Vec<Motor> {
+        self.rows.iter().filter(|row| row.port == port).map(|row| row.motor).collect()
     }
 
-    /// What a row is doing, in words, and whether it is bad.
+    /// The latched ports, and the program that set the first latch; `None`: no latch is set.
+    pub fn latched(&self) -> Option<(Vec<&str>, &Arc<str>)> {
+        let latched = || self.ports.iter().filter_map(|port| Some((port, port.latched.as_ref()?)));
+        let (_, by) = latched().next()?;
+        Some((latched().map(|(port, _)| port.label.as_str()).collect(), by))
+    }
+
+    /// The names of the motors whose stop is in progress.
+    pub fn being_stopped(&self) -> String {
+        let rows = self.rows.iter().filter(|row| row.stop == Stop::UnderWay);
+        rows.map(|row| row.name.as_str()).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The text of the state column, and whether it is bad.
     pub fn state(&self, row: &Row) -> (String, bool) {
         if let Some((since, _)) = &self.ports[row.port].gone {
             return (format!("PORT GONE {}", age(*since)), true);
         }
-        if let Stop::NotConfirmed(_) = row.stop {
+        if row.unconfirmed.is_some() {
             return ("NOT CONFIRMED".to_owned(), true);
         }
         if let Some((since, _)) = &row.silent {
@@ -212,7 +262,7 @@ impl Model {
         (state.unwrap_or_else(|| "-".to_owned()), is_bad)
     }
 
-    /// Whether the confirmation of a stop is shown: for a while, and as long as the latch holds.
+    /// Whether to show the confirmation of a stop: for some time, and while the latch is set.
     pub fn has_confirmed(&self, row: &Row) -> bool {
         match row.stop {
             Stop::Confirmed(at) => {
@@ -222,12 +272,12 @@ impl Model {
         }
     }
 
-    /// The faults of a motor, in words.
+    /// The text of the faults; `None`: no fault.
     pub fn faults(&self, row: &Row) -> Option<String> {
         values::faults(row.motor, row.value(row.main.faults)?)
     }
 
-    /// Takes a record of a port.
+    /// Handles a record of a port.
     pub fn take(&mut self, port: usize, record: &Record) {
         match record {
             Record::Lost(count) => self.ports[port].lost += count,
@@ -241,7 +291,14 @@ impl Model {
         }
     }
 
-    /// Takes a record of the details of a row: values only, since events come to its port.
+    /// Handles a record for added rows. The first subscription of the port receives the same events.
+    pub fn take_added(&mut self, port: usize, record: &Record) {
+        if !matches!(record, Record::Event(_)) {
+            self.take(port, record);
+        }
+    }
+
+    /// Handles a record for the details of a row. The subscription of the port receives the same events.
     pub fn take_details(&mut self, at: usize, record: &Record) {
         if let Record::Values(values) = record
             && values.poll.motor == self.rows[at].motor
@@ -251,7 +308,7 @@ impl Model {
         }
     }
 
-    /// Takes the rates of a port.
+    /// Stores the rates of a port.
     pub fn rates(&mut self, port: usize, rates: &[Rate]) {
         for row in self.rows.iter_mut().filter(|row| row.port == port) {
             row.rates =
@@ -259,28 +316,46 @@ impl Model {
         }
     }
 
-    /// A stop was asked for.
-    pub fn stopping(&mut self, at: usize) {
-        self.rows[at].stop = Stop::UnderWay;
+    /// This program begins a stop of a motor. Returns the number of the stop.
+    pub fn stopping(&mut self, at: usize) -> u64 {
+        let row = &mut self.rows[at];
+        row.stop = Stop::UnderWay;
+        row.stop_number += 1;
+        row.stop_number
     }
 
-    /// The result of a stop: that of the engine's event or of its reply, whichever comes first.
-    pub fn stopped(&mut self, at: usize, result: Result<(), String>) {
-        if self.rows[at].stop != Stop::UnderWay {
-            return;
+    /// Stores the result of a stop of this program. Results of earlier stops are ignored.
+    pub fn stopped(&mut self, at: usize, number: u64, result: Result<(), String>) {
+        if self.rows[at].stop_number == number {
+            self.stop_ended(at, result);
         }
-        let name = self.rows[at].name.clone();
-        self.rows[at].stop = match result {
+    }
+
+    /// Rows whose stop was not confirmed and is due to be repeated.
+    pub fn due_stops(&self, now: Instant) -> Vec<usize> {
+        let rows = self.rows.iter().enumerate();
+        rows.filter(|(_, row)| row.is_stop_due(now)).map(|(at, _)| at).collect()
+    }
+
+    fn stop_ended(&mut self, at: usize, result: Result<(), String>) {
+        let now = Instant::now();
+        let row = &mut self.rows[at];
+        match result {
             Ok(()) => {
-                self.say(Some(at), format!("{name}: stop confirmed"), false);
-                Stop::Confirmed(Instant::now())
+                (row.stop, row.unconfirmed) = (Stop::Confirmed(now), None);
+                let text = format!("{}: stop confirmed", row.name);
+                self.say(Some(at), text, false);
             }
             Err(why) => {
-                let text = format!("{name}: stop NOT confirmed, it may still be turning: {why}");
-                self.say(Some(at), text, true);
-                Stop::NotConfirmed(why)
+                row.stop = Stop::NotConfirmed(now);
+                let text =
+                    format!("{}: stop NOT confirmed, it may still be turning: {why}", row.name);
+                // A repeat with the same result adds no line to the log.
+                if row.unconfirmed.replace(why.clone()).as_ref() != Some(&why) {
+                    self.say(Some(at), text, true);
+                }
             }
-        };
+        }
     }
 
     /// Adds a message.
@@ -325,18 +400,17 @@ impl Model {
             What::Doubtful(motor, _) => self.of_motor(port, *motor, |_| {
                 Some(("a reply came twice or late: values may be exchanged".to_owned(), true))
             }),
+            // The thread of our stop reports its result.
+            What::Stopping(_, by, _) if *by == self.by => {}
             What::Stopping(id, by, request) => {
                 if let Some(motor) = request.motor() {
                     self.ports[port].stops.insert(*id, motor);
-                    let by = Arc::clone(by);
-                    self.of_motor(port, motor, |row| {
-                        row.stop = Stop::UnderWay;
-                        Some((format!("{by} stops it"), false))
-                    });
+                    let text = format!("{by} asked for a stop");
+                    self.of_motor(port, motor, |_| Some((text, false)));
                 }
             }
-            What::Stopped(id) => self.stop_ended(port, *id, Ok(())),
-            What::StopFailed(id, why) => self.stop_ended(port, *id, Err(why.to_string())),
+            What::Stopped(id) => self.other_stop_ended(port, *id, Ok(())),
+            What::StopFailed(id, why) => self.other_stop_ended(port, *id, Err(why.to_string())),
             What::Latched(by) => {
                 self.ports[port].latched = Some(Arc::clone(by));
                 self.say(None, format!("{label}: {by} latched: motion is refused"), true);
@@ -349,14 +423,14 @@ impl Model {
         }
     }
 
-    fn stop_ended(&mut self, port: usize, id: CommandId, result: Result<(), String>) {
+    fn other_stop_ended(&mut self, port: usize, id: CommandId, result: Result<(), String>) {
         let motor = self.ports[port].stops.remove(&id);
         if let Some(at) = motor.and_then(|motor| self.find(port, motor)) {
-            self.stopped(at, result);
+            self.stop_ended(at, result);
         }
     }
 
-    /// Changes the row of a motor and says what happened.
+    /// Changes the row of a motor and adds a message.
     fn of_motor(
         &mut self,
         port: usize,
@@ -371,9 +445,14 @@ impl Model {
     }
 }
 
-/// How long ago, short.
+/// The time since then, in few characters.
 pub fn age(since: Instant) -> String {
-    match since.elapsed().as_secs() {
+    span(since.elapsed())
+}
+
+/// A time in few characters.
+pub fn span(time: Duration) -> String {
+    match time.as_secs() {
         seconds @ 0..=99 => format!("{seconds}s"),
         seconds @ 100..=5999 => format!("{}min", seconds / 60),
         seconds => format!("{}h", seconds / 3600),

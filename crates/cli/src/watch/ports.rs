@@ -1,4 +1,4 @@
-//! The engines of the ports, and the motors that are there.
+//! The engines of the ports, and the search for motors.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use motorlink::rmd::{MotorId, MotorSet, ReadStatus, Stop};
 use motorlink::st::{Command, Error, ErrorCode, MotorNumber, RegisterId, Request as StRequest};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::CommandError;
-use motorlink_telemetry::line::{LineError, Request, RmdLine, StLine};
+use motorlink_telemetry::line::{Line, LineError, Request, RmdLine, StLine};
 use motorlink_telemetry::runner::{Remote, Runner};
 use motorlink_telemetry::signal::Motor;
 
@@ -15,15 +15,23 @@ use super::args::Args;
 use super::settings::TIME_TO_LIVE;
 use crate::failure::Failure;
 
+/// The protocol of the motors of a port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Protocol {
+    St,
+    Rmd,
+}
+
 /// A port, its engine and its motors.
 pub struct Opened {
     pub runner: Runner,
-    /// As -p takes it.
+    /// The argument of -p.
     pub name: String,
+    pub protocol: Protocol,
     pub motors: Vec<Motor>,
 }
 
-/// Opens a port and finds its motors. A port that can be both is a serial line and a CAN bus.
+/// Opens a port and finds its motors. A port of both kinds gives a serial line and a CAN bus.
 pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failure> {
     let port: PortName = text.parse()?;
     let mut opened = Vec::new();
@@ -31,40 +39,67 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
         let mut options = motorlink::st::Options { profile: args.profile, ..Default::default() };
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = StLine::open(&port, options).map_err(Failure::from)?;
-        let runner = start(text, Acquisition::new(Box::new(line)))?;
-        let motors = st_motors(runner.remote(), &args.motor, by, text)?;
-        opened.push(Opened { runner, name: text.to_owned(), motors });
+        let numbers = (1..=u8::MAX).map_while(MotorNumber::new);
+        let given = numbers.filter(|it| args.motor.contains(&it.number())).map(Motor::St).collect();
+        opened.push(Opened::new(text, Box::new(line), Protocol::St, given, by)?);
     }
     if port.as_can().is_some() {
         let mut options = motorlink::rmd::Options::default();
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = RmdLine::open(&port, options).map_err(Failure::from)?;
-        let runner = start(text, Acquisition::new(Box::new(line)))?;
-        let motors = rmd_motors(runner.remote(), &args.id, by, text)?;
-        opened.push(Opened { runner, name: text.to_owned(), motors });
+        let ids = args.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
+        let given = ids.map(Motor::Rmd).collect();
+        opened.push(Opened::new(text, Box::new(line), Protocol::Rmd, given, by)?);
     }
     Ok(opened)
 }
 
-fn start(name: &str, acquisition: Acquisition) -> Result<Runner, Failure> {
-    // The system's names of threads are short, and end at a zero.
-    let name: String = name.chars().filter(|c| c.is_ascii_graphic()).collect();
-    Ok(Runner::start(&name, acquisition)?)
+impl Opened {
+    /// With the given motors; if there are none, with those that reply.
+    fn new(
+        name: &str,
+        line: Box<dyn Line>,
+        protocol: Protocol,
+        given: Vec<Motor>,
+        by: &Arc<str>,
+    ) -> Result<Self, Failure> {
+        // The name of a thread must not contain a zero byte.
+        let thread: String = name.chars().filter(|c| c.is_ascii_graphic()).collect();
+        let runner = Runner::start(&thread, Acquisition::new(line))?;
+        let motors = match given.is_empty() {
+            true => motors(runner.remote(), by, protocol).map_err(|why| {
+                let option = match protocol {
+                    Protocol::St => "--motor 1",
+                    Protocol::Rmd => "--id 1",
+                };
+                Failure::link(format!("no motor answers at {name}: {why}"))
+                    .trying(format!("to watch for a motor that is off now, name it: {option}"))
+            })?,
+            false => given,
+        };
+        Ok(Opened { runner, name: name.to_owned(), protocol, motors })
+    }
 }
 
-/// The motors of --motor, or those that the drive has.
-fn st_motors(
+/// Searches for motors. Returns those that reply.
+///
+/// # Errors
+/// No motor replies.
+pub fn motors(
     remote: &Remote,
-    given: &[u8],
     by: &Arc<str>,
-    port: &str,
-) -> Result<Vec<Motor>, Failure> {
-    let all = (1..=u8::MAX).map_while(MotorNumber::new);
-    if !given.is_empty() {
-        return Ok(all.filter(|it| given.contains(&it.number())).map(Motor::St).collect());
+    protocol: Protocol,
+) -> Result<Vec<Motor>, CommandError> {
+    match protocol {
+        Protocol::St => st_motors(remote, by),
+        Protocol::Rmd => rmd_motors(remote, by),
     }
+}
+
+/// The motors that the drive has.
+fn st_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError> {
     let mut found = Vec::new();
-    for number in all {
+    for number in (1..=u8::MAX).map_while(MotorNumber::new) {
         let read = Request::st(number.number(), StRequest::GetRegister(RegisterId::STATUS));
         match remote.command(by, read, TIME_TO_LIVE) {
             Ok(_) => found.push(Motor::St(number)),
@@ -73,26 +108,16 @@ fn st_motors(
                     found.push(Motor::St(number));
                 }
             }
-            // Without an answer of the drive there are no more motors behind it.
-            Err(error) if found.is_empty() => return Err(none(port, &error, "--motor 1")),
+            // The drive no longer replies: do not wait for the other numbers.
+            Err(error) if found.is_empty() => return Err(error),
             Err(_) => break,
         }
     }
     Ok(found)
 }
 
-/// The motors of --id, or those that answer.
-fn rmd_motors(
-    remote: &Remote,
-    given: &[MotorSet],
-    by: &Arc<str>,
-    port: &str,
-) -> Result<Vec<Motor>, Failure> {
-    if !given.is_empty() {
-        let ids = given.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
-        return Ok(ids.map(Motor::Rmd).collect());
-    }
-    // A busy machine may miss the time of a reply once.
+fn rmd_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError> {
+    // On a busy machine one reply may be late.
     let ask_once = |id: MotorId| remote.command(by, Request::rmd(id, &ReadStatus), TIME_TO_LIVE);
     let ask = |id: MotorId| ask_once(id).or_else(|_| ask_once(id));
     let answers: Vec<_> = std::thread::scope(|scope| {
@@ -100,23 +125,15 @@ fn rmd_motors(
         let joined = asked.into_iter().map(|(id, asked)| (id, asked.join()));
         joined.filter_map(|(id, answer)| Some((id, answer.ok()?))).collect()
     });
-    let found: Vec<Motor> = answers
-        .iter()
-        .filter(|(_, answer)| answer.is_ok())
-        .map(|(id, _)| Motor::Rmd(*id))
-        .collect();
-    match answers.iter().find_map(|(_, answer)| answer.as_ref().err()) {
-        Some(error) if found.is_empty() => Err(none(port, error, "--id 1")),
+    let answer = answers.iter().filter(|(_, answer)| answer.is_ok());
+    let found: Vec<Motor> = answer.map(|(id, _)| Motor::Rmd(*id)).collect();
+    match answers.into_iter().find_map(|(_, answer)| answer.err()) {
+        Some(error) if found.is_empty() => Err(error),
         _ => Ok(found),
     }
 }
 
-fn none(port: &str, why: &dyn std::fmt::Display, option: &str) -> Failure {
-    Failure::link(format!("no motor answers at {port}: {why}"))
-        .trying(format!("to watch for a motor that is off now, name it: {option}"))
-}
-
-/// What stops a motor.
+/// The request that stops a motor.
 pub fn stop_of(motor: Motor) -> Request {
     match motor {
         Motor::St(number) => {
@@ -126,7 +143,7 @@ pub fn stop_of(motor: Motor) -> Request {
     }
 }
 
-/// A short name for each port: the end of its name. Ports with the same end get a number.
+/// A short name for each port: the last part of its name. If two are equal, a number is added.
 pub fn labels(names: &[String]) -> Vec<String> {
     let mut labels: Vec<String> = Vec::new();
     for name in names {
@@ -144,7 +161,7 @@ pub fn labels(names: &[String]) -> Vec<String> {
     labels
 }
 
-/// Letters of a port in the name of a motor.
+/// The longest short name, in characters.
 const LABEL: usize = 7;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The terminal: raw, on its alternate screen, and as it was before whatever happens.
+//! The terminal: raw mode and the alternate screen, and their restoration.
 
 use std::io::{IsTerminal, stdin, stdout};
 use std::sync::Arc;
@@ -15,19 +15,19 @@ use signal_hook::consts::{SIGCONT, SIGHUP, SIGTSTP};
 
 use crate::failure::Failure;
 
-/// Time for the end of the view, and for stops that are under way.
+/// Time to end the view and the stops in progress.
 const END: Duration = Duration::from_secs(10);
 
-/// A terminal that is restored when this is dropped. A panic restores it, too.
+/// A terminal that is restored on drop. A panic restores it, too.
 pub struct Screen {
     pub terminal: DefaultTerminal,
-    /// SIGTSTP came.
+    /// Whether SIGTSTP was received.
     suspend: Arc<AtomicBool>,
-    /// SIGCONT came.
+    /// Whether SIGCONT was received.
     go_on: Arc<AtomicBool>,
 }
 
-/// Refuses a terminal that cannot show a view.
+/// Returns an error if stdin or stdout is no terminal, or if it cannot show a view.
 pub fn require_terminal() -> Result<(), Failure> {
     let is_dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let why = match stdin().is_terminal() && stdout().is_terminal() {
@@ -53,8 +53,8 @@ impl Screen {
         Ok(Screen { terminal, suspend, go_on })
     }
 
-    /// Suspends the process if SIGTSTP came, and takes the terminal again after SIGCONT. Returns
-    /// whether all has to be drawn.
+    /// Suspends the process after SIGTSTP. Sets up the terminal again after SIGCONT. Returns whether
+    /// the screen is empty now.
     pub fn obey(&mut self) -> Result<bool, Failure> {
         if self.suspend.swap(false, Ordering::SeqCst) {
             self.suspend()?;
@@ -68,7 +68,7 @@ impl Screen {
         Ok(goes_on)
     }
 
-    /// Gives the terminal back and stops the process, until SIGCONT.
+    /// Restores the terminal and stops the process until SIGCONT.
     pub fn suspend(&mut self) -> Result<(), Failure> {
         restore();
         signal_hook::low_level::emulate_default_handler(SIGTSTP)?;
@@ -78,13 +78,19 @@ impl Screen {
 
     fn take_again(&mut self) -> Result<(), Failure> {
         enable_raw_mode()?;
-        execute!(stdout(), EnterAlternateScreen, Clear(ClearType::All))?;
-        // Its picture of the screen is empty, so all is drawn again.
+        execute!(stdout(), EnterAlternateScreen)?;
+        self.clear()
+    }
+
+    /// Clears the terminal. The next drawing is complete.
+    pub fn clear(&mut self) -> Result<(), Failure> {
+        execute!(stdout(), Clear(ClearType::All))?;
+        // `Terminal::clear` would ask for the position of the cursor. Some terminals do not reply.
         self.terminal = Terminal::new(CrosstermBackend::new(stdout()))?;
         Ok(())
     }
 
-    /// Waits for a key, or for this time. Ends with the terminal.
+    /// Waits for a key, at most this time. Also detects the end of the terminal.
     pub fn wait(&self, time: Duration) -> Result<Wait, Failure> {
         let stdin = stdin();
         let mut fds = [PollFd::new(&stdin, PollFlags::IN)];
@@ -94,19 +100,19 @@ impl Screen {
             Ok(_) => {}
             Err(error) => return Err(std::io::Error::from(error).into()),
         }
-        // Crossterm would read the end of a terminal again and again.
+        // At the end of a terminal crossterm would read without end.
         let is_gone =
             fds[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL);
         Ok(if is_gone { Wait::Gone } else { Wait::Keys })
     }
 }
 
-/// Ends the process some time after its terminal is gone. The view ends by itself, except if the
-/// terminal goes while crossterm looks for keys: it reads the end of the terminal for ever.
+/// Ends the process some time after its terminal was closed. Normally the view detects this first. If
+/// the terminal is closed while crossterm reads keys, crossterm reads without end.
 fn end_without_terminal() {
     let stdin = stdin();
     let mut fds = [PollFd::new(&stdin, PollFlags::empty())];
-    // Without a wanted event this waits for the end of the terminal only.
+    // Without requested events this waits only for the end of the terminal.
     while poll(&mut fds, None) == Err(Errno::INTR) {}
     std::thread::sleep(END);
     std::process::exit(128 + SIGHUP);
@@ -116,7 +122,7 @@ fn end_without_terminal() {
 pub enum Wait {
     Nothing,
     Keys,
-    /// The terminal is gone, as when its window was closed.
+    /// The terminal was closed, for example its window.
     Gone,
 }
 
@@ -126,7 +132,63 @@ impl Drop for Screen {
     }
 }
 
-/// A terminal that is gone needs no restoring.
+/// Errors are ignored: the terminal may be closed.
 fn restore() {
     let _ = ratatui::try_restore();
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::io::Read;
+    use std::os::unix::fs::OpenOptionsExt;
+    use std::process::Command;
+
+    use rustix::fs::OFlags;
+    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+    use rustix::termios::tcgetattr;
+
+    use super::*;
+
+    /// Set in the process that panics.
+    const PANICS: &str = "MOTORLINK_TEST_PANICS_IN_THE_VIEW";
+
+    #[test]
+    fn a_panic_restores_the_terminal_before_its_message() {
+        if std::env::var_os(PANICS).is_some() {
+            let _screen = Screen::enter().unwrap();
+            panic!("a defect of the view");
+        }
+        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&ours).unwrap();
+        unlockpt(&ours).unwrap();
+        let name = ptsname(&ours, Vec::new()).unwrap().into_string().unwrap();
+        let flags = OFlags::NOCTTY.bits() as i32;
+        let theirs = File::options().read(true).write(true).custom_flags(flags).open(name).unwrap();
+        let modes = || {
+            let now = tcgetattr(&theirs).unwrap();
+            (now.input_modes, now.output_modes, now.local_modes)
+        };
+        let before = modes();
+        let end = || theirs.try_clone().unwrap();
+        let test = "watch::screen::tests::a_panic_restores_the_terminal_before_its_message";
+        let status = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", test, "--nocapture"])
+            .envs([(PANICS, "1"), ("TERM", "xterm-256color"), ("RUST_BACKTRACE", "0")])
+            .stdin(end())
+            .stdout(end())
+            .stderr(end())
+            .status()
+            .unwrap();
+        assert!(!status.success());
+        assert_eq!(modes(), before);
+        drop(theirs);
+        let mut said = Vec::new();
+        // The end of a pty is an error.
+        let _ = File::from(ours).read_to_end(&mut said);
+        let said = String::from_utf8_lossy(&said);
+        let place = |text| said.find(text).unwrap_or_else(|| panic!("{text:?} in {said:?}"));
+        assert!(place("\x1b[?1049h") < place("\x1b[?1049l"), "{said:?}");
+        assert!(place("\x1b[?1049l") < place("a defect of the view"), "{said:?}");
+    }
 }

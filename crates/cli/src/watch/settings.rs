@@ -1,5 +1,5 @@
-//! Registers of an ST drive and gains of an RMD motor: read, and written with a read-back, through
-//! the engine.
+//! Registers of ST drives and gains of RMD motors: reads, and writes with a read-back. All requests
+//! go through the engine.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -9,7 +9,8 @@ use motorlink::rmd::{
     WriteAccelerationRam, WritePidRam,
 };
 use motorlink::st::{
-    Error, Features, RegisterId, Request as StRequest, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
+    Error, Feature, Features, RegisterId, Request as StRequest, Unverified, VERIFY_ATTEMPTS,
+    VerifiedWrite,
 };
 use motorlink::time::Micros;
 use motorlink_telemetry::event::CommandError;
@@ -21,10 +22,10 @@ use super::values::Units;
 use crate::failure::Failure;
 use crate::rmd::{GainChange, wanted};
 
-/// A command that waits longer is refused.
+/// A command that is not sent in this time is refused.
 pub const TIME_TO_LIVE: Micros = Micros(2_000_000);
 
-/// What can be read, and perhaps written.
+/// A value that can be read. Some can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Item {
     Register(RegisterId),
@@ -34,7 +35,7 @@ pub enum Item {
 }
 
 impl Item {
-    /// All of a motor.
+    /// All items of a motor.
     pub fn of(motor: Motor, units: &Units) -> Vec<Item> {
         let profile = units.st.profile;
         match motor {
@@ -60,7 +61,7 @@ impl Item {
         }
     }
 
-    /// What it means.
+    /// Its description.
     pub fn meaning(&self) -> &'static str {
         match self {
             Item::Register(register) => register.text().map_or("", |text| text.doc),
@@ -69,20 +70,27 @@ impl Item {
         }
     }
 
-    /// Why it is not written here, if it is not.
+    /// Why it cannot be edited; `None`: it can.
     pub fn unwritable(&self, units: &Units) -> Option<String> {
         let Item::Register(register) = self else { return None };
-        match VerifiedWrite::new::<Infallible>(units.st.profile, *register, 0) {
-            Ok(_) => None,
-            Err(Unverified::Acts) => {
-                Some(format!("{register} makes the motor act: this view starts and moves nothing"))
+        let profile = units.st.profile;
+        match VerifiedWrite::new::<Infallible>(profile, *register, 0) {
+            Ok(_) if register.is_setting(profile) || is_of_a_measurement(*register) => None,
+            Ok(_) | Err(Unverified::Acts) => {
+                Some(format!("{register} makes the drive act: use `motorlink st set`"))
             }
             Err(_) => Some(format!("{register} can only be read")),
         }
     }
 }
 
-/// One motor, as a worker reads and writes it.
+/// Whether a register is an input of the motor profiler or of the DAC.
+fn is_of_a_measurement(register: RegisterId) -> bool {
+    let feature = register.shape().map(|shape| shape.feature);
+    matches!(feature, Some(Feature::Dac | Feature::Profiler))
+}
+
+/// Access of a thread to one motor.
 #[derive(Clone)]
 pub struct Access {
     pub remote: Remote,
@@ -92,7 +100,7 @@ pub struct Access {
 }
 
 impl Access {
-    /// The value, as people read it; otherwise why there is none, in short.
+    /// The value with its unit, or a short reason why there is none.
     pub fn read(&self, item: Item) -> Result<String, String> {
         match item {
             Item::Register(register) => {
@@ -113,7 +121,7 @@ impl Access {
         }
     }
 
-    /// Writes a value and reads it back. Says what it was and is.
+    /// Writes a value and reads it back. Returns a text with the old and the new value.
     pub fn write(&self, item: Item, text: &str) -> Result<String, String> {
         if let Some(why) = item.unwritable(&self.units) {
             return Err(format!("{why}; nothing was sent"));
@@ -139,7 +147,7 @@ impl Access {
             StRequest::GetRegister(register) => self.register_bits(*register).map(Some),
             request => self.st(*request).map(|_| None),
         };
-        // Whoever typed the value sees the error, and can write again.
+        // Any error ends the write: the user sees it and can try again.
         match write.run(VERIFY_ATTEMPTS, exchange, |_| true) {
             Ok(_) => Ok(()),
             Err(Unverified::Differs { expected, read }) => {
@@ -202,14 +210,14 @@ impl Access {
         }
     }
 
-    /// Makes sure that the replies belong to their requests.
+    /// Confirms that the replies belong to their requests.
     fn confirm(&self) -> Result<(), String> {
         self.send(Request::Confirm(self.motor)).map(drop)
     }
 
     fn send(&self, request: Request) -> Result<Reply, String> {
         self.remote.command(&self.by, request, TIME_TO_LIVE).map_err(|error| match error {
-            // The motor and the register are on the screen.
+            // The screen shows the motor and the register already.
             CommandError::Line(LineError::St(Error::Refused { code, .. })) => {
                 format!("refused: {code}: {}", code.doc())
             }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::rmd::MotorId;
-use motorlink::st::{MotorNumber, Profile, RegisterId};
+use motorlink::st::{Limits, MotorNumber, Profile, RegisterId, Request};
 use motorlink::time::{Instant, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::event::{Event, What};
@@ -20,7 +20,8 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::style::{Color, Modifier};
 
 use super::keys::{Ask, Field, Place, View};
-use super::model::{Model, Port, Row};
+use super::model::{Model, Port, Row, Stop};
+use super::ports::Protocol;
 use super::settings::Item;
 use super::values::Units;
 use super::view::{self, Shown, Theme};
@@ -45,8 +46,8 @@ fn rmd(number: u8) -> Motor {
 /// Two ST motors at the first port, three RMD motors at the second.
 fn model() -> Model {
     let ports = vec![
-        Port::new("st0".to_owned(), "./st0".to_owned()),
-        Port::new("can0".to_owned(), "slcan:./can0".to_owned()),
+        Port::new("st0".to_owned(), "./st0".to_owned(), Protocol::St),
+        Port::new("can0".to_owned(), "slcan:./can0".to_owned(), Protocol::Rmd),
     ];
     let row = |port, motor, name: &str| Row::new(port, motor, name.to_owned(), PERIOD);
     let rows = vec![
@@ -56,7 +57,7 @@ fn model() -> Model {
         row(1, rmd(2), "can0:2"),
         row(1, rmd(32), "can0:32"),
     ];
-    let mut model = Model::new(units(), ports, rows, PERIOD);
+    let mut model = Model::new("watch 1".into(), units(), ports, rows, PERIOD);
     give(&mut model, 0, st(1), &[("STATUS", 6), ("SPEED_MEAS", 1500), ("TORQUE_MEAS", -1234)]);
     give(&mut model, 0, st(1), &[("HEATS_TEMP", 45), ("BUS_VOLTAGE", 325), ("FLAGS", 0)]);
     give(&mut model, 0, st(2), &[("STATUS", 10), ("SPEED_MEAS", 0), ("FLAGS", 0x0002_0002)]);
@@ -136,7 +137,7 @@ fn each_motor_has_a_row_with_its_values() {
         lines[..9],
         [
             "motorlink watch: 5 motors on 2 ports, 10.0 Hz asked for",
-            " motor      state                speed     current  temp supply got/asked speed",
+            " motor      state                speed     current  temp supply got/asked trend",
             ">st0:1      RUN               1500 rpm  -1234 s16A 45 °C  325 V  9.9/10.0 █",
             " st0:2      FAULT_NOW            0 rpm           -     -      -         - ▁",
             " can0:1     turning           -360 °/s     1.031 A 31 °C 24.1 V         - █",
@@ -150,7 +151,7 @@ fn each_motor_has_a_row_with_its_values() {
         lines[22..],
         [
             "SPACE STOP ALL  up/down select  Enter details  r registers  s stop  u unlatch",
-            "? help  q quit",
+            "n new motors  ? help  q quit",
         ]
     );
 }
@@ -161,7 +162,11 @@ fn a_port_that_is_gone_and_back_is_said() {
     happens(&mut model, 1, What::Lost(LineError::Closed.into()));
     let gone = lines(&drawn(&model, &Place::new(5), 80, 24));
     assert!(gone[4].starts_with(" can0:1     PORT GONE 0s             -"), "{gone:?}");
-    assert!(gone.contains(&"can0: port gone for 0s: the port was closed".to_owned()), "{gone:?}");
+    let text = "port gone, opened again when it is back: can0 for 0s";
+    assert!(gone.contains(&text.to_owned()), "{gone:?}");
+    let details =
+        lines(&drawn(&model, &Place { view: View::Details, row: 2, ..Place::new(5) }, 80, 24));
+    assert_eq!(details[2], "port gone for 0s: the port was closed");
     happens(&mut model, 1, What::Back);
     let back = lines(&drawn(&model, &Place::new(5), 80, 24));
     assert!(back[4].starts_with(" can0:1     turning"), "{back:?}");
@@ -179,31 +184,94 @@ fn a_silent_motor_has_no_present_value() {
     assert!(answers[2].starts_with(">st0:1      RUN"), "{answers:?}");
 }
 
-#[test]
-fn a_stop_that_is_not_confirmed_is_said_in_bold_words() {
-    let mut model = model();
-    (0..5).for_each(|row| model.stopping(row));
+/// Stops each motor: the last one does not confirm it.
+fn stop_all_but_the_last(model: &mut Model) {
+    let numbers: Vec<u64> = (0..5).map(|row| model.stopping(row)).collect();
     assert_eq!(model.state(&model.rows[0]).0, "stopping ...");
-    (0..4).for_each(|row| model.stopped(row, Ok(())));
-    model.stopped(4, Err("no reply".to_owned()));
-    // The result of the thread comes behind the event of the engine.
-    model.stopped(0, Err("no reply".to_owned()));
-    let terminal = drawn(&model, &Place::new(5), 80, 24);
-    let lines = lines(&terminal);
-    let bad = "stop NOT CONFIRMED, may still be turning: can0:32: no reply";
-    let at = lines.iter().position(|line| line == bad).unwrap_or_else(|| panic!("{lines:?}"));
-    let cell = terminal.backend().buffer().cell((0, at as u16)).unwrap().clone();
-    assert!(cell.modifier.contains(Modifier::BOLD));
-    assert_eq!(cell.fg, Color::Reset);
+    (0..4).for_each(|row| model.stopped(row, numbers[row], Ok(())));
+    model.stopped(4, numbers[4], Err("no reply".to_owned()));
+}
+
+#[test]
+fn a_stop_that_is_not_confirmed_is_said_in_bold_words_in_every_view() {
+    let mut model = model();
+    stop_all_but_the_last(&mut model);
+    let bad = "stop NOT CONFIRMED, may still be turning: can0:32";
+    for view in [View::Motors, View::Details, View::Settings] {
+        for shows_help in [false, true] {
+            for (width, height) in [(80, 24), (200, 60), (50, 5)] {
+                let place = Place { view, shows_help, ..Place::new(5) };
+                let terminal = drawn(&model, &place, width, height);
+                let lines = lines(&terminal);
+                let at = lines.iter().position(|line| line == bad);
+                let at = at.unwrap_or_else(|| panic!("{lines:?}"));
+                let cell = terminal.backend().buffer().cell((0, at as u16)).unwrap().clone();
+                assert!(cell.modifier.contains(Modifier::BOLD));
+                assert_eq!(cell.fg, Color::Reset);
+            }
+        }
+    }
+    let lines = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let why = "stop NOT CONFIRMED by can0:32, repeated when it answers: no reply";
+    assert!(lines.contains(&why.to_owned()), "{lines:?}");
     let good = "stop confirmed by 4 of 5: st0:1 st0:2 can0:1 can0:2";
     assert!(lines.contains(&good.to_owned()), "{lines:?}");
-    assert!(lines[6].starts_with(" can0:32    NOT CONFIRMED"), "{lines:?}");
+    assert!(lines[7].starts_with(" can0:32    NOT CONFIRMED"), "{lines:?}");
+}
+
+#[test]
+fn a_stop_that_is_not_confirmed_is_repeated_when_the_motor_answers_until_it_is_confirmed() {
+    let mut model = model();
+    let later = || std::time::Instant::now() + Duration::from_secs(2);
+    stop_all_but_the_last(&mut model);
+    assert!(model.due_stops(later()).is_empty(), "it does not answer");
+    give(&mut model, 1, rmd(32), &[("speed_dps", 360)]);
+    assert!(model.due_stops(std::time::Instant::now()).is_empty(), "not too often");
+    assert_eq!(model.due_stops(later()), [4]);
+    let number = model.stopping(4);
+    assert!(model.due_stops(later()).is_empty(), "it is under way");
+    assert_eq!(model.state(&model.rows[4]).0, "NOT CONFIRMED");
+    let said = model.events.len();
+    model.stopped(4, number, Err("no reply".to_owned()));
+    assert_eq!(model.events.len(), said, "the same result is said once");
+    give(&mut model, 1, rmd(32), &[("speed_dps", 360)]);
+    assert_eq!(model.due_stops(later()), [4]);
+    let number = model.stopping(4);
+    model.stopped(4, number, Ok(()));
+    assert!(model.due_stops(later()).is_empty());
+    assert_eq!(model.state(&model.rows[4]).0, "turning");
+}
+
+#[test]
+fn only_the_result_of_the_last_stop_counts() {
+    let mut model = model();
+    let (first, second) = (model.stopping(0), model.stopping(0));
+    model.stopped(0, first, Ok(()));
+    assert_eq!(model.rows[0].stop, Stop::UnderWay);
+    model.stopped(0, second, Err("no reply".to_owned()));
+    assert_eq!(model.state(&model.rows[0]).0, "NOT CONFIRMED");
+}
+
+#[test]
+fn what_does_not_fit_is_counted() {
+    let mut model = model();
+    for number in [1, 2, 32] {
+        give(&mut model, 1, rmd(number), &[("errors", 0b1000)]);
+    }
+    let lines = lines(&drawn(&model, &Place::new(5), 80, 12));
+    assert!(lines.contains(&"... 2 more lines: Enter shows one motor".to_owned()), "{lines:?}");
 }
 
 #[test]
 fn the_latch_is_always_in_view() {
     let mut model = model();
     happens(&mut model, 0, What::Latched("ann".into()));
+    let some = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(
+        some[1].starts_with("LATCHED (u releases it): motion of st0 is refused since ann"),
+        "{some:?}"
+    );
+    happens(&mut model, 1, What::Latched("ann".into()));
     for view in [View::Motors, View::Details, View::Settings] {
         let place = Place { view, ..Place::new(5) };
         for (width, height) in [(80, 24), (200, 60), (40, 10)] {
@@ -211,18 +279,24 @@ fn the_latch_is_always_in_view() {
             assert!(lines[1].starts_with("LATCHED (u releases it): every motion"), "{lines:?}");
         }
     }
-    happens(&mut model, 0, What::Released("ann".into()));
+    (0..2).for_each(|port| happens(&mut model, port, What::Released("ann".into())));
     assert!(model.latched().is_none());
+    let place = Place { field: Field::Release, ..Place::new(5) };
+    let lines = lines(&drawn(&model, &place, 80, 24));
+    assert!(lines.contains(&"no latch is set: any key goes back _".to_owned()), "{lines:?}");
 }
 
 #[test]
 fn nothing_panics_on_small_terminals_and_the_selected_motor_is_in_view() {
     let mut model = model();
-    (0..5).for_each(|row| model.stopping(row));
-    (0..5).for_each(|row| model.stopped(row, Err("a long story ".repeat(20))));
+    for row in 0..5 {
+        let number = model.stopping(row);
+        model.stopped(row, number, Err("a long story ".repeat(20)));
+    }
+    happens(&mut model, 0, What::Latched("ann".into()));
     for view in [View::Motors, View::Details, View::Settings] {
         for shows_help in [false, true] {
-            for (width, height) in [(1, 1), (2, 3), (10, 4), (40, 10), (80, 24), (200, 60)] {
+            for (width, height) in [(1, 1), (2, 3), (20, 5), (40, 10), (80, 24), (200, 60)] {
                 let items = Item::of(st(1), &units());
                 let place = Place { view, shows_help, items, row: 4, ..Place::new(5) };
                 drawn(&model, &place, width, height);
@@ -230,8 +304,11 @@ fn nothing_panics_on_small_terminals_and_the_selected_motor_is_in_view() {
         }
     }
     let place = Place { row: 4, ..Place::new(5) };
-    let lines = lines(&drawn(&model, &place, 40, 10));
-    assert!(lines.iter().any(|line| line.starts_with(">can0:32")), "{lines:?}");
+    for (width, height) in [(20, 5), (40, 10)] {
+        let lines = lines(&drawn(&model, &place, width, height));
+        assert!(lines.iter().any(|line| line.starts_with(">can0:32")), "{lines:?}");
+        assert!(lines.iter().any(|line| line.starts_with("SPACE STOP ALL")), "{lines:?}");
+    }
 }
 
 #[test]
@@ -243,10 +320,16 @@ fn details_have_all_signals_and_the_reason_of_a_refusal() {
     let lines = lines(&drawn(&model, &place, 80, 24));
     assert_eq!(lines[1], "st0:1  RUN  on ./st0");
     assert_eq!(lines[2], "no fault is reported");
-    assert!(lines[3].starts_with("STATUS        RUN (0x6)"), "{lines:?}");
+    assert!(lines[3].ends_with("      age   Hz got    asked line has"), "{lines:?}");
+    assert!(lines[4].starts_with("STATUS        RUN (0x6)"), "{lines:?}");
     let speed = lines.iter().find(|line| line.starts_with("SPEED_MEAS    1500 rpm  ")).unwrap();
-    assert!(speed.ends_with("  9.9 Hz, asked 10.0, line 10.0"), "{speed}");
-    assert!(lines.contains(&"MOTOR_POWER   none: the reply does not fit…".to_owned()), "{lines:?}");
+    assert!(speed.ends_with("     0.0s      9.9     10.0     10.0"), "{speed}");
+    let power = lines.iter().find(|line| line.starts_with("MOTOR_POWER")).unwrap();
+    assert!(power.starts_with("MOTOR_POWER   none: the reply does not fit"), "{power}");
+    assert!(
+        lines.contains(&"speed: 1500 rpm to 1500 rpm in the last 1 reads".to_owned()),
+        "{lines:?}"
+    );
     assert!(lines.iter().any(|line| line.starts_with("replies 2, silent 0 times")), "{lines:?}");
 }
 
@@ -322,6 +405,7 @@ fn a_register_is_found_and_edited() {
 #[test]
 fn registers_that_move_the_motor_are_not_edited() {
     let moving = [
+        RegisterId::PFC_DCBUS_REF,
         RegisterId::TARGET_MOTOR,
         RegisterId::CONTROL_MODE,
         RegisterId::TORQUE_REF,
@@ -330,18 +414,58 @@ fn registers_that_move_the_motor_are_not_edited() {
     ];
     for register in moving {
         let why = Item::Register(register).unwritable(&units()).unwrap();
-        assert!(why.contains("makes the motor act"), "{why}");
+        assert!(why.contains("makes the drive act"), "{why}");
+    }
+    for profile in Profile::ALL {
+        let mut units = units();
+        units.st.profile = profile;
+        assert!(Item::Register(RegisterId::IQ_SPEEDMODE).unwritable(&units).is_some());
     }
     let mut place = Place::new(5);
     type_in(&mut place, "r/CONTROL_MODE");
     press(&mut place, KeyCode::Enter);
     type_in(&mut place, "e");
     assert_eq!(place.field, Field::None);
-    assert!(place.message.clone().unwrap().0.starts_with("CONTROL_MODE makes the motor act"));
+    assert!(place.message.clone().unwrap().0.starts_with("CONTROL_MODE makes the drive act"));
     let reads = Item::Register(RegisterId::SPEED_MEAS).unwritable(&units());
     assert_eq!(reads.unwrap(), "SPEED_MEAS can only be read");
     assert_eq!(Item::Register(RegisterId::SPEED_KP).unwritable(&units()), None);
     assert_eq!(Item::Gain(0).unwritable(&units()), None);
+}
+
+#[test]
+fn no_limit_applies_to_what_is_edited() {
+    let limits = Limits { speed_rpm: Some(0), current_s16a: Some(0) };
+    for profile in Profile::ALL {
+        let mut units = units();
+        units.st.profile = profile;
+        for item in Item::of(st(1), &units).into_iter().filter(|it| it.unwritable(&units).is_none())
+        {
+            let Item::Register(register) = item else { panic!("{item:?}") };
+            let write = Request::SetRegister { register, value: &[0xFF; 4] };
+            assert_eq!(limits.check(&write), Ok(()), "{register}");
+        }
+    }
+}
+
+#[test]
+fn keys_that_work_in_every_view_do_so() {
+    for view in [View::Motors, View::Details, View::Settings] {
+        let at = || Place { view, ..Place::new(5) };
+        assert_eq!(press(&mut at(), KeyCode::Char('s')), Some(Ask::Stop));
+        assert_eq!(press(&mut at(), KeyCode::Char('n')), Some(Ask::Find));
+        assert_eq!(press(&mut at(), KeyCode::Char('q')), Some(Ask::Quit));
+        let mut place = at();
+        press(&mut place, KeyCode::Char('r'));
+        assert_eq!(place.view, View::Settings);
+        assert_eq!(place.found().len(), Item::of(st(1), &units()).len());
+        let mut place = at();
+        press(&mut place, KeyCode::Char('?'));
+        assert!(place.shows_help);
+        let mut place = at();
+        press(&mut place, KeyCode::Esc);
+        assert_eq!(place.view, View::Motors);
+    }
 }
 
 #[test]

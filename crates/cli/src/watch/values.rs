@@ -1,4 +1,4 @@
-//! Which signals a motor's row has, and how values are shown.
+//! The signals of a row, and the text of values.
 
 use motorlink::rmd::Errors;
 use motorlink::st::{Flags, Reading, RegisterId, Status};
@@ -8,7 +8,7 @@ use motorlink_telemetry::signal::{Motor, Quantity, Signal, Source};
 use crate::json::{RmdUnits, Row};
 use crate::st::{STATUS, StUnits};
 
-/// How values of both protocols are shown and taken.
+/// The units of values of both protocols.
 #[derive(Clone, Copy)]
 pub struct Units {
     pub st: StUnits,
@@ -18,7 +18,7 @@ pub struct Units {
 /// The signals of a row.
 #[derive(Clone, Copy)]
 pub struct Main {
-    /// The state of an ST motor. An RMD motor has none.
+    /// The state of an ST motor. RMD motors report none.
     pub state: Option<Source>,
     pub faults: Source,
     pub speed: Source,
@@ -50,12 +50,12 @@ impl Main {
         }
     }
 
-    /// What changes fast, and is read at the rate that was asked for.
+    /// Signals that are read at --rate.
     pub fn fast(&self) -> impl Iterator<Item = Source> {
         [Some(self.speed), Some(self.current), self.state, Some(self.faults)].into_iter().flatten()
     }
 
-    /// What changes slowly.
+    /// Signals that are read at a lower rate.
     pub fn slow(&self) -> [Source; 2] {
         [self.temperature, self.voltage]
     }
@@ -104,7 +104,7 @@ impl Units {
     }
 }
 
-/// The state in one word. An RMD motor does not report one: its speed and its errors say it.
+/// The state in one or two words. That of an RMD motor is derived from its speed and errors.
 pub fn state(main: &Main, value: impl Fn(Source) -> Option<Sample>) -> Option<String> {
     if let Some(source) = main.state {
         return value(source).map(|sample| Status::from(sample.digits as u8).to_string());
@@ -117,7 +117,7 @@ pub fn state(main: &Main, value: impl Fn(Source) -> Option<Sample>) -> Option<St
     })
 }
 
-/// The faults in words; none if there is none.
+/// The names and descriptions of faults; `None`: no fault.
 pub fn faults(motor: Motor, sample: Sample) -> Option<String> {
     match motor {
         Motor::Rmd(_) => {

@@ -1,4 +1,4 @@
-//! What waits for an engine, in threads, so that the view never waits.
+//! Threads that wait for an engine, so that the view does not wait.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -11,34 +11,44 @@ use motorlink_telemetry::runner::Remote;
 use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::{Full, Subscription};
 
-use super::ports::stop_of;
+use super::ports::{Protocol, motors, stop_of};
 use super::settings::{Access, Item};
 use super::values::{Main, details};
 
-/// Results that wait for the view.
+/// Capacity of the queue of results.
 const RESULTS: usize = 1024;
-/// How often rates are read.
+/// Time between two reads of the rates.
 const RATES: Duration = Duration::from_secs(1);
-/// How often slow signals and those of the details are read, at most.
+/// Least period of slow signals and of the details.
 const SLOW: Duration = Duration::from_millis(500);
-/// Records that wait for the view.
+/// Capacity of a subscription, in records.
 const CAPACITY: usize = 4096;
 
-/// What a thread has done.
+/// The result of a thread.
 pub enum Done {
     Rates(usize, Vec<Rate>),
-    /// The stop of a row.
-    Stopped(usize, Result<(), String>),
-    /// The signals of the details of a row.
+    Stopped(Stopping, Result<(), String>),
+    /// Motors that a search found at a port, and their subscription.
+    Found(usize, Result<(Vec<Motor>, Subscription), String>),
+    /// The subscription to the details of a row.
     Details(usize, ConsumerId, Subscription),
     /// A value of a row.
     Read(usize, Item, Result<String, String>),
-    /// All values that were wanted are read.
+    /// All requested registers were read.
     AllRead,
     Written(usize, Item, Result<String, String>),
 }
 
-/// Starts threads and collects what they have done.
+/// A stop of a row.
+#[derive(Clone, Copy)]
+pub struct Stopping {
+    pub row: usize,
+    pub motor: Motor,
+    /// The number of the stop, counted for each row.
+    pub number: u64,
+}
+
+/// Starts threads and collects their results.
 pub struct Work {
     sender: SyncSender<Done>,
     pub done: Receiver<Done>,
@@ -51,32 +61,53 @@ impl Work {
         Work { sender, done, by }
     }
 
-    /// Runs in a thread. What it sends is not received after the end.
+    /// Runs a task in a thread. After the end of the view its results are not received.
     fn spawn(&self, task: impl FnOnce(&SyncSender<Done>) + Send + 'static) {
         let sender = self.sender.clone();
         std::thread::spawn(move || task(&sender));
     }
 
-    /// Latches a port, then stops motors, given with their rows, each in a thread of its own.
-    pub fn stop_all(&self, remote: &Remote, motors: Vec<(usize, Motor)>) {
+    /// Latches a port, then stops motors, each in a thread of its own.
+    pub fn stop_all(&self, remote: &Remote, stops: Vec<Stopping>) {
         let (remote, by) = (remote.clone(), Arc::clone(&self.by));
         self.spawn(move |sender| {
-            // An engine that has ended fails the stops, too.
+            // If the engine has ended, the stops fail, too.
             let _ = remote.latch(&by);
-            for (row, motor) in motors {
+            for it in stops {
                 let (remote, by, sender) = (remote.clone(), Arc::clone(&by), sender.clone());
-                std::thread::spawn(move || stop(&remote, &by, row, motor, &sender));
+                std::thread::spawn(move || stop(&remote, &by, it, &sender));
             }
         });
     }
 
     /// Stops a motor.
-    pub fn stop(&self, remote: &Remote, row: usize, motor: Motor) {
+    pub fn stop(&self, remote: &Remote, it: Stopping) {
         let (remote, by) = (remote.clone(), Arc::clone(&self.by));
-        self.spawn(move |sender| stop(&remote, &by, row, motor, sender));
+        self.spawn(move |sender| stop(&remote, &by, it, sender));
     }
 
-    /// Allows motion again.
+    /// Searches for unknown motors of a port, and subscribes to their signals.
+    pub fn find(
+        &self,
+        remote: &Remote,
+        port: usize,
+        protocol: Protocol,
+        known: Vec<Motor>,
+        period: Duration,
+    ) {
+        let (remote, by) = (remote.clone(), Arc::clone(&self.by));
+        self.spawn(move |sender| {
+            let found = motors(&remote, &by, protocol).map_err(|why| why.to_string());
+            let found = found.and_then(|mut found| {
+                found.retain(|motor| !known.contains(motor));
+                let records = subscribe(&remote, &found, period).map_err(|why| why.to_string())?;
+                Ok((found, records))
+            });
+            let _ = sender.send(Done::Found(port, found));
+        });
+    }
+
+    /// Releases the latch of a port.
     pub fn release(&self, remote: &Remote) {
         let (remote, by) = (remote.clone(), Arc::clone(&self.by));
         self.spawn(move |_| {
@@ -85,7 +116,7 @@ impl Work {
         });
     }
 
-    /// Reads the rates of a port again and again, until the view ends.
+    /// Reads the rates of a port repeatedly until the view ends.
     pub fn rates(&self, remote: &Remote, port: usize) {
         let remote = remote.clone();
         self.spawn(move |sender| {
@@ -98,7 +129,7 @@ impl Work {
         });
     }
 
-    /// Reads all signals of the details of a motor.
+    /// Subscribes to all signals of a motor.
     pub fn watch_details(&self, remote: &Remote, row: usize, motor: Motor, period: Duration) {
         let remote = remote.clone();
         let period = Micros::from(period.max(SLOW));
@@ -110,11 +141,11 @@ impl Work {
         });
     }
 
-    /// Reads the signals of the details no longer.
+    /// Ends a subscription.
     pub fn unwatch(&self, remote: &Remote, id: ConsumerId) {
         let remote = remote.clone();
         self.spawn(move |_| {
-            // An engine that has ended sends nothing more.
+            // If the engine has ended, the subscription has ended, too.
             let _ = remote.unsubscribe(id);
         });
     }
@@ -140,12 +171,12 @@ impl Work {
     }
 }
 
-fn stop(remote: &Remote, by: &Arc<str>, row: usize, motor: Motor, sender: &SyncSender<Done>) {
-    let result = remote.stop(by, stop_of(motor));
-    let _ = sender.send(Done::Stopped(row, result.map(drop).map_err(|why| why.to_string())));
+fn stop(remote: &Remote, by: &Arc<str>, it: Stopping, sender: &SyncSender<Done>) {
+    let result = remote.stop(by, stop_of(it.motor));
+    let _ = sender.send(Done::Stopped(it, result.map(drop).map_err(|why| why.to_string())));
 }
 
-/// The signals of the rows of a port, with their events.
+/// Subscribes to the signals of rows, and to the events of their port.
 pub fn subscribe(
     remote: &Remote,
     motors: &[Motor],

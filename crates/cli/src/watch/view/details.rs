@@ -1,13 +1,17 @@
-//! Everything of one motor.
+//! The page with the details of one motor.
 
+use std::time::Duration;
+
+use motorlink_telemetry::sample::Sample;
 use ratatui::text::Line;
 
-use super::super::model::{age, hertz};
+use super::super::model::{Model, Row, age, hertz, span};
 use super::super::values::details;
+use super::motors::short;
 use super::parts::{Shown, Theme, events};
-use super::text::{fit, sparkline};
+use super::text::{fit, right, sparkline, wrapped};
 
-/// Least lines for events.
+/// The least number of lines for events.
 const EVENTS: usize = 4;
 
 pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Line<'static>> {
@@ -17,11 +21,18 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
     let (state, is_bad) = model.state(row);
     let text = format!("{}  {state}  on {}", row.name, port.name);
     let mut lines = vec![Line::styled(fit(&text, width), theme.of(is_bad).patch(theme.bold()))];
-    let faults = model.faults(row).map_or("no fault is reported".to_owned(), |faults| faults);
-    lines.push(Line::styled(fit(&faults, width), theme.of(model.faults(row).is_some())));
+    let (trouble, is_bad) = trouble(model, row);
+    let trouble = wrapped(&trouble, width).into_iter();
+    lines.extend(trouble.map(|line| Line::styled(line, theme.of(is_bad))));
     let signals = details(row.motor);
     let names = signals.iter().map(|signal| signal.source.to_string().len()).max().unwrap_or(0);
-    let values = width.saturating_sub(names + 4 + RATES).max(VALUE);
+    let values = width.saturating_sub(names + 2 + RATES).max(VALUE);
+    let columns = |name: &str, value: &str, rates: [&str; 4]| {
+        let rates = rates.map(|text| right(text, RATE)).concat();
+        fit(&format!("{name:<names$}  {}{rates}", fit(value, values)), width)
+    };
+    let header = columns("signal", "value", ["age", "Hz got", "asked", "line has"]);
+    lines.push(Line::styled(header, theme.dim()));
     for signal in signals {
         let source = signal.source;
         let value = match (row.value(source), row.refused.get(&source)) {
@@ -29,25 +40,30 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
             (None, Some(why)) => format!("none: {why}"),
             (None, None) => "-".to_owned(),
         };
+        let age = row.age(source).map_or_else(|| "-".to_owned(), tenths);
         let rate = row.rates.iter().find(|rate| rate.signal == signal);
-        let rate = rate.map_or_else(String::new, |rate| {
-            let [asked, can] = [hertz(rate.asked), hertz(rate.predicted)];
-            format!("{:.1} Hz, asked {asked:.1}, line {can:.1}", rate.achieved)
-        });
-        let text = format!("{:<names$}  {}  {rate}", source.to_string(), fit(&value, values));
-        lines.push(Line::raw(fit(&text, width)));
+        let [got, asked, line] = match rate {
+            Some(rate) => [rate.achieved, hertz(rate.asked), hertz(rate.predicted)].map(short),
+            None => ["-"; 3].map(str::to_owned),
+        };
+        lines.push(Line::raw(columns(&source.to_string(), &value, [&age, &got, &asked, &line])));
     }
-    let silent = row
-        .silent
-        .as_ref()
-        .map_or_else(String::new, |(since, why)| format!(", no answer for {}: {why}", age(*since)));
     let (replies, silences, lost) = (row.replies, row.silences, port.lost);
-    let counts =
-        format!("replies {replies}, silent {silences} times{silent}, not shown in time {lost}");
+    let counts = format!("replies {replies}, silent {silences} times, not shown in time {lost}");
     lines.push(Line::raw(fit(&counts, width)));
-    for (name, values) in [("speed", &row.speeds), ("current", &row.currents)] {
-        let bars = sparkline(values.iter(), width.saturating_sub(LABEL).min(values.len()));
-        lines.push(Line::raw(fit(name, LABEL) + &bars));
+    let main =
+        [("speed", row.main.speed, &row.speeds), ("current", row.main.current, &row.currents)];
+    for (name, source, history) in main {
+        let bars = sparkline(history.iter().map(|it| it.value), width.min(history.len()));
+        let by_value = |one: &&Sample, other: &&Sample| one.value.total_cmp(&other.value);
+        let least = history.iter().min_by(by_value);
+        let most = history.iter().max_by(by_value);
+        if let (Some(least), Some(most)) = (least, most) {
+            let [least, most] = [least, most].map(|it| model.units.short(source, *it));
+            let text = format!("{name}: {least} to {most} in the last {} reads", history.len());
+            lines.push(Line::styled(fit(&text, width), theme.dim()));
+            lines.push(Line::raw(bars));
+        }
     }
     lines.truncate(height.saturating_sub(EVENTS));
     let own = model.events.iter().filter(|said| said.row.is_none_or(|at| at == shown.place.row));
@@ -55,9 +71,29 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
     lines
 }
 
+/// Why there are no values, or the faults; and whether this is bad.
+fn trouble(model: &Model, row: &Row) -> (String, bool) {
+    let silent = row.silent.as_ref().map(|(since, why)| ("no answer", since, why));
+    let gone = model.ports[row.port].gone.as_ref().map(|(since, why)| ("port gone", since, why));
+    if let Some((what, since, why)) = gone.or(silent) {
+        return (format!("{what} for {}: {why}", age(*since)), true);
+    }
+    match model.faults(row) {
+        Some(faults) => (faults, true),
+        None => ("no fault is reported".to_owned(), false),
+    }
+}
+
+/// The age of a value.
+fn tenths(age: Duration) -> String {
+    match age.as_secs() {
+        0..10 => format!("{:.1}s", age.as_secs_f64()),
+        _ => span(age),
+    }
+}
+
 /// Least width of a value.
 const VALUE: usize = 16;
-/// Width of the rates: 100.0 Hz, asked 100.0, line 100.0.
-const RATES: usize = 35;
-/// Width of the name of a sparkline.
-const LABEL: usize = 8;
+/// Width of the age, and of each rate.
+const RATE: usize = 9;
+const RATES: usize = 4 * RATE;

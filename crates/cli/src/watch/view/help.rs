@@ -1,4 +1,4 @@
-//! All keys.
+//! The help: all keys.
 
 use ratatui::text::Line;
 
@@ -10,7 +10,8 @@ const KEY: usize = 20;
 const PLACE: usize = 11;
 
 pub fn lines(theme: &Theme, width: usize) -> Vec<Line<'static>> {
-    let mut lines = vec![Line::styled(fit("Keys; any key closes this help", width), theme.bold())];
+    let title = "Keys; any key closes this help, q ends the program";
+    let mut lines = vec![Line::styled(fit(title, width), theme.bold())];
     for key in HELP {
         let place = match key.view {
             None => "everywhere",
@@ -23,8 +24,8 @@ pub fn lines(theme: &Theme, width: usize) -> Vec<Line<'static>> {
     }
     for text in [
         "",
-        "This view starts no motor. When it ends, motors that others started go on.",
-        "`got/asked`: reads a second. `-`: no present value. `?`: see details. Times: UTC.",
+        "This program starts no motor. When it ends, motors that turn go on turning.",
+        "got/asked: reads a second. -: no value now. ?: see details. Times are UTC.",
     ] {
         lines.push(Line::raw(fit(text, width)));
     }

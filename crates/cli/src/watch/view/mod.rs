@@ -1,4 +1,4 @@
-//! What is drawn: lines of text, of which the lowest tell the keys.
+//! The screen: lines of text. The last lines list keys.
 
 mod details;
 mod help;
@@ -17,17 +17,18 @@ use parts::MARK;
 pub use parts::{Shown, Theme};
 use text::wrapped;
 
-/// Behind what is typed.
+/// The character after typed text.
 const CURSOR: char = '_';
 
-/// Draws everything.
+/// Draws the screen.
 pub fn draw(frame: &mut Frame<'_>, shown: &Shown<'_>, theme: &Theme) {
     let area = frame.area();
     let (width, height) = (usize::from(area.width), usize::from(area.height));
-    let keys = keys(shown.place, width);
-    let top = title(shown, theme, width);
+    let top = top(shown, theme, width, height);
     let mut bottom: Vec<Line<'_>> = field(shown, theme, width);
-    bottom.extend(keys.into_iter().map(|line| Line::styled(line, theme.dim())));
+    // In a low terminal only the first keys are listed.
+    let keys = keys(shown.place, width).into_iter().take((height / 3).max(1));
+    bottom.extend(keys.map(|line| Line::styled(line, theme.dim())));
     let left = height.saturating_sub(top.len() + bottom.len());
     let mut lines = top;
     let mut body = match (shown.place.shows_help, shown.place.view) {
@@ -39,7 +40,7 @@ pub fn draw(frame: &mut Frame<'_>, shown: &Shown<'_>, theme: &Theme) {
     body.resize(left, Line::default());
     lines.extend(body);
     lines.extend(bottom);
-    // The cursor is where the user is: for screen readers, and a hidden one would have to come back.
+    // Screen readers read at the cursor, so it is visible and at the selection.
     let starts = |line: &Line<'_>, mark: &str| {
         line.spans.first().is_some_and(|span| span.content.starts_with(mark))
     };
@@ -55,29 +56,47 @@ pub fn draw(frame: &mut Frame<'_>, shown: &Shown<'_>, theme: &Theme) {
     frame.render_widget(Paragraph::new(lines), Rect { x: 0, y: 0, ..area });
 }
 
-/// The first lines: what is watched, and the latch.
-fn title(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+/// The first lines: title, latch, and stops that are not confirmed.
+fn top(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Line<'static>> {
     let model = shown.model;
-    let count = |count: usize, one: &str| match count {
-        1 => format!("1 {one}"),
-        _ => format!("{count} {one}s"),
-    };
-    let ports = count(model.ports.len(), "port");
-    let motors = count(model.rows.len(), "motor");
-    let hertz = 1.0 / model.period.as_secs_f64();
-    let mut lines = vec![Line::styled(
-        text::fit(&format!("motorlink watch: {motors} on {ports}, {hertz:.1} Hz asked for"), width),
-        theme.bold(),
-    )];
-    if let Some(by) = model.latched() {
-        let text =
-            format!("LATCHED (u releases it): every motion is refused since {by} stopped all");
-        lines.push(Line::styled(text::fit(&text, width), theme.bad().patch(theme.selected())));
+    let mut lines = Vec::new();
+    if height >= TITLED {
+        let ports = count(model.ports.len(), "port");
+        let motors = count(model.rows.len(), "motor");
+        let hertz = 1.0 / model.period.as_secs_f64();
+        let text = format!("motorlink watch: {motors} on {ports}, {hertz:.1} Hz asked for");
+        lines.push(Line::styled(text::fit(&text, width), theme.bold()));
+    }
+    let loud = theme.bad().patch(theme.selected());
+    if let Some((ports, by)) = model.latched() {
+        let of = match ports.len() == model.ports.len() {
+            true => "every motion".to_owned(),
+            false => format!("motion of {}", ports.join(" ")),
+        };
+        let text = format!("LATCHED (u releases it): {of} is refused since {by} stopped all");
+        lines.push(Line::styled(text::fit(&text, width), loud));
+    }
+    let rows = model.rows.iter().filter(|row| row.unconfirmed.is_some());
+    let names: Vec<&str> = rows.map(|row| row.name.as_str()).collect();
+    if !names.is_empty() {
+        let names = names.join(" ");
+        let text = format!("stop NOT CONFIRMED, may still be turning: {names}");
+        lines.push(Line::styled(text::fit(&text, width), loud));
     }
     lines
 }
 
-/// What is typed, or the question that waits for a y.
+/// Least height of a terminal with a title.
+const TITLED: usize = 6;
+
+fn count(count: usize, one: &str) -> String {
+    match count {
+        1 => format!("1 {one}"),
+        _ => format!("{count} {one}s"),
+    }
+}
+
+/// The typed text, or the question that needs a y.
 fn field(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
     let place = shown.place;
     let text = match &place.field {
@@ -87,12 +106,12 @@ fn field(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
             let name = &shown.model.rows[place.row].name;
             format!("{name}: new value of {}: {text}{CURSOR}", item.name())
         }
-        Field::Release => {
-            let by = shown.model.latched().map_or("nobody", |by| by);
-            format!(
+        Field::Release => match shown.model.latched() {
+            Some((_, by)) => format!(
                 "release the latch of {by}, so that motors can be started again? y or n: {CURSOR}"
-            )
-        }
+            ),
+            None => format!("no latch is set: any key goes back {CURSOR}"),
+        },
     };
     wrapped(&text, width).into_iter().map(|line| Line::styled(line, theme.bold())).collect()
 }
@@ -106,6 +125,7 @@ fn keys(place: &Place, width: usize) -> Vec<String> {
             .filter(|key| is_shown(key.view) && !key.short.is_empty())
             .filter(|key| key.key != "Esc" || place.view != View::Motors)
             .filter(|key| key.key != "r" || place.view != View::Settings)
+            .filter(|key| key.key != "n" || place.view == View::Motors)
             .map(|key| {
                 let mut names = key.key.split(' ');
                 let first = names.next().unwrap_or_default();

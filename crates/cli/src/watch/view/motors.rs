@@ -1,4 +1,4 @@
-//! A row a motor.
+//! The page with a row for each motor.
 
 use ratatui::text::{Line, Span};
 
@@ -6,11 +6,11 @@ use super::super::model::{Model, Row};
 use super::parts::{Shown, Theme, first, listed, notices};
 use super::text::{fit, right, sparkline};
 
-/// The columns with their widths, and their text for a row.
+/// The widths of the sparklines.
 struct Columns {
-    /// Of a sparkline.
+    /// Of the speed.
     speeds: usize,
-    /// Of the sparkline of the current; 0: there is none.
+    /// Of the current; 0: no sparkline.
     currents: usize,
 }
 
@@ -21,12 +21,14 @@ const CURRENT: usize = 11;
 const TEMPERATURE: usize = 5;
 const VOLTAGE: usize = 6;
 const RATE: usize = 9;
-/// The mark, and a space behind each column but the last.
+/// The mark, and a space after each column except the last.
 const REST: usize = 1 + 7;
 const FIXED: usize = NAME + STATE + SPEED + CURRENT + TEMPERATURE + VOLTAGE + RATE + REST;
 /// The longest sparkline.
 const LONGEST: usize = 50;
-/// Least lines for notices, where there is height.
+/// Up to this height there is no header, to show more motors.
+const HEADED: usize = 2;
+/// Lines for notices, if the terminal is high enough.
 const NOTICES: usize = 5;
 
 impl Columns {
@@ -45,10 +47,13 @@ impl Columns {
 pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Line<'static>> {
     let (model, place) = (shown.model, shown.place);
     let columns = Columns::of(width);
-    // The line below the rows says which ones are shown.
+    // A line below the rows shows their range.
     let notices_height = NOTICES.min(height / 3);
     let rows = model.rows.len().min(height.saturating_sub(1 + notices_height).max(1));
-    let mut lines = vec![Line::styled(header(&columns), theme.dim())];
+    let mut lines = Vec::new();
+    if height > HEADED {
+        lines.push(Line::styled(header(&columns), theme.dim()));
+    }
     let begin = first(place.row, rows);
     for (at, row) in model.rows.iter().enumerate().skip(begin).take(rows) {
         lines.push(listed(spans(model, row, &columns, theme), at == place.row, theme));
@@ -72,9 +77,13 @@ fn header(columns: &Columns) -> String {
         right("got/asked", RATE),
     ];
     let mut line = format!(" {}", fixed.join(" "));
-    line += &format!(" {}", fit("speed", columns.speeds));
+    let [speeds, currents] = match columns.currents {
+        0 => ["trend", ""],
+        _ => ["trend of the speed", "trend of the current"],
+    };
+    line += &format!(" {}", fit(speeds, columns.speeds));
     if columns.currents > 0 {
-        line += &format!(" {}", fit("current", columns.currents));
+        line += &format!(" {}", fit(currents, columns.currents));
     }
     line
 }
@@ -85,7 +94,7 @@ fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span
     let value = |source| {
         match row.value(source).filter(|_| is_known) {
             Some(sample) => model.units.short(source, sample),
-            // The details say why there is none.
+            // The details show the reason.
             None if row.refused.contains_key(&source) => "?".to_owned(),
             None => "-".to_owned(),
         }
@@ -104,9 +113,10 @@ fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span
         right(&rate, RATE),
     ]
     .join(" ");
-    rest += &format!(" {}", sparkline(row.speeds.iter(), columns.speeds));
+    rest += &format!(" {}", sparkline(row.speeds.iter().map(|it| it.value), columns.speeds));
     if columns.currents > 0 {
-        rest += &format!(" {}", sparkline(row.currents.iter(), columns.currents));
+        rest +=
+            &format!(" {}", sparkline(row.currents.iter().map(|it| it.value), columns.currents));
     }
     vec![
         Span::raw(fit(&row.name, NAME) + " "),
@@ -115,8 +125,8 @@ fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span
     ]
 }
 
-/// A rate in few letters.
-fn short(hertz: f64) -> String {
+/// A rate in few characters.
+pub fn short(hertz: f64) -> String {
     match hertz {
         ..99.95 => format!("{hertz:.1}"),
         _ => format!("{hertz:.0}"),

@@ -1,4 +1,4 @@
-//! What several views share.
+//! Parts that several pages use.
 
 use std::collections::BTreeMap;
 
@@ -6,22 +6,22 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::super::keys::Place;
-use super::super::model::{Model, Said, Stop, age};
+use super::super::model::{Model, Said, age};
 use super::super::settings::Item;
 use super::text::wrapped;
 
-/// Before the selected line of a list.
+/// The mark of the selected line.
 pub const MARK: &str = ">";
 
-/// What is shown.
+/// The data of the screen.
 pub struct Shown<'a> {
     pub model: &'a Model,
     pub place: &'a Place,
-    /// Values of the list of registers.
+    /// Values of registers, or why there is none.
     pub read: &'a BTreeMap<(usize, Item), Result<String, String>>,
 }
 
-/// Styles. Colours only support what words say.
+/// Styles. No information is in the colour alone.
 pub struct Theme {
     has_colours: bool,
 }
@@ -61,8 +61,8 @@ impl Theme {
     }
 }
 
-/// What has to be known: stops that are not confirmed, ports that are gone, faults, then confirmed
-/// stops, then what happened, the newest at the end.
+/// Notices in the order of importance: stops that are not confirmed, lost ports, faults, confirmed
+/// stops. Then events, the newest at the end.
 pub fn notices(
     shown: &Shown<'_>,
     theme: &Theme,
@@ -74,22 +74,26 @@ pub fn notices(
     let mut say = |text: String, style: Style| {
         lines.extend(wrapped(&text, width).into_iter().map(|line| Line::styled(line, style)));
     };
-    // Often all motors have the same reason.
+    // Motors with the same reason share a notice.
     let mut reasons: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for row in &model.rows {
-        if let Stop::NotConfirmed(why) = &row.stop {
+        if let Some(why) = &row.unconfirmed {
             reasons.entry(why).or_default().push(&row.name);
         }
     }
     for (why, names) in reasons {
         let names = names.join(" ");
-        say(format!("stop NOT CONFIRMED, may still be turning: {names}: {why}"), theme.bad());
+        let text = format!("stop NOT CONFIRMED by {names}, repeated when it answers: {why}");
+        say(text, theme.bad());
     }
-    for port in &model.ports {
-        if let Some((since, why)) = &port.gone {
-            let gone = age(*since);
-            say(format!("{}: port gone for {gone}: {why}", port.label), theme.bad());
-        }
+    let gone: Vec<String> = model
+        .ports
+        .iter()
+        .filter_map(|port| Some(format!("{} for {}", port.label, age(port.gone.as_ref()?.0))))
+        .collect();
+    if !gone.is_empty() {
+        let text = format!("port gone, opened again when it is back: {}", gone.join(", "));
+        say(text, theme.bad());
     }
     for row in &model.rows {
         if let Some(faults) = model.faults(row) {
@@ -103,11 +107,18 @@ pub fn notices(
         .map(|row| row.name.clone())
         .collect();
     if !confirmed.is_empty() {
-        let of = match confirmed.len() == model.rows.len() {
-            true => format!("all {}", confirmed.len()),
-            false => format!("{} of {}", confirmed.len(), model.rows.len()),
+        let (some, all) = (confirmed.len(), model.rows.len());
+        let text = match some == all {
+            true => format!("stop confirmed by all {all} motors"),
+            false => format!("stop confirmed by {some} of {all}: {}", confirmed.join(" ")),
         };
-        say(format!("stop confirmed by {of}: {}", confirmed.join(" ")), theme.bold());
+        say(text, theme.bold());
+    }
+    let hidden = lines.len().saturating_sub(height);
+    if hidden > 0 {
+        lines.truncate(height.saturating_sub(1));
+        let text = format!("... {} more lines: Enter shows one motor", hidden + 1);
+        lines.push(Line::styled(text, theme.bad()));
     }
     let more = height.saturating_sub(lines.len());
     lines.extend(events(model.events.iter(), theme, width, more));
@@ -137,14 +148,14 @@ pub fn events<'a>(
     lines
 }
 
-/// A line of a list, which is marked if it is selected.
+/// A line of a list, with a mark if it is selected.
 pub fn listed(spans: Vec<Span<'static>>, is_selected: bool, theme: &Theme) -> Line<'static> {
     let mark = if is_selected { MARK } else { " " };
     let line = Line::from([vec![Span::raw(mark)], spans].concat());
     if is_selected { line.style(theme.selected()) } else { line }
 }
 
-/// The first of the lines of a list that are shown, so that the selected one is among them.
+/// The first visible line of a list, so that the selected line is visible.
 pub fn first(selected: usize, height: usize) -> usize {
     (selected + 1).saturating_sub(height.max(1))
 }

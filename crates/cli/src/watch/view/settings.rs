@@ -1,4 +1,4 @@
-//! The registers of an ST drive, or the gains of an RMD motor.
+//! The page with the registers of an ST drive, or the gains of an RMD motor.
 
 use ratatui::text::{Line, Span};
 
@@ -7,12 +7,14 @@ use super::super::settings::Item;
 use super::parts::{Shown, Theme, first, listed};
 use super::text::{fit, wrapped};
 
-/// Registers around the selected one that are read. No terminal shows more of them at once.
+/// The number of registers around the selected one that are read. Terminals show fewer lines.
 const AROUND: usize = 60;
 const NAME: usize = 24;
 const VALUE: usize = 24;
+/// The mark, the name, the value, and an `e` if the value can be edited.
+const FIXED: usize = 1 + NAME + 1 + VALUE + 1 + 1 + 1;
 
-/// The registers that are read again and again.
+/// The registers that are read repeatedly.
 pub fn in_view(place: &Place) -> Vec<Item> {
     let found = place.found();
     let begin = place.item.saturating_sub(AROUND / 2);
@@ -27,8 +29,19 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
         "" => String::new(),
         text => format!(", with `{text}`"),
     };
-    let text = format!("{}: {} of {}{search}", row.name, found.len(), place.items.len());
-    let mut lines = vec![Line::styled(fit(&text, width), theme.bold())];
+    let model = shown.model;
+    let (state, is_bad) = model.state(row);
+    let present = [row.main.speed, row.main.current].map(|source| {
+        row.value(source).map_or_else(|| "-".to_owned(), |it| model.units.short(source, it))
+    });
+    let text = format!(
+        "{}  {state}  {}  {} of {} registers{search}",
+        row.name,
+        present.join("  "),
+        found.len(),
+        place.items.len(),
+    );
+    let mut lines = vec![Line::styled(fit(&text, width), theme.of(is_bad).patch(theme.bold()))];
     let about = about(shown, width);
     let message: Vec<Line<'static>> = place
         .message
@@ -47,12 +60,13 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
             Some(Err(why)) => format!("({why})"),
             None => "...".to_owned(),
         };
-        let meaning = width.saturating_sub(1 + NAME + 1 + VALUE + 1);
+        let is_writable = item.unwritable(&model.units).is_none();
         let text = format!(
-            "{} {} {}",
+            "{} {} {} {}",
             fit(&item.name(), NAME),
             fit(&value, VALUE),
-            fit(item.meaning(), meaning)
+            if is_writable { "e" } else { " " },
+            fit(item.meaning(), width.saturating_sub(FIXED))
         );
         lines.push(listed(vec![Span::raw(text)], at == place.item, theme));
     }
@@ -62,7 +76,7 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
     lines
 }
 
-/// The selected register in full.
+/// The lines with all text of the selected register.
 fn about(shown: &Shown<'_>, width: usize) -> Vec<String> {
     let place = shown.place;
     let Some(item) = place.found().get(place.item).copied() else { return Vec::new() };

@@ -1,9 +1,9 @@
-//! Text that fits its place.
+//! Text of a given width.
 
 /// Heights of a bar.
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// Text of exactly this width. What does not fit ends with `…`.
+/// Text of exactly this width. If it is cut, it ends with `…`.
 pub fn fit(text: &str, width: usize) -> String {
     let length = text.chars().count();
     if length <= width {
@@ -13,7 +13,7 @@ pub fn fit(text: &str, width: usize) -> String {
     if width == 0 { kept } else { kept + "…" }
 }
 
-/// As [`fit`], at the right.
+/// As [`fit`], right-aligned.
 pub fn right(text: &str, width: usize) -> String {
     match text.chars().count() <= width {
         true => format!("{text:>width$}"),
@@ -21,7 +21,7 @@ pub fn right(text: &str, width: usize) -> String {
     }
 }
 
-/// Text in lines of at most this width. Lines behind the first are indented.
+/// Text in lines of at most this width. Lines after the first are indented.
 pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();
@@ -38,7 +38,7 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Words in lines of at most this width, with `gap` between two.
+/// Words in lines of at most this width, with `gap` between two words.
 pub fn flow(words: &[String], gap: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words {
@@ -53,13 +53,10 @@ pub fn flow(words: &[String], gap: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// The last values as bars of their size, without their sign.
-pub fn sparkline<'a>(
-    values: impl DoubleEndedIterator<Item = &'a f64> + ExactSizeIterator,
-    width: usize,
-) -> String {
+/// The last values as bars. The height of a bar is the magnitude of its value.
+pub fn sparkline(values: impl ExactSizeIterator<Item = f64>, width: usize) -> String {
     let skipped = values.len().saturating_sub(width);
-    let last: Vec<f64> = values.skip(skipped).map(|value| value.abs()).collect();
+    let last: Vec<f64> = values.skip(skipped).map(f64::abs).collect();
     let most = last.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let bar = |value: &f64| {
         let step = (value / most * (BARS.len() - 1) as f64).round() as usize;
@@ -87,8 +84,8 @@ mod tests {
 
     #[test]
     fn a_sparkline_has_the_last_values_without_sign() {
-        assert_eq!(sparkline([9.0, 0.0, 350.0, -700.0].iter(), 3), "▁▅█");
-        assert_eq!(sparkline([0.0, 0.0].iter(), 3), "▁▁ ");
-        assert_eq!(sparkline([].iter(), 2), "  ");
+        assert_eq!(sparkline([9.0, 0.0, 350.0, -700.0].into_iter(), 3), "▁▅█");
+        assert_eq!(sparkline([0.0, 0.0].into_iter(), 3), "▁▁ ");
+        assert_eq!(sparkline([].into_iter(), 2), "  ");
     }
 }
