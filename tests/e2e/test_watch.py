@@ -13,7 +13,7 @@ PATIENT = ("--timeout", "1s")
 #: The keys from the list of motors to each view, and what is in it.
 VIEWS = {
     "motors": ((), "got/asked"),
-    "details": (("enter",), "line has"),
+    "details": (("enter",), "possible"),
     "registers": (("r",), "of 68 registers"),
     "help": (("?",), "any key closes"),
 }

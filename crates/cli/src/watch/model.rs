@@ -15,7 +15,7 @@ use super::ports::Protocol;
 use super::values::{self, Main, Units};
 
 /// Values of a sparkline.
-const HISTORY: usize = 200;
+pub const HISTORY: usize = 200;
 /// Events that are kept.
 const EVENTS: usize = 200;
 /// An older value is not shown; nor one that is older than three periods, if that is longer.
@@ -62,6 +62,8 @@ pub struct Row {
     pub stop: Stop,
     /// Why a stop was not confirmed. `None` again after a confirmed one.
     pub unconfirmed: Option<String>,
+    /// Whether its port is lost.
+    pub is_gone: bool,
     /// When it stopped replying, and why.
     pub silent: Option<(Instant, Arc<str>)>,
     pub speeds: VecDeque<Sample>,
@@ -120,6 +122,7 @@ impl Row {
             main: Main::of(motor),
             stop: Stop::None,
             unconfirmed: None,
+            is_gone: false,
             silent: None,
             speeds: VecDeque::new(),
             currents: VecDeque::new(),
@@ -137,7 +140,8 @@ impl Row {
     /// The value of a signal, if it is recent.
     pub fn value(&self, source: Source) -> Option<Sample> {
         let (sample, at) = self.values.get(&source)?;
-        (at.elapsed() < self.valid && self.silent.is_none()).then_some(*sample)
+        let is_recent = at.elapsed() < self.valid && self.silent.is_none() && !self.is_gone;
+        is_recent.then_some(*sample)
     }
 
     /// The time since a signal was read.
@@ -370,10 +374,12 @@ impl Model {
         match what {
             What::Lost(why) => {
                 self.ports[port].gone = Some((now, why.to_string().into()));
+                self.set_gone(port, true);
                 self.say(None, format!("{label}: the port is gone"), true);
             }
             What::Back => {
                 let gone = self.ports[port].gone.take();
+                self.set_gone(port, false);
                 let after =
                     gone.map_or_else(String::new, |(since, _)| format!(" after {}", age(since)));
                 self.say(None, format!("{label}: the port is back{after}"), false);
@@ -421,6 +427,11 @@ impl Model {
             }
             What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => {}
         }
+    }
+
+    fn set_gone(&mut self, port: usize, is_gone: bool) {
+        let rows = self.rows.iter_mut().filter(|row| row.port == port);
+        rows.for_each(|row| row.is_gone = is_gone);
     }
 
     fn other_stop_ended(&mut self, port: usize, id: CommandId, result: Result<(), String>) {

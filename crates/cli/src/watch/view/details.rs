@@ -8,11 +8,11 @@ use ratatui::text::Line;
 use super::super::model::{Model, Row, age, hertz, span};
 use super::super::values::details;
 use super::motors::short;
-use super::parts::{Shown, Theme, events};
-use super::text::{fit, right, sparkline, wrapped};
+use super::parts::{Shown, Theme, events, trend};
+use super::text::{fit, right, wrapped};
 
 /// The least number of lines for events.
-const EVENTS: usize = 4;
+const EVENTS: usize = 1;
 
 pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Line<'static>> {
     let model = shown.model;
@@ -31,7 +31,7 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
         let rates = rates.map(|text| right(text, RATE)).concat();
         fit(&format!("{name:<names$}  {}{rates}", fit(value, values)), width)
     };
-    let header = columns("signal", "value", ["age", "Hz got", "asked", "line has"]);
+    let header = columns("signal", "value", ["age", "got Hz", "asked", "possible"]);
     lines.push(Line::styled(header, theme.dim()));
     for signal in signals {
         let source = signal.source;
@@ -49,20 +49,19 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
         lines.push(Line::raw(columns(&source.to_string(), &value, [&age, &got, &asked, &line])));
     }
     let (replies, silences, lost) = (row.replies, row.silences, port.lost);
-    let counts = format!("replies {replies}, silent {silences} times, not shown in time {lost}");
+    let counts = format!("replies {replies}, silent {silences} times, lost by this view {lost}");
     lines.push(Line::raw(fit(&counts, width)));
     let main =
         [("speed", row.main.speed, &row.speeds), ("current", row.main.current, &row.currents)];
     for (name, source, history) in main {
-        let bars = sparkline(history.iter().map(|it| it.value), width.min(history.len()));
         let by_value = |one: &&Sample, other: &&Sample| one.value.total_cmp(&other.value);
         let least = history.iter().min_by(by_value);
         let most = history.iter().max_by(by_value);
         if let (Some(least), Some(most)) = (least, most) {
             let [least, most] = [least, most].map(|it| model.units.short(source, *it));
-            let text = format!("{name}: {least} to {most} in the last {} reads", history.len());
-            lines.push(Line::styled(fit(&text, width), theme.dim()));
-            lines.push(Line::raw(bars));
+            let range = fit(&format!("{name} {least} to {most}"), RANGE);
+            let bars = trend(history, width.saturating_sub(RANGE + 1));
+            lines.push(Line::raw(fit(&format!("{range} {bars}"), width)));
         }
     }
     lines.truncate(height.saturating_sub(EVENTS));
@@ -92,6 +91,8 @@ fn tenths(age: Duration) -> String {
     }
 }
 
+/// Width of the least and the largest value of a sparkline.
+const RANGE: usize = 36;
 /// Least width of a value.
 const VALUE: usize = 16;
 /// Width of the age, and of each rate.

@@ -81,13 +81,16 @@ fn top(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Lin
     if !names.is_empty() {
         let names = names.join(" ");
         let text = format!("stop NOT CONFIRMED, may still be turning: {names}");
-        lines.push(Line::styled(text::fit(&text, width), loud));
+        let text = wrapped(&text, width).into_iter().take((height / LOUD).max(1));
+        lines.extend(text.map(|line| Line::styled(text::fit(&line, width), loud)));
     }
     lines
 }
 
 /// Least height of a terminal with a title.
 const TITLED: usize = 6;
+/// The part of the height for the names of motors whose stop is not confirmed: one line in so many.
+const LOUD: usize = 8;
 
 fn count(count: usize, one: &str) -> String {
     match count {

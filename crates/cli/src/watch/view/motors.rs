@@ -3,8 +3,8 @@
 use ratatui::text::{Line, Span};
 
 use super::super::model::{Model, Row};
-use super::parts::{Shown, Theme, first, listed, notices};
-use super::text::{fit, right, sparkline};
+use super::parts::{Shown, Theme, first, listed, notices, trend};
+use super::text::{fit, right};
 
 /// The widths of the sparklines.
 struct Columns {
@@ -18,7 +18,7 @@ const NAME: usize = 10;
 const STATE: usize = 15;
 const SPEED: usize = 10;
 const CURRENT: usize = 11;
-const TEMPERATURE: usize = 5;
+const TEMPERATURE: usize = 6;
 const VOLTAGE: usize = 6;
 const RATE: usize = 9;
 /// The mark, and a space after each column except the last.
@@ -90,9 +90,8 @@ fn header(columns: &Columns) -> String {
 
 fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span<'static>> {
     let (state, is_bad) = model.state(row);
-    let is_known = model.ports[row.port].gone.is_none();
     let value = |source| {
-        match row.value(source).filter(|_| is_known) {
+        match row.value(source) {
             Some(sample) => model.units.short(source, sample),
             // The details show the reason.
             None if row.refused.contains_key(&source) => "?".to_owned(),
@@ -101,7 +100,7 @@ fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span
     };
     let rate = row
         .rate()
-        .filter(|_| is_known)
+        .filter(|_| !row.is_gone)
         .map_or_else(|| "-".to_owned(), |(asked, had)| format!("{}/{}", short(had), short(asked)));
     let main = row.main;
     let mut rest = [
@@ -113,10 +112,9 @@ fn spans(model: &Model, row: &Row, columns: &Columns, theme: &Theme) -> Vec<Span
         right(&rate, RATE),
     ]
     .join(" ");
-    rest += &format!(" {}", sparkline(row.speeds.iter().map(|it| it.value), columns.speeds));
+    rest += &format!(" {}", trend(&row.speeds, columns.speeds));
     if columns.currents > 0 {
-        rest +=
-            &format!(" {}", sparkline(row.currents.iter().map(|it| it.value), columns.currents));
+        rest += &format!(" {}", trend(&row.currents, columns.currents));
     }
     vec![
         Span::raw(fit(&row.name, NAME) + " "),

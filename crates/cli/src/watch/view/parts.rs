@@ -1,14 +1,15 @@
 //! Parts that several pages use.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
+use motorlink_telemetry::sample::Sample;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::super::keys::Place;
-use super::super::model::{Model, Said, age};
+use super::super::model::{HISTORY, Model, Said, age};
 use super::super::settings::Item;
-use super::text::wrapped;
+use super::text::{sparkline, wrapped};
 
 /// The mark of the selected line.
 pub const MARK: &str = ">";
@@ -83,7 +84,7 @@ pub fn notices(
     }
     for (why, names) in reasons {
         let names = names.join(" ");
-        let text = format!("stop NOT CONFIRMED by {names}, repeated when it answers: {why}");
+        let text = format!("stop NOT CONFIRMED by {names}, repeated after the next reply: {why}");
         say(text, theme.bad());
     }
     let gone: Vec<String> = model
@@ -146,6 +147,11 @@ pub fn events<'a>(
         lines = all;
     }
     lines
+}
+
+/// The last values of a signal as bars.
+pub fn trend(history: &VecDeque<Sample>, width: usize) -> String {
+    sparkline(history.iter().map(|sample| sample.value), width, HISTORY)
 }
 
 /// A line of a list, with a mark if it is selected.

@@ -53,17 +53,23 @@ pub fn flow(words: &[String], gap: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// The last values as bars. The height of a bar is the magnitude of its value.
-pub fn sparkline(values: impl ExactSizeIterator<Item = f64>, width: usize) -> String {
-    let skipped = values.len().saturating_sub(width);
-    let last: Vec<f64> = values.skip(skipped).map(f64::abs).collect();
-    let most = last.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let bar = |value: &f64| {
-        let step = (value / most * (BARS.len() - 1) as f64).round() as usize;
+/// The last `span` values as at most `width` bars. The height of a bar is the largest magnitude of
+/// its values, so that a short peak is visible.
+pub fn sparkline(
+    values: impl DoubleEndedIterator<Item = f64>,
+    width: usize,
+    span: usize,
+) -> String {
+    let each = span.div_ceil(width.max(1));
+    let magnitudes: Vec<f64> = values.rev().take(each * width).map(f64::abs).collect();
+    let bars = magnitudes.chunks(each).rev();
+    let heights: Vec<f64> = bars.map(|bar| bar.iter().copied().fold(0.0, f64::max)).collect();
+    let most = heights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let bar = |height: &f64| {
+        let step = (height / most * (BARS.len() - 1) as f64).round() as usize;
         BARS[step.min(BARS.len() - 1)]
     };
-    let text: String = last.iter().map(bar).collect();
-    fit(&text, width)
+    fit(&heights.iter().map(bar).collect::<String>(), width)
 }
 
 #[cfg(test)]
@@ -84,8 +90,15 @@ mod tests {
 
     #[test]
     fn a_sparkline_has_the_last_values_without_sign() {
-        assert_eq!(sparkline([9.0, 0.0, 350.0, -700.0].into_iter(), 3), "▁▅█");
-        assert_eq!(sparkline([0.0, 0.0].into_iter(), 3), "▁▁ ");
-        assert_eq!(sparkline([].into_iter(), 2), "  ");
+        assert_eq!(sparkline([9.0, 0.0, 350.0, -700.0].into_iter(), 3, 3), "▁▅█");
+        assert_eq!(sparkline([0.0, 0.0].into_iter(), 3, 3), "▁▁ ");
+        assert_eq!(sparkline([].into_iter(), 2, 2), "  ");
+        assert_eq!(sparkline([1.0].into_iter(), 0, 2), "");
+    }
+
+    #[test]
+    fn a_bar_of_several_values_shows_their_peak() {
+        assert_eq!(sparkline([9.0, 4.0, 0.0, 0.0, -8.0].into_iter(), 2, 4), "▅█");
+        assert_eq!(sparkline([8.0, 0.0, 0.0].into_iter(), 2, 4), "█▁");
     }
 }
