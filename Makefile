@@ -198,8 +198,10 @@ python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
 
-pictures: ## plays and draws scenarios (docs/pictures) and the demo (docs/demo.svg)
+pictures: $(VENV)/ready ## draws scenarios (docs/pictures) and screens of the program (docs/*.svg)
 	mkdir -p docs/pictures
+	$(PROGRAM)
+	MOTORLINK_BIN=$(DEBUG)/motorlink $(VENV)/bin/python tests/e2e/pictures.py docs
 	$(CARGO) run --release --locked --quiet -p motorlink-cli -- demo --picture docs/demo.svg
 	@for scenario in scenarios/*.toml; do \
 		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \

@@ -1,5 +1,6 @@
 """A program in a terminal: its keys, and its screen as a person sees it."""
 
+import copy
 import fcntl
 import os
 import pty
@@ -69,6 +70,11 @@ class Terminal:
         """What is on the screen, a line each."""
         with self._lock:
             return [line.rstrip() for line in self.screen.display]
+
+    def frozen(self):
+        """A copy of the screen."""
+        with self._lock:
+            return copy.deepcopy(self.screen)
 
     @property
     def text(self):

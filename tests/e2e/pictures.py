@@ -1,0 +1,138 @@
+"""Draws screens of the program as pictures for the documents: `pictures.py FOLDER`, which `make pictures`
+runs. test_pictures.py compares them with the program."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import pyte
+
+from program import Sim, environment, eventually
+from terminal import Terminal
+
+COLUMNS = 80
+#: Measures in pixels, and colours, as in the picture of the demo (crates/cli/src/demo/picture.rs).
+FONT, COLUMN, LINE, MARGIN = 14, 8.43, 19, 18
+TEXT, BACKGROUND, BORDER, FAULT = "#24292f", "#ffffff", "#e4e7eb", "#c43e00"
+FONTS = "ui-monospace, SFMono-Regular, Menlo, Consolas, 'DejaVu Sans Mono', monospace"
+
+
+def draw(screen, title):
+    """A screen as SVG, up to its last line with text."""
+    last = max(number for number, line in enumerate(screen.display) if line.strip())
+    width, height = round(2 * MARGIN + COLUMNS * COLUMN), 2 * MARGIN + LINE * (last + 1)
+    svg = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
+        f'font-family="{FONTS}" font-size="{FONT}">',
+        f"<title>{escape(title)}</title>",
+        f'<rect x="0.5" y="0.5" width="{width - 1}" height="{height - 1}" rx="8" fill="{BACKGROUND}" stroke="{BORDER}"/>',
+    ]
+    for number in range(last + 1):
+        for column, text, (is_bold, is_reverse, colour) in runs(screen.buffer[number]):
+            x, y, length = MARGIN + column * COLUMN, MARGIN + LINE * number, len(text) * COLUMN
+            ink = TEXT if colour == "default" else FAULT
+            if is_reverse:
+                svg.append(f'<rect x="{x:.1f}" y="{y}" width="{length:.1f}" height="{LINE}" fill="{ink}"/>')
+                ink = BACKGROUND
+            if text.strip():
+                weight = ' font-weight="bold"' if is_bold else ""
+                svg.append(
+                    f'<text x="{x:.1f}" y="{y + LINE - 5}" textLength="{length:.1f}" fill="{ink}"{weight} '
+                    f'xml:space="preserve">{escape(text)}</text>'
+                )
+    return "\n".join([*svg, "</svg>", ""])
+
+
+def runs(line):
+    """The runs of equal style of a line: column, text, style. Spaces at the end of a line have no style."""
+    found = []
+    for column in range(COLUMNS):
+        cell = line[column]
+        style = (cell.bold, cell.reverse, cell.fg)
+        if found and found[-1][2] == style:
+            found[-1][1].append(cell.data)
+        else:
+            found.append((column, [cell.data], style))
+    for column, cells, style in found:
+        text = "".join(cells)
+        yield column, text if style[1] else text.rstrip(), style
+
+
+def shell(folder, motorlink, *commands):
+    """A screen with commands and their output."""
+    screen = pyte.Screen(COLUMNS, 60)
+    screen.set_mode(pyte.modes.LNM)
+    stream = pyte.Stream(screen)
+    for command in commands:
+        stream.feed(f"\x1b[1m$ {command}\x1b[0m\n")
+        program, *words = command.split()
+        done = subprocess.run(
+            [motorlink if program == "motorlink" else program, *words],
+            cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
+        )
+        stream.feed(done.stdout)
+    return screen
+
+
+def watch(folder, motorlink, drives):
+    """Six motors: one gets faster, one turns, one is too hot."""
+    run = lambda *words: subprocess.run(
+        [motorlink, *words], cwd=folder, env=environment(), check=True, capture_output=True, timeout=60
+    )
+    run("rmd", "-p", "slcan:./can0", "--timeout", "1s", "--id", "2", "speed", "360")
+    drives.do("temperature", port=f"slcan-pty:{folder}/can0", motor=4, celsius=120)
+    run("st", "-p", "./st0", "start", "--ramp", "1500", "5s")
+    words = ["watch", "-p", "./st0", "-p", "slcan:./can0", "--timeout", "1s", "--rate", "25"]
+    terminal = Terminal([motorlink, *words], COLUMNS, 14, folder, NO_COLOR=None)
+    texts = ("6 motors", "RUN", " 1500 rpm", "turning", "ERROR", "over temperature protection", "q quit")
+
+    def complete():
+        screen = terminal.frozen()
+        rows = [line for line in screen.display if "/25.0 " in line]
+        # The last column is the end of the trend.
+        is_full = len(rows) == 6 and all(row[-1] != " " for row in rows)
+        return screen if is_full and all(text in "\n".join(screen.display) for text in texts) else None
+
+    try:
+        return eventually(complete, "rates, trends and 1500 rpm", 60)
+    finally:
+        terminal.end()
+
+
+def dump(folder, motorlink, _):
+    """Settings into a file, a change, the difference, and back."""
+    st = "motorlink st -p ./st0"
+    return shell(
+        folder, motorlink,
+        f"{st} dump motor1.toml",
+        "sed -n 9,13p motor1.toml",
+        f"{st} set SPEED_KP 400",
+        f"{st} diff motor1.toml",
+        f"{st} restore motor1.toml",
+    )
+
+
+#: Each picture: how its screen comes about, and its title, for screen readers.
+PICTURES = {
+    "watch": (watch, "motorlink watch: a row for each of six motors with state, speed, current, temperature, supply and rate; one motor is too hot"),
+    "dump": (dump, "motorlink st dump writes settings into a file, diff shows a changed gain, restore writes the old value"),
+}
+
+
+def picture(name, motorlink):
+    """The SVG of a picture, on new simulated drives."""
+    scene, title = PICTURES[name]
+    with tempfile.TemporaryDirectory() as folder:
+        drives = Sim([motorlink, "sim", "--stdin", "--json", "--st", f"pty:{folder}/st0", "--rmd", f"slcan-pty:{folder}/can0"], 2)
+        try:
+            return draw(scene(folder, motorlink, drives), title)
+        finally:
+            drives.end()
+
+
+if __name__ == "__main__":
+    for name in PICTURES:
+        Path(sys.argv[1], f"{name}.svg").write_text(picture(name, os.environ["MOTORLINK_BIN"]), encoding="utf8")

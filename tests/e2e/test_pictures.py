@@ -1,0 +1,27 @@
+"""The pictures of the documents show what the program prints. `make pictures` draws them."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from pictures import PICTURES, picture
+
+FOLDER = Path(__file__).parents[2] / "docs"
+
+
+def words(svg):
+    """The text of a picture, line by line, without values that differ from run to run."""
+    lines = {}
+    for text in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text"):
+        lines.setdefault(int(text.get("y")), []).append((float(text.get("x")), text.text))
+    joined = [" ".join(text for _, text in sorted(parts)) for _, parts in sorted(lines.items())]
+    bars, numbers = re.compile("[▁▂▃▄▅▆▇█]+"), re.compile(r"-?\d[\d.]*")
+    return [" ".join(numbers.sub("0", bars.sub("", line)).split()) for line in joined]
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_shows_the_program_of_today(name, motorlink):
+    drawn = (FOLDER / f"{name}.svg").read_text(encoding="utf8")
+    assert words(drawn) == words(picture(name, motorlink)), f"`make pictures` draws {name}.svg anew"
