@@ -65,6 +65,11 @@ class Terminal:
             self.screen.resize(lines, columns)
         self._set_size(columns, lines)
 
+    def clear(self):
+        """Clears the screen, as a shell may after a stop of the program."""
+        with self._lock:
+            self.screen.reset()
+
     @property
     def lines(self):
         """What is on the screen, a line each."""

@@ -206,8 +206,9 @@ def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
         terminal.shows(f">{names[row]}")
     terminal.press("enter")
     terminal.shows("st0:1  IDLE", "CONTROL_MODE", "SPEED (0x1)", "MOTOR_POWER", "replies")
-    terminal.press("down")
-    terminal.shows("st0:2  IDLE")
+    for key, name in (("down", "st0:2"), ("up", "st0:1"), ("j", "st0:2"), ("k", "st0:1")):
+        terminal.press(key)
+        terminal.shows(f"{name}  IDLE")
     terminal.press("esc")
     terminal.shows("got/asked")
     terminal.press("end", "enter")
@@ -217,12 +218,17 @@ def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
     for key, name in (("down", "position_ki"), ("j", "speed_kp"), ("up", "position_ki"), ("k", "position_kp"), ("end", "acceleration"), ("home", "position_kp")):
         terminal.press(key)
         terminal.shows(f">{name}")
-    terminal.press("/", "torque")
-    terminal.shows("2 of 7 registers")
-    terminal.press("r")
-    terminal.shows("search: torquer_")
+    terminal.press("/", "torque_k")
+    terminal.shows("search: torque_k_", "2 of 7 registers")
+    terminal.press("enter", "enter")
+    terminal.shows("new value of torque_kp: _", "2 of 7 registers")
+    terminal.press("esc")
+    terminal.shows_no("new value")
+    terminal.press("/", "torque_k")
+    terminal.shows("search: torque_k_")
     terminal.press("esc")
     terminal.shows("7 of 7 registers")
+    terminal.shows_no("search:")
     terminal.press("esc")
     terminal.shows(">can0:4")
 
@@ -381,6 +387,16 @@ def test_it_can_be_suspended(bench, watch, how):
     terminal.press("q")
     assert terminal.wait() == 0
     eventually(lambda: terminal.is_as_before, "the terminal as before")
+
+
+def test_it_is_drawn_again_after_a_stop_that_it_cannot_handle(bench, watch):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.signal(signal.SIGSTOP)
+    eventually(lambda: is_suspended(terminal), "a stopped program")
+    terminal.clear()
+    terminal.signal(signal.SIGCONT)
+    terminal.shows("6 motors on 2 ports", "can0:4", "q quit")
 
 
 def test_motors_that_others_started_go_on_when_it_ends_or_is_killed(bench, watch):
