@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from program import Outcome, Running, Sim, environment
+from program import PATIENT, Outcome, Running, Sim, environment
+from terminal import Terminal
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -74,6 +75,22 @@ def start(motorlink):
     yield start
     for process in started:
         process.end()
+
+
+@pytest.fixture
+def watch(motorlink):
+    """`watch(ports, ...)`: `motorlink watch` on these ports, in a terminal."""
+    started = []
+
+    def watch(*words, columns=80, lines=24, **variables):
+        words = ["watch", *PATIENT, *map(str, words)]
+        terminal = Terminal([motorlink, *words], columns, lines, **variables)
+        started.append(terminal)
+        return terminal
+
+    yield watch
+    for terminal in started:
+        terminal.end()
 
 
 def serving(motorlink, folder):

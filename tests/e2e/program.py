@@ -10,6 +10,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 
+#: Options for simulated drives: a busy machine may be late with a reply.
+PATIENT = ("--timeout", "1s")
+
+
 def environment(variables=()):
     """The environment without what the user of this machine has set for motorlink."""
     inherited = {k: v for k, v in os.environ.items() if not k.startswith("MOTORLINK_")}

@@ -5,11 +5,9 @@ import signal
 import pytest
 
 from peers import Plug
-from program import eventually
+from program import PATIENT, eventually
 from terminal import Terminal
 
-#: A busy machine may be late with a reply.
-PATIENT = ("--timeout", "1s")
 #: The keys from the list of motors to each view, and what is in it.
 VIEWS = {
     "motors": ((), "got/asked"),
@@ -32,22 +30,6 @@ def go_back(terminal, view):
     if view != "motors":
         terminal.press("esc")
     terminal.shows("got/asked")
-
-
-@pytest.fixture
-def watch(motorlink, tmp_path):
-    """`watch(ports, ...)`: the view on these ports, in a terminal."""
-    started = []
-
-    def watch(*words, columns=80, lines=24, **variables):
-        words = ["watch", *PATIENT, *map(str, words)]
-        terminal = Terminal([motorlink, *words], columns, lines, **variables)
-        started.append(terminal)
-        return terminal
-
-    yield watch
-    for terminal in started:
-        terminal.end()
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ mod model;
 mod ports;
 mod screen;
 mod settings;
+mod share;
 mod values;
 mod view;
 mod work;
@@ -34,6 +35,7 @@ use keys::{Ask, Place, View};
 use model::{Model, Port, Row};
 use screen::{Screen, Wait};
 use settings::{Access, Item};
+use share::Share;
 use values::Units;
 use work::{Done, Stopping, Work};
 
@@ -72,6 +74,7 @@ struct Watch {
     /// Subscriptions for motors that were found later, each with its port.
     added: Vec<(usize, Subscription)>,
     details: Option<Details>,
+    shares: Vec<Share>,
     work: Work,
     model: Model,
     place: Place,
@@ -121,6 +124,7 @@ impl Watch {
             subscriptions,
             added: Vec::new(),
             details: None,
+            shares: Share::of(&names, &work),
             work,
             model,
             place,
@@ -188,6 +192,7 @@ impl Watch {
                 }
             }
             Ask::Release => {
+                self.shares.iter().for_each(|share| share.latch(false));
                 self.runners.iter().for_each(|runner| self.work.release(runner.remote()));
             }
             Ask::Write(item, text) => self.work.write(self.access(row), row, item, text),
@@ -197,6 +202,7 @@ impl Watch {
     }
 
     fn stop_all(&mut self) {
+        self.shares.iter().for_each(|share| share.latch(true));
         for (port, runner) in self.runners.iter().enumerate() {
             let rows = 0..self.model.rows.len();
             let of_port: Vec<_> = rows.filter(|&row| self.model.rows[row].port == port).collect();
@@ -298,6 +304,10 @@ impl Watch {
             Done::Rates(port, rates) => self.model.rates(port, &rates),
             Done::Stopped(stop, result) => self.model.stopped(stop.row, stop.number, result),
             Done::Found(port, found) => self.found(port, found),
+            Done::Latch(share, latch) => {
+                let ports = &self.shares[share].ports;
+                ports.iter().for_each(|&port| self.model.set_share_latch(port, latch.clone()));
+            }
             Done::Details(row, id, records) => match &mut self.details {
                 Some(details) if details.row == row && details.records.is_none() => {
                     details.records = Some((id, records));

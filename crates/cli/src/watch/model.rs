@@ -25,6 +25,9 @@ const CONFIRMED: Duration = Duration::from_secs(30);
 /// Least time between a stop that was not confirmed and its repeat.
 const REPEAT: Duration = Duration::from_secs(1);
 
+/// The program that set the latch of a share, if it is set; or why this is unknown.
+pub type Latch = Result<Option<Arc<str>>, String>;
+
 /// A port with its engine.
 pub struct Port {
     /// A short name, for rows.
@@ -36,6 +39,8 @@ pub struct Port {
     pub gone: Option<(Instant, Arc<str>)>,
     /// The program that set the latch.
     pub latched: Option<Arc<str>>,
+    /// The latch of its share, if it is a line of one.
+    pub share: Option<Latch>,
     /// Records that were lost because the view was too slow.
     pub lost: u64,
     /// Stops of other programs in progress, with their motor.
@@ -109,7 +114,23 @@ pub struct Model {
 
 impl Port {
     pub fn new(label: String, name: String, protocol: Protocol) -> Self {
-        Port { label, name, protocol, gone: None, latched: None, lost: 0, stops: BTreeMap::new() }
+        Port {
+            label,
+            name,
+            protocol,
+            gone: None,
+            latched: None,
+            share: None,
+            lost: 0,
+            stops: BTreeMap::new(),
+        }
+    }
+}
+
+impl Port {
+    /// The program that set the latch of the share.
+    fn share_latch(&self) -> Option<&Arc<str>> {
+        self.share.as_ref()?.as_ref().ok()?.as_ref()
     }
 }
 
@@ -234,9 +255,39 @@ impl Model {
         self.rows.iter().filter(|row| row.port == port).map(|row| row.motor).collect()
     }
 
+    /// Stores the latch of the share of a port.
+    pub fn set_share_latch(&mut self, port: usize, latch: Latch) {
+        let shown = &mut self.ports[port];
+        let before = shown.share_latch().cloned();
+        shown.share = Some(latch);
+        let (label, now) = (shown.label.clone(), shown.share_latch().cloned());
+        if before != now {
+            let text = match now {
+                Some(by) => format!("{label}: {by} latched the share: motion is refused"),
+                None => format!("{label}: the latch of the share is released"),
+            };
+            self.say(None, text, false);
+        }
+    }
+
+    /// The latched ports whose share is not latched, and why.
+    pub fn unlatched_shares(&self) -> Option<(Vec<&str>, &str)> {
+        let ports = self.ports.iter().filter(|port| port.latched.is_some());
+        let ports = ports.filter(|port| port.share.is_some() && port.share_latch().is_none());
+        let labels: Vec<&str> = ports.clone().map(|port| port.label.as_str()).collect();
+        let why = ports.into_iter().find_map(|port| port.share.as_ref()?.as_ref().err());
+        let why = why.map_or("not yet, or another program released it", String::as_str);
+        (!labels.is_empty()).then_some((labels, why))
+    }
+
     /// The latched ports, and the program that set the first latch; `None`: no latch is set.
     pub fn latched(&self) -> Option<(Vec<&str>, &Arc<str>)> {
-        let latched = || self.ports.iter().filter_map(|port| Some((port, port.latched.as_ref()?)));
+        let latched = || {
+            self.ports.iter().filter_map(|port| {
+                let by = port.latched.as_ref().or_else(|| port.share_latch());
+                Some((port, by?))
+            })
+        };
         let (_, by) = latched().next()?;
         Some((latched().map(|(port, _)| port.label.as_str()).collect(), by))
     }

@@ -11,6 +11,7 @@ use motorlink_telemetry::runner::Remote;
 use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::{Full, Subscription};
 
+use super::model::Latch;
 use super::ports::{Protocol, motors, stop_of};
 use super::settings::{Access, Item};
 use super::values::{Main, details};
@@ -30,6 +31,8 @@ pub enum Done {
     Stopped(Stopping, Result<(), String>),
     /// Motors that a search found at a port, and their subscription.
     Found(usize, Result<(Vec<Motor>, Subscription), String>),
+    /// The latch of a share.
+    Latch(usize, Latch),
     /// The subscription to the details of a row.
     Details(usize, ConsumerId, Subscription),
     /// A value of a row.
@@ -62,7 +65,7 @@ impl Work {
     }
 
     /// Runs a task in a thread. After the end of the view its results are not received.
-    fn spawn(&self, task: impl FnOnce(&SyncSender<Done>) + Send + 'static) {
+    pub fn spawn(&self, task: impl FnOnce(&SyncSender<Done>) + Send + 'static) {
         let sender = self.sender.clone();
         std::thread::spawn(move || task(&sender));
     }

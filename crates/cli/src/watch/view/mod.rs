@@ -76,6 +76,11 @@ fn top(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Lin
         let text = format!("LATCHED (u releases it): {of} is refused since {by} stopped all");
         lines.push(Line::styled(text::fit(&text, width), loud));
     }
+    if let Some((ports, why)) = model.unlatched_shares() {
+        let ports = ports.join(" ");
+        let text = format!("NOT LATCHED for other programs of the share: {ports}: {why}");
+        lines.push(Line::styled(text::fit(&text, width), loud));
+    }
     let rows = model.rows.iter().filter(|row| row.unconfirmed.is_some());
     let names: Vec<&str> = rows.map(|row| row.name.as_str()).collect();
     if !names.is_empty() {

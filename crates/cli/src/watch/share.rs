@@ -1,0 +1,167 @@
+//! The latch of a share. It holds for all programs of the share, that of an engine here does not.
+
+use std::io::{self, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::frame::{self, Kind, Reader};
+use motorlink_telemetry::share::message::{self, Answer, Ask, Request, Text};
+
+use super::model::Latch;
+use super::work::{Done, Work};
+
+/// Time between two looks at the latch.
+const LOOK: Duration = Duration::from_millis(500);
+/// The longest time for an answer of the share.
+const ANSWER: Duration = Duration::from_secs(5);
+
+/// A share that has some of the ports.
+pub struct Share {
+    path: PathBuf,
+    pub ports: Vec<usize>,
+    commands: Sender<bool>,
+}
+
+impl Share {
+    /// The shares of ports, each with a thread that looks at its latch.
+    pub fn of(names: &[String], work: &Work) -> Vec<Share> {
+        let mut shares: Vec<Share> = Vec::new();
+        for (port, name) in names.iter().enumerate() {
+            let Some((path, _)) = name.strip_prefix("share:").and_then(|it| it.rsplit_once('/'))
+            else {
+                continue;
+            };
+            let path = Path::new(path);
+            match shares.iter_mut().find(|share| share.path == path) {
+                Some(share) => share.ports.push(port),
+                None => {
+                    let (commands, received) = channel();
+                    let (path, number) = (path.to_owned(), shares.len());
+                    let watcher = Watcher {
+                        path: path.clone(),
+                        by: Arc::clone(&work.by),
+                        connection: None,
+                        holds: false,
+                    };
+                    work.spawn(move |sender| {
+                        watcher.run(&received, |latch| {
+                            sender.send(Done::Latch(number, latch)).is_ok()
+                        });
+                    });
+                    shares.push(Share { path, ports: vec![port], commands });
+                }
+            }
+        }
+        shares
+    }
+
+    /// Sets the latch, or releases it, whoever set it.
+    pub fn latch(&self, is_set: bool) {
+        // The thread ends with the view.
+        let _ = self.commands.send(is_set);
+    }
+}
+
+/// The thread of a share.
+struct Watcher {
+    path: PathBuf,
+    by: Arc<str>,
+    connection: Option<Connection>,
+    /// Whether this program set the latch and has not released it. A new share gets it again.
+    holds: bool,
+}
+
+impl Watcher {
+    fn run(mut self, commands: &Receiver<bool>, report: impl Fn(Latch) -> bool) {
+        let mut pending = None;
+        loop {
+            let latch = self.look(&mut pending).map_err(|error| error.to_string());
+            if latch.is_err() {
+                self.connection = None;
+            }
+            if !report(latch) {
+                return;
+            }
+            match commands.recv_timeout(LOOK) {
+                Ok(is_set) => {
+                    self.holds = is_set;
+                    pending = Some(is_set);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    /// Carries out a pending command and reads the latch.
+    fn look(&mut self, pending: &mut Option<bool>) -> io::Result<Option<Arc<str>>> {
+        let connection = match &mut self.connection {
+            Some(connection) => connection,
+            none => {
+                if self.holds {
+                    *pending = Some(true);
+                }
+                none.insert(Connection::open(&self.path, &self.by)?)
+            }
+        };
+        match *pending {
+            Some(true) => drop(connection.ask(Ask::Latch)?),
+            Some(false) => drop(connection.ask(Ask::Release)?),
+            None => {}
+        }
+        *pending = None;
+        match connection.ask(Ask::Lines)? {
+            Answer::Lines { latched_by, .. } => Ok(latched_by.map(Arc::from)),
+            _ => Err(io::Error::other("the share gives another answer")),
+        }
+    }
+}
+
+struct Connection {
+    socket: UnixStream,
+    reader: Reader,
+    last_id: u32,
+}
+
+impl Connection {
+    fn open(path: &Path, by: &str) -> io::Result<Self> {
+        let socket = UnixStream::connect(path)?;
+        socket.set_read_timeout(Some(ANSWER))?;
+        socket.set_write_timeout(Some(ANSWER))?;
+        let mut opened = Connection { socket, reader: Reader::default(), last_id: 0 };
+        opened.ask(Ask::Hello { protocol: VERSION, name: by.to_owned() })?;
+        Ok(opened)
+    }
+
+    /// Sends a request and waits for its answer.
+    fn ask(&mut self, ask: Ask) -> io::Result<Answer> {
+        self.last_id = self.last_id.wrapping_add(1);
+        let request = message::encode(&Request { id: self.last_id, ask });
+        let mut stream = Vec::new();
+        frame::append(Kind::Text, &request, &mut stream).map_err(io::Error::other)?;
+        self.socket.write_all(&stream)?;
+        let mut bytes = [0; 4096];
+        loop {
+            while let Some(frame) = self.reader.take().map_err(io::Error::other)? {
+                if frame.kind != Kind::Text {
+                    continue;
+                }
+                match message::decode(&frame.payload).map_err(io::Error::other)? {
+                    Text::Answer { id, answer } if id == self.last_id => return Ok(answer),
+                    Text::Refusal { id, message, .. } if id == self.last_id => {
+                        return Err(io::Error::other(message));
+                    }
+                    _ => {}
+                }
+            }
+            match self.socket.read(&mut bytes)? {
+                0 => return Err(io::Error::other("the share closed the connection")),
+                count => self.reader.push(&bytes[..count]),
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+"""`motorlink watch` on the lines of a share, beside other programs."""
+
+import signal
+
+import pytest
+
+from program import PATIENT, eventually
+from sharing import Client
+
+
+@pytest.fixture
+def serve(start, sim, tmp_path):
+    """`serve()`: a share of simulated drives, `share.ports` is for watch. They stay when it is killed."""
+    drives = sim()
+
+    def serve():
+        path = tmp_path / "share"
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}"]
+        running = start("share", *words, *PATIENT)
+        running.line(0)
+        running.path, running.drives = path, drives
+        running.ports = ("-p", f"share:{path}/st0", "-p", f"share:{path}/rmd0")
+        return running
+
+    return serve
+
+
+def speed(share):
+    return abs(share.drives.motor(1, f"pty:{share.drives.st}")["speed_rpm"])
+
+
+def test_stop_all_stops_and_latches_the_programs_of_the_share(serve, watch):
+    share = serve()
+    tuner = Client(share.path, "tuner")
+    tuner.command("st0", 1, 3, 1)
+    eventually(lambda: speed(share) > 300, "a motor that turns")
+    terminal = watch(*share.ports)
+    terminal.shows("6 motors on 2 ports", "RUN")
+    terminal.press("!")
+    terminal.shows("stop confirmed by all 6 motors", "LATCHED (u releases it): every motion is refused")
+    terminal.shows_no("NOT LATCHED")
+    eventually(lambda: speed(share) < 1, "a motor at rest", 30)
+    refused = tuner.command("st0", 1, 3, 1)
+    assert refused["reason"] == "latched" and "watch" in refused["message"]
+    terminal.press("u", "y")
+    terminal.shows_no("LATCHED")
+    tuner.command("st0", 1, 3, 1)
+    eventually(lambda: speed(share) > 300, "a motor that turns")
+
+
+def test_the_latch_of_another_program_is_shown_and_can_be_released(serve, watch):
+    share = serve()
+    terminal = watch(*share.ports)
+    terminal.shows("6 motors on 2 ports")
+    Client(share.path, "ann").ask("latch")
+    terminal.shows("LATCHED (u releases it): every motion is refused since ann stopped all")
+    terminal.press("u")
+    terminal.shows("release the latch of ann")
+    terminal.press("y")
+    terminal.shows_no("LATCHED")
+
+
+def test_the_kill_of_the_share_is_said_and_stop_and_latch_are_repeated_at_the_next_one(serve, watch):
+    share = serve()
+    tuner = Client(share.path, "tuner")
+    tuner.command("st0", 1, 3, 1)
+    terminal = watch(*share.ports)
+    terminal.shows("RUN")
+    share.process.send_signal(signal.SIGKILL)
+    share.wait()
+    terminal.shows("PORT GONE", "port gone, opened again")
+    terminal.press("!")
+    terminal.shows("stop NOT CONFIRMED, may still be turning:", "NOT LATCHED for other programs of the share")
+    assert terminal.bold("NOT LATCHED") and speed(share) > 300
+    share = serve()
+    eventually(lambda: speed(share) < 1, "a motor at rest", 30)
+    terminal.shows("stop confirmed by all 6 motors", "LATCHED (u releases it)")
+    terminal.shows_no("NOT LATCHED")
+    assert Client(share.path, "tuner").command("st0", 1, 3, 1)["reason"] == "latched"
+    terminal.press("q")
+    assert terminal.wait() == 0
