@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 
 import pyte
 
-from program import Sim, environment, eventually
+from program import Running, Sim, environment, eventually
 from terminal import Terminal
 
 COLUMNS = 80
@@ -63,18 +63,31 @@ def runs(line):
 
 def shell(folder, motorlink, *commands):
     """A screen with commands and their output."""
+    screen, stream = paper()
+    for command in commands:
+        stream.feed(prompt(command) + output(folder, motorlink, command))
+    return screen
+
+
+def paper():
+    """An empty screen and the stream of its text."""
     screen = pyte.Screen(COLUMNS, 60)
     screen.set_mode(pyte.modes.LNM)
-    stream = pyte.Stream(screen)
-    for command in commands:
-        stream.feed(f"\x1b[1m$ {command}\x1b[0m\n")
-        program, *words = command.split()
-        done = subprocess.run(
-            [motorlink if program == "motorlink" else program, *words],
-            cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
-        )
-        stream.feed(done.stdout)
-    return screen
+    return screen, pyte.Stream(screen)
+
+
+def prompt(command):
+    return f"\x1b[1m$ {command}\x1b[0m\n"
+
+
+def output(folder, motorlink, command):
+    """What a command prints."""
+    program, *words = command.split()
+    done = subprocess.run(
+        [motorlink if program == "motorlink" else program, *words],
+        cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
+    )
+    return done.stdout
 
 
 def watch(folder, motorlink, drives):
@@ -115,9 +128,32 @@ def dump(folder, motorlink, _):
     )
 
 
+def share(folder, motorlink, _):
+    """A share in the background with its log, and two programs on its lines."""
+    serve = "motorlink share -p ./st0 -p slcan:./can0 --at unix:./share"
+    running = Running([motorlink, *serve.split()[1:]], folder=folder)
+    screen, stream = paper()
+    try:
+        stream.feed(prompt(f"{serve} &") + running.line(0) + "\n")
+        told = 1
+        for command in (
+            "motorlink st -p share:./share/st0 set SPEED_KP 300",
+            "motorlink rmd -p share:./share/rmd0 --id 2 stop",
+        ):
+            stream.feed(prompt(command) + output(folder, motorlink, command))
+            has_left = lambda: any(line.endswith(" left") for line in running.out[told:])
+            running.until(has_left, "the end of the log")
+            stream.feed("".join(f"{line}\n" for line in running.out[told:]))
+            told = len(running.out)
+    finally:
+        running.end()
+    return screen
+
+
 #: Each picture: how its screen comes about, and its title, for screen readers.
 PICTURES = {
     "watch": (watch, "motorlink watch: a row for each of six motors with state, speed, current, temperature, supply and rate; one motor is too hot"),
+    "share": (share, "motorlink share holds two ports; motorlink st and motorlink rmd use its lines; its log lists their requests"),
     "dump": (dump, "motorlink st dump writes settings into a file, diff shows a changed gain, restore writes the old value"),
 }
 
