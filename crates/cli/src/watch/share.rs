@@ -59,7 +59,7 @@ impl Share {
         shares
     }
 
-    /// Sets the latch, or releases it, whoever set it.
+    /// Sets or releases the latch, also that of another program.
     pub fn latch(&self, is_set: bool) {
         // The thread ends with the view.
         let _ = self.commands.send(is_set);

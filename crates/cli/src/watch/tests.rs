@@ -20,8 +20,9 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::style::{Color, Modifier};
 
 use super::keys::{Ask, Field, Place, View};
-use super::model::{Model, Port, Row, Stop};
+use super::model::{Model, Port};
 use super::ports::Protocol;
+use super::row::{Row, Stop};
 use super::settings::Item;
 use super::values::Units;
 use super::view::{self, Shown, Theme};

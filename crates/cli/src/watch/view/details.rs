@@ -5,7 +5,8 @@ use std::time::Duration;
 use motorlink_telemetry::sample::Sample;
 use ratatui::text::Line;
 
-use super::super::model::{Model, Row, age, hertz, span};
+use super::super::model::{Model, age, span};
+use super::super::row::{Row, hertz};
 use super::super::values::details;
 use super::motors::short;
 use super::parts::{Shown, Theme, events, trend};

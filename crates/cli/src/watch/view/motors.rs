@@ -2,7 +2,8 @@
 
 use ratatui::text::{Line, Span};
 
-use super::super::model::{Model, Row};
+use super::super::model::Model;
+use super::super::row::Row;
 use super::parts::{Shown, Theme, first, listed, notices, trend};
 use super::text::{fit, right};
 

@@ -7,7 +7,8 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::super::keys::Place;
-use super::super::model::{HISTORY, Model, Said, age};
+use super::super::model::{Model, Said, age};
+use super::super::row::HISTORY;
 use super::super::settings::Item;
 use super::text::{sparkline, wrapped};
 
