@@ -103,6 +103,23 @@ def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch, key):
     terminal.shows("stop confirmed by all 6")
 
 
+@pytest.mark.parametrize("before", ["many keys", "a resize"])
+def test_stop_all_that_comes_together_with_more_is_taken(bench, watch, before):
+    bench.turn()
+    terminal = watch(*bench.ports)
+    terminal.shows("RUN")
+    # What comes while it is stopped comes together.
+    terminal.signal(signal.SIGSTOP)
+    if before == "many keys":
+        terminal.press("j" * 1500)
+    else:
+        terminal.resize(100, 30)
+    terminal.press("space")
+    terminal.signal(signal.SIGCONT)
+    terminal.shows("LATCHED", "stop confirmed")
+    bench.rests()
+
+
 def test_s_stops_the_selected_motor_only(bench, watch):
     bench.turn()
     terminal = watch(*bench.ports)

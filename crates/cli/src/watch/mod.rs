@@ -152,8 +152,10 @@ impl Watch {
             if let Wait::Gone = waited {
                 return Ok(());
             }
+            let mut came = false;
             // A resize is an event without input on stdin.
             while event::poll(Duration::ZERO)? {
+                came = true;
                 match event::read()? {
                     Event::Key(key) => match self.press(key) {
                         Some(Ask::Quit) => return Ok(()),
@@ -165,6 +167,9 @@ impl Watch {
                     _ => continue,
                 }
                 self.has_changed = true;
+            }
+            if let (Wait::Keys, false) = (waited, came) {
+                screen.announce_again()?;
             }
             self.receive()?;
             self.repeat_stops();

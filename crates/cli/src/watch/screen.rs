@@ -11,6 +11,7 @@ use ratatui::crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, enabl
 use ratatui::{DefaultTerminal, Terminal};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGTSTP};
 
 use crate::failure::Failure;
@@ -104,6 +105,15 @@ impl Screen {
         let is_gone =
             fds[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL);
         Ok(if is_gone { Wait::Gone } else { Wait::Keys })
+    }
+
+    /// Makes crossterm read keys that it has left. It leaves keys behind a resize, and those behind 1024
+    /// bytes, until the next key comes. Setting the mode of the terminal anew counts as a key.
+    pub fn announce_again(&self) -> Result<(), Failure> {
+        let stdin = stdin();
+        let mode = tcgetattr(&stdin).map_err(std::io::Error::from)?;
+        tcsetattr(&stdin, OptionalActions::Now, &mode).map_err(std::io::Error::from)?;
+        Ok(())
     }
 }
 
