@@ -56,7 +56,8 @@ pub const FULL: Duration = Duration::from_millis(1);
 /// Back-off: the waits between attempts to reopen a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackOff {
-    /// Wait after the first failed attempt. It doubles after each further one.
+    /// Wait after the first failed attempt. It doubles after each further one. Also the shortest time
+    /// between two successful attempts.
     pub first: Duration,
     /// Maximum wait.
     pub cap: Duration,
@@ -78,7 +79,9 @@ pub struct Reopening<L> {
     back_off: BackOff,
     wait: Duration,
     not_before: Instant,
-    /// The error of the last attempt.
+    /// When the port was opened again.
+    reopened: Option<Instant>,
+    /// Why it is closed.
     trouble: String,
     clock: Clock,
     sign: LinkSign,
@@ -102,6 +105,7 @@ impl<L> Reopening<L> {
             back_off: BackOff::default(),
             wait: Duration::ZERO,
             not_before: now,
+            reopened: None,
             trouble: String::new(),
             clock: Clock::default(),
             sign: LinkSign(Arc::new(Mutex::new(Shown::Open))),
@@ -154,6 +158,7 @@ impl<L> Reopening<L> {
             match open() {
                 Ok(link) => {
                     self.link = Some(link);
+                    self.reopened = Some(Instant::now());
                     self.sign.show(Shown::Open);
                 }
                 Err(error) => {
@@ -169,10 +174,15 @@ impl<L> Reopening<L> {
         Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
     }
 
-    /// Closes the link. The next call may open it at once.
+    /// Closes the link. The next call may open it at once, unless it was opened again just before: a
+    /// busy device server accepts each connection and closes it.
     pub fn close(&mut self) {
-        self.link = None;
-        self.closed_until(Instant::now());
+        if self.link.take().is_some() {
+            self.trouble = PortError::Closed { port: self.name.to_string() }.to_string();
+        }
+        let now = Instant::now();
+        let earliest = self.reopened.map_or(now, |reopened| reopened + self.back_off.first);
+        self.closed_until(now.max(earliest));
     }
 
     fn postpone(&mut self, error: &PortError) {
@@ -190,10 +200,21 @@ impl<L> Reopening<L> {
 impl<L: 'static> Reopening<L> {
     /// The same port, with another type of link.
     pub fn map<M: 'static>(self, form: fn(L) -> M) -> Reopening<M> {
-        let Reopening { name, link, open, back_off, wait, not_before, trouble, clock, sign } = self;
+        let Reopening {
+            name,
+            link,
+            open,
+            back_off,
+            wait,
+            not_before,
+            reopened,
+            trouble,
+            clock,
+            sign,
+        } = self;
         let link = link.map(form);
         let open = open.map(|mut open| -> Opener<M> { Box::new(move || open().map(form)) });
-        Reopening { name, link, open, back_off, wait, not_before, trouble, clock, sign }
+        Reopening { name, link, open, back_off, wait, not_before, reopened, trouble, clock, sign }
     }
 }
 
@@ -217,5 +238,32 @@ mod tests {
         let attempt = told();
         assert!(attempt.starts_with("there is no CAN interface `can0`"), "{attempt}");
         assert_eq!(told(), attempt);
+    }
+
+    #[test]
+    fn a_port_that_closes_as_soon_as_it_is_open_is_not_opened_again_and_again() {
+        let attempts = Arc::new(Mutex::new(0));
+        let counted = Arc::clone(&attempts);
+        let open: Opener<()> = Box::new(move || {
+            *counted.lock().unwrap() += 1;
+            Ok(())
+        });
+        let hour = Duration::from_secs(3600);
+        let mut port = Reopening::open("tcp:drive", open, BackOff { first: hour, cap: hour })
+            .expect("the first attempt succeeds");
+        port.close();
+        // A link that has worked is replaced at once.
+        assert!(port.link().expect("it is back").1);
+        port.close();
+        for _ in 0..3 {
+            let away = port.link().expect_err("it was just opened").to_string();
+            assert!(away.contains("the far end hung up"), "{away}");
+            // What fails to use it closes it once more.
+            port.close();
+        }
+        assert!(
+            matches!(port.sign().state(), LinkState::Closed { retry_in } if !retry_in.is_zero())
+        );
+        assert_eq!(*attempts.lock().unwrap(), 2);
     }
 }
