@@ -108,7 +108,7 @@ pub fn settings_file(data: &[u8]) {
 }
 
 fn restored<M: Tunable<Error: std::fmt::Debug + std::fmt::Display>>(text: &str, motor: &M) {
-    let file = match SettingsFile::parse(text, motor) {
+    let file = match SettingsFile::parse(text, &motor.tuning()) {
         Ok(file) => file,
         Err(error) => {
             assert!((1..=text.split('\n').count()).contains(&error.line), "{error}");
@@ -127,7 +127,7 @@ fn restored<M: Tunable<Error: std::fmt::Debug + std::fmt::Display>>(text: &str, 
         Err(RestoreError::Undone(undone)) => assert!(undone.is_complete(), "{undone}"),
         Err(_) => {}
     }
-    let own = SettingsFile::parse(&before, motor).expect("it is the text of a motor");
+    let own = SettingsFile::parse(&before, &motor.tuning()).expect("it is the text of a motor");
     let back = Comparison::read(motor, &own).expect("the motor has its settings");
     back.restore(motor, Permissions { rom: true, running: true }, || false)
         .expect("they were its own");

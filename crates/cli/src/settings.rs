@@ -4,8 +4,8 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use motorlink::settings::{
-    self, Cause, Comparison, Difference, Kind, Permissions, Problem, RestoreError, Setting,
-    SettingsFile, Tunable, Undone, Unread,
+    self, Cause, Comparison, Difference, Id, Kind, Permissions, Problem, RestoreError, Setting,
+    SettingsFile, StepError, Tunable, Tuning, Undone, Unread,
 };
 use motorlink_link::printable;
 
@@ -139,11 +139,11 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         self.output.result(format!("{}: {}", self.name(), done.join("; ")), line)
     }
 
-    fn compare(&self, args: &FileArg) -> Result<Comparison<M::Id>, Failure> {
+    fn compare(&self, args: &FileArg) -> Result<Comparison<Id<M>>, Failure> {
         let name = shown(&args.file);
         let text = read(&args.file)
             .map_err(|error| Failure::usage(format!("cannot read `{name}`: {error}")))?;
-        let file = SettingsFile::parse(&text, &self.motor).map_err(|error| {
+        let file = SettingsFile::parse(&text, &self.motor.tuning()).map_err(|error| {
             let failure = Failure::usage(format!("{name}: {error}; nothing was sent"));
             match error.problem {
                 Problem::OtherProfile { file, .. } => {
@@ -154,7 +154,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         })?;
         Comparison::read(&self.motor, &file).map_err(|unread| {
             let names = unread.settings.join(", ");
-            let is_refusal = M::is_refusal(&unread.error);
+            let is_refusal = unread.error.is_refusal();
             let failure = (self.unread)(unread);
             let failure = match names.is_empty() {
                 true => failure,
@@ -170,7 +170,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     }
 
     /// Shows the settings that differ: those of the motor, those of the file.
-    fn show(&self, comparison: &Comparison<M::Id>, args: &FileArg) -> Result<(), Failure> {
+    fn show(&self, comparison: &Comparison<Id<M>>, args: &FileArg) -> Result<(), Failure> {
         let name = shown(&args.file);
         let differences: Vec<Difference> = comparison.differences().collect();
         if self.output.json {
@@ -215,7 +215,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
             RestoreError::Rom { .. } => Failure::usage(text)
                 .trying("add --write-rom to allow it, or remove the lines from the file"),
             RestoreError::Running { .. } => {
-                let stop = format!("`motorlink {} stop`", self.motor.kind().protocol);
+                let stop = format!("`motorlink {} stop`", self.motor.tuning().kind().protocol);
                 Failure::refused(text).trying(format!("stop it first: {stop}; or add --running"))
             }
             RestoreError::Before(error) => error.into().then("nothing was written"),
@@ -226,7 +226,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
 
     /// The failure of a restore that ended early, with the state of the motor.
     fn undone(&self, text: String, undone: Undone<M::Error>, args: &FileArg) -> Failure {
-        let Kind { protocol, .. } = self.motor.kind();
+        let Kind { protocol, .. } = self.motor.tuning().kind();
         let diff =
             format!("`motorlink {protocol} diff {}`", quoted(&args.file.display().to_string()));
         let show = format!("{diff} shows what differs");
@@ -262,7 +262,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     }
 
     fn name(&self) -> String {
-        format!("motor {}", self.motor.kind().motor)
+        format!("motor {}", self.motor.tuning().kind().motor)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Compares the settings of a motor with those of a file.
 
-use super::{Setting, SettingsFile, Tunable, Writing, list};
+use super::procedure::{Line, Procedure};
+use super::{Setting, SettingsFile, Tunable, Tuning, Writing, list};
 
 /// The settings of a motor that a file has, too.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,34 +46,57 @@ pub struct Unread<E> {
     pub error: E,
 }
 
-impl<Id: Copy + PartialEq> Comparison<Id> {
+impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     /// Reads the settings that the file has.
     ///
     /// # Errors
     /// Those of an exchange. The motor does not have a setting of the file.
-    pub fn read<M: Tunable<Id = Id>>(
-        motor: &M,
+    pub fn read<M>(motor: &M, file: &SettingsFile) -> Result<Self, Unread<M::Error>>
+    where
+        M: Tunable<Tuning: Tuning<Id = Id>>,
+    {
+        Self::reading(motor.tuning(), file).run(motor)
+    }
+
+    /// As [`read`](Self::read), in steps.
+    pub fn reading<'a, T, E>(
+        tuning: T,
         file: &SettingsFile,
-    ) -> Result<Self, Unread<M::Error>> {
+    ) -> Procedure<'a, Id, E, Result<Self, Unread<E>>>
+    where
+        T: Tuning<Id = Id> + Send + Sync + 'a,
+        Id: 'a,
+        E: Send + 'a,
+    {
+        let file = file.clone();
+        Procedure::new(|line| async move { Self::ask(&tuning, &line, &file).await })
+    }
+
+    async fn ask<T: Tuning<Id = Id>, E>(
+        tuning: &T,
+        line: &Line<Id, E>,
+        file: &SettingsFile,
+    ) -> Result<Self, Unread<E>> {
         let mut blocks = Vec::new();
-        for block in motor.blocks() {
+        for block in tuning.blocks() {
             let wanted = block.settings.iter().map(|setting| file.digits(setting));
             let wanted: Vec<Option<i64>> = wanted.collect();
             if wanted.iter().all(Option::is_none) {
                 continue;
             }
-            let now = motor.read(block.id).map_err(|error| {
+            let now = line.read(block.id).await.map_err(|error| {
                 let named = block.settings.iter().zip(&wanted).filter(|(_, file)| file.is_some());
                 let settings = named.map(|(setting, _)| setting.name.clone()).collect();
                 Unread { settings, error }
             })?;
             let file: Vec<i64> =
                 wanted.iter().zip(&now).map(|(file, now)| file.unwrap_or(*now)).collect();
-            let expected = motor.expected(block.id, file.clone());
+            let expected = tuning.expected(block.id, file.clone());
             let (id, settings, writing) = (block.id, block.settings, block.writing);
             blocks.push(Compared { id, settings, writing, now, file, expected });
         }
-        motor.confirm().map_err(|error| Unread { settings: Vec::new(), error })?;
+        let confirmed = line.confirm().await;
+        confirmed.map_err(|error| Unread { settings: Vec::new(), error })?;
         Ok(Comparison { blocks })
     }
 

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::file::{MOTOR, PROFILE, SETTINGS};
-use super::{Block, Kind, Setting, Tunable};
+use super::procedure::{Line, Procedure};
+use super::{Block, Kind, Setting, StepError, Tunable, Tuning};
 
 /// The column of comments behind values.
 const COMMENTS: usize = 30;
@@ -26,25 +27,47 @@ pub struct Dump {
 /// # Errors
 /// Those of an exchange. A setting that the motor refuses to read is left out.
 pub fn dump<M: Tunable>(motor: &M) -> Result<Dump, M::Error> {
-    let mut dump =
-        Dump { kind: motor.kind(), identity: motor.identity()?, blocks: vec![], absent: vec![] };
-    for Block { id, settings, heading, .. } in motor.blocks() {
-        match motor.read(id) {
-            Ok(digits) => {
-                let values = settings.into_iter().zip(digits).collect();
-                dump.blocks.push((heading, values));
-            }
-            Err(error) if M::is_refusal(&error) => {
-                dump.absent.extend(settings.into_iter().map(|setting| setting.name));
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    motor.confirm()?;
-    Ok(dump)
+    Dump::reading(motor.tuning()).run(motor)
 }
 
 impl Dump {
+    /// Reads all settings that a motor has, in steps. A setting that the motor refuses to read is left
+    /// out.
+    pub fn reading<'a, T, E>(tuning: T) -> Procedure<'a, T::Id, E, Result<Self, E>>
+    where
+        T: Tuning + Send + Sync + 'a,
+        E: StepError + Send + 'a,
+    {
+        Procedure::new(|line| async move { Dump::read(&tuning, &line).await })
+    }
+
+    async fn read<T: Tuning, E: StepError>(tuning: &T, line: &Line<T::Id, E>) -> Result<Self, E> {
+        let mut dump =
+            Dump { kind: tuning.kind(), identity: vec![], blocks: vec![], absent: vec![] };
+        for number in 0..tuning.identity() {
+            match line.identity(number).await {
+                Ok(text) => dump.identity.extend(text),
+                // Firmware 5.0 does not know the request for its version.
+                Err(error) if error.is_refusal() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        for Block { id, settings, heading, .. } in tuning.blocks() {
+            match line.read(id).await {
+                Ok(digits) => {
+                    let values = settings.into_iter().zip(digits).collect();
+                    dump.blocks.push((heading, values));
+                }
+                Err(error) if error.is_refusal() => {
+                    dump.absent.extend(settings.into_iter().map(|setting| setting.name));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        line.confirm().await?;
+        Ok(dump)
+    }
+
     /// The settings with their digits.
     pub fn values(&self) -> impl Iterator<Item = (&Setting, i64)> {
         let values = self.blocks.iter().flat_map(|(_, values)| values);

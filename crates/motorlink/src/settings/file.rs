@@ -8,7 +8,7 @@ use motorlink_proto::units::Unfit;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::{Kind, Setting, Tunable};
+use super::{Kind, Setting, Tuning};
 
 /// The key of the profile of ST's protocol.
 pub(super) const PROFILE: &str = "profile";
@@ -141,10 +141,10 @@ impl SettingsFile {
     ///
     /// # Errors
     /// The text has another form, or is for another kind of motor.
-    pub fn parse<M: Tunable>(text: &str, motor: &M) -> Result<Self, FileError> {
+    pub fn parse<T: Tuning>(text: &str, tuning: &T) -> Result<Self, FileError> {
         let settings: Vec<Setting> =
-            motor.blocks().into_iter().flat_map(|block| block.settings).collect();
-        Text { text }.settings(&motor.kind(), &settings)
+            tuning.blocks().into_iter().flat_map(|block| block.settings).collect();
+        Text { text }.settings(&tuning.kind(), &settings)
     }
 
     /// The digits of a setting, if the file has it.

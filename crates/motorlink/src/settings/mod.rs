@@ -8,7 +8,7 @@
 //! let motor = client.motor(1)?;
 //! let text = settings::dump(&motor)?.text();
 //!
-//! let file = SettingsFile::parse(&text, &motor)?;
+//! let file = SettingsFile::parse(&text, &motor.tuning())?;
 //! let comparison = Comparison::read(&motor, &file)?;
 //! for difference in comparison.differences() {
 //!     println!("{}: {} becomes {}", difference.setting.name, difference.now, difference.file);
@@ -20,6 +20,7 @@
 mod compare;
 mod dump;
 mod file;
+mod procedure;
 mod restore;
 mod rmd;
 mod st;
@@ -29,8 +30,10 @@ use motorlink_proto::units::Scale;
 pub use compare::{Comparison, Difference, Unread};
 pub use dump::{Dump, dump};
 pub use file::{FileError, Problem, SettingsFile};
+pub use procedure::{Next, Procedure, Step};
 pub use restore::{Cause, Permissions, RestoreError, Undone};
-pub use rmd::RmdBlock;
+pub use rmd::{RmdBlock, RmdTuning};
+pub use st::StTuning;
 
 /// One value of a motor.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,70 +84,99 @@ pub struct Kind {
     pub motor: u8,
 }
 
-/// A motor with settings.
-pub trait Tunable {
+/// What is asked of a motor with one request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ask<Id> {
+    /// A line of what is known of the drive, counted from 0.
+    Identity(u8),
+    /// The digits of a block.
+    Read(Id),
+    /// Writes a block.
+    Write(Id, Vec<i64>),
+    /// Makes a block permanent. It has these digits already.
+    Keep(Id, Vec<i64>),
+    /// What the motor does.
+    Motion,
+}
+
+/// What a reply has for an [`Ask`].
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Answer {
+    /// The digits of a block that was read.
+    pub digits: Vec<i64>,
+    /// The line of an identity. What the motor does, unless it is at rest.
+    pub text: Option<String>,
+}
+
+/// The settings of a kind of motor: what reads and writes them. It sends nothing.
+pub trait Tuning {
     /// Names a block of this protocol.
-    type Id: Copy + PartialEq;
-    /// The error of an exchange.
-    type Error;
+    type Id: Copy + PartialEq + Send + Sync;
+    /// A request of this protocol.
+    type Request;
 
     /// The kind of the motor.
     fn kind(&self) -> Kind;
 
-    /// What is known of the drive, a line each.
-    ///
-    /// # Errors
-    /// Those of an exchange.
-    fn identity(&self) -> Result<Vec<String>, Self::Error>;
+    /// How many lines of what is known of the drive can be asked for.
+    fn identity(&self) -> u8;
 
     /// The blocks of its protocol, in the order of a file. The motor may not have all of them.
     fn blocks(&self) -> Vec<Block<Self::Id>>;
 
-    /// Reads a block, in digits.
-    ///
-    /// # Errors
-    /// Those of an exchange.
-    fn read(&self, block: Self::Id) -> Result<Vec<i64>, Self::Error>;
+    /// The request that asks this.
+    fn request(&self, ask: &Ask<Self::Id>) -> Self::Request;
 
-    /// Checks a write of a block against the limits of the client. Sends nothing.
-    ///
-    /// # Errors
-    /// A limit forbids it.
-    fn check(&self, block: Self::Id, digits: &[i64]) -> Result<(), Self::Error>;
-
-    /// Writes a block.
-    ///
-    /// # Errors
-    /// Those of an exchange.
-    fn write(&self, block: Self::Id, digits: &[i64]) -> Result<(), Self::Error>;
-
-    /// Makes a block permanent. It has these digits already.
-    ///
-    /// # Errors
-    /// Those of an exchange.
-    fn keep(&self, block: Self::Id, digits: &[i64]) -> Result<(), Self::Error>;
+    /// What a reply to that request has; `None` if it is no reply to it.
+    fn answer(&self, ask: &Ask<Self::Id>, reply: &[u8]) -> Option<Answer>;
 
     /// The digits that a motor reads back after these were written.
     fn expected(&self, block: Self::Id, digits: Vec<i64>) -> Vec<i64>;
+}
 
-    /// What the motor does, unless it is at rest.
+/// The error of a step.
+pub trait StepError {
+    /// Whether the motor has refused a block, which was not changed.
+    fn is_refusal(&self) -> bool;
+
+    /// Whether it is that of the line: the request may have been carried out.
+    fn is_line_failure(&self) -> bool;
+
+    /// Whether the caller wants an end, as after Ctrl-C. The request may have been carried out.
+    fn is_interruption(&self) -> bool;
+}
+
+/// A motor with settings, whose exchanges wait.
+pub trait Tunable {
+    /// Its settings.
+    type Tuning: Tuning + Send + Sync;
+    /// The error of an exchange.
+    type Error: StepError + Send;
+
+    /// Its settings.
+    fn tuning(&self) -> Self::Tuning;
+
+    /// One exchange.
     ///
     /// # Errors
     /// Those of an exchange.
-    fn motion(&self) -> Result<Option<String>, Self::Error>;
+    fn ask(&self, ask: &Ask<Id<Self>>) -> Result<Answer, Self::Error>;
+
+    /// Checks a request against the limits of the client. Sends nothing.
+    ///
+    /// # Errors
+    /// A limit forbids it.
+    fn check(&self, ask: &Ask<Id<Self>>) -> Result<(), Self::Error>;
 
     /// Checks that replies and requests match.
     ///
     /// # Errors
     /// What was read or acknowledged since the last confirmation cannot be trusted.
     fn confirm(&self) -> Result<(), Self::Error>;
-
-    /// Whether the motor has refused a block, which was not changed.
-    fn is_refusal(error: &Self::Error) -> bool;
-
-    /// Whether an error is that of the line: the request may have been carried out.
-    fn is_line_failure(error: &Self::Error) -> bool;
 }
+
+/// The name of a block of a motor.
+pub type Id<M> = <<M as Tunable>::Tuning as Tuning>::Id;
 
 impl Setting {
     /// A value with as many decimals as its digits have, without the unit.

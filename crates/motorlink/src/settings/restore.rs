@@ -5,7 +5,8 @@ use std::fmt;
 use motorlink_proto::st::VERIFY_ATTEMPTS;
 
 use super::compare::Compared;
-use super::{Comparison, Tunable, Writing, list};
+use super::procedure::{Line, Procedure};
+use super::{Comparison, StepError, Tunable, Tuning, Writing, list};
 
 /// What a restore may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -105,44 +106,40 @@ enum Failed<E> {
     Differs(Vec<i64>),
 }
 
-impl<Id: Copy + PartialEq> Comparison<Id> {
+impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     /// Writes the settings that differ, reads each back, and returns when the motor has all of them. With
     /// [`Permissions::rom`] gains are made permanent at the end, also if they did not differ: the values in
     /// ROM cannot be read. `is_interrupted` ends the restore before the next write.
     ///
     /// # Errors
     /// Nothing was written, or the old values were written again, as far as the line allowed.
-    pub fn restore<M: Tunable<Id = Id>>(
+    pub fn restore<M>(
         &self,
         motor: &M,
         permissions: Permissions,
-        mut is_interrupted: impl FnMut() -> bool,
-    ) -> Result<(), RestoreError<M::Error>> {
-        self.check(motor, permissions)?;
-        let mut restoring = Restoring { motor, written: Vec::new() };
-        let undone = |restoring: Restoring<'_, M>, cause| {
-            Err(RestoreError::Undone(Box::new(restoring.undo(cause))))
-        };
-        for block in self.blocks.iter().filter(|block| block.differs()) {
-            if is_interrupted() {
-                return undone(restoring, Cause::Interrupted);
-            }
-            if let Err(cause) = restoring.write(block) {
-                return undone(restoring, cause);
-            }
-        }
-        for block in self.to_keep(permissions) {
-            if is_interrupted() {
-                return undone(restoring, Cause::Interrupted);
-            }
-            if let Err(cause) = restoring.keep(block) {
-                let mut undone = restoring.undo(cause);
-                let names = block.settings.iter().map(|setting| setting.name.clone());
-                undone.unknown_in_rom = names.collect();
-                return Err(RestoreError::Undone(Box::new(undone)));
-            }
-        }
-        Ok(())
+        is_interrupted: impl FnMut() -> bool + Send,
+    ) -> Result<(), RestoreError<M::Error>>
+    where
+        M: Tunable<Tuning: Tuning<Id = Id>>,
+    {
+        self.restoring(permissions, is_interrupted).run(motor)
+    }
+
+    /// As [`restore`](Self::restore), in steps.
+    pub fn restoring<'a, E: StepError + Send + 'a>(
+        &self,
+        permissions: Permissions,
+        is_interrupted: impl FnMut() -> bool + Send + 'a,
+    ) -> Procedure<'a, Id, E, Result<(), RestoreError<E>>>
+    where
+        Id: 'a,
+    {
+        let comparison = self.clone();
+        Procedure::new(|line| async move {
+            comparison.checked(&line, permissions).await?;
+            let restoring = Restoring { line: &line, written: Vec::new() };
+            restoring.all(&comparison, permissions, is_interrupted).await
+        })
     }
 
     /// The names of the settings that [`restore`](Self::restore) makes permanent by a request of its own,
@@ -163,11 +160,34 @@ impl<Id: Copy + PartialEq> Comparison<Id> {
     ///
     /// # Errors
     /// Those of `restore`, except [`RestoreError::Undone`].
-    pub fn check<M: Tunable<Id = Id>>(
+    pub fn check<M>(
         &self,
         motor: &M,
         permissions: Permissions,
-    ) -> Result<(), RestoreError<M::Error>> {
+    ) -> Result<(), RestoreError<M::Error>>
+    where
+        M: Tunable<Tuning: Tuning<Id = Id>>,
+    {
+        self.checking(permissions).run(motor)
+    }
+
+    /// As [`check`](Self::check), in steps.
+    pub fn checking<'a, E: Send + 'a>(
+        &self,
+        permissions: Permissions,
+    ) -> Procedure<'a, Id, E, Result<(), RestoreError<E>>>
+    where
+        Id: 'a,
+    {
+        let comparison = self.clone();
+        Procedure::new(|line| async move { comparison.checked(&line, permissions).await })
+    }
+
+    async fn checked<E>(
+        &self,
+        line: &Line<Id, E>,
+        permissions: Permissions,
+    ) -> Result<(), RestoreError<E>> {
         let differing = || self.blocks.iter().filter(|block| block.differs());
         let fixed = self.differences().find(|difference| difference.writing == Writing::Fixed);
         if let Some(difference) = fixed {
@@ -182,14 +202,16 @@ impl<Id: Copy + PartialEq> Comparison<Id> {
             return Err(RestoreError::Rom { settings });
         }
         for block in differing() {
-            motor.check(block.id, &block.file).map_err(RestoreError::Before)?;
+            let checked = line.check(block.id, block.file.clone()).await;
+            checked.map_err(RestoreError::Before)?;
         }
         let is_idle = differing().next().is_none() && self.to_keep(permissions).next().is_none();
         if permissions.running || is_idle {
             return Ok(());
         }
-        let motion = motor.motion().and_then(|motion| motor.confirm().map(|()| motion));
-        match motion.map_err(RestoreError::Before)? {
+        let motion = line.motion().await.map_err(RestoreError::Before)?;
+        line.confirm().await.map_err(RestoreError::Before)?;
+        match motion {
             Some(motion) => Err(RestoreError::Running { motion }),
             None => Ok(()),
         }
@@ -197,16 +219,45 @@ impl<Id: Copy + PartialEq> Comparison<Id> {
 }
 
 /// A restore in progress.
-struct Restoring<'a, M: Tunable> {
-    motor: &'a M,
+struct Restoring<'a, Id, E> {
+    line: &'a Line<Id, E>,
     /// Blocks that do not have their old values, in the order of the writes.
-    written: Vec<&'a Compared<M::Id>>,
+    written: Vec<&'a Compared<Id>>,
 }
 
-impl<'a, M: Tunable> Restoring<'a, M> {
-    fn write(&mut self, block: &'a Compared<M::Id>) -> Result<(), Cause<M::Error>> {
+impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> {
+    async fn all(
+        mut self,
+        comparison: &'a Comparison<Id>,
+        permissions: Permissions,
+        mut is_interrupted: impl FnMut() -> bool,
+    ) -> Result<(), RestoreError<E>> {
+        for block in comparison.blocks.iter().filter(|block| block.differs()) {
+            if is_interrupted() {
+                return Err(self.undo(Cause::Interrupted).await.into());
+            }
+            if let Err(cause) = self.write(block).await {
+                return Err(self.undo(cause).await.into());
+            }
+        }
+        for block in comparison.to_keep(permissions) {
+            if is_interrupted() {
+                return Err(self.undo(Cause::Interrupted).await.into());
+            }
+            if let Err(cause) = self.keep(block).await {
+                let mut undone = self.undo(cause).await;
+                let names = block.settings.iter().map(|setting| setting.name.clone());
+                undone.unknown_in_rom = names.collect();
+                return Err(undone.into());
+            }
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, block: &'a Compared<Id>) -> Result<(), Cause<E>> {
         self.written.push(block);
-        self.set(block, &block.file, &block.expected).map_err(|failed| match failed {
+        let set = self.set(block, &block.file, &block.expected).await;
+        set.map_err(|failed| match failed {
             Failed::Refused(error) => {
                 self.written.pop();
                 Cause::Exchange { settings: block.names(), error }
@@ -225,11 +276,11 @@ impl<'a, M: Tunable> Restoring<'a, M> {
     }
 
     /// Makes a block permanent.
-    fn keep(&self, block: &Compared<M::Id>) -> Result<(), Cause<M::Error>> {
-        let mut kept = self.motor.keep(block.id, &block.file);
+    async fn keep(&self, block: &Compared<Id>) -> Result<(), Cause<E>> {
+        let mut kept = self.line.keep(block.id, block.file.clone()).await;
         for _ in 1..VERIFY_ATTEMPTS {
-            if kept.as_ref().is_err_and(M::is_line_failure) {
-                kept = self.motor.keep(block.id, &block.file);
+            if kept.as_ref().is_err_and(E::is_line_failure) {
+                kept = self.line.keep(block.id, block.file.clone()).await;
             }
         }
         let names = block.settings.iter().map(|setting| setting.name.clone()).collect();
@@ -238,34 +289,34 @@ impl<'a, M: Tunable> Restoring<'a, M> {
 
     /// Writes a block until it reads back as `expected`. A ROM is not written again if the motor has
     /// acknowledged the write and has another value.
-    fn set(
+    async fn set(
         &self,
-        block: &Compared<M::Id>,
+        block: &Compared<Id>,
         digits: &[i64],
         expected: &[i64],
-    ) -> Result<(), Failed<M::Error>> {
+    ) -> Result<(), Failed<E>> {
         let id = block.id;
         for attempt in 1.. {
-            let written = self.motor.write(id, digits);
+            let written = self.line.write(id, digits.to_vec()).await;
             let is_acknowledged = written.is_ok();
             match written {
-                Err(error) if M::is_refusal(&error) && attempt == 1 => {
+                Err(error) if error.is_refusal() && attempt == 1 => {
                     return Err(Failed::Refused(error));
                 }
-                Err(error) if !M::is_line_failure(&error) => return Err(Failed::Exchange(error)),
+                Err(error) if !error.is_line_failure() => return Err(Failed::Exchange(error)),
                 // A write without an acknowledge may have been carried out.
                 _ => {}
             }
-            let (failed, is_final) = match self.motor.read(id) {
+            let (failed, is_final) = match self.line.read(id).await {
                 Ok(read) if read == expected => {
-                    return self.motor.confirm().map_err(Failed::Exchange);
+                    return self.line.confirm().await.map_err(Failed::Exchange);
                 }
                 Ok(read) => {
                     let is_final = is_acknowledged && block.writing == Writing::Permanent;
                     (Failed::Differs(read), is_final)
                 }
                 Err(error) => {
-                    let is_final = !M::is_line_failure(&error);
+                    let is_final = !error.is_line_failure();
                     (Failed::Exchange(error), is_final)
                 }
             };
@@ -277,7 +328,7 @@ impl<'a, M: Tunable> Restoring<'a, M> {
     }
 
     /// Writes the old values again, in the reverse order.
-    fn undo(self, cause: Cause<M::Error>) -> Undone<M::Error> {
+    async fn undo(self, cause: Cause<E>) -> Undone<E> {
         let mut undone = Undone {
             cause,
             rolled_back: Vec::new(),
@@ -293,7 +344,7 @@ impl<'a, M: Tunable> Restoring<'a, M> {
                 undone.changed.splice(0..0, block.names());
                 continue;
             }
-            let error = match self.set(block, &block.now, &block.now) {
+            let error = match self.set(block, &block.now, &block.now).await {
                 Ok(()) => {
                     undone.rolled_back.splice(0..0, block.names());
                     continue;
@@ -301,11 +352,18 @@ impl<'a, M: Tunable> Restoring<'a, M> {
                 Err(Failed::Differs(_)) => None,
                 Err(Failed::Refused(error) | Failed::Exchange(error)) => Some(error),
             };
-            is_lost = error.as_ref().is_some_and(M::is_line_failure);
+            let ends = |error: &E| error.is_line_failure() || error.is_interruption();
+            is_lost = error.as_ref().is_some_and(ends);
             undone.unknown.splice(0..0, block.names());
             undone.rollback_error = undone.rollback_error.or(error);
         }
         undone
+    }
+}
+
+impl<E> From<Undone<E>> for RestoreError<E> {
+    fn from(undone: Undone<E>) -> Self {
+        RestoreError::Undone(Box::new(undone))
     }
 }
 

@@ -1,11 +1,12 @@
 //! Settings of RMD motors: gains, acceleration limit, encoder offset.
 
 use motorlink_proto::rmd::{
-    Acceleration, EncoderOffset, Payload, Pid, WriteAccelerationRam, WriteEncoderOffsetRom,
-    WritePidRam, WritePidRom,
+    Acceleration, Command, Encoder, EncoderOffset, MotionStatus, MotorId, Payload, Pid,
+    ReadAcceleration, ReadEncoder, ReadMotionStatus, ReadPid, WriteAccelerationRam,
+    WriteEncoderOffsetRom, WritePidRam, WritePidRom,
 };
 
-use super::{Block, Kind, Setting, Tunable, Writing};
+use super::{Answer, Ask, Block, Kind, Setting, StepError, Tunable, Tuning, Writing};
 use crate::rmd::{Error, Motor};
 
 /// What one request of an RMD motor writes.
@@ -19,17 +20,24 @@ pub enum RmdBlock {
     EncoderOffset,
 }
 
-impl Tunable for Motor<'_> {
+/// The settings of an RMD motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RmdTuning {
+    /// The motor.
+    pub motor: MotorId,
+}
+
+impl Tuning for RmdTuning {
     type Id = RmdBlock;
-    type Error = Error;
+    type Request = [u8; 8];
 
     fn kind(&self) -> Kind {
-        Kind { protocol: "rmd", profile: None, motor: self.id().number() }
+        Kind { protocol: "rmd", profile: None, motor: self.motor.number() }
     }
 
-    /// Nothing: a motor of V1.62 has no name that can be read.
-    fn identity(&self) -> Result<Vec<String>, Error> {
-        Ok(Vec::new())
+    /// None: a motor of V1.62 has no name that can be read.
+    fn identity(&self) -> u8 {
+        0
     }
 
     fn blocks(&self) -> Vec<Block<RmdBlock>> {
@@ -55,55 +63,81 @@ impl Tunable for Motor<'_> {
         ]
     }
 
-    fn read(&self, block: RmdBlock) -> Result<Vec<i64>, Error> {
-        Ok(match block {
-            RmdBlock::Gains => digits(&self.pid()?),
-            RmdBlock::Acceleration => digits(&Acceleration { acceleration: self.acceleration()? }),
-            RmdBlock::EncoderOffset => digits(&EncoderOffset { offset: self.encoder()?.offset }),
-        })
-    }
-
-    /// Nothing: no limit of the client is about settings.
-    fn check(&self, _: RmdBlock, _: &[i64]) -> Result<(), Error> {
-        Ok(())
-    }
-
-    fn write(&self, block: RmdBlock, digits: &[i64]) -> Result<(), Error> {
-        match block {
-            RmdBlock::Gains => self.ask(WritePidRam(payload(digits))).map(drop),
-            RmdBlock::Acceleration => self.ask(WriteAccelerationRam(payload(digits))).map(drop),
-            RmdBlock::EncoderOffset => self.ask(WriteEncoderOffsetRom(payload(digits))).map(drop),
+    fn request(&self, ask: &Ask<RmdBlock>) -> [u8; 8] {
+        match ask {
+            Ask::Read(RmdBlock::Gains) => ReadPid.encode(),
+            Ask::Read(RmdBlock::Acceleration) => ReadAcceleration.encode(),
+            Ask::Read(RmdBlock::EncoderOffset) => ReadEncoder.encode(),
+            Ask::Write(RmdBlock::Gains, digits) => WritePidRam(payload(digits)).encode(),
+            Ask::Keep(RmdBlock::Gains, digits) => WritePidRom(payload(digits)).encode(),
+            Ask::Write(RmdBlock::Acceleration, digits)
+            | Ask::Keep(RmdBlock::Acceleration, digits) => {
+                WriteAccelerationRam(payload(digits)).encode()
+            }
+            Ask::Write(RmdBlock::EncoderOffset, digits)
+            | Ask::Keep(RmdBlock::EncoderOffset, digits) => {
+                WriteEncoderOffsetRom(payload(digits)).encode()
+            }
+            Ask::Motion | Ask::Identity(_) => ReadMotionStatus.encode(),
         }
     }
 
-    fn keep(&self, block: RmdBlock, digits: &[i64]) -> Result<(), Error> {
-        match block {
-            RmdBlock::Gains => self.ask(WritePidRom(payload(digits))).map(drop),
-            RmdBlock::Acceleration | RmdBlock::EncoderOffset => Ok(()),
-        }
+    fn answer(&self, ask: &Ask<RmdBlock>, reply: &[u8]) -> Option<Answer> {
+        let reply = reply.try_into().ok()?;
+        let digits = match ask {
+            Ask::Read(RmdBlock::Gains) => digits(&Pid::decode(&reply)),
+            Ask::Read(RmdBlock::Acceleration) => digits(&Acceleration::decode(&reply)),
+            Ask::Read(RmdBlock::EncoderOffset) => {
+                digits(&EncoderOffset { offset: Encoder::decode(&reply).offset })
+            }
+            _ => Vec::new(),
+        };
+        // A motor that holds its angle is at rest, too: the protocol cannot read what it was commanded.
+        let speed = (*ask == Ask::Motion).then(|| MotionStatus::decode(&reply).speed);
+        let speed = speed.filter(|speed| speed.0 != 0);
+        Some(Answer { digits, text: speed.map(|speed| format!("turns at {speed}")) })
     }
 
     fn expected(&self, _: RmdBlock, digits: Vec<i64>) -> Vec<i64> {
         digits
     }
+}
 
-    /// A motor that holds its angle is at rest, too: the protocol cannot read what it was commanded.
-    fn motion(&self) -> Result<Option<String>, Error> {
-        let speed = self.motion_status()?.speed;
-        Ok((speed.0 != 0).then(|| format!("turns at {speed}")))
+impl Tunable for Motor<'_> {
+    type Tuning = RmdTuning;
+    type Error = Error;
+
+    fn tuning(&self) -> RmdTuning {
+        RmdTuning { motor: self.id() }
+    }
+
+    fn ask(&self, ask: &Ask<RmdBlock>) -> Result<Answer, Error> {
+        let reply = self.bus().raw(self.id(), self.tuning().request(ask))?;
+        Ok(self.tuning().answer(ask, &reply).unwrap_or_default())
+    }
+
+    /// Nothing: no limit of the client is about settings.
+    fn check(&self, _: &Ask<RmdBlock>) -> Result<(), Error> {
+        Ok(())
     }
 
     fn confirm(&self) -> Result<(), Error> {
         self.bus().confirm(self.id())
     }
+}
 
+impl StepError for Error {
     /// Never: a motor that does not know a command is silent.
-    fn is_refusal(_: &Error) -> bool {
+    fn is_refusal(&self) -> bool {
         false
     }
 
-    fn is_line_failure(error: &Error) -> bool {
-        error.is_line_failure()
+    fn is_line_failure(&self) -> bool {
+        self.is_line_failure()
+    }
+
+    fn is_interruption(&self) -> bool {
+        matches!(self, Error::Port(error) if error.is_interruption())
     }
 }
 

@@ -1,12 +1,14 @@
 //! Settings of ST drives: registers and the phases of the rev-up.
 
+use motorlink_link::printable;
 use motorlink_proto::st::register::Unit;
 use motorlink_proto::st::{
-    ErrorCode, Feature, Request, RevupPhase, Setting as Id, Status, VerifiedWrite,
+    BoardInfo, ErrorCode, Feature, FirmwareVersion, MotorNumber, OwnedRequest, Profile, RegisterId,
+    Request, RevupPhase, Setting as Id, Status, VerifiedWrite,
 };
 use motorlink_proto::units::Scale;
 
-use super::{Block, Kind, Setting, Tunable, Writing};
+use super::{Answer, Ask, Block, Kind, Setting, StepError, Tunable, Tuning, Writing};
 use crate::st::{Error, Motor};
 
 /// The heading of the phases of the rev-up.
@@ -16,107 +18,143 @@ const DIVISORS: &str = "Divisors of the gains, of the firmware; they cannot be w
 /// The heading of registers that every drive has.
 const CORE: &str = "Registers of every drive";
 
-impl Tunable for Motor<'_> {
+/// The settings of a motor of an ST drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StTuning {
+    /// The motor.
+    pub motor: MotorNumber,
+    /// The profile of the drive.
+    pub profile: Profile,
+}
+
+impl Tuning for StTuning {
     type Id = Id;
-    type Error = Error;
+    /// The number of a motor, 0 for the drive, and the message to it.
+    type Request = (u8, OwnedRequest);
 
     fn kind(&self) -> Kind {
-        let profile = Some(self.client().profile().name());
-        Kind { protocol: "st", profile, motor: self.number().number() }
+        let profile = Some(self.profile.name());
+        Kind { protocol: "st", profile, motor: self.motor.number() }
     }
 
-    fn identity(&self) -> Result<Vec<String>, Error> {
-        let board = self.client().board_info()?;
-        let [major, minor, patch] = board.version;
-        let mut lines = vec![format!("board: {} {major}.{minor}.{patch}", board.name)];
-        match self.client().firmware_version() {
-            Ok(firmware) => lines.push(format!("firmware: {} {}", firmware.name, firmware.version)),
-            // Firmware 5.0 does not know the frame code.
-            Err(error) if error.is_refusal() => {}
-            Err(error) => return Err(error),
-        }
-        Ok(lines)
+    /// The board, and the firmware.
+    fn identity(&self) -> u8 {
+        2
     }
 
     fn blocks(&self) -> Vec<Block<Id>> {
-        Id::all(self.client().profile()).map(|id| self.block(id)).collect()
+        Id::all(self.profile).map(|id| self.block(id)).collect()
     }
 
-    fn read(&self, block: Id) -> Result<Vec<i64>, Error> {
-        Ok(match block {
-            Id::Register(register) => vec![self.get_raw(register)?.into()],
-            Id::RevupPhase(phase) => digits(self.revup_data(phase)?),
+    fn request(&self, ask: &Ask<Id>) -> (u8, OwnedRequest) {
+        let bytes;
+        let request = match ask {
+            Ask::Identity(0) => return (0, Request::GetBoardInfo.into()),
+            Ask::Identity(_) => return (0, Request::GetFirmwareVersion.into()),
+            Ask::Motion => Request::GetRegister(RegisterId::STATUS),
+            Ask::Read(Id::Register(register)) => Request::GetRegister(*register),
+            Ask::Read(Id::RevupPhase(phase)) => Request::GetRevupData(*phase),
+            // No setting of ST's protocol is permanent.
+            Ask::Write(Id::Register(register), digits)
+            | Ask::Keep(Id::Register(register), digits) => {
+                bytes = bits(digits).to_le_bytes();
+                let size = usize::from(register.write_size(self.profile));
+                Request::SetRegister { register: *register, value: &bytes[..size.min(bytes.len())] }
+            }
+            Ask::Write(Id::RevupPhase(phase), digits)
+            | Ask::Keep(Id::RevupPhase(phase), digits) => {
+                Request::SetRevupData(*phase, revup(digits))
+            }
+        };
+        (self.motor.number(), request.into())
+    }
+
+    fn answer(&self, ask: &Ask<Id>, reply: &[u8]) -> Option<Answer> {
+        let text = |text| Answer { text, ..Answer::default() };
+        let read = |digits| Answer { digits, ..Answer::default() };
+        Some(match ask {
+            Ask::Identity(0) => {
+                let board = BoardInfo::decode(reply)?;
+                let ([major, minor, patch], name) = (board.version, printable(board.name));
+                text(Some(format!("board: {name} {major}.{minor}.{patch}")))
+            }
+            Ask::Identity(_) => {
+                let firmware = FirmwareVersion::decode(reply);
+                let [name, version] = [firmware.name, firmware.version].map(printable);
+                text(Some(format!("firmware: {name} {version}")))
+            }
+            Ask::Motion => {
+                let state = Status::from(RegisterId::STATUS.decode(self.profile, reply)? as u8);
+                text((!is_at_rest(state)).then(|| format!("is in {state}")))
+            }
+            Ask::Read(Id::Register(register)) => {
+                read(vec![register.decode(self.profile, reply)?.into()])
+            }
+            Ask::Read(Id::RevupPhase(_)) => read(digits(RevupPhase::decode(reply)?)),
+            Ask::Write(..) | Ask::Keep(..) => Answer::default(),
         })
     }
 
-    fn check(&self, block: Id, digits: &[i64]) -> Result<(), Error> {
-        let number = self.number().number();
-        match block {
-            Id::Register(register) => {
-                let bytes = bits(digits).to_le_bytes();
-                let size = usize::from(register.write_size(self.client().profile()));
-                let value = &bytes[..size.min(bytes.len())];
-                self.client().check(number, &Request::SetRegister { register, value })
-            }
-            Id::RevupPhase(phase) => {
-                self.client().check(number, &Request::SetRevupData(phase, revup(digits)))
-            }
-        }
-    }
-
-    fn write(&self, block: Id, digits: &[i64]) -> Result<(), Error> {
-        match block {
-            Id::Register(register) => {
-                let size = register.write_size(self.client().profile());
-                self.set_raw(register, bits(digits), size)
-            }
-            Id::RevupPhase(phase) => self.set_revup_data(phase, revup(digits)),
-        }
-    }
-
-    /// Nothing: no setting of ST's protocol is permanent.
-    fn keep(&self, _: Id, _: &[i64]) -> Result<(), Error> {
-        Ok(())
-    }
-
     fn expected(&self, block: Id, written: Vec<i64>) -> Vec<i64> {
-        let profile = self.client().profile();
         match block {
             Id::Register(register) => {
-                match VerifiedWrite::new::<()>(profile, register, bits(&written)) {
+                match VerifiedWrite::new::<()>(self.profile, register, bits(&written)) {
                     Ok(write) => vec![write.expected().into()],
                     // A divisor, which is never written.
                     Err(_) => written,
                 }
             }
-            Id::RevupPhase(_) => digits(revup(&written).expected(profile)),
+            Id::RevupPhase(_) => digits(revup(&written).expected(self.profile)),
         }
     }
+}
 
-    fn motion(&self) -> Result<Option<String>, Error> {
-        let status = self.status()?;
-        let is_at_rest =
-            matches!(status, Status::Idle | Status::FaultNow | Status::FaultOver | Status::IclWait);
-        Ok((!is_at_rest).then(|| format!("is in {status}")))
+/// Whether new settings cannot change how a motor moves.
+fn is_at_rest(state: Status) -> bool {
+    matches!(state, Status::Idle | Status::FaultNow | Status::FaultOver | Status::IclWait)
+}
+
+impl Tunable for Motor<'_> {
+    type Tuning = StTuning;
+    type Error = Error;
+
+    fn tuning(&self) -> StTuning {
+        StTuning { motor: self.number(), profile: self.client().profile() }
+    }
+
+    fn ask(&self, ask: &Ask<Id>) -> Result<Answer, Error> {
+        let tuning = self.tuning();
+        let (motor, request) = tuning.request(ask);
+        self.client().exchange(motor, &request.request(), |reply| tuning.answer(ask, reply))
+    }
+
+    fn check(&self, ask: &Ask<Id>) -> Result<(), Error> {
+        let (motor, request) = self.tuning().request(ask);
+        self.client().check(motor, &request.request())
     }
 
     fn confirm(&self) -> Result<(), Error> {
         self.client().confirm()
     }
+}
 
-    fn is_refusal(error: &Error) -> bool {
-        matches!(error, Error::Refused { code, .. } if *code != ErrorCode::BadMotorSelected)
+impl StepError for Error {
+    fn is_refusal(&self) -> bool {
+        matches!(self, Error::Refused { code, .. } if *code != ErrorCode::BadMotorSelected)
     }
 
-    fn is_line_failure(error: &Error) -> bool {
-        error.is_line_failure()
+    fn is_line_failure(&self) -> bool {
+        self.is_line_failure()
+    }
+
+    fn is_interruption(&self) -> bool {
+        matches!(self, Error::Port(error) if error.is_interruption())
     }
 }
 
-impl Motor<'_> {
+impl StTuning {
     /// A block with its names.
     fn block(&self, id: Id) -> Block<Id> {
-        let profile = self.client().profile();
         let (settings, heading, writing) = match id {
             Id::Register(register) => {
                 let (shape, text) = (register.shape(), register.text());
@@ -128,7 +166,7 @@ impl Motor<'_> {
                 };
                 let setting = Setting {
                     name: register.to_string(),
-                    scale: register.scale(profile).expect("settings are integers"),
+                    scale: register.scale(self.profile).expect("settings are integers"),
                     doc: text.map_or("", |text| text.doc),
                 };
                 let writing = if is_divisor { Writing::Fixed } else { Writing::Volatile };

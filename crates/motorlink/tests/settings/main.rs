@@ -72,7 +72,7 @@ fn restore<M>(motor: &M, text: &str, permissions: Permissions) -> Result<(), Res
 where
     M: Tunable<Error: Debug>,
 {
-    let file = SettingsFile::parse(text, motor).unwrap();
+    let file = SettingsFile::parse(text, &motor.tuning()).unwrap();
     Comparison::read(motor, &file).unwrap().restore(motor, permissions, || false)
 }
 
@@ -125,7 +125,7 @@ fn only_what_differs_is_written() {
     let bench = bench();
     let (client, sent) = st(&bench, Cut::Never);
     let motor = client.motor(1).unwrap();
-    let file = SettingsFile::parse(&text(&motor), &motor).unwrap();
+    let file = SettingsFile::parse(&text(&motor), &motor.tuning()).unwrap();
     let comparison = Comparison::read(&motor, &file).unwrap();
     assert_eq!(comparison.differences().count(), 0);
     let before = sent.load(Ordering::Relaxed);
@@ -133,7 +133,7 @@ fn only_what_differs_is_written() {
     assert_eq!(sent.load(Ordering::Relaxed), before);
 
     let other = changed(&text(&motor), &[("SPEED_KP", 5)]);
-    let file = SettingsFile::parse(&other, &motor).unwrap();
+    let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
     let comparison = Comparison::read(&motor, &file).unwrap();
     let names: Vec<_> =
         comparison.differences().map(|one| (&*one.setting.name, one.file)).collect();
@@ -220,7 +220,7 @@ fn a_file_of_another_drive_is_not_restored() {
     // Motor 2 has no flux weakening.
     let motor = client.motor(2).unwrap();
     let text = before.replace("motor = 1", "motor = 2");
-    let file = SettingsFile::parse(&text, &motor).unwrap();
+    let file = SettingsFile::parse(&text, &motor.tuning()).unwrap();
     let unread = Comparison::read(&motor, &file).unwrap_err();
     assert_eq!(unread.settings, ["OBSERVER_C1"]);
     assert!(unread.error.is_refusal());
@@ -247,7 +247,7 @@ fn an_interrupted_restore_puts_the_old_values_back() {
     let motor = client.motor(1).unwrap();
     let before = text(&motor);
     let other = changed(&before, &[("SPEED_KP", 5), ("SPEED_KI", 6), ("FF_2", 7)]);
-    let file = SettingsFile::parse(&other, &motor).unwrap();
+    let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
     for writes in 0..3 {
         let comparison = Comparison::read(&motor, &file).unwrap();
         let mut asked = 0;
@@ -271,7 +271,7 @@ fn a_value_that_the_motor_does_not_take_is_rolled_back() {
     let before = text(&motor);
     // More counts than the encoder has.
     let other = changed(&before, &[("speed_kp", 9), ("encoder_offset", 60_000)]);
-    let file = SettingsFile::parse(&other, &motor).unwrap();
+    let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
     let comparison = Comparison::read(&motor, &file).unwrap();
     let requests = sent.load(Ordering::Relaxed);
     let undone = undone(comparison.restore(&motor, ROM, || false));
@@ -323,7 +323,7 @@ fn an_st_drive_is_as_the_error_says_wherever_the_line_is_cut() {
             let few = only(&before.text(), &file);
             let (cut, _) = st(&bench, lost(at));
             let motor_cut = cut.motor(1).unwrap();
-            let settings = SettingsFile::parse(&few, &motor_cut).unwrap();
+            let settings = SettingsFile::parse(&few, &motor_cut.tuning()).unwrap();
             let Ok(comparison) = Comparison::read(&motor_cut, &settings) else { continue };
             let result = comparison.restore(&motor_cut, RAM, || false);
             let real = |name: &str| value(&motor, name);
@@ -361,7 +361,7 @@ fn an_st_drive_is_restored_although_one_request_or_reply_is_lost() {
             let few = only(&text(&motor), &[("SPEED_KP", 5), ("FF_2", 7)]);
             let (cut, _) = st(&bench, lost(at));
             let motor_cut = cut.motor(1).unwrap();
-            let settings = SettingsFile::parse(&few, &motor_cut).unwrap();
+            let settings = SettingsFile::parse(&few, &motor_cut.tuning()).unwrap();
             let Ok(comparison) = Comparison::read(&motor_cut, &settings) else { continue };
             let before = (value(&motor, "SPEED_KP"), value(&motor, "FF_2"));
             let expected = match comparison.restore(&motor_cut, RAM, || false) {
@@ -394,7 +394,7 @@ fn an_rmd_motor_is_as_the_error_says_wherever_the_bus_is_cut() {
             let (cut, _) = rmd(&bench, lost(at));
             let motor_cut = cut.motor(1).unwrap();
             let settings =
-                SettingsFile::parse(&changed(&before.text(), &file), &motor_cut).unwrap();
+                SettingsFile::parse(&changed(&before.text(), &file), &motor_cut.tuning()).unwrap();
             let Ok(comparison) = Comparison::read(&motor_cut, &settings) else { continue };
             let result = comparison.restore(&motor_cut, ROM, || false);
             // A late reply to the cut host must not be matched to a question of this one.
@@ -431,7 +431,7 @@ where
 {
     let before = dump(motor).unwrap();
     let old = |name: &str| before.values().find(|(setting, _)| setting.name == name).unwrap().1;
-    let settings = SettingsFile::parse(&only(&before.text(), file), bad).unwrap();
+    let settings = SettingsFile::parse(&only(&before.text(), file), &bad.tuning()).unwrap();
     let result = Comparison::read(bad, &settings).ok()?.restore(bad, ROM, || false);
     wait();
     let real = |name: &str| value(motor, name);

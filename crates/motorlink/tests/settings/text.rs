@@ -1,6 +1,6 @@
 //! The text of a file, and errors with their line.
 
-use motorlink::settings::{FileError, Problem, SettingsFile};
+use motorlink::settings::{FileError, Problem, SettingsFile, Tunable};
 
 use super::{bench, rmd, st, text};
 use crate::cut::Cut;
@@ -9,7 +9,8 @@ use crate::cut::Cut;
 fn st_error(text: &str) -> FileError {
     let bench = bench();
     let (client, _) = st(&bench, Cut::Never);
-    SettingsFile::parse(text, &client.motor(1).unwrap()).unwrap_err()
+    let motor = client.motor(1).unwrap();
+    SettingsFile::parse(text, &motor.tuning()).unwrap_err()
 }
 
 /// The same with these lines of settings.
@@ -127,7 +128,7 @@ fn an_rmd_acceleration_is_checked_as_on_the_command_line() {
     let motor = client.motor(1).unwrap();
     let why = |line: &str| {
         let text = format!("[rmd]\n[rmd.settings]\n{line}\n");
-        SettingsFile::parse(&text, &motor).unwrap_err().to_string()
+        SettingsFile::parse(&text, &motor.tuning()).unwrap_err().to_string()
     };
     assert!(why("acceleration = -1").contains("may treat it as no limit"));
     assert!(why("acceleration = 0.2").contains("means no limit"));
