@@ -38,12 +38,19 @@ pub struct Difference<'a> {
 
 /// A motor whose settings could not be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{} of the file cannot be read: {error}", list(.settings))]
+#[error("{} cannot be read: {error}", named(.settings))]
 pub struct Unread<E> {
     /// The names of the settings; empty if it is about all of them.
     pub settings: Vec<String>,
     /// The error of the exchange.
     pub error: E,
+}
+
+fn named(settings: &[String]) -> String {
+    match settings {
+        [] => "the settings of the motor".to_owned(),
+        some => format!("{} of the file", list(some)),
+    }
 }
 
 impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {

@@ -98,7 +98,7 @@ pub enum Cause<E> {
 
 /// Why a block does not have its values.
 enum Failed<E> {
-    /// It was refused, and is as before.
+    /// It was refused.
     Refused(E),
     /// An exchange failed.
     Exchange(E),
@@ -257,12 +257,13 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
     async fn write(&mut self, block: &'a Compared<Id>) -> Result<(), Cause<E>> {
         self.written.push(block);
         let set = self.set(block, &block.file, &block.expected).await;
+        if matches!(set, Err(Failed::Refused(_))) && self.is_as_before(block).await {
+            self.written.pop();
+        }
         set.map_err(|failed| match failed {
-            Failed::Refused(error) => {
-                self.written.pop();
+            Failed::Refused(error) | Failed::Exchange(error) => {
                 Cause::Exchange { settings: block.names(), error }
             }
-            Failed::Exchange(error) => Cause::Exchange { settings: block.names(), error },
             Failed::Differs(read) => {
                 let values = block.settings.iter().zip(block.expected.iter().zip(read));
                 let values = values.filter(|(_, (expected, read))| *expected != read);
@@ -296,21 +297,32 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
         expected: &[i64],
     ) -> Result<(), Failed<E>> {
         let id = block.id;
+        let mut is_acknowledged = false;
+        // Whether the block was read back, and the reply may be one to an older request.
+        let mut is_doubtful = false;
         for attempt in 1.. {
-            let written = self.line.write(id, digits.to_vec()).await;
-            let is_acknowledged = written.is_ok();
-            match written {
-                Err(error) if error.is_refusal() && attempt == 1 => {
-                    return Err(Failed::Refused(error));
+            if !is_doubtful {
+                let written = self.line.write(id, digits.to_vec()).await;
+                is_acknowledged = written.is_ok();
+                match written {
+                    Err(error) if error.is_refusal() && attempt == 1 => {
+                        return Err(Failed::Refused(error));
+                    }
+                    Err(error) if !error.is_line_failure() => return Err(Failed::Exchange(error)),
+                    // A write without an acknowledge may have been carried out.
+                    _ => {}
                 }
-                Err(error) if !error.is_line_failure() => return Err(Failed::Exchange(error)),
-                // A write without an acknowledge may have been carried out.
-                _ => {}
             }
+            is_doubtful = false;
             let (failed, is_final) = match self.line.read(id).await {
-                Ok(read) if read == expected => {
-                    return self.line.confirm().await.map_err(Failed::Exchange);
-                }
+                Ok(read) if read == expected => match self.line.confirm().await {
+                    Ok(()) => return Ok(()),
+                    Err(error) => {
+                        is_doubtful = true;
+                        let is_final = !error.is_line_failure();
+                        (Failed::Exchange(error), is_final)
+                    }
+                },
                 Ok(read) => {
                     let is_final = is_acknowledged && block.writing == Writing::Permanent;
                     (Failed::Differs(read), is_final)
@@ -325,6 +337,12 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
             }
         }
         Ok(())
+    }
+
+    /// Whether a block has its old values. A motor may refuse a write and have carried it out.
+    async fn is_as_before(&self, block: &Compared<Id>) -> bool {
+        matches!(self.line.read(block.id).await, Ok(read) if read == block.now)
+            && self.line.confirm().await.is_ok()
     }
 
     /// Writes the old values again, in the reverse order.
