@@ -149,6 +149,10 @@ def test_a_motor_that_turns_is_restored_on_request_only(motor, tmp_path, protoco
         (("SPEED_KI_DIV = 256", "SPEED_KI_DIV = 128"), 2, "SPEED_KI_DIV is 128 in the file and 256 in the motor"),
         (("SPEED_KD = 0", "SPEED_KD = 40000"), 2, "SPEED_KD: 40000 s16A/unit is outside -32768 to 32767 s16A/unit"),
         (("SPEED_KD = 0", "SPEED_KP = 0"), 2, "line 14: duplicate key"),
+        (("[st.settings]", "[[st.settings]]"), 2, "line 10: `settings` has to be a table"),
+        (("SPEED_KD = 0", "SPEED_KD = nan"), 2, "SPEED_KD: NaN s16A/unit is outside -32768 to 32767 s16A/unit"),
+        (("SPEED_KD = 0", "SPEED_KD = 99999999999999999999"), 2, "is outside -32768 to 32767 s16A/unit"),
+        (("SPEED_KD = 0", "SPEED_KD = '0 A'"), 2, "line 14: SPEED_KD is '0 A', and not a number: write the number alone"),
         (("SPEED_KD = 0", "OBSERVER_CR_C1 = 1"), 1, "drives that are built with: state observer with CORDIC; remove the line"),
     ],
 )
@@ -162,6 +166,39 @@ def test_a_file_that_is_not_for_this_motor_is_refused(motor, tmp_path, change, c
     told = command("restore", file).ended(code).err
     assert said in told, told
     assert command("dump").ended(0).out == before
+
+
+@BOTH
+def test_a_file_that_was_cut_off_is_refused(motor, tmp_path, protocol):
+    command, (name, value) = motor(protocol), PROTOCOLS[protocol][0]
+    file = tmp_path / "motor1.toml"
+    before = command("dump").ended(0).out
+    text = changed(before, {name: value})
+    for cut, said in {
+        text.index(f"{name} =") + len(f"{name} = {value}") - 1: f"{name} ends the file without a line end",
+        text.index("settings]") + len("settings]\n"): f"there are no settings below `[{protocol}.settings]`",
+        text.index(f"{name} =") + len(name): "key with no value",
+        0: f"`[{protocol}]` is missing",
+    }.items():
+        file.write_text(text[:cut])
+        told = command("restore", file).ended(2).err
+        assert said in told and "nothing was sent" in told, told
+    assert command("dump").ended(0).out == before
+
+
+@BOTH
+def test_a_file_without_an_end_is_refused(motor, protocol):
+    assert "more than 1 MiB" in motor(protocol)("restore", "/dev/zero").ended(2).err
+
+
+@BOTH
+def test_line_ends_and_marks_of_other_editors_are_read(motor, tmp_path, protocol):
+    command, values = motor(protocol), PROTOCOLS[protocol]
+    file = tmp_path / "motor1.toml"
+    before = command("dump").ended(0).out
+    file.write_text("\ufeff" + changed(before, values).replace("\n", "\r\n"), newline="")
+    assert command("restore", file).ended(0).out.endswith("2 settings written and read back\n")
+    assert command("dump").ended(0).out == changed(before, values)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 //! `dump`, `diff` and `restore`: settings of a motor as text, for both protocols.
 
-use std::io::Read as _;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use motorlink::settings::{
@@ -288,11 +289,14 @@ fn shown(path: &Path) -> String {
     }
 }
 
+/// The text of a file; not much more than a file of settings may have, because a device has no end.
 fn read(path: &Path) -> std::io::Result<String> {
-    if path != Path::new(STDIN) {
-        return std::fs::read_to_string(path);
-    }
     let mut text = String::new();
-    std::io::stdin().read_to_string(&mut text)?;
+    let most = SettingsFile::MAX_SIZE as u64 + 1;
+    let source: Box<dyn Read> = match path == Path::new(STDIN) {
+        true => Box::new(std::io::stdin()),
+        false => Box::new(File::open(path)?),
+    };
+    source.take(most).read_to_string(&mut text)?;
     Ok(text)
 }

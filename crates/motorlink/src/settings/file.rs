@@ -47,6 +47,15 @@ pub enum Problem {
     /// Not TOML; also a name that is there twice.
     #[error("{0}")]
     Syntax(String),
+    /// Longer than [`SettingsFile::MAX_SIZE`].
+    #[error("the file has more than 1 MiB; the settings of a motor have a few kB")]
+    TooLong,
+    /// There are no settings.
+    #[error("there are no settings below `[{0}]`, as if the file was cut off")]
+    Empty(String),
+    /// A number ends the text, and could have more digits.
+    #[error("{0} ends the file without a line end, as if the file was cut off; complete the line")]
+    CutOff(String),
     /// A table or a key is missing.
     #[error("`{0}` is missing")]
     Missing(String),
@@ -137,6 +146,9 @@ fn unit_alone(unit: &str) -> String {
 }
 
 impl SettingsFile {
+    /// The longest text.
+    pub const MAX_SIZE: usize = 1 << 20;
+
     /// Reads the settings of a motor from the text of a file.
     ///
     /// # Errors
@@ -160,6 +172,9 @@ struct Text<'a> {
 
 impl Text<'_> {
     fn settings(&self, kind: &Kind, settings: &[Setting]) -> Result<SettingsFile, FileError> {
+        if self.text.len() > SettingsFile::MAX_SIZE {
+            return Err(self.error(0..0, Problem::TooLong));
+        }
         let root = DeTable::parse(self.text).map_err(|error| {
             let place = error.span().unwrap_or_default();
             self.error(place, Problem::Syntax(printable(error.message())))
@@ -186,7 +201,12 @@ impl Text<'_> {
         if kind.profile.is_some() && profile.is_none() {
             return Err(missing(PROFILE));
         }
-        Ok(SettingsFile { values: values.ok_or_else(|| missing(SETTINGS))? })
+        let values = values.ok_or_else(|| missing(SETTINGS))?;
+        if values.is_empty() {
+            let name = format!("{}.{SETTINGS}", kind.protocol);
+            return Err(self.error(table.span(), Problem::Empty(name)));
+        }
+        Ok(SettingsFile { values })
     }
 
     /// The table of the motor's protocol.
@@ -206,6 +226,10 @@ impl Text<'_> {
                 }
                 (DeValue::Table(_), Some(file)) => {
                     let problem = Problem::OtherProtocol { file, motor: kind.protocol };
+                    return Err(self.error(key.span(), problem));
+                }
+                _ if is_own => {
+                    let problem = Problem::WrongType { name: name.to_owned(), expected: "a table" };
                     return Err(self.error(key.span(), problem));
                 }
                 _ => {
@@ -267,6 +291,9 @@ impl Text<'_> {
                 return Err(self.error(key.span(), unknown(name, &known)));
             };
             let digits = self.digits(setting, value).map_err(|why| self.error(key.span(), why))?;
+            if value.span().end == self.text.len() {
+                return Err(self.error(key.span(), Problem::CutOff(setting.name.clone())));
+            }
             values.insert(setting.name.clone(), digits);
         }
         Ok(values)
@@ -308,9 +335,12 @@ fn in_order<'t>(
 
 fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
-        DeValue::Integer(integer) => {
-            i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|whole| whole as f64)
-        }
+        DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(whole) => Some(whole as f64),
+            // More digits than any setting has.
+            Err(_) if integer.radix() == 10 => integer.as_str().parse().ok(),
+            Err(_) => Some(f64::INFINITY),
+        },
         DeValue::Float(float) => float.as_str().parse().ok(),
         _ => None,
     }

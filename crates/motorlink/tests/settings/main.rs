@@ -52,7 +52,7 @@ fn changed(text: &str, values: &[(&str, i64)]) -> String {
         let line = lines.iter_mut().find(|line| line.starts_with(&begin)).unwrap();
         *line = format!("{begin}{value}");
     }
-    lines.join("\n")
+    lines.join("\n") + "\n"
 }
 
 /// The text with other values, and without the other settings.
@@ -60,7 +60,7 @@ fn only(text: &str, values: &[(&str, i64)]) -> String {
     let other = changed(text, values);
     let has = |line: &str| values.iter().any(|(name, _)| line.starts_with(&format!("{name} =")));
     let is_kept = |line: &&str| line.starts_with('[') || line.starts_with("profile") || has(line);
-    other.lines().filter(is_kept).collect::<Vec<_>>().join("\n")
+    other.lines().filter(is_kept).collect::<Vec<_>>().join("\n") + "\n"
 }
 
 fn value<M: Tunable<Error: Debug>>(motor: &M, name: &str) -> i64 {

@@ -1,6 +1,6 @@
 //! The text of a file, and errors with their line.
 
-use motorlink::settings::{FileError, Problem, SettingsFile, Tunable};
+use motorlink::settings::{Comparison, FileError, Problem, SettingsFile, Tunable};
 
 use super::{bench, rmd, st, text};
 use crate::cut::Cut;
@@ -78,6 +78,48 @@ fn values_that_no_motor_has_are_refused_with_their_unit() {
     assert!(why("SPEED_KP = 0x8000").contains("32768"));
     assert!(why("SPEED_KP = true").contains("not a number"));
     assert!(why("SPEED_KP = 1e300").contains("outside"));
+    assert!(why("SPEED_KP = 99999999999999999999999999").contains("outside"));
+}
+
+#[test]
+fn a_file_that_was_cut_off_is_refused() {
+    let begin = "[st]\nprofile = \"spec\"\n[st.settings]\n";
+    // The number could have more digits.
+    let said = st_error(&format!("{begin}SPEED_KI = 1\nSPEED_KP = 12")).to_string();
+    assert_eq!(
+        said,
+        "line 5: SPEED_KP ends the file without a line end, as if the file was cut off; complete \
+         the line"
+    );
+    assert!(st_error(begin).to_string().contains("there are no settings below `[st.settings]`"));
+    let bench = bench();
+    let (client, _) = st(&bench, Cut::Never);
+    let motor = client.motor(1).unwrap();
+    for whole in ["SPEED_KP = 12\n", "SPEED_KP = 12 # s", "SPEED_KP = 12 "] {
+        SettingsFile::parse(&format!("{begin}{whole}"), &motor.tuning()).unwrap();
+    }
+}
+
+#[test]
+fn no_cut_of_a_file_gives_a_setting_another_value() {
+    let bench = bench();
+    let (client, _) = rmd(&bench, Cut::Never);
+    let motor = client.motor(1).unwrap();
+    let text = text(&motor);
+    let mut accepted = 0;
+    for end in (0..text.len()).filter(|end| text.is_char_boundary(*end)) {
+        let Ok(file) = SettingsFile::parse(&text[..end], &motor.tuning()) else { continue };
+        accepted += 1;
+        let comparison = Comparison::read(&motor, &file).unwrap();
+        assert_eq!(comparison.differences().count(), 0, "cut at {end}");
+    }
+    assert!(accepted > 10);
+}
+
+#[test]
+fn a_text_that_is_too_long_is_refused_at_once() {
+    let text = "# x\n".repeat(SettingsFile::MAX_SIZE / 4 + 1);
+    assert!(st_error(&text).to_string().contains("more than 1 MiB"));
 }
 
 #[test]
@@ -116,6 +158,7 @@ fn a_file_for_another_motor_is_refused() {
     assert!(why("[st]\nprofile = \"spec\"\nsettings = 3\n").contains("has to be a table"));
     assert!(why("[st]\nprofile = \"spec\"\nmotor = \"1\"\n").contains("has to be a number"));
     assert!(why("[st\n").starts_with("line 1: "));
+    assert_eq!(why("\n[[st]]\n[st.settings]\n"), "line 2: `st` has to be a table");
     assert!(
         why("[st]\nprofile = \"spec\"\n[st.settings]\n[motor]\n").contains("line 4: there is no")
     );
