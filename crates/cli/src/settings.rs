@@ -52,6 +52,14 @@ pub struct RestoreArgs {
     running: bool,
 }
 
+/// What is done with a file.
+#[derive(Clone, Copy)]
+pub enum Task<'a> {
+    Dump(&'a DumpArgs),
+    Diff(&'a FileArg),
+    Restore(&'a RestoreArgs),
+}
+
 /// A motor with its settings, and where results go.
 pub struct Tuned<'a, M: Tunable> {
     pub motor: M,
@@ -65,8 +73,16 @@ pub struct Tuned<'a, M: Tunable> {
 }
 
 impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> {
+    pub fn carry_out(self, task: Task<'_>) -> Result<(), Failure> {
+        match task {
+            Task::Dump(args) => self.dump(args),
+            Task::Diff(args) => self.diff(args),
+            Task::Restore(args) => self.restore(args),
+        }
+    }
+
     /// `dump`: writes the settings as text.
-    pub fn dump(self, args: &DumpArgs) -> Result<(), Failure> {
+    fn dump(self, args: &DumpArgs) -> Result<(), Failure> {
         let output = outputs::resolve(&[("FILE", Some(&args.file))], &[])?;
         let file = output.into_iter().flatten().next().filter(|file| *file != Output::Stdout);
         if !args.overwrite && file.as_ref().is_some_and(Output::exists) {
@@ -86,7 +102,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     }
 
     /// `diff`: shows the settings that differ. It is a failure if some do, as of `diff`.
-    pub fn diff(self, args: &FileArg) -> Result<(), Failure> {
+    fn diff(self, args: &FileArg) -> Result<(), Failure> {
         let comparison = self.compare(args)?;
         self.show(&comparison, args)?;
         match comparison.differences().count() {
@@ -102,7 +118,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     }
 
     /// `restore`: shows the settings that differ, writes them and reads them back.
-    pub fn restore(self, args: &RestoreArgs) -> Result<(), Failure> {
+    fn restore(self, args: &RestoreArgs) -> Result<(), Failure> {
         let permissions = Permissions { rom: self.write_rom, running: args.running };
         let comparison = self.compare(&args.file)?;
         self.show(&comparison, &args.file)?;
@@ -265,6 +281,15 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     fn name(&self) -> String {
         format!("motor {}", self.motor.tuning().kind().motor)
     }
+}
+
+/// Refuses an option that converts values. It is empty if none was given.
+pub fn refuse_conversion(option: &str, units: &str) -> Result<(), Failure> {
+    if option.is_empty() {
+        return Ok(());
+    }
+    let why = format!("a file has {units}, and {option} converts them; nothing was sent");
+    Err(Failure::usage(why).trying(format!("leave out {option}")))
 }
 
 /// A value as people and programs read it.

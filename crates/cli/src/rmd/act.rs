@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::Row;
 use crate::output::{hex, parse_hex};
+use crate::settings::Task;
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let (can_turn, is_stop) = (act.can_turn(), matches!(act, Act::Off { .. } | Act::Stop { .. }));
@@ -32,7 +33,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Acceleration { dps_per_second } => settings::acceleration(session, dps_per_second),
         Act::Encoder => session.show(&motor.encoder()?),
         Act::EncoderOffset { offset } => settings::encoder_offset(session, offset),
-        Act::Restore(args) => files::restore(session, &args),
+        Act::Restore(args) => files::run(session, Task::Restore(&args)),
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;

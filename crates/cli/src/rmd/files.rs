@@ -1,29 +1,14 @@
 //! `motorlink rmd dump`, `diff` and `restore`.
 
-use motorlink::rmd::{Error, Motor};
+use motorlink::rmd::Error;
 use motorlink::settings::Unread;
 
 use super::session::Session;
 use crate::failure::Failure;
-use crate::settings::{DumpArgs, FileArg, RestoreArgs, Tuned};
+use crate::settings::{Task, Tuned, refuse_conversion};
 
-pub fn dump(session: &Session, args: &DumpArgs) -> Result<(), Failure> {
-    with(session, |tuned| tuned.dump(args))
-}
-
-pub fn diff(session: &Session, args: &FileArg) -> Result<(), Failure> {
-    with(session, |tuned| tuned.diff(args))
-}
-
-pub fn restore(session: &Session, args: &RestoreArgs) -> Result<(), Failure> {
-    with(session, |tuned| tuned.restore(args))
-}
-
-/// The motor with its settings. They are those of the motor shaft.
-fn with(
-    session: &Session,
-    run: impl FnOnce(Tuned<'_, Motor<'_>>) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+/// Carries out a task for the motor. Its settings are those of the motor shaft.
+pub fn run(session: &Session, task: Task<'_>) -> Result<(), Failure> {
     let units = &session.units;
     let option = match (units.gear, units.encoder_bits) {
         (Some(_), _) => "--gear-ratio",
@@ -31,14 +16,9 @@ fn with(
         (None, None) if units.raw => "--raw",
         (None, None) => "",
     };
-    if !option.is_empty() {
-        return Err(Failure::usage(format!(
-            "a file has the settings of the motor shaft in their own units, and {option} converts them; \
-             nothing was sent"
-        ))
-        .trying(format!("leave out {option}")));
-    }
+    refuse_conversion(option, "the settings of the motor shaft in their own units")?;
     let unread = |unread: Unread<Error>| unread.error.into();
     let (output, line, motor) = (session.output, session.line(session.id), session.motor()?);
-    run(Tuned { motor, output, line, unread: &unread, write_rom: session.write_rom })
+    let write_rom = session.write_rom;
+    Tuned { motor, output, line, unread: &unread, write_rom }.carry_out(task)
 }

@@ -20,6 +20,7 @@ use motorlink::rmd::MotorId;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{keep_error, kept_error};
+use crate::settings::Task;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, motor, command } = args;
@@ -74,8 +75,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
         Command::Read(Read::Dump(_) | Read::Diff(_)) if ids.len() > 1 => {
             Err(Failure::usage("a file has the settings of one motor: give one --id"))
         }
-        Command::Read(Read::Dump(args)) => files::dump(&session, &args),
-        Command::Read(Read::Diff(args)) => files::diff(&session, &args),
+        Command::Read(Read::Dump(args)) => files::run(&session, Task::Dump(&args)),
+        Command::Read(Read::Diff(args)) => files::run(&session, Task::Diff(&args)),
         Command::Read(Read::Status { .. }) => several::each(&mut session, ids, false, read::status),
         Command::Read(Read::Angle { .. }) => several::each(&mut session, ids, false, read::angle),
     });

@@ -12,13 +12,14 @@ use motorlink::time;
 use super::args::{Act, Pfc, Wait};
 use super::read::explain;
 use super::session::Session;
-use super::{mode, set, settings};
+use super::{files, mode, set};
 use crate::advice;
 use crate::arrival;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::Row;
 use crate::output::{hex, kept_error, parse_hex};
+use crate::settings::Task;
 use crate::span::parse_milliseconds;
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
@@ -124,7 +125,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
             motor.set_revup_data(phase, data)?;
             session.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
-        Act::Restore(args) => settings::restore(session, &args),
+        Act::Restore(args) => files::run(session, Task::Restore(&args)),
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
 }

@@ -3,6 +3,7 @@
 mod act;
 mod args;
 mod every;
+mod files;
 mod mode;
 mod read;
 mod refusal;
@@ -10,7 +11,6 @@ mod registers;
 mod scan;
 mod session;
 mod set;
-mod settings;
 mod units;
 
 pub use args::Args;
@@ -25,6 +25,7 @@ use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::keep_error;
+use crate::settings::Task;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
@@ -72,8 +73,8 @@ fn run_at(
                 }
                 None => read::segment(&connect()?, segment, &registers),
             },
-            Read::Dump(args) => settings::dump(&connect()?, &args),
-            Read::Diff(args) => settings::diff(&connect()?, &args),
+            Read::Dump(args) => files::run(&connect()?, Task::Dump(&args)),
+            Read::Diff(args) => files::run(&connect()?, Task::Diff(&args)),
             Read::Info => read::info(&connect()?),
             Read::Status { repeat } => match repeat.every {
                 Some(every) => watched.watch(&read::STATUS, None, (every, &repeat)),
