@@ -8,7 +8,7 @@ use motorlink::{rmd, st};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::{PyDict, PyTuple, PyType};
 
 /// The exception.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +23,20 @@ enum Kind {
     NotArrived,
     UnknownRegister,
     Closed,
+    Settings,
+    Any,
+}
+
+/// What an exception says about the request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ErrorClass {
+    /// The drive refused it.
+    Refusal,
+    /// It may have been carried out.
+    Line,
+    /// The caller wants an end: Ctrl-C, a cancelled task, an exception of a signal handler.
+    Interruption,
+    Other,
 }
 
 /// The attributes of an exception.
@@ -36,7 +50,7 @@ struct Facts<'a> {
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 10] = [const { PyOnceLock::new() }; 10];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 12] = [const { PyOnceLock::new() }; 12];
         let name = match self {
             Kind::Refused => "RefusedError",
             Kind::Implausible => "ImplausibleValueError",
@@ -48,6 +62,8 @@ impl Kind {
             Kind::NotArrived => "NotArrivedError",
             Kind::UnknownRegister => "UnknownRegisterError",
             Kind::Closed => "ClosedError",
+            Kind::Settings => "SettingsError",
+            Kind::Any => "MotorlinkError",
         };
         CLASSES[self as usize].import(py, "motorlink.errors", name)
     }
@@ -93,6 +109,48 @@ pub(crate) fn elsewhere(py: Python<'_>, port: &str) -> PyErr {
     let facts = Facts { port: Some(port), ..Facts::default() };
     let why = "was opened by another process, which this one was forked from; open it in this one";
     Kind::Closed.raise(py, format_args!("{port} {why}"), facts)
+}
+
+/// A reply that does not belong to its request.
+pub(crate) fn link_error(py: Python<'_>, message: impl Display) -> PyErr {
+    Kind::Link.raise(py, message, Facts::default())
+}
+
+/// Settings that were not restored: those that have their old values again, those of the file, those
+/// that are unknown, and those that are unknown in ROM.
+pub(crate) fn settings_error(
+    py: Python<'_>,
+    message: impl Display,
+    motor: u8,
+    states: [&[String]; 4],
+    cause: Option<PyErr>,
+) -> PyErr {
+    let error = Kind::Settings.raise(py, message, Facts { motor: Some(motor), ..Facts::default() });
+    let names = ["rolled_back", "changed", "unknown", "unknown_in_rom"];
+    for (name, settings) in names.into_iter().zip(states) {
+        let set = PyTuple::new(py, settings).and_then(|all| error.value(py).setattr(name, all));
+        if let Err(error) = set {
+            return error;
+        }
+    }
+    error.set_cause(py, cause);
+    error
+}
+
+/// What an exception of an exchange says about its request.
+pub(crate) fn class_of(py: Python<'_>, error: &PyErr) -> ErrorClass {
+    let is = |kind: Kind| kind.class(py).is_ok_and(|class| error.is_instance(py, class));
+    if !is(Kind::Any) {
+        return ErrorClass::Interruption;
+    }
+    if is(Kind::Link) || is(Kind::ReplyTimeout) || is(Kind::Closed) {
+        return ErrorClass::Line;
+    }
+    let code = error.value(py).getattr("code").and_then(|code| code.extract::<u8>());
+    match code {
+        Ok(code) if ErrorCode::from(code) != ErrorCode::BadMotorSelected => ErrorClass::Refusal,
+        _ => ErrorClass::Other,
+    }
 }
 
 /// An error of an ST client.

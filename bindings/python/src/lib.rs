@@ -11,6 +11,7 @@ mod event;
 mod number;
 mod rmd;
 mod sampling;
+mod settings;
 mod shared;
 mod signals;
 mod sim;
@@ -42,6 +43,8 @@ mod _core {
         rmd_encoder_degrees, rmd_errors_text, rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
     };
     #[pymodule_export]
+    use super::settings::{MotorSettings, SettingsComparison, SettingsSteps};
+    #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
@@ -68,6 +71,8 @@ mod _core {
         let tolerance = motorlink::rmd::FullTurn::TOLERANCE;
         module.add("RMD_FULL_TURN_TOLERANCE", TurnCentiDegrees::UNIT.value(tolerance.digits()))?;
         module.add("RMD_SCAN_WIDTH", motorlink::rmd::SCAN_WIDTH)?;
+        let most = motorlink::settings::SettingsFile::MAX_SIZE;
+        module.add("SETTINGS_MAX_SIZE", most)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 

@@ -30,6 +30,7 @@ classes! {
     scan_result _rmd "ScanResult";
     st_scan_result _scan "ScanResult";
     frame _values "Frame";
+    setting_difference _settings "SettingDifference";
 }
 
 /// A reply of an RMD motor with several values, as an object of its class.

@@ -41,6 +41,10 @@ __all__ = [
     "ReplyTimeoutError",
     "Sample",
     "Sampling",
+    "SettingDifference",
+    "Settings",
+    "SettingsDump",
+    "SettingsError",
     "__version__",
     "aio",
     "can",
@@ -55,6 +59,7 @@ if TYPE_CHECKING:
     from motorlink import aio, can, errors, rmd, sim, st
     from motorlink._core import __version__
     from motorlink._sampling import Sample, Sampling, to_pandas
+    from motorlink._settings import SettingDifference, Settings, SettingsDump
     from motorlink.errors import (
         ClosedError,
         FullTurnError,
@@ -66,10 +71,12 @@ if TYPE_CHECKING:
         PortError,
         RefusedError,
         ReplyTimeoutError,
+        SettingsError,
     )
 else:
     _FROM = {"__version__": "motorlink._core"}
     _FROM |= dict.fromkeys(("Sample", "Sampling", "to_pandas"), "motorlink._sampling")
+    _FROM |= dict.fromkeys(("SettingDifference", "Settings", "SettingsDump"), "motorlink._settings")
 
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""

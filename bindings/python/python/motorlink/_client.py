@@ -134,6 +134,8 @@ class AnyClient:
         self._core = core
         self._close: Close = functools.partial(core.close, **ends)
         self._name: str = core.port
+        #: Motors whose settings are being restored.
+        self._restored: dict[int, object] = {}
         self._release = when_left_open(
             self, self._close, self._name, stop_on_signals=stop_on_signals and ends["stop"]
         )

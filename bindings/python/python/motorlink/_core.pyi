@@ -8,12 +8,14 @@ from typing_extensions import Self, disjoint_base
 from motorlink import _rmd
 from motorlink._rmd_table import MotionStatus
 from motorlink._scan import ScanResult
+from motorlink._settings import SettingDifference
 from motorlink._values import Frame, RegisterInfo
 from motorlink.errors import MotorlinkError
 
 __all__ = [
     "Arrival",
     "CanPort",
+    "MotorSettings",
     "RMD_FULL_TURN_TOLERANCE",
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
@@ -27,6 +29,9 @@ __all__ = [
     "RmdOptions",
     "RmdRequest",
     "RmdSampling",
+    "SETTINGS_MAX_SIZE",
+    "SettingsComparison",
+    "SettingsSteps",
     "SimBench",
     "SimPort",
     "SimRecording",
@@ -83,6 +88,7 @@ RMD_STOP_TIME: float
 #: How long a reply is awaited, s.
 RMD_TIMEOUT: float
 #: How often a verified write is tried.
+SETTINGS_MAX_SIZE: int
 ST_ATTEMPTS: int
 #: The rates that drives are built with, the most frequent first.
 ST_BAUD_RATES: tuple[int, ...]
@@ -246,6 +252,7 @@ class StClient:
     @staticmethod
     def open(port: str | SimPort, options: StOptions) -> StClient: ...
     def exchange(self, motor: int, request: StRequest) -> Any: ...
+    def check(self, motor: int, request: StRequest) -> None: ...
     def set_verified(self, motor: int, request: StRequest, attempts: int) -> int: ...
     def confirm(self) -> None: ...
     @property
@@ -334,6 +341,34 @@ class RmdClient:
     def port(self) -> str: ...
 
 @final
+class MotorSettings:
+    """The settings of one motor."""
+
+    @staticmethod
+    def st(motor: int, profile: str) -> MotorSettings: ...
+    @staticmethod
+    def rmd(motor: int) -> MotorSettings: ...
+    @property
+    def motor(self) -> int: ...
+    def dumping(self) -> SettingsSteps: ...
+    def comparing(self, text: str) -> SettingsSteps: ...
+
+@final
+class SettingsSteps:
+    """A dump, a comparison or a restore in progress."""
+
+    def next(self) -> tuple[str, Any]: ...
+    def answered(self, reply: bytes) -> None: ...
+    def failed(self, error: BaseException) -> None: ...
+
+@final
+class SettingsComparison:
+    """The settings of a motor, and those of a file."""
+
+    def differences(self) -> list[SettingDifference]: ...
+    def restoring(self, *, dry_run: bool, to_rom: bool, running: bool) -> SettingsSteps: ...
+
+@final
 class SimBench:
     """An ST drive and a bus of RMD motors on virtual time."""
 
@@ -396,6 +431,7 @@ class StEventClient:
     def is_open(self) -> bool: ...
     def reopen(self) -> None: ...
     def fileno(self) -> int | None: ...
+    def check(self, motor: int, request: StRequest) -> None: ...
     def begin(self, motor: int, request: StRequest) -> None: ...
     def begin_raw(self, motor: int, code: int, payload: bytes) -> None: ...
     def begin_confirmation(self) -> None: ...

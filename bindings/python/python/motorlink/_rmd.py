@@ -331,6 +331,15 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         given: Exchanges[Any] = self._client._exchange(self._id, request)
         return given
 
+    def _settings(self) -> _core.MotorSettings:
+        return _core.MotorSettings.rmd(self._id)
+
+    def _check(self, motor: int, request: Request) -> None:
+        """Nothing: no limit is about settings."""
+
+    def _confirm(self) -> Any:
+        return self._client._confirm(self._id)
+
     def _moved(
         self,
         request: Request,
@@ -342,8 +351,7 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         needs_wait(wait, arrival_tolerance_degrees=tolerance_degrees, timeout=timeout)
         if wait:
             watch = _core.rmd_arrival(self._id, request, tolerance_degrees, timeout)
-            confirm = functools.partial(self._client._confirm, self._id)
-            move = moved(self._client, watch, self._exchange, confirm, move)
+            move = moved(self._client, watch, self._exchange, self._confirm, move)
         motion: MotionStatus = yield from move
         return motion
 

@@ -48,6 +48,15 @@ class StMotor(Generic[ClientT]):
         given: Exchanges[Any] = self._client._exchange(self._number, request)
         return given
 
+    def _settings(self) -> _core.MotorSettings:
+        return _core.MotorSettings.st(self._number, self._client.profile)
+
+    def _check(self, motor: int, request: Request) -> None:
+        self._client._core.check(motor, request)
+
+    def _confirm(self) -> Any:
+        return self._client._confirm()
+
     @both_apis
     def get(self, register: str | int, *, raw: bool = False) -> Exchanges[float]:
         """Reads a register (0x02, 4.5) in its unit, or in digits with ``raw=True``.
@@ -260,7 +269,7 @@ class StMotor(Generic[ClientT]):
             watch = _core.st_arrival(
                 self._number, angle_rad, duration_s, arrival_tolerance_rad, timeout
             )
-            move = moved(self._client, watch, self._read, self._client._confirm, move)
+            move = moved(self._client, watch, self._read, self._confirm, move)
         yield from move
 
     def _sent(self, request: Request) -> Exchanges[None]:

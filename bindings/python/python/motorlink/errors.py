@@ -19,6 +19,7 @@ __all__ = [
     "PortError",
     "RefusedError",
     "ReplyTimeoutError",
+    "SettingsError",
     "UnknownRegisterError",
 ]
 
@@ -137,6 +138,27 @@ class UnknownRegisterError(InvalidValueError, KeyError):
 
     # KeyError would quote the message.
     __str__ = Exception.__str__
+
+
+class SettingsError(MotorlinkError):
+    """Settings were not restored, or could not be read. The message says which values the motor has.
+
+    All attributes are empty if nothing was changed. The cause (``__cause__``) is the exception of the
+    exchange that failed, if one did.
+    """
+
+    #: Names of settings that were written and have their old values again.
+    rolled_back: tuple[str, ...]
+    #: Names of settings that have the values of the file.
+    changed: tuple[str, ...]
+    #: Names of settings whose values are unknown: the old or the new ones.
+    unknown: tuple[str, ...]
+    #: Names of settings whose values in ROM are unknown.
+    unknown_in_rom: tuple[str, ...]
+
+    def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
+        super().__init__(message, port=port, motor=motor)
+        self.rolled_back = self.changed = self.unknown = self.unknown_in_rom = ()
 
 
 class ClosedError(MotorlinkError, ValueError):

@@ -37,6 +37,7 @@ from motorlink._core import RmdClient as Core
 from motorlink._rmd import RmdClient, RmdMotor, ScanResult
 from motorlink._rmd_table import *
 from motorlink._sampling import Sampling
+from motorlink._settings import Settings
 from motorlink._values import Errors, Frame
 
 __all__ = [
@@ -91,6 +92,11 @@ class Motor(Blocking, RmdMotor["Client"]):
     """One motor on the bus, from :meth:`Client.motor`."""
 
     __slots__ = ()
+
+    @property
+    def settings(self) -> Settings:
+        """The settings as text: ``motor.settings.dump()``, ``diff`` and ``restore``."""
+        return Settings(self)
 
 
 class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort", Sampling]):

@@ -45,6 +45,7 @@ from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Sampling
 from motorlink._scan import Path, ScanResult, scanning
+from motorlink._settings import Settings
 from motorlink._st import StClient
 from motorlink._st_motor import StMotor
 from motorlink._values import (
@@ -88,6 +89,11 @@ class Motor(Blocking, StMotor["Client"]):
     def registers(self) -> Registers:
         """The registers as a mapping: ``motor.registers["SPEED_KP"]``, ``motor.registers.SPEED_KP``."""
         return Registers(self)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings as text: ``motor.settings.dump()``, ``diff`` and ``restore``."""
+        return Settings(self)
 
 
 class Client(BlockingClient, StClient[Motor, PortLike, Sampling]):

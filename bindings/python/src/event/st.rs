@@ -89,6 +89,13 @@ impl StEventClient {
         self.driven.step(py, |line| fileno(line.client.descriptor()))
     }
 
+    /// Checks a request against the limits. Sends nothing.
+    fn check(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<()> {
+        let motor = motor_number(py, motor)?;
+        let checked = self.driven.step(py, |line| line.client.check(motor, &request.request()))?;
+        checked.map_err(|error| st_error(py, &error))
+    }
+
     /// Begins an exchange. An exchange under way is abandoned.
     fn begin(&self, py: Python<'_>, motor: i64, request: Py<StRequest>) -> PyResult<()> {
         let motor = motor_number(py, motor)?;

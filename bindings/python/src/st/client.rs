@@ -60,6 +60,13 @@ impl StClient {
         request.value(py, answer.map_err(|error| st_error(py, &error))?)
     }
 
+    /// Checks a request against the limits. Sends nothing.
+    fn check(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<()> {
+        let motor = motor_number(py, motor)?;
+        let checked = self.client.get(py)?.check(motor, &request.request());
+        checked.map_err(|error| st_error(py, &error))
+    }
+
     /// Writes a register and reads it back until it has the value. Returns the number of attempts.
     fn set_verified(
         &self,

@@ -16,6 +16,7 @@ mod verified;
 pub(crate) use arrival::st_arrival;
 pub(crate) use client::{StClient, frame_code, not_stopped};
 pub(crate) use options::StOptions;
+pub(crate) use profile::named as profile_named;
 pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
 pub(crate) use sample::StSampling;

@@ -34,6 +34,11 @@ impl StRequest {
         StRequest { request: request.into(), scale, reply }
     }
 
+    /// A message whose reply is returned as bytes.
+    pub(crate) fn for_bytes(request: OwnedRequest) -> Self {
+        StRequest { request, scale: Scale::plain(), reply: Reply::Bytes }
+    }
+
     /// The request for a client.
     pub(crate) fn request(&self) -> Request<'_> {
         self.request.request()

@@ -127,7 +127,7 @@ pub trait Tuning {
     /// The request that asks this.
     fn request(&self, ask: &Ask<Self::Id>) -> Self::Request;
 
-    /// What a reply to that request has; `None` if it is no reply to it.
+    /// What a reply to that request has; `None` if the reply belongs to another.
     fn answer(&self, ask: &Ask<Self::Id>, reply: &[u8]) -> Option<Answer>;
 
     /// The digits that a motor reads back after these were written.

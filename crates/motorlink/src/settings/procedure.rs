@@ -46,10 +46,7 @@ impl<'a, Id: Clone, E, T> Procedure<'a, Id, E, T> {
     }
 
     /// The next step: the same one until it is answered. Not to be called after [`Next::Done`].
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "a procedure is no iterator: it has a result"
-    )]
+    #[expect(clippy::should_implement_trait, reason = "an iterator has no result")]
     pub fn next(&mut self) -> Next<Id, T> {
         match self.steps.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(result) => Next::Done(result),

@@ -122,6 +122,14 @@ impl EventClient {
         self.driven.session.started().motors()
     }
 
+    /// Checks a request against the limits, as [`Client::check`].
+    ///
+    /// # Errors
+    /// [`Error::Limit`], [`Error::NoSuchMotor`].
+    pub fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.driven.session.rules().check(motor, request)
+    }
+
     /// Begins an exchange, as [`Client::exchange`]; one that is under way is abandoned.
     ///
     /// # Errors

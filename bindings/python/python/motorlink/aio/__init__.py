@@ -26,8 +26,9 @@ A client belongs to the event loop in which it was opened.
 
 from motorlink.aio import rmd, st
 from motorlink.aio._sampling import Sampling
+from motorlink.aio._settings import Settings
 
-__all__ = ["Sampling", "rmd", "st"]
+__all__ = ["Sampling", "Settings", "rmd", "st"]
 
 
 def __dir__() -> list[str]:

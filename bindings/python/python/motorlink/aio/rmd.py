@@ -23,6 +23,7 @@ from motorlink._apis import Awaited
 from motorlink._core import RMD_SCAN_WIDTH, CanPort, RmdEventClient, RmdRequest, RmdSampling
 from motorlink._rmd import RmdClient, RmdMotor, ScanResult
 from motorlink.aio._sampling import Sampling, sampled
+from motorlink.aio._settings import Settings
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import ClosedError, MotorlinkError, PortError
 
@@ -37,6 +38,11 @@ class Motor(Awaited, RmdMotor["Client"]):
     """One motor on the bus, from :meth:`Client.motor`. See :class:`motorlink.rmd.Motor`."""
 
     __slots__ = ()
+
+    @property
+    def settings(self) -> Settings:
+        """The settings as text: ``motor.settings.dump()``, ``diff`` and ``restore``."""
+        return Settings(self)
 
 
 class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanPort], Sampling]):

@@ -26,6 +26,7 @@ from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient
 from motorlink._st_motor import StMotor
 from motorlink.aio._sampling import Sampling, sampled
+from motorlink.aio._settings import Settings
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import (
     InvalidValueError,
@@ -51,6 +52,11 @@ class Motor(Awaited, StMotor["Client"]):
     def registers(self) -> RegisterNames:
         """The names of the registers, and what each is: ``"SPEED_KP" in motor.registers``."""
         return RegisterNames(self)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings as text: ``motor.settings.dump()``, ``diff`` and ``restore``."""
+        return Settings(self)
 
 
 class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Sampling]):
