@@ -240,6 +240,12 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
                 return Err(self.undo(cause).await.into());
             }
         }
+        // Another program may write at the same time. A single block was read back just now.
+        if self.written.len() > 1
+            && let Err(cause) = self.check_all().await
+        {
+            return Err(self.undo(cause).await.into());
+        }
         for block in comparison.to_keep(permissions) {
             if is_interrupted() {
                 return Err(self.undo(Cause::Interrupted).await.into());
@@ -264,16 +270,38 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
             Failed::Refused(error) | Failed::Exchange(error) => {
                 Cause::Exchange { settings: block.names(), error }
             }
-            Failed::Differs(read) => {
-                let values = block.settings.iter().zip(block.expected.iter().zip(read));
-                let values = values.filter(|(_, (expected, read))| *expected != read);
-                let settings = values.map(|(setting, (expected, read))| {
-                    let (name, read) = (&setting.name, setting.shown(read));
-                    format!("{name} {} (it has {read})", setting.shown(*expected))
-                });
-                Cause::Differs { settings: settings.collect() }
-            }
+            Failed::Differs(read) => not_taken(block, &read),
         })
+    }
+
+    /// Checks that all written blocks have their new values.
+    async fn check_all(&self) -> Result<(), Cause<E>> {
+        let mut attempt = 1;
+        loop {
+            match self.read_all().await {
+                Ok(read) => {
+                    let all = self.written.iter().zip(&read);
+                    let mut others = all.filter(|(block, read)| block.expected != **read);
+                    let other = others.next();
+                    return other.map_or(Ok(()), |(block, read)| Err(not_taken(block, read)));
+                }
+                Err(error) if error.is_line_failure() && attempt < VERIFY_ATTEMPTS => attempt += 1,
+                Err(error) => {
+                    let settings = self.written.iter().flat_map(|block| block.names()).collect();
+                    return Err(Cause::Exchange { settings, error });
+                }
+            }
+        }
+    }
+
+    /// The digits of the written blocks.
+    async fn read_all(&self) -> Result<Vec<Vec<i64>>, E> {
+        let mut all = Vec::new();
+        for block in &self.written {
+            all.push(self.line.read(block.id).await?);
+        }
+        self.line.confirm().await?;
+        Ok(all)
     }
 
     /// Makes a block permanent.
@@ -377,6 +405,17 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
         }
         undone
     }
+}
+
+/// Why a restore ends whose block has other digits than those of the file.
+fn not_taken<Id, E>(block: &Compared<Id>, read: &[i64]) -> Cause<E> {
+    let values = block.settings.iter().zip(block.expected.iter().zip(read));
+    let values = values.filter(|(_, (expected, read))| expected != read);
+    let settings = values.map(|(setting, (expected, read))| {
+        let (name, read) = (&setting.name, setting.shown(*read));
+        format!("{name} {} (it has {read})", setting.shown(*expected))
+    });
+    Cause::Differs { settings: settings.collect() }
 }
 
 impl<E> From<Undone<E>> for RestoreError<E> {

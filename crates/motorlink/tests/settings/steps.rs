@@ -37,11 +37,13 @@ struct Motor {
     writes: u32,
     /// The outcome of a write: whether it is carried out, and its error. Writes count from 1.
     outcome: fn(u32) -> (bool, Option<Failure>),
+    /// The gains that another program writes after the second write.
+    others: Option<Vec<i64>>,
 }
 
 impl Motor {
     fn new(outcome: fn(u32) -> (bool, Option<Failure>)) -> Self {
-        Motor { gains: vec![1; 6], acceleration: vec![0], writes: 0, outcome }
+        Motor { gains: vec![1; 6], acceleration: vec![0], writes: 0, outcome, others: None }
     }
 
     fn block(&mut self, id: RmdBlock) -> &mut Vec<i64> {
@@ -59,6 +61,11 @@ impl Motor {
                 let (is_done, error) = (self.outcome)(self.writes);
                 if is_done {
                     *self.block(id) = digits;
+                }
+                if self.writes == 2
+                    && let Some(gains) = self.others.take()
+                {
+                    self.gains = gains;
                 }
                 error.map_or(Ok(Answer::default()), Err)
             }
@@ -132,4 +139,15 @@ fn an_interruption_puts_the_old_values_back_and_a_second_one_ends_that() {
         (vec!["speed_kp".to_owned()], vec!["acceleration".to_owned()])
     );
     assert_eq!((motor.gains[2], motor.writes), (5, 3));
+}
+
+#[test]
+fn a_setting_that_another_program_writes_meanwhile_is_noticed() {
+    let mut motor = Motor::new(|_| (true, None));
+    motor.others = Some(vec![9; 6]);
+    let undone = motor.restore();
+    let Cause::Differs { settings } = &undone.cause else { panic!("{:?}", undone.cause) };
+    assert_eq!(settings[2], "speed_kp 5 (it has 9)");
+    assert_eq!(undone.rolled_back, ["speed_kp", "acceleration"]);
+    assert_eq!((motor.gains, motor.acceleration), (vec![1; 6], vec![0]));
 }
