@@ -22,6 +22,8 @@ type Look = Box<dyn Fn() -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sy
 /// While [`Look`] runs, the line is unlocked and belongs to its thread: that thread may use the line
 /// from within, and other threads wait.
 pub(crate) struct Turns<T> {
+    /// Held by the thread that is next. A thread that takes turn after turn queues here, behind it.
+    next: Mutex<()>,
     shared: Mutex<Shared<T>>,
     is_free: Condvar,
     look: Option<Look>,
@@ -42,16 +44,20 @@ pub(crate) struct Turn<'a, T> {
 impl<T> Turns<T> {
     pub(crate) fn new(state: T) -> Self {
         let line = Mutex::new(Shared { state, looking: None });
-        Turns { shared: line, is_free: Condvar::new(), look: None }
+        Turns { next: Mutex::new(()), shared: line, is_free: Condvar::new(), look: None }
     }
 
     pub(crate) fn set_look(&mut self, look: Look) {
         self.look = Some(look);
     }
 
-    /// Waits until the line is free, or looked away from by this thread.
+    /// Waits until the line is free, or looked away from by this thread. A thread that waits gets the
+    /// line before one that has just had it.
     pub(crate) fn take(&self) -> Turn<'_, T> {
-        let mut line = self.lock();
+        let mut line = {
+            let _next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
+            self.lock()
+        };
         while line.looking.is_some_and(|thread| thread != thread::current().id()) {
             line = self.is_free.wait(line).unwrap_or_else(PoisonError::into_inner);
         }
@@ -102,5 +108,25 @@ impl<T> Deref for Turn<'_, T> {
 impl<T> DerefMut for Turn<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
         &mut self.shared.state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_waits_goes_before_one_that_has_just_had_its_turn() {
+        let turns = Turns::new(0);
+        let first = turns.take();
+        thread::scope(|scope| {
+            scope.spawn(|| *turns.take() += 1);
+            // It waits for this turn once it is the next one.
+            while turns.next.try_lock().is_ok() {
+                thread::yield_now();
+            }
+            drop(first);
+            assert_eq!(*turns.take(), 1);
+        });
     }
 }
