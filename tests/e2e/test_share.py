@@ -4,6 +4,7 @@ import json
 import os
 import random
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from badline import BadLine, slcan_messages
+from peers import Plug
 from program import eventually
 from sharing import Client, event
 
@@ -173,6 +175,41 @@ def test_after_the_kill_of_a_share_programs_see_the_end_and_a_new_one_takes_its_
     new = start("share", "-p", drives.st, "--at", f"unix:{share.path}")
     assert new.line(0).startswith(f"share at unix:{share.path}: st0 (serial:")
     assert Client(share.path, "y").ask("lines")["kind"] == "answer"
+
+
+def test_a_stop_while_the_port_is_gone_is_repeated_when_it_is_back(sim, run, start, tmp_path):
+    drives = sim(st=("tcp",), rmd=())
+    cable, path = Plug(drives.st_address), tmp_path / "share"
+    # No program of the share has started the motor.
+    run("st", "-p", f"tcp:{drives.st_address}", "--timeout", "1s", "start").ended(0)
+    start("share", "-p", cable.port, "--at", f"unix:{path}").line(0)
+    eventually(lambda: abs(drives.motor(1)["speed_rpm"]) > 300, "a motor that turns")
+    client = Client(path, "operator")
+    client.command("st0", 1, 2, 2)
+    cable.unplug()
+    client.until(lambda it: event(it) == "lost")
+    (stopped,) = client.ask("stop", motor={"line": "st0", "motor": 1})["motors"]
+    assert "failure" in stopped, stopped
+    cable.plug_in()
+    client.until(lambda it: event(it) == "stopped")
+    eventually(lambda: abs(drives.motor(1)["speed_rpm"]) < 30, "a motor at rest")
+    cable.unplug()
+
+
+def test_connections_that_say_nothing_lock_nobody_out(share):
+    silent = [socket.socket(socket.AF_UNIX) for _ in range(64)]
+    for connection in silent:
+        connection.connect(str(share.path))
+
+    def is_let_in():
+        try:
+            return Client(share.path, "late").ask("lines")["kind"] == "answer"
+        except (AssertionError, OSError):
+            return False
+
+    eventually(is_let_in, "a place for a program")
+    for connection in silent:
+        connection.close()
 
 
 def test_a_share_takes_no_place_of_others(share, drives, run, tmp_path):

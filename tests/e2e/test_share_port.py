@@ -105,9 +105,9 @@ def test_a_latch_refuses_motion_and_the_readers_go_on(share, run, start, direct)
     direct.ask("latch")
     for command in (["start"], ["ramp", "1000", "100"]):
         refused = run("st", "-p", share.st, *command).ended(1)
-        assert "looks stopped the motors: no motion until the latch is released" in refused.err
+        assert "looks latched: motion is refused until the latch is released" in refused.err
     turned = run("rmd", "-p", share.rmd, "--id", "1", "speed", "100").ended(1)
-    assert "no motion until the latch is released" in turned.err
+    assert "motion is refused until the latch is released" in turned.err
     run("st", "-p", share.st, "stop").ended(0)
     direct.ask("release")
     run("st", "-p", share.st, "start").ended(0)

@@ -210,9 +210,13 @@ impl Acquisition {
         id
     }
 
-    /// Refuses all motion from now on, whoever asks, until it is released.
-    pub fn latch(&mut self, by: &Arc<str>) {
+    /// Refuses all motion from now on, whoever asks, until it is released. Motion that waits to be sent
+    /// is refused, too.
+    pub fn latch(&mut self, by: &Arc<str>, ended: &mut Ended<'_>) {
         self.latch = Some(Arc::clone(by));
+        for (id, _) in self.schedule.withdraw(|queued| !may_move(&queued.request)) {
+            ended(id, Err(CommandError::Latched(Arc::clone(by))));
+        }
         self.tell(What::Latched(Arc::clone(by)));
     }
 
@@ -278,6 +282,8 @@ impl Acquisition {
         self.is_open = true;
         self.schedule.reopened(self.clock.now());
         self.tell(What::Back);
+        // It may be another drive.
+        self.replan();
     }
 
     fn retry_in(&self) -> Option<Duration> {

@@ -65,7 +65,7 @@ pub enum CommandError {
     #[error("a stop replaced the command; the drive may have executed it before")]
     Displaced,
     /// Motion is refused since an operator stopped. Nothing was sent.
-    #[error("{0} stopped the motors: no motion until the latch is released")]
+    #[error("{0} latched: motion is refused until the latch is released")]
     Latched(Arc<str>),
     /// Too many commands wait. Nothing was sent.
     #[error("too many commands wait; send fewer")]

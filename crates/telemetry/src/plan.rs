@@ -1,6 +1,6 @@
 //! From the signals that are wanted to the fewest exchanges.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_proto::rmd::{Code, MotorId};
 use motorlink_proto::st::register::Access;
@@ -42,8 +42,8 @@ pub enum Read {
 ///
 /// Registers of a motor with the same period are in one data segment, if the drive has a free one in
 /// `segments`. The shortest periods come first. Registers that only a data segment can have always take
-/// one. Each other register is one exchange.
-pub fn st_polls(wants: &Wants, segments: &[u8]) -> Vec<Poll> {
+/// one. Registers in `alone` share none. Each other register is one exchange.
+pub fn st_polls(wants: &Wants, segments: &[u8], alone: &BTreeSet<RegisterId>) -> Vec<Poll> {
     let mut groups: BTreeMap<(Micros, MotorNumber), Vec<RegisterId>> = BTreeMap::new();
     for (signal, period) in wants {
         if let (Motor::St(motor), Source::Register(register)) = (signal.motor, signal.source) {
@@ -60,7 +60,9 @@ pub fn st_polls(wants: &Wants, segments: &[u8]) -> Vec<Poll> {
             let signal = |&register| Signal { motor, source: Source::Register(register) };
             Poll { motor, period, read, signals: registers.iter().map(signal).collect() }
         };
-        for registers in chunks(&known) {
+        let (alone, together): (Vec<_>, Vec<_>) =
+            known.into_iter().partition(|register| alone.contains(register));
+        for registers in chunks(&together).chain(alone.chunks(1)) {
             let pays = registers.len() > 1 || registers.iter().any(|&it| needs_segment(it));
             match free.as_slice() {
                 [segment, ..] if pays => {
@@ -138,6 +140,10 @@ fn motor_polls(id: MotorId, quantities: &[(Quantity, Micros)]) -> Vec<Poll> {
 mod tests {
     use super::*;
 
+    fn none() -> BTreeSet<RegisterId> {
+        BTreeSet::new()
+    }
+
     const FAST: Micros = Micros(10_000);
     const SLOW: Micros = Micros(100_000);
 
@@ -209,11 +215,11 @@ mod tests {
         ];
         let wants = wants(motor, &names);
         assert_eq!(
-            texts(&st_polls(&wants, &[3, 2])),
+            texts(&st_polls(&wants, &[3, 2], &none())),
             ["segment 3 10 ms: SPEED_MEAS I_A", "segment 2 100 ms: STATUS BUS_VOLTAGE HEATS_TEMP"]
         );
         assert_eq!(
-            texts(&st_polls(&wants, &[3])),
+            texts(&st_polls(&wants, &[3], &none())),
             [
                 "segment 3 10 ms: SPEED_MEAS I_A",
                 "GET_REG 100 ms: STATUS",
@@ -221,18 +227,18 @@ mod tests {
                 "GET_REG 100 ms: HEATS_TEMP"
             ]
         );
-        assert_eq!(st_polls(&wants, &[]).len(), 5);
+        assert_eq!(st_polls(&wants, &[], &none()).len(), 5);
     }
 
     #[test]
     fn one_register_alone_needs_no_segment_unless_nothing_else_has_it() {
         let motor = Motor::St(MotorNumber::new(1).unwrap());
         assert_eq!(
-            texts(&st_polls(&wants(motor, &[("STATUS", FAST)]), &[3])),
+            texts(&st_polls(&wants(motor, &[("STATUS", FAST)]), &[3], &none())),
             ["GET_REG 10 ms: STATUS"]
         );
         assert_eq!(
-            texts(&st_polls(&wants(motor, &[("I_A", FAST)]), &[3])),
+            texts(&st_polls(&wants(motor, &[("I_A", FAST)]), &[3], &none())),
             ["segment 3 10 ms: I_A"]
         );
     }
@@ -242,7 +248,7 @@ mod tests {
         let motor = Motor::St(MotorNumber::new(1).unwrap());
         let source = |register| Signal { motor, source: Source::Register(register) };
         let wants: Wants = RegisterId::all().map(|register| (source(register), FAST)).collect();
-        let polls = st_polls(&wants, &[0, 1, 2, 3]);
+        let polls = st_polls(&wants, &[0, 1, 2, 3], &none());
         let mut sizes = Vec::new();
         for poll in &polls {
             if let Read::Segment(_, registers) = &poll.read {

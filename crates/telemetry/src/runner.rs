@@ -154,8 +154,27 @@ impl Remote {
     /// # Errors
     /// The engine has ended.
     pub fn latch(&self, by: &Arc<str>) -> Result<(), Ended> {
+        let (sender, receiver) = mpsc::channel();
+        self.latch_then(by, move || {
+            let _ = sender.send(());
+        })?;
+        receiver.recv().map_err(|_| Ended)
+    }
+
+    /// As [`latch`](Self::latch), without waiting: `done` is called in the engine's thread.
+    ///
+    /// # Errors
+    /// The engine has ended.
+    pub fn latch_then(
+        &self,
+        by: &Arc<str>,
+        done: impl FnOnce() + Send + 'static,
+    ) -> Result<(), Ended> {
         let by = Arc::clone(by);
-        self.with(move |engine| engine.latch(&by))
+        self.send(move |Engine { acquisition, waiting }| {
+            acquisition.latch(&by, &mut |id, result| tell(waiting, id, result));
+            done();
+        })
     }
 
     /// Allows motion again.

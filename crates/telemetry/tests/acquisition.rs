@@ -41,6 +41,11 @@ impl Engine {
         self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
     }
 
+    fn latch(&mut self) {
+        let ended = &mut self.ended;
+        self.acquisition.latch(&"operator".into(), &mut |id, result| ended.push((id, result)));
+    }
+
     fn result(&self, id: CommandId) -> Option<&Result<Reply, CommandError>> {
         self.ended.iter().find(|(ended, _)| *ended == id).map(|(_, result)| result)
     }
@@ -202,7 +207,7 @@ fn a_motor_is_commanded_watched_and_stopped() {
     engine.run(SECOND);
     assert!(matches!(engine.result(started), Some(Ok(Reply::Rmd([0xA2, ..])))));
     let stopped = engine.stop(Request::rmd(id, &Stop));
-    engine.acquisition.latch(&"operator".into());
+    engine.latch();
     engine.run(SECOND);
     assert!(matches!(engine.result(stopped), Some(Ok(Reply::Rmd([0x81, ..])))));
     let got = Got::of(&subscription);
@@ -213,7 +218,7 @@ fn a_motor_is_commanded_watched_and_stopped() {
     let refused = engine.command(Request::rmd(id, &turn)).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "operator stopped the motors: no motion until the latch is released"
+        "operator latched: motion is refused until the latch is released"
     );
     let off = engine.command(Request::rmd(id, &Off)).unwrap();
     engine.run(CENTISECOND);
@@ -355,6 +360,49 @@ fn a_refused_register_is_said_once() {
 }
 
 #[test]
+fn a_refused_register_takes_no_values_from_others_of_its_segment() {
+    let bench = bench();
+    let mut engine = st_engine(&bench, "");
+    let wanted = signals(st(1), &["I_A", "SPEED_MEAS"]);
+    let subscription = engine.subscribe(&wanted, CENTISECOND);
+    engine.run(SECOND);
+    // RAMP_DURATION can be written only.
+    let other = engine.subscribe(&signals(st(1), &["RAMP_DURATION", "I_B"]), CENTISECOND);
+    engine.run(SECOND);
+    let got = Got::of(&subscription);
+    for signal in &wanted {
+        assert!(got.values(*signal).len() >= 190, "{}", got.values(*signal).len());
+    }
+    let got = Got::of(&other);
+    assert!(got.values(signals(st(1), &["I_B"])[0]).len() >= 90);
+    let refused: Vec<_> = got
+        .events()
+        .filter_map(|what| match what {
+            What::Refused(signals, _) => Some(signals.clone()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(refused, [signals(st(1), &["RAMP_DURATION"])]);
+}
+
+#[test]
+fn a_latch_refuses_motion_that_waits() {
+    let bench = bench();
+    let mut engine = rmd_engine(&bench, "");
+    let id = MotorId::new(1).unwrap();
+    let turn = SetSpeed { speed: CentiDps::from_dps(360.0) };
+    let waits = engine.command(Request::rmd(id, &turn)).unwrap();
+    let reads = engine.command(Request::rmd(id, &ReadStatus)).unwrap();
+    engine.latch();
+    engine.acquisition.release(&"operator".into());
+    engine.run(SECOND);
+    assert!(matches!(engine.result(waits), Some(Err(CommandError::Latched(_)))));
+    assert!(matches!(engine.result(reads), Some(Ok(_))));
+    let at = bench.signals().iter().position(|it| it.name == "rmd1.speed_dps").unwrap();
+    assert!(bench.values()[at].abs() < 1.0);
+}
+
+#[test]
 fn a_value_of_the_other_profile_is_no_value() {
     let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
     let bench = Bench::new(&config).unwrap();
@@ -419,7 +467,7 @@ fn a_latch_holds_for_a_command_that_waits() {
     let turn = Request::rmd(motor, &SetSpeed { speed: CentiDps::from_dps(360.0) });
     let reading = engine.command(Request::rmd(motor, &ReadStatus)).unwrap();
     let moving = engine.command(turn.clone()).unwrap();
-    engine.acquisition.latch(&"operator".into());
+    engine.latch();
     engine.run(SECOND);
     assert!(matches!(engine.result(reading), Some(Ok(_))), "{:?}", engine.ended);
     let refused = engine.result(moving);

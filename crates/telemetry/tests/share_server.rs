@@ -288,11 +288,13 @@ fn requests_that_are_not_possible_are_refused_with_words() {
     }
     let mut program = share.join("x");
     assert_eq!(program.ask(hello(VERSION, "y")).unwrap_err().0, Reason::Usage);
-    let commands: [(&str, u8, &[u8], &str); 6] = [
+    let commands: [(&str, u8, &[u8], &str); 8] = [
         ("st1", 1, &[3, 1], "no line `st1`; the lines are st0, rmd0"),
         ("st0", 0, &[3, 1], "number from 1 to 7"),
         ("st0", 1, &[], "frame code"),
         ("st0", 1, &[0x0D, 0], "configure it first"),
+        ("st0", 1, &[3; 200], "at most 128 bytes"),
+        ("st0", 1, &[0x23, 1], "5 bits"),
         ("rmd0", 33, &[0; 8], "1 to 32"),
         ("rmd0", 1, &[0x9A], "8 bytes, not 1"),
     ];

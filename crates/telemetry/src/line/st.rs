@@ -1,5 +1,6 @@
 //! The line to an ST drive: one lane.
 
+use std::collections::BTreeSet;
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
@@ -26,6 +27,8 @@ pub struct StLine {
     /// The registers of each data segment that this line configured.
     configured: [Option<Vec<RegisterId>>; SEGMENTS],
     segments: Vec<u8>,
+    /// Registers of data segments that the drive refused.
+    alone: BTreeSet<RegisterId>,
     /// How often the line had been lost when the exchange began.
     losses: u32,
     /// How often it had been lost when the replies were judged last.
@@ -68,8 +71,15 @@ impl StLine {
             Profile::Spec => (0..SEGMENTS as u8).rev().collect(),
             Profile::Mcsdk54 => Vec::new(),
         };
-        let (step, configured) = (Step::Idle, Default::default());
-        StLine { client, step, configured, segments, losses: 0, judged: 0 }
+        StLine {
+            client,
+            step: Step::Idle,
+            configured: Default::default(),
+            segments,
+            alone: BTreeSet::new(),
+            losses: 0,
+            judged: 0,
+        }
     }
 
     /// Uses this data segment only, and none in the profile that has none.
@@ -106,9 +116,10 @@ impl StLine {
                 self.configured[usize::from(segment.number)] = Some(segment.registers.clone());
                 self.begin_segment(segment).map_err(Err)
             }
-            (Step::Configuring(_), Err(error)) => {
+            (Step::Configuring(segment), Err(error)) => {
+                // The drive has no data segments, or not for one of these registers.
                 if matches!(error, Error::Refused { .. }) {
-                    self.segments.clear();
+                    self.alone.extend(&segment.registers);
                 }
                 Err(Err(error))
             }
@@ -181,6 +192,7 @@ impl Line for StLine {
     fn reopen(&mut self) -> Result<(), LineError> {
         self.client.reopen()?;
         self.configured = Default::default();
+        self.alone.clear();
         self.judged = self.client.counters().losses;
         Ok(())
     }
@@ -267,7 +279,7 @@ impl Line for StLine {
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {
-        st_polls(wants, &self.segments)
+        st_polls(wants, &self.segments, &self.alone)
     }
 
     fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples> {

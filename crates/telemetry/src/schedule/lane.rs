@@ -57,7 +57,7 @@ impl<C> Default for LaneState<C> {
 }
 
 impl<C: Clone> LaneState<C> {
-    /// Takes out the commands that a stop overtakes.
+    /// Takes out the commands that wait and do not pass `keep`.
     pub(super) fn overtake(&mut self, keep: impl Fn(&C) -> bool) -> Vec<(CommandId, C)> {
         let queued = std::mem::take(&mut self.commands);
         let mut overtaken = Vec::new();

@@ -213,6 +213,11 @@ impl<C: Clone> Schedule<C> {
         (id, overtaken)
     }
 
+    /// Takes out the commands that wait and do not pass `keep`: they are not sent any more.
+    pub fn withdraw(&mut self, keep: impl Fn(&C) -> bool) -> Vec<(CommandId, C)> {
+        self.lanes.values_mut().flat_map(|lane| lane.overtake(&keep)).collect()
+    }
+
     /// What to do now. Call again until it is [`Next::Wait`].
     pub fn next(&mut self, now: Instant) -> Next<C> {
         self.update_load(now);

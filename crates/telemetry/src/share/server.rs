@@ -20,6 +20,8 @@ use crate::line::Stopped;
 const BATCH: Duration = Duration::from_millis(16);
 /// Bytes that wait for a program outside the queues of its subscriptions.
 const WAITING: usize = 1 << 16;
+/// How long a connection may have no name: it takes the place of another program.
+const HELLO: Duration = Duration::from_secs(5);
 /// How long a connection that ends may take its last message.
 const LAST: Duration = Duration::from_millis(500);
 
@@ -51,6 +53,7 @@ pub enum ServerError {
 struct Client {
     session: SessionId,
     stream: UnixStream,
+    since: Instant,
     reader: Reader,
     out: Vec<u8>,
     /// When it is closed at the latest.
@@ -90,6 +93,9 @@ impl Server {
         self.accept();
         for client in &mut self.clients {
             client.receive(&mut self.hub);
+            if client.since.elapsed() > HELLO && !self.hub.is_named(client.session) {
+                self.hub.close(client.session, format!("no `hello` within {} s", HELLO.as_secs()));
+            }
         }
         self.hub.advance();
         if Instant::now() >= self.due {
@@ -166,6 +172,7 @@ impl Server {
             self.clients.push(Client {
                 session,
                 stream,
+                since: Instant::now(),
                 reader: Reader::new(LONGEST_REQUEST),
                 out: Vec::new(),
                 until: None,

@@ -148,8 +148,7 @@ impl Hub {
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
                 for held in &self.lines {
-                    let by = Arc::clone(name);
-                    held.remote().post(move |engine| engine.latch(&by)).map_err(ended)?;
+                    held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
                 Ok(Some(Answer::Latch))
             }

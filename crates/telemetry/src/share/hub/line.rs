@@ -8,7 +8,7 @@ use std::time::Duration;
 use motorlink::Clock;
 use motorlink_proto::rmd::{Code, MotorId, Stop};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, Frame, MAX_PAYLOAD, MotorNumber, RegisterId};
+use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
 use super::place::{SessionId, Speaks, seconds, wall_now};
@@ -43,6 +43,8 @@ pub struct Held {
     pub(super) starting: Vec<(Motor, SessionId)>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
+    /// The motors that did not confirm a stop, and who asked for it.
+    pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
 }
 
 /// A data segment that a command configures, for the program that sends it.
@@ -86,6 +88,7 @@ impl Held {
             owners: BTreeMap::new(),
             starting: Vec::new(),
             known: BTreeSet::new(),
+            unstopped: BTreeMap::new(),
             runner: Runner::start(name, acquisition)?,
         })
     }
@@ -126,7 +129,8 @@ impl Held {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
-            self.words.retries(&event.what, self.owners.keys(), retry);
+            let motors = self.owners.keys().chain(self.unstopped.keys());
+            self.words.retries(&event.what, motors, retry);
             match &event.what {
                 What::Lost(_) => doubts.push(None),
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
@@ -189,31 +193,38 @@ impl Held {
         let Some((code, payload)) = bytes.split_first() else {
             return Err("a request has at least its frame code".to_owned());
         };
-        let request = proto::Request::decode(profile, *code, payload);
+        if Frame::header(*code, 0) != *code || payload.len() > MAX_PAYLOAD {
+            return Err("a frame code has 5 bits, and a payload at most 128 bytes".to_owned());
+        }
+        let request = proto::Request::decode(profile, *code, payload).ok();
+        // More bytes than the request has are sent as they are: the drive decides.
+        let mut frame = [0; MAX_FRAME];
+        let is_whole = |request: &proto::Request<'_>| {
+            let whole = Frame::command(motor, request, &mut frame);
+            whole.is_some_and(|whole| whole[2..whole.len() - 1] == *payload)
+        };
+        let request = request.filter(is_whole);
         let is_about_drive = matches!(
             request,
-            Ok(proto::Request::GetBoardInfo | proto::Request::GetFirmwareVersion)
+            Some(proto::Request::GetBoardInfo | proto::Request::GetFirmwareVersion)
         );
         if motor != 0 || !is_about_drive {
             self.motor(motor)?;
         }
         match request {
-            Ok(proto::Request::ConfigureSegment { segment, registers }) => {
+            Some(proto::Request::ConfigureSegment { segment, registers }) => {
                 let registers: Vec<_> = registers.iter().copied().map(RegisterId).collect();
                 let request = Request::Segment(motor, segment, registers.clone());
                 Ok((request, Some(Configures { segment, registers })))
             }
-            Ok(proto::Request::GetSegment(segment)) => match segments(segment) {
+            Some(proto::Request::GetSegment(segment)) => match segments(segment) {
                 Some(registers) => Ok((Request::Segment(motor, segment, registers), None)),
                 None => Err(format!(
                     "data segment {segment} has the registers of another program: configure it first"
                 )),
             },
-            Ok(request) => Ok((Request::st(motor, request), None)),
-            Err(_) if Frame::header(*code, 0) != *code || payload.len() > MAX_PAYLOAD => {
-                Err("a frame code has 5 bits, and a payload at most 128 bytes".to_owned())
-            }
-            Err(_) => Ok((Request::Raw(motor, *code, payload.to_vec()), None)),
+            Some(request) => Ok((Request::st(motor, request), None)),
+            None => Ok((Request::Raw(motor, *code, payload.to_vec()), None)),
         }
     }
 

@@ -37,7 +37,7 @@ pub struct LineEnded(pub String);
 const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after the last \
     confirmation: the answers so far may be those to other commands; ask again";
 
-/// The pause before a stop that failed is repeated, if the program of the motor has gone.
+/// The pause before a stop that failed is repeated.
 const AGAIN: Duration = Duration::from_secs(1);
 
 /// Lines and the programs that use them.
@@ -48,7 +48,7 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
-    /// Motors whose stop failed, and when it is repeated if nobody owns them.
+    /// Motors that programs turned and whose stop failed, and when it is repeated.
     again: BTreeMap<(usize, Motor), Instant>,
     done: Sender<Done>,
     ended: Receiver<Done>,
@@ -67,7 +67,7 @@ struct Done {
 enum Work {
     Command(Sent, CommandResult),
     Confirm { motor: Motor, result: CommandResult },
-    Stop { motor: Motor, result: CommandResult },
+    Stop { motor: Motor, by: Arc<str>, result: CommandResult },
     Rates(Vec<Rate>),
 }
 
@@ -143,6 +143,11 @@ impl Hub {
         self.sessions.get(&id).is_some_and(Session::is_accepting)
     }
 
+    /// Whether a program has said hello.
+    pub fn is_named(&self, id: SessionId) -> bool {
+        self.sessions.get(&id).is_some_and(|session| session.name.is_some())
+    }
+
     /// Whether the connection of a program has to be closed after its last message.
     pub fn is_closing(&self, id: SessionId) -> bool {
         self.sessions.get(&id).is_none_or(Session::is_closing)
@@ -171,18 +176,18 @@ impl Hub {
     /// An engine has ended.
     pub fn collect(&mut self) -> Result<(), LineEnded> {
         self.sessions.values_mut().for_each(Session::collect);
-        self.stop_again();
+        self.repeat_stops();
         self.collect_events()
     }
 
     /// Repeats stops that no drive has confirmed.
-    fn stop_again(&mut self) {
+    fn repeat_stops(&mut self) {
         let now = Instant::now();
         let due: Vec<_> =
             self.again.iter().filter(|(_, at)| **at <= now).map(|(place, _)| *place).collect();
         for (line, motor) in due {
             self.again.remove(&(line, motor));
-            self.stop_if_orphaned(line, motor);
+            self.stop_again(line, motor);
         }
     }
 
@@ -197,7 +202,7 @@ impl Hub {
             }
             events.into_iter().for_each(|event| self.publish(event));
             for motor in retry {
-                self.stop_if_orphaned(line, motor);
+                self.stop_again(line, motor);
             }
         }
         Ok(())
@@ -254,13 +259,23 @@ impl Hub {
                     Err(error) => session.refuse(id, reason(&error), error.to_string()),
                 }
             }
-            Work::Stop { motor, result } => {
+            Work::Stop { motor, by, result } => {
                 let Some(held) = self.lines.get_mut(line) else { return };
+                let is_owned = held.owners.contains_key(&motor);
                 match &result {
-                    Ok(_) => drop(held.owners.remove(&motor)),
-                    // The end of these is an event.
-                    Err(CommandError::Closed | CommandError::Ended) => {}
-                    Err(_) => drop(self.again.insert((line, motor), Instant::now() + AGAIN)),
+                    Ok(_) => {
+                        held.owners.remove(&motor);
+                        held.unstopped.remove(&motor);
+                    }
+                    Err(error) if may_be_executed(error) => {
+                        held.unstopped.insert(motor, by);
+                    }
+                    Err(_) => {}
+                }
+                // The end of these is an event.
+                let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
+                if is_owned && result.is_err() && !is_event {
+                    self.again.insert((line, motor), Instant::now() + AGAIN);
                 }
                 let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
                 let motor = MotorName { line: held.name.clone(), motor: number(motor) };
@@ -347,15 +362,32 @@ impl Hub {
             held.starting.remove(at);
         }
         match (motion, result) {
-            (Motion::Stops, Ok(_)) => drop(held.owners.remove(&motor)),
+            (Motion::Stops, Ok(_)) => {
+                held.owners.remove(&motor);
+                held.unstopped.remove(&motor);
+            }
             (Motion::Starts, result) => {
                 // A refused start takes the motor from nobody.
                 if result.as_ref().err().is_none_or(may_be_executed) {
+                    held.unstopped.remove(&motor);
                     held.owners.insert(motor, session);
                 }
                 self.stop_if_orphaned(line, motor);
             }
+            (Motion::Stops, Err(error)) if may_be_executed(error) => {
+                let name = self.sessions.get(&session).and_then(|session| session.name.clone());
+                held.unstopped.insert(motor, name.unwrap_or_else(|| "share".into()));
+            }
             (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
+        }
+    }
+
+    /// Repeats a stop that was not confirmed. A motor of a program that left is stopped, too.
+    fn stop_again(&mut self, line: usize, motor: Motor) {
+        let by = self.lines.get_mut(line).and_then(|held| held.unstopped.remove(&motor));
+        match by {
+            Some(by) => self.stop(line, motor, SessionId::default(), None, &by),
+            None => self.stop_if_orphaned(line, motor),
         }
     }
 
@@ -379,12 +411,13 @@ impl Hub {
     ) {
         let Some(held) = self.lines.get(line) else { return };
         let tell = self.teller(session, id, line);
+        let asker = Arc::clone(by);
         let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
-            tell(Work::Stop { motor, result });
+            tell(Work::Stop { motor, by: asker, result });
         });
         if begun.is_err() {
-            let result = Err(CommandError::Ended);
-            self.finish(Done { session, id, line, what: Work::Stop { motor, result } });
+            let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
+            self.finish(Done { session, id, line, what: Work::Stop { motor, by, result } });
         }
     }
 

@@ -7,8 +7,8 @@ use motorlink_proto::time::Instant;
 
 use crate::signal::Motor;
 
-/// A program at the share.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// A program at the share. No program has the default.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub(super) u64);
 
 /// What the drives of a line speak.
