@@ -187,11 +187,11 @@ def test_a_stop_while_the_port_is_gone_is_repeated_when_it_is_back(sim, run, sta
     client = Client(path, "operator")
     client.command("st0", 1, 2, 2)
     cable.unplug()
-    client.until(lambda it: event(it) == "lost")
+    client.until(event("lost"))
     (stopped,) = client.ask("stop", motor={"line": "st0", "motor": 1})["motors"]
     assert "failure" in stopped, stopped
     cable.plug_in()
-    client.until(lambda it: event(it) == "stopped")
+    client.until(event("stopped"))
     eventually(lambda: abs(drives.motor(1)["speed_rpm"]) < 30, "a motor at rest")
     cable.unplug()
 
