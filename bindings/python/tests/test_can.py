@@ -240,7 +240,9 @@ def test_stops_are_sent_if_receiving_fails(flaky: Flaky, motor: Motor) -> None:
             motor.heard.clear()
             with pytest.raises(motorlink.LinkError, match="no room"):
                 stop()
-            eventually(lambda: motor.heard == [code] * 4, "four frames that stop the motor")
+            # An attempt on a port that may not be opened again yet sends nothing.
+            eventually(lambda: len(motor.heard) >= 2, "frames that stop the motor")
+            assert set(motor.heard) == {code}
 
 
 def test_a_bus_that_failed_once_is_used_again_by_asyncio(flaky: Flaky, motor: Motor) -> None:
