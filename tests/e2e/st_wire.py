@@ -32,7 +32,7 @@ class Line:
     """A serial line to a drive."""
 
     def __init__(self, url):
-        self.port = serial.serial_for_url(url, 115200, timeout=60)
+        self.port = serial.serial_for_url(url, 115200, timeout=5)
 
     def __enter__(self):
         return self

@@ -154,7 +154,7 @@ def test_a_reset_connection_stops_the_motor(sim, guard):
     drives = sim(rmd=())
     process = guard(drives.st, serve="tcp-listen:127.0.0.1:0")
     host, _, port = process.port.removeprefix("socket://").rpartition(":")
-    program = socket.create_connection((host, int(port)), timeout=60)
+    program = socket.create_connection((host, int(port)), timeout=5)
     program.sendall(frame(header(EXECUTE, 1), [START]))
     assert program.recv(16) == frame(ACK)
     runs(drives, 1)

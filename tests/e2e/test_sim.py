@@ -34,7 +34,7 @@ def test_each_port_is_announced_when_it_can_be_opened(sim, tmp_path):
     }
     for port in (st_tcp, rmd_tcp):
         host, _, number = port["path"].rpartition(":")
-        socket.create_connection((host, int(number)), timeout=60).close()
+        socket.create_connection((host, int(number)), timeout=5).close()
 
 
 def test_without_ports_it_serves_one_of_each_kind_here(start, tmp_path, monkeypatch):
@@ -62,7 +62,7 @@ def test_a_serial_line_over_tcp_has_one_client_at_a_time(sim):
     with Line(url) as first:
         assert first.get(CONTROL_MODE) == 1
         host, _, port = address.rpartition(":")
-        with socket.create_connection((host, int(port)), timeout=60) as second:
+        with socket.create_connection((host, int(port)), timeout=5) as second:
             assert second.recv(1) == b"", "the second is closed at once"
         assert first.get(CONTROL_MODE) == 1
     with Line(url) as third:
