@@ -146,7 +146,7 @@ def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path)
     share.process.send_signal(signal.SIGSTOP)
     try:
         reads.until(
-            lambda: any("the line is lost: share:" in line for line in reads.err), "why", within=30
+            lambda: any("does not answer: is it stopped" in line for line in reads.err), "why", within=30
         )
     finally:
         share.process.send_signal(signal.SIGCONT)

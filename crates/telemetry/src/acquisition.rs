@@ -357,20 +357,23 @@ impl Acquisition {
             Err(error) if error.is_line_failure() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
-        match shows {
-            Shows::Nothing => {}
-            Shows::Match => {
+        let verdict = self.schedule.ended(now, lane, outcome);
+        match (shows, verdict) {
+            (Shows::Match, _) => {
                 self.confirmed.insert(lane, sent);
                 self.tell_each(lane, |motor| What::Confirmed(motor, sent));
             }
-            Shows::Doubt => {
-                let since = self.confirmed.get(&lane).copied().unwrap_or_default();
-                self.tell_each(lane, |motor| What::Doubtful(motor, since));
-                self.distrust(lane);
-            }
+            // The reason of a failed poll is told first.
+            (Shows::Nothing, _) | (Shows::Doubt, Some(Verdict::Poll(_))) => {}
+            (Shows::Doubt, _) => self.doubt(lane),
         }
-        match self.schedule.ended(now, lane, outcome) {
-            Some(Verdict::Poll(id)) => self.polled(lane, id, sent, result),
+        match verdict {
+            Some(Verdict::Poll(id)) => {
+                self.polled(lane, id, sent, result);
+                if shows == Shows::Doubt {
+                    self.doubt(lane);
+                }
+            }
             Some(Verdict::Command(id)) => ended(id, result.map_err(CommandError::Line)),
             Some(Verdict::Stopped(id)) => {
                 self.tell(What::Stopped(id));
@@ -385,6 +388,13 @@ impl Acquisition {
             }
             Some(Verdict::StopAgain(_)) | None => {}
         }
+    }
+
+    /// The values of a lane since its last confirmation may be those of other signals.
+    fn doubt(&mut self, lane: Lane) {
+        let since = self.confirmed.get(&lane).copied().unwrap_or_default();
+        self.tell_each(lane, |motor| What::Doubtful(motor, since));
+        self.distrust(lane);
     }
 
     fn stop_failed(&mut self, id: CommandId, why: &CommandError) {

@@ -93,6 +93,12 @@ impl Held {
         })
     }
 
+    /// A motor has confirmed a stop: nobody is responsible for it any more.
+    pub(super) fn stopped(&mut self, motor: Motor) {
+        self.owners.remove(&motor);
+        self.unstopped.remove(&motor);
+    }
+
     pub(super) fn remote(&self) -> &Remote {
         self.runner.remote()
     }

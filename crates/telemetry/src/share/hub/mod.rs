@@ -263,10 +263,7 @@ impl Hub {
                 let Some(held) = self.lines.get_mut(line) else { return };
                 let is_owned = held.owners.contains_key(&motor);
                 match &result {
-                    Ok(_) => {
-                        held.owners.remove(&motor);
-                        held.unstopped.remove(&motor);
-                    }
+                    Ok(_) => held.stopped(motor),
                     Err(error) if may_be_executed(error) => {
                         held.unstopped.insert(motor, by);
                     }
@@ -362,12 +359,9 @@ impl Hub {
             held.starting.remove(at);
         }
         match (motion, result) {
-            (Motion::Stops, Ok(_)) => {
-                held.owners.remove(&motor);
-                held.unstopped.remove(&motor);
-            }
+            (Motion::Stops, Ok(_)) => held.stopped(motor),
             (Motion::Starts, result) => {
-                // A refused start takes the motor from nobody.
+                // The owner stays if the start was refused.
                 if result.as_ref().err().is_none_or(may_be_executed) {
                     held.unstopped.remove(&motor);
                     held.owners.insert(motor, session);
