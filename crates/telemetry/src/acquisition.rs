@@ -71,6 +71,9 @@ pub struct Acquisition {
     careful: BTreeMap<Lane, Instant>,
     /// Polls that the drive refused.
     refused: BTreeSet<PollId>,
+    /// Registers that have their size in the other profile. Each read of one loses the line, so they are
+    /// not read again until the port is opened again, or until somebody else wants them.
+    unfit: BTreeSet<Signal>,
     /// Failures in a row of each lane.
     failures: BTreeMap<Lane, u32>,
 }
@@ -127,6 +130,7 @@ impl Acquisition {
             confirmed: BTreeMap::new(),
             careful: BTreeMap::new(),
             refused: BTreeSet::new(),
+            unfit: BTreeSet::new(),
             failures: BTreeMap::new(),
         }
     }
@@ -156,8 +160,13 @@ impl Acquisition {
         self.schedule.load()
     }
 
-    /// Sends these signals, and all events, to a subscription.
+    /// Sends these signals, and all events, to a subscription. What the drive refuses is said again.
     pub fn subscribe(&mut self, subscription: Subscription, wants: Wants) -> ConsumerId {
+        self.unfit.retain(|signal| !wants.contains_key(signal));
+        self.refused.retain(|id| {
+            let poll = self.polls.get(id);
+            poll.is_some_and(|poll| !poll.signals.iter().any(|it| wants.contains_key(it)))
+        });
         self.last_consumer += 1;
         let id = ConsumerId(self.last_consumer);
         self.consumers.insert(id, Consumer::new(subscription, wants));
@@ -281,6 +290,7 @@ impl Acquisition {
         }
         self.is_open = true;
         self.schedule.reopened(self.clock.now());
+        self.unfit.clear();
         self.tell(What::Back);
         // It may be another drive.
         self.replan();

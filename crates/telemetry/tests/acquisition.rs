@@ -1,12 +1,13 @@
 //! The engine of a line against simulated drives on virtual time.
 
 mod engine;
+mod got;
 
 use std::sync::Arc;
 
 use motorlink_proto::rmd::{MotorId, Off, ReadStatus, SetSpeed, Stop};
 use motorlink_proto::st::{self, Profile, RegisterId};
-use motorlink_proto::time::{Instant, Micros};
+use motorlink_proto::time::Micros;
 use motorlink_proto::units::CentiDps;
 use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{LineError, Reply, Request};
@@ -14,10 +15,11 @@ use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::rows::Rows;
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal};
-use motorlink_telemetry::subscription::{Full, Record, Subscription};
+use motorlink_telemetry::subscription::{Full, Subscription};
 use motorlink_testbench::{Bench, BenchConfig};
 
 use engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
+use got::Got;
 
 const CENTISECOND: Micros = Micros(10_000);
 
@@ -48,37 +50,6 @@ impl Engine {
 
     fn result(&self, id: CommandId) -> Option<&Result<Reply, CommandError>> {
         self.ended.iter().find(|(ended, _)| *ended == id).map(|(_, result)| result)
-    }
-}
-
-/// What a consumer got: times and values of a signal, and the events.
-#[derive(Default)]
-struct Got {
-    records: Vec<Record>,
-}
-
-impl Got {
-    fn of(subscription: &Subscription) -> Self {
-        Got { records: std::iter::from_fn(|| subscription.take()).collect() }
-    }
-
-    fn values(&self, signal: Signal) -> Vec<(Instant, f64)> {
-        let value = |record: &Record| match record {
-            Record::Values(values) => Some((values.time(), values.get(signal)?.value)),
-            _ => None,
-        };
-        self.records.iter().filter_map(value).collect()
-    }
-
-    fn replies(&self) -> usize {
-        self.records.iter().filter(|record| matches!(record, Record::Values(_))).count()
-    }
-
-    fn events(&self) -> impl Iterator<Item = &What> {
-        self.records.iter().filter_map(|record| match record {
-            Record::Event(event) => Some(&event.what),
-            _ => None,
-        })
     }
 }
 
@@ -337,55 +308,6 @@ fn two_motors_of_a_line_are_confirmed_and_fall_silent_together() {
 }
 
 #[test]
-fn a_refused_register_is_said_once() {
-    let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
-    let bench = Bench::new(&config).unwrap();
-    let mut engine = st_engine(&bench, "");
-    let mut wanted = signals(st(1), &["SPEED_MEAS"]);
-    wanted.extend(signals(st(1), &["0xEE"]));
-    let subscription = engine.subscribe(&wanted, Micros(50_000));
-    engine.run(Micros(2 * SECOND.0));
-    let got = Got::of(&subscription);
-    assert!(got.values(wanted[0]).len() >= 39);
-    let refused: Vec<_> = got
-        .events()
-        .filter_map(|what| match what {
-            What::Refused(signals, why) => Some((signals.clone(), why.clone())),
-            _ => None,
-        })
-        .collect();
-    let [(signals, why)] = &refused[..] else { panic!("{refused:?}") };
-    assert_eq!(signals[..], wanted[1..]);
-    assert!(why.to_string().contains("refused reading 0xee"), "{why}");
-}
-
-#[test]
-fn a_refused_register_takes_no_values_from_others_of_its_segment() {
-    let bench = bench();
-    let mut engine = st_engine(&bench, "");
-    let wanted = signals(st(1), &["I_A", "SPEED_MEAS"]);
-    let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(SECOND);
-    // RAMP_DURATION can be written only.
-    let other = engine.subscribe(&signals(st(1), &["RAMP_DURATION", "I_B"]), CENTISECOND);
-    engine.run(SECOND);
-    let got = Got::of(&subscription);
-    for signal in &wanted {
-        assert!(got.values(*signal).len() >= 190, "{}", got.values(*signal).len());
-    }
-    let got = Got::of(&other);
-    assert!(got.values(signals(st(1), &["I_B"])[0]).len() >= 90);
-    let refused: Vec<_> = got
-        .events()
-        .filter_map(|what| match what {
-            What::Refused(signals, _) => Some(signals.clone()),
-            _ => None,
-        })
-        .collect();
-    assert_eq!(refused, [signals(st(1), &["RAMP_DURATION"])]);
-}
-
-#[test]
 fn a_latch_refuses_motion_that_waits() {
     let bench = bench();
     let mut engine = rmd_engine(&bench, "");
@@ -400,24 +322,6 @@ fn a_latch_refuses_motion_that_waits() {
     assert!(matches!(engine.result(reads), Some(Ok(_))));
     let at = bench.signals().iter().position(|it| it.name == "rmd1.speed_dps").unwrap();
     assert!(bench.values()[at].abs() < 1.0);
-}
-
-#[test]
-fn a_value_of_the_other_profile_is_no_value() {
-    let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
-    let bench = Bench::new(&config).unwrap();
-    // FLUXWK_BUS of shipped firmware has digits of 0.1 %.
-    let mut engine = Engine::st(bench.bytes(&spec("")), st_options(Profile::Spec));
-    let wanted = signals(st(1), &["FLUXWK_BUS"]);
-    let subscription = engine.subscribe(&wanted, Micros(50_000));
-    engine.run(SECOND);
-    let got = Got::of(&subscription);
-    assert!(got.replies() >= 19 && got.values(wanted[0]).is_empty());
-    let refused: Vec<_> = got.events().filter(|what| matches!(what, What::Refused(..))).collect();
-    let [What::Refused(signals, why)] = refused[..] else { panic!("{refused:?}") };
-    assert_eq!(*signals, wanted);
-    let why = why.to_string();
-    assert!(why.contains("not plausible") && why.contains("mcsdk-5.4"), "{why}");
 }
 
 #[test]

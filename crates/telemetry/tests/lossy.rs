@@ -5,7 +5,7 @@ mod engine;
 use std::time::Duration;
 
 use motorlink::port::{ByteLink, Link, PortError};
-use motorlink_link::fault::Rng;
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::Profile;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::event::What;
@@ -62,21 +62,20 @@ fn a_bus_that_loses_frames_gives_rows_when_it_can() {
 }
 
 /// A link on which some reads come a second time, behind the next write.
-struct Twice<L> {
+struct Twice<L, C> {
     link: L,
-    rate: f64,
-    chance: Rng,
+    comes_again: C,
     again: Vec<u8>,
     due: Vec<u8>,
 }
 
-impl<L: Link> Link for Twice<L> {
+impl<L: Link, C: Send> Link for Twice<L, C> {
     fn within(&self) -> Option<&dyn Link> {
         Some(&self.link)
     }
 }
 
-impl<L: ByteLink> ByteLink for Twice<L> {
+impl<L: ByteLink, C: FnMut(&[u8]) -> bool + Send> ByteLink for Twice<L, C> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.due.append(&mut self.again);
         self.link.write(bytes)
@@ -89,32 +88,39 @@ impl<L: ByteLink> ByteLink for Twice<L> {
             return Ok(count);
         }
         let count = self.link.read(buffer, timeout)?;
-        if count > 0 && self.chance.f64() < self.rate {
+        if count > 0 && (self.comes_again)(&buffer[..count]) {
             self.again = buffer[..count].to_vec();
         }
         Ok(count)
     }
 }
 
-/// What a consumer was told of values of a bad line: how many are confirmed, and how many moments are
-/// in doubt. A wrong value that is confirmed fails.
-fn judged(faults: &str, twice: f64, timeout_ms: u64, seed: u64) -> (usize, usize) {
-    let bench = bench();
-    let faults = spec(faults);
-    let chance = Rng::with_seed(seed);
-    let link = bench.bytes(&motorlink_link::fault::Faults { seed, ..faults });
-    let link = Twice { link, rate: twice, chance, again: Vec::new(), due: Vec::new() };
+/// A line with faults, and with replies that come twice.
+fn bad_line(
+    faults: Faults,
+    comes_again: impl FnMut(&[u8]) -> bool + Send + 'static,
+    timeout_ms: u64,
+) -> Engine {
+    let link = bench().bytes(&faults);
+    let link = Twice { link, comes_again, again: Vec::new(), due: Vec::new() };
     let timeout = Duration::from_millis(timeout_ms);
     let options = motorlink::st::Options { timeout, ..st_options(Profile::Spec) };
     let mut engine = Engine::st(link, options);
     engine.step = STEP;
-    // Their values are known. Those of the same size are different.
-    let constants = [("BUS_VOLTAGE", 325.0), ("STATUS", 0.0), ("RUC_STAGE_NBR", 5.0)];
+    engine
+}
+
+/// A register and its value, which is constant, and its period in ms.
+type Constant = (&'static str, f64, u32);
+
+/// What a consumer was told of values of a bad line: how many are confirmed, and how many moments are
+/// in doubt. Each register has a period of its own, so that there is no data segment. A wrong value that
+/// is confirmed fails.
+fn judged(mut engine: Engine, constants: &[Constant], line: &str) -> (usize, usize) {
     let wanted: Vec<Signal> =
-        constants.iter().flat_map(|(name, _)| signals(st(1), &[name])).collect();
-    // Each register at a rate of its own: no data segment.
-    let wants = wanted.iter().zip([20_000, 30_000, 40_000]);
-    let wants: Wants = wants.map(|(signal, period)| (*signal, Micros(period))).collect();
+        constants.iter().flat_map(|(name, ..)| signals(st(1), &[name])).collect();
+    let wants = wanted.iter().zip(constants);
+    let wants: Wants = wants.map(|(it, (.., ms))| (*it, Micros::from_millis(*ms))).collect();
     let subscription = Subscription::new(1_000_000, Full::DropNewest);
     engine.acquisition.subscribe(subscription.clone(), wants);
     engine.run(Micros(5 * SECOND.0));
@@ -124,8 +130,8 @@ fn judged(faults: &str, twice: f64, timeout_ms: u64, seed: u64) -> (usize, usize
         match record {
             Record::Values(values) => {
                 let constants = wanted.iter().zip(constants);
-                open.extend(constants.filter_map(|(signal, (_, value))| {
-                    Some((values.replied, values.get(*signal)?.value == value))
+                open.extend(constants.filter_map(|(signal, (_, value, _))| {
+                    Some((values.replied, values.get(*signal)?.value == *value))
                 }));
             }
             Record::Event(event) => match event.what {
@@ -135,12 +141,12 @@ fn judged(faults: &str, twice: f64, timeout_ms: u64, seed: u64) -> (usize, usize
                 }
                 What::Confirmed(_, until) => {
                     let mut is_right = |(at, right): &(Instant, bool)| *at > until || *right;
-                    assert!(open.iter().all(&mut is_right), "{faults} {twice} {seed}: {event:?}");
+                    assert!(open.iter().all(&mut is_right), "{line}: {event:?}");
                     let before = open.len();
                     open.retain(|(at, _)| *at > until);
                     confirmed += before - open.len();
                 }
-                What::Unanswered(..) | What::Silent(..) | What::Answers(_) => {}
+                What::Unanswered(..) | What::Silent(..) | What::Answers(_) | What::Refused(..) => {}
                 _ => panic!("{event:?}"),
             },
             Record::Lost(_) => panic!("the queue is long enough"),
@@ -151,6 +157,8 @@ fn judged(faults: &str, twice: f64, timeout_ms: u64, seed: u64) -> (usize, usize
 
 #[test]
 fn no_wrong_value_is_confirmed_on_a_bad_line() {
+    // Values of the same size are different.
+    let constants = [("BUS_VOLTAGE", 325.0, 20), ("STATUS", 0.0, 30), ("RUC_STAGE_NBR", 5.0, 40)];
     let lines = [
         // Replies that come after the timeout.
         ("pause=20ms..80ms@1e-2", 0.0, 15),
@@ -161,9 +169,31 @@ fn no_wrong_value_is_confirmed_on_a_bad_line() {
         ("drop=0.02", 0.02, 50),
     ];
     for (faults, twice, timeout_ms) in lines {
-        let judged = (0..6).map(|seed| judged(faults, twice, timeout_ms, seed));
+        let judged = (0..6).map(|seed| {
+            let mut chance = Rng::with_seed(seed);
+            let faults = Faults { seed, ..spec(faults) };
+            let engine = bad_line(faults, move |_| chance.f64() < twice, timeout_ms);
+            judged(engine, &constants, &format!("{faults} {twice} {seed}"))
+        });
         let (confirmed, doubts) = judged.fold((0, 0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
         assert!(confirmed > 200, "{faults} {twice}: {confirmed}");
         assert!(doubts > 0 || twice == 0.0, "{faults} {twice}");
+    }
+}
+
+#[test]
+fn a_size_of_the_other_profile_confirms_no_value_before_it() {
+    // BUS_VOLTAGE comes twice: HEATS_TEMP gets 325, and CTRBID the two bytes of HEATS_TEMP.
+    let constants = [("BUS_VOLTAGE", 325.0, 20), ("HEATS_TEMP", 25.0, 40), ("CTRBID", 17.0, 80)];
+    for nth in 1..16 {
+        let mut seen = 0;
+        let comes_again = move |bytes: &[u8]| {
+            let is_voltage = bytes == [0xF0, 0x02, 0x45, 0x01, 0x39];
+            seen += u32::from(is_voltage);
+            is_voltage && seen == nth
+        };
+        let (confirmed, doubts) =
+            judged(bad_line(Faults::NONE, comes_again, 100), &constants, &format!("{nth}"));
+        assert!(confirmed > 200 && doubts > 0, "{nth}: {confirmed} {doubts}");
     }
 }

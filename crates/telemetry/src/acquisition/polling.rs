@@ -69,6 +69,11 @@ impl Acquisition {
             },
             Err(error) if error.is_unconfirmed() => {}
             Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, error),
+            Err(error) if error.is_of_other_profile() => {
+                self.refuse(id, poll.signals.clone(), error);
+                self.unfit.extend(&poll.signals);
+                self.replan();
+            }
             // The drive may have no data segments: then the plan is another.
             Err(error) if !self.replan() => {
                 self.refuse(id, poll.signals.clone(), error);
@@ -105,7 +110,8 @@ impl Acquisition {
     /// Plans the polls anew. Returns whether they are others now.
     pub(super) fn replan(&mut self) -> bool {
         let mut wants = Wants::new();
-        for (signal, period) in self.consumers.values().flat_map(|consumer| &consumer.wants) {
+        let wanted = self.consumers.values().flat_map(|consumer| &consumer.wants);
+        for (signal, period) in wanted.filter(|(signal, _)| !self.unfit.contains(signal)) {
             let shortest = wants.entry(*signal).or_insert(*period);
             *shortest = (*shortest).min(*period);
         }

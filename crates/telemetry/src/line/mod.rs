@@ -74,15 +74,19 @@ impl LineError {
     /// has the size of the other profile says something about what was read, not about the line.
     pub fn is_line_failure(&self) -> bool {
         match self {
-            LineError::St(motorlink::st::Error::Failed {
-                failure: proto::Failure::Size { fits: Some(_), .. },
-                ..
-            }) => false,
+            _ if self.is_of_other_profile() => false,
             LineError::St(error) => error.is_line_failure(),
             LineError::Rmd(error) => error.is_line_failure(),
             LineError::Closed => true,
             LineError::Protocol | LineError::Reply | LineError::Implausible(_) => false,
         }
+    }
+
+    /// Whether the reply has the size of the other profile.
+    pub(crate) fn is_of_other_profile(&self) -> bool {
+        use motorlink::st::Error::Failed;
+        use proto::Failure::Size;
+        matches!(self, LineError::St(Failed { failure: Size { fits: Some(_), .. }, .. }))
     }
 
     /// Whether a motor did not answer.

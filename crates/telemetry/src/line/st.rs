@@ -8,7 +8,7 @@ use motorlink::st::{Error, EventClient, Options, Progress};
 use motorlink::{Clock, LinkState, port::PortName};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Confirmation, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
+    Confirmation, Counters, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
 };
 
 use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
@@ -33,6 +33,9 @@ pub struct StLine {
     losses: u32,
     /// How often it had been lost when the replies were judged last.
     judged: u32,
+    /// The unasked bytes up to a reply with the size of the other profile. If more come until the next
+    /// confirmation, the reply belonged to another request.
+    unasked: Option<u32>,
 }
 
 /// How far the exchange is.
@@ -79,6 +82,7 @@ impl StLine {
             alone: BTreeSet::new(),
             losses: 0,
             judged: 0,
+            unasked: None,
         }
     }
 
@@ -147,16 +151,25 @@ impl StLine {
             result => result,
         };
         let was_lost = self.losses != self.judged;
+        let shows_silence = result.as_ref().is_err_and(shows_no_reply);
+        let result = result.map_err(LineError::from);
+        let Counters { losses, unasked_bytes, .. } = self.client.counters();
+        let is_another = self.unasked.is_some_and(|before| before != unasked_bytes);
         let shows = match &result {
+            Ok(Reply::Confirmed) if is_another => Shows::Doubt,
             Ok(Reply::Confirmed) => Shows::Match,
-            Err(error) if !was_lost && shows_no_reply(error) => Shows::Match,
+            Err(_) if !was_lost && shows_silence => Shows::Match,
             Err(error) if error.is_line_failure() => Shows::Doubt,
+            Err(error) if error.is_of_other_profile() => {
+                self.unasked.get_or_insert(unasked_bytes);
+                Shows::Nothing
+            }
             _ => Shows::Nothing,
         };
         if shows != Shows::Nothing {
-            self.judged = self.client.counters().losses;
+            self.judged = losses;
+            self.unasked = None;
         }
-        let result = result.map_err(LineError::from);
         Over { lane: LANE, result, sent: self.client.sent(), shows }
     }
 }
@@ -194,6 +207,7 @@ impl Line for StLine {
         self.configured = Default::default();
         self.alone.clear();
         self.judged = self.client.counters().losses;
+        self.unasked = None;
         Ok(())
     }
 

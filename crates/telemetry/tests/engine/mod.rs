@@ -1,4 +1,5 @@
 //! The engine of a line with simulated drives, on virtual time.
+#![allow(dead_code, reason = "no test needs all of it")]
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
