@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import select
 import subprocess
 import threading
 from collections.abc import Awaitable, Callable
@@ -38,6 +39,18 @@ def changed(text: str, values: dict[str, int]) -> str:
     return text
 
 
+def reply_at_once(steps: Any) -> None:
+    """Gives each reply to the client in the same step of the event loop as its request."""
+    take = steps.take
+
+    def take_the_reply() -> None:
+        take()
+        select.select([steps._watched], [], [], PATIENT)
+        take()
+
+    steps.take = take_the_reply
+
+
 class Motor:
     """Motor 1 of served drives, through either API: one connection for each call."""
 
@@ -46,6 +59,7 @@ class Motor:
         self.port = served.st if protocol == "st" else served.can
         self.options: dict[str, Any] = {} if protocol == "st" else {"timeout": PATIENT}
         self.writes = 0
+        self.replies_at_once = False
 
     def do(self, act: Callable[[Any], Any], meddling: Meddling | None = None) -> Any:
         """The result of `act`, which gets the motor's settings."""
@@ -61,6 +75,8 @@ class Motor:
         awaited: Any = {"st": aio.st, "rmd": aio.rmd}[self.protocol]
         async with awaited.open(self.port, **self.options) as client:
             self.meddle(client, meddling)
+            if self.replies_at_once:
+                reply_at_once(client._steps)
             return await act(client.motor(1).settings)
 
     def meddle(self, client: Any, meddling: Meddling | None) -> None:
@@ -372,7 +388,10 @@ def test_a_second_ctrl_c_ends_the_roll_back(motor: MotorOf, protocol: str) -> No
 
 
 @PROTOCOLS
-def test_a_cancelled_restore_puts_the_old_values_back(motor: MotorOf, protocol: str) -> None:
+@pytest.mark.parametrize("replies_at_once", [False, True])
+def test_a_cancelled_restore_puts_the_old_values_back(
+    motor: MotorOf, protocol: str, replies_at_once: bool
+) -> None:
     one, new = motor(protocol, "asyncio"), NEW[protocol]
     before = one.dump()
     tasks: list[asyncio.Task[Any]] = []
@@ -391,7 +410,9 @@ def test_a_cancelled_restore_puts_the_old_values_back(motor: MotorOf, protocol: 
             return error.__cause__
         return None
 
+    one.replies_at_once = replies_at_once
     state = one.do(main, cancel)
+    one.replies_at_once = False
     assert one.dump() == before
     assert isinstance(state, motorlink.SettingsError)
     assert state.rolled_back == (*new,)[:2]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import os
-from collections.abc import Callable, Coroutine, Generator
+from collections.abc import Callable, Coroutine, Generator, Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
@@ -107,9 +107,9 @@ class Steps:
             self._loop.remove_reader(self._watched)
             self._watched = None
 
-    async def turn(self) -> None:
-        """Lets other tasks run if the port replies without waiting."""
-        if self._watched is None:
+    async def turn(self, answers: Iterable[asyncio.Future[Any]]) -> None:
+        """Lets other tasks run, and a cancellation come, if the port has replied without waiting."""
+        if all(answer.done() for answer in answers):
             await asyncio.sleep(0)
 
     def drop(self, give_up: Callable[[], None]) -> None:

@@ -78,7 +78,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
             begin()
             answers = self._expect([motor])
             self._steps.take()
-            await self._steps.turn()
+            await self._steps.turn(answers.values())
             return await answers[motor]
         finally:
             self._forget([motor])
@@ -166,7 +166,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
     async def _answered(self, answers: dict[int, asyncio.Future[Any]]) -> dict[int, Any]:
         """Waits for all replies. A port that fails is raised, as it failed for all."""
         self._steps.take()
-        await self._steps.turn()
+        await self._steps.turn(answers.values())
         if answers:
             await asyncio.wait(answers.values())
         outcomes = {id: answer.exception() or answer.result() for id, answer in answers.items()}

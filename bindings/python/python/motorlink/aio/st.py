@@ -123,7 +123,7 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Samp
             try:
                 begin()
                 self._steps.take()
-                await self._steps.turn()
+                await self._steps.turn([answer])
                 return await answer
             finally:
                 self._answer = None
