@@ -67,7 +67,7 @@ def test_ctrl_c_during_the_demo_stops_the_motors(start, tmp_path):
     demo.until(lambda: any(re.search(r"ST 1 +RUN", line) for line in demo.out), "ST 1 in RUN")
     demo.interrupt()
     assert demo.wait() == 130
-    assert any("motor 1 is stopped" in line for line in demo.err), demo.err
+    assert any("motor 1 acknowledged its stop" in line for line in demo.err), demo.err
     assert not any("may still turn" in line for line in demo.err), demo.err
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 

@@ -41,7 +41,7 @@ def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(si
             eventually(lambda: bus.passed(b"t1418A2"), "the motor gets a motion command")
             bus.lose(b"t141881")
         eventually(lambda: bus.is_lost(b"t141881"), "the guard's first 0x81 is lost")
-        process.says("motor 1 is stopped (0x81 acknowledged)")
+        process.says("motor 1 acknowledged its stop (0x81)")
         assert drives.motor(1)["mode"] == "stopped"
         assert not any("another node" in text for text in process.err), process.err
 
@@ -55,7 +55,7 @@ def test_an_rmd_motor_that_its_program_ended_is_left_as_it_is(sim, guard):
         line.say(b"t1428A2000000A08C0000\r", b"t1428A2")
         line.say(b"t14288100000000000000\r", b"t142881")
         line.say(b"t1418A2000000A08C0000\r", b"t1418A2")
-    process.says("motor 1 is stopped (0x81 acknowledged)")
+    process.says("motor 1 acknowledged its stop (0x81)")
     assert not any("motor 2" in text for text in process.err), process.err
     assert drives.motor(2)["mode"] == "stopped"
 
@@ -72,7 +72,7 @@ def test_what_other_nodes_command_is_reported(sim, start, client, run, tmp_path)
     run(*other, "speed", 100).ended(0)
     process.says("motor 3 is commanded by another node of the bus (0xa2)")
     program.kill()
-    process.says("motor 1 is stopped")
+    process.says("motor 1 acknowledged its stop")
     assert drives.motor(3)["mode"] == "speed", "it is another's"
 
 
@@ -87,7 +87,7 @@ def test_an_rmd_guard_over_a_lost_port_goes_on_when_it_is_back(sim, guard, clien
     process.says("motor 1 MAY STILL TURN")
     drives = sim(st=())
     process.says("the port of the drive works again")
-    process.says("motor 1 is stopped (0x81 acknowledged)")
+    process.says("motor 1 acknowledged its stop (0x81)")
 
 
 @pytest.mark.parametrize("protocol", PORT)
@@ -143,4 +143,4 @@ def test_the_pfc_that_a_program_enabled_is_disabled(sim, guard, tmp_path):
     os.write(line, frame(header(EXECUTE, 1), [0x0A]))
     assert os.read(line, 16)[0] == ACK
     os.close(line)
-    process.says("the PFC is stopped (PFC_DISABLE acknowledged)")
+    process.says("the PFC acknowledged its stop (PFC_DISABLE)")

@@ -48,11 +48,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
     )?;
     // These stop the motors however the demo ends.
     let _st_guard = st.stop_on_drop().reporting(|stopped| match &stopped.result {
-        Ok(()) => note(format!("ST {} is stopped", stopped.motor)),
+        Ok(()) => note(format!("ST {} acknowledged its stop", stopped.motor)),
         Err(error) => note(format!("ST {} may still turn: {error}", stopped.motor)),
     });
     let _rmd_guard = bus.stop_on_drop().reporting(|stopped| match &stopped.result {
-        Ok(()) => note(format!("RMD motor {} is off", stopped.id)),
+        Ok(()) => note(format!("RMD motor {} acknowledged its stop", stopped.id)),
         Err(error) => note(format!("RMD motor {} may still turn: {error}", stopped.id)),
     });
     let picture = outputs::resolve(&[("--picture", args.picture.as_deref())], &[])?;

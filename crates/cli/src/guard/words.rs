@@ -89,6 +89,7 @@ fn in_words(halt: &Halt, again: &str) -> String {
     let part = halt.part;
     match &halt.outcome {
         Outcome::Stopped(state) => format!("{part} is stopped ({state})"),
+        Outcome::Acknowledged(command) => format!("{part} acknowledged its stop ({command})"),
         Outcome::Stopping(state) => {
             format!("{part} is stopping ({state}): its rotor may still coast")
         }
@@ -112,6 +113,7 @@ fn as_json(halt: &Halt) -> Value {
         Outcome::Stopped(state) | Outcome::Stopping(state) | Outcome::Unproven(state) => {
             object["state"] = json!(state);
         }
+        Outcome::Acknowledged(command) => object["acknowledged"] = json!(command),
         Outcome::Failed(error) => object["error"] = Failure::link(error).object(),
     }
     object

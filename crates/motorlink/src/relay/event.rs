@@ -97,8 +97,10 @@ pub struct Halt {
 /// How a stop went.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
-    /// It rests: the state in which it was seen, or what it acknowledged.
+    /// It rests: the state in which it was seen.
     Stopped(String),
+    /// It acknowledged this command, and its protocol has no state that shows whether it rests.
+    Acknowledged(String),
     /// It acknowledged its stop and was seen in this state, in which the rotor may still coast.
     Stopping(String),
     /// It acknowledged its stop and was seen in this state afterwards.
@@ -108,8 +110,9 @@ pub enum Outcome {
 }
 
 impl Halt {
-    /// Whether the part rests, or is about to.
+    /// Whether the part rests, or is about to, or acknowledged its stop if nothing more can be known.
     pub fn is_stopped(&self) -> bool {
-        matches!(self.outcome, Outcome::Stopped(_) | Outcome::Stopping(_))
+        use Outcome::{Acknowledged, Stopped, Stopping};
+        matches!(self.outcome, Stopped(_) | Acknowledged(_) | Stopping(_))
     }
 }

@@ -143,7 +143,7 @@ impl Hold for RmdHold {
         let told = |Stopped { id, result }: Stopped| Halt {
             part: Part::Motor(id.number()),
             outcome: match result {
-                Ok(()) => Outcome::Stopped(format!("{:#04x} acknowledged", request[0])),
+                Ok(()) => Outcome::Acknowledged(format!("{:#04x}", request[0])),
                 Err(error) => Outcome::Failed(error.to_string()),
             },
         };

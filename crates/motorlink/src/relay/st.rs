@@ -76,7 +76,7 @@ impl StHold {
         let motor = self.follower.pfc()?;
         let disable = Request::ExecuteCommand(Command::PfcDisable);
         let outcome = match client.exchange(motor, &disable, |_| Some(())) {
-            Ok(()) => Outcome::Stopped("PFC_DISABLE acknowledged".into()),
+            Ok(()) => Outcome::Acknowledged("PFC_DISABLE".into()),
             // What the drive does not have draws no current.
             Err(Error::Refused {
                 code: ErrorCode::WrongCmd | ErrorCode::BadMotorSelected, ..
