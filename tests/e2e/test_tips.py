@@ -45,6 +45,9 @@ def test_an_invalid_command_line_is_answered_with_what_to_write(run, words, tip,
 def test_a_scenario_behind_sim_is_recognized(run, tmp_path):
     assert "`motorlink sim run none.toml` plays a scenario" in run("sim", "none.toml").ended(2).err
     assert "`motorlink sim --help` lists the commands" in run("sim", "pesets").ended(2).err
+    assert "write the command before its options: `motorlink sim presets" in (
+        run("sim", "--json", "presets").ended(2).err
+    )
     path = tmp_path / "rest.toml"
     path.write_text(SCENARIO)
     assert f"the file is a scenario; `motorlink sim run {path}` plays a scenario" in run("sim", path).ended(2).err

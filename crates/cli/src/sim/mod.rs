@@ -9,6 +9,7 @@ use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use clap::Subcommand as _;
 use motorlink::st::Profile;
 use motorlink_link::serve::ServeName;
 use motorlink_testbench::scenario::Scenario;
@@ -103,6 +104,10 @@ fn wrong_config(path: &Path, error: ConfigError) -> Failure {
     let play = format!("`motorlink sim run {}` plays a scenario", path.display());
     let is_scenario = Scenario::read(path).is_ok();
     let advice = match &error {
+        ConfigError::Unreadable { .. } if is_subcommand(path) => {
+            let command = path.display();
+            format!("write the command before its options: `motorlink sim {command} ..`")
+        }
         ConfigError::Unreadable { .. } if path.extension().is_none() => {
             "`motorlink sim --help` lists the commands".to_owned()
         }
@@ -113,6 +118,12 @@ fn wrong_config(path: &Path, error: ConfigError) -> Failure {
         _ => return error.into(),
     };
     Failure::from(error).trying(advice)
+}
+
+fn is_subcommand(word: &Path) -> bool {
+    Command::augment_subcommands(clap::Command::new("sim"))
+        .get_subcommands()
+        .any(|command| Path::new(command.get_name()) == word)
 }
 
 /// Serves the ports and prints one JSON line per port on `out`.
