@@ -235,7 +235,7 @@ def test_an_outage_of_a_watch_is_in_its_stream_and_so_is_its_end(sim, start, wor
     served = {"st": ("pty",)} if protocol == "st" else {"rmd": ("slcan-pty",)}
     drives = sim(**{"st": (), "rmd": (), **served})
     port = drives.port("pty" if protocol == "st" else "slcan")
-    watch = start(protocol, "-p", port, "--timeout", "500ms", "--json", *command, "--every", "20ms")
+    watch = start(protocol, "-p", port, "--timeout", "500ms", "--json", *command, "--every", "200ms")
     watch.more_lines(2)
     drives.kill()
     watch.until(lambda: any('"outage"' in line for line in watch.out), "the outage")
