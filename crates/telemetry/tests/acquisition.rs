@@ -5,7 +5,7 @@ mod got;
 
 use std::sync::Arc;
 
-use motorlink_proto::rmd::{MotorId, Off, ReadStatus, SetSpeed, Stop};
+use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, SetSpeed, Stop};
 use motorlink_proto::st::{self, Profile, RegisterId};
 use motorlink_proto::time::Micros;
 use motorlink_proto::units::CentiDps;
@@ -361,6 +361,21 @@ fn the_sender_of_a_command_is_named_in_an_event() {
         matches!(what, What::Commanded(id, who, Request::Rmd(..)) if *id == sent && *who == by)
     });
     assert!(told, "{:?}", got.records);
+}
+
+#[test]
+fn a_latch_refuses_commands_whose_effect_is_unknown() {
+    let bench = bench();
+    let mut engine = rmd_engine(&bench, "");
+    engine.latch();
+    let id = MotorId::new(1).unwrap();
+    for code in 0..=u8::MAX {
+        let sent = engine.command(Request::Rmd(id, [code, 0, 0, 0, 0, 0, 0, 0]));
+        let row = Code::from(code).info();
+        let is_harmless = row.is_some_and(|row| !row.moves);
+        assert_eq!(sent.is_ok(), is_harmless, "{code:#04x}");
+        engine.run(CENTISECOND);
+    }
 }
 
 #[test]

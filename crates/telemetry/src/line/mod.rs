@@ -242,7 +242,7 @@ impl Poll {
     }
 }
 
-/// Whether a motor may turn after this request.
+/// Whether a motor may turn after this request. That of an unnamed code is unknown.
 pub(crate) fn may_move(request: &Request) -> bool {
     match request {
         Request::St(_, request) => {
@@ -254,8 +254,11 @@ pub(crate) fn may_move(request: &Request) -> bool {
                     Effect::Starts | Effect::Ramps | Effect::Supersedes
                 )
         }
-        Request::Rmd(_, [code, ..]) => Code::from(*code).may_move(),
-        // Its effect is unknown.
+        Request::Rmd(_, [code, ..]) => {
+            let code = Code::from(*code);
+            // A later version of the protocol may let go of a brake with a code that this one lacks.
+            code.may_move() || code.info().is_none()
+        }
         Request::Raw(..) => true,
         Request::Segment(..) | Request::Confirm(_) => false,
     }
