@@ -211,6 +211,9 @@ impl Acquisition {
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
         let keep =
             |queued: &Arc<Command>| !may_move(&queued.request) || is_other(queued.request.motor());
+        if !self.line.sends_at_once(lane) {
+            self.schedule.is_unsent(lane);
+        }
         let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), keep);
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
@@ -335,16 +338,22 @@ impl Acquisition {
                     self.schedule.ended(self.clock.now(), lane, Outcome::Refused);
                     return ended(id, Err(CommandError::Latched(latch)));
                 }
-                let what = What::Commanded(id, Arc::clone(&command.by), command.request.clone());
-                self.tell(what);
-                Some(command.request.clone())
+                if command.request.is_for_any_lane() || self.line.sends_at_once(lane) {
+                    let by = Arc::clone(&command.by);
+                    self.tell(What::Commanded(id, by, command.request.clone()));
+                    Some(command.request.clone())
+                } else {
+                    return self.recover(lane, id, &command, ended);
+                }
             }
             Job::Stop { command, displaced, .. } => {
                 if displaced.is_some() {
                     self.line.cancel(lane);
                 }
-                if let Some(Displaced::Command(id)) = displaced {
-                    ended(id, Err(CommandError::Displaced));
+                match displaced {
+                    Some(Displaced::Command(id)) => ended(id, Err(CommandError::Displaced)),
+                    Some(Displaced::Unsent(id)) => ended(id, Err(CommandError::Overtaken)),
+                    Some(Displaced::Poll(_) | Displaced::Recovery) | None => {}
                 }
                 Some(command.request.clone())
             }
@@ -353,6 +362,22 @@ impl Acquisition {
         if let Err(error) = begun {
             let sent = self.clock.now();
             self.over(Over { lane, result: Err(error), sent, shows: Shows::Nothing }, ended);
+        }
+    }
+
+    /// Brings a lane in sync before its command begins.
+    fn recover(
+        &mut self,
+        lane: Lane,
+        id: CommandId,
+        command: &Arc<Command>,
+        ended: &mut Ended<'_>,
+    ) {
+        self.schedule.recover(lane);
+        if let Err(error) = self.line.begin(lane, &command.request.recovery()) {
+            self.schedule.ended(self.clock.now(), lane, Outcome::Refused);
+            self.schedule.withdraw(|queued| !Arc::ptr_eq(queued, command));
+            ended(id, Err(error.into()));
         }
     }
 
@@ -396,7 +421,7 @@ impl Acquisition {
                 }
                 ended(id, result);
             }
-            Some(Verdict::StopAgain(_)) | None => {}
+            Some(Verdict::StopAgain(_) | Verdict::Recovered) | None => {}
         }
     }
 
@@ -422,7 +447,10 @@ impl Acquisition {
                     self.stop_failed(id, &CommandError::Closed);
                     ended(id, Err(CommandError::Closed));
                 }
-                Verdict::Poll(_) | Verdict::Stopped(_) | Verdict::StopAgain(_) => {}
+                Verdict::Poll(_)
+                | Verdict::Stopped(_)
+                | Verdict::StopAgain(_)
+                | Verdict::Recovered => {}
             }
         }
         self.tell(What::Lost(Arc::new(why)));

@@ -113,6 +113,12 @@ impl EventClient {
         self.driven.session.counters()
     }
 
+    /// Whether a request to a motor is sent at once. Otherwise late replies of the motor are awaited
+    /// first.
+    pub fn sends_at_once(&self, id: MotorId) -> bool {
+        self.driven.session.sends_at_once(id)
+    }
+
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
         self.driven.session.moving()

@@ -176,6 +176,11 @@ impl Session {
         self.host.busy().union(self.waiting).union(self.unsent).union(held).union(not_done)
     }
 
+    /// Whether a request to a motor is sent at once. Otherwise late replies are awaited before.
+    pub(super) fn sends_at_once(&self, id: MotorId) -> bool {
+        self.is_held || self.host.is_trusted(id)
+    }
+
     /// Tells that the bus was opened anew.
     pub(super) fn reopened(&mut self, now: Instant) {
         for id in self.busy() {

@@ -106,6 +106,12 @@ impl EventClient {
         self.driven.session.sync_state()
     }
 
+    /// Whether a request is sent at once. Otherwise the line is recovered first. While an exchange is
+    /// under way: whether its request has been sent.
+    pub fn sends_at_once(&self) -> bool {
+        self.driven.session.sends_at_once()
+    }
+
     /// When the last frame was sent. Behind an exchange that is over, it is that of its request, not of
     /// a recovery before it.
     pub fn sent(&self) -> Instant {

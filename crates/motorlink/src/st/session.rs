@@ -119,6 +119,11 @@ impl Session {
         self.master.sync_state()
     }
 
+    /// Whether a request is sent at once. Otherwise the line is recovered before.
+    pub(super) fn sends_at_once(&self) -> bool {
+        self.is_held || self.sync_state() == SyncState::InSync
+    }
+
     pub(super) fn counters(&self) -> Counters {
         self.master.counters()
     }

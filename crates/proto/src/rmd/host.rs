@@ -305,6 +305,11 @@ impl Host {
         self.slots[id.index()].doubt.is_unknown()
     }
 
+    /// Whether no late reply of a motor is pending, so that a request to it is sent at once.
+    pub fn is_trusted(&self, id: MotorId) -> bool {
+        self.slots[id.index()].doubt.is_none()
+    }
+
     /// The motors with an open exchange or with a result that was not yet polled. While a frame of
     /// [`set_torque4`](Self::set_torque4) is queued, these are all four motors that it reaches.
     pub const fn busy(&self) -> MotorSet {

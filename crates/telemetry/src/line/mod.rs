@@ -7,7 +7,7 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink::{Clock, LinkState};
-use motorlink_proto::rmd::{Code, MotorId};
+use motorlink_proto::rmd::{Code, MotorId, ReadStatus};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
 use motorlink_proto::time::Instant;
@@ -172,6 +172,10 @@ pub trait Line: Send {
     /// What is readable when there is something to receive.
     fn descriptor(&self) -> Option<BorrowedFd<'_>>;
 
+    /// Whether what begins in this lane is sent at once. Otherwise the lane is brought in sync before.
+    /// While an exchange is under way: whether its request was sent.
+    fn sends_at_once(&self, lane: Lane) -> bool;
+
     /// Begins an exchange in a lane that has none.
     ///
     /// # Errors
@@ -209,6 +213,28 @@ impl Request {
             Request::Rmd(id, _) => Some(Motor::Rmd(*id)),
             Request::Confirm(motor) => Some(*motor),
         }
+    }
+
+    /// Reads the state of the motor. A lane that is not in sync is brought in sync before.
+    pub(crate) fn recovery(&self) -> Self {
+        match self {
+            Request::St(motor, _) | Request::Raw(motor, ..) | Request::Segment(motor, ..) => {
+                Request::st(*motor, proto::Request::GetRegister(RegisterId::STATUS))
+            }
+            Request::Rmd(id, _) => Request::rmd(*id, &ReadStatus),
+            Request::Confirm(motor) => Request::Confirm(*motor),
+        }
+    }
+
+    /// Whether it is sent on a lane that is not in sync. A read that is late moves nothing, and what
+    /// stops a motor goes ahead of the recovery.
+    pub(crate) fn is_for_any_lane(&self) -> bool {
+        let stops = match self {
+            Request::St(_, request) => Effect::of(&request.request()) == Effect::Stops,
+            Request::Rmd(_, [code, ..]) => Code::from(*code).ends_motion(),
+            Request::Raw(..) | Request::Segment(..) | Request::Confirm(_) => false,
+        };
+        stops || self.is_read()
     }
 
     /// Whether it only reads.

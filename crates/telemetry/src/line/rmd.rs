@@ -71,6 +71,10 @@ impl Line for RmdLine {
         self.client.descriptor()
     }
 
+    fn sends_at_once(&self, lane: Lane) -> bool {
+        MotorId::new(lane.0).is_none_or(|id| self.client.sends_at_once(id))
+    }
+
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
         let id = MotorId::new(lane.0).ok_or(LineError::Protocol)?;
         match request {

@@ -215,6 +215,10 @@ impl Line for StLine {
         self.client.descriptor()
     }
 
+    fn sends_at_once(&self, _: Lane) -> bool {
+        self.client.sends_at_once()
+    }
+
     fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
         self.losses = self.client.counters().losses;
         self.step = match request {

@@ -21,6 +21,10 @@ pub enum Displaced {
     Poll(PollId),
     /// A command. The drive may have executed it.
     Command(CommandId),
+    /// A command that was not sent.
+    Unsent(CommandId),
+    /// A recovery of the lane.
+    Recovery,
 }
 
 /// How an exchange ended.
@@ -43,6 +47,8 @@ pub enum Verdict {
     Poll(PollId),
     /// A command.
     Command(CommandId),
+    /// A recovery of the lane. The command that it was for waits again, or is over.
+    Recovered,
     /// A stop that the drive confirmed.
     Stopped(CommandId),
     /// A stop that is repeated.
@@ -56,6 +62,8 @@ pub(super) enum Kind {
     Stop(CommandId),
     Command(CommandId),
     Poll(PollId),
+    /// The lane is brought in sync for a command that waits.
+    Recovery(CommandId),
 }
 
 /// The exchange of a lane.
@@ -65,13 +73,17 @@ pub(super) struct UnderWay {
     pub(super) since: Instant,
     /// Whether the line was in sync when it began. Else its duration is not that of the exchange alone.
     pub(super) in_sync: bool,
+    /// Whether a stop replaces it, because nothing was sent.
+    pub(super) is_unsent: bool,
 }
 
 impl UnderWay {
     pub(super) fn displaced(self) -> Option<Displaced> {
         match self.kind {
             Kind::Poll(poll) => Some(Displaced::Poll(poll)),
+            Kind::Command(id) if self.is_unsent => Some(Displaced::Unsent(id)),
             Kind::Command(id) => Some(Displaced::Command(id)),
+            Kind::Recovery(_) => Some(Displaced::Recovery),
             Kind::Stop(_) => None,
         }
     }

@@ -28,6 +28,8 @@ pub(super) struct LaneState<C> {
     /// The first one is under way if [`under_way`](Self::under_way) is a stop.
     stops: VecDeque<Stop<C>>,
     pub(super) commands: VecDeque<(CommandId, C, Instant)>,
+    /// The command that has begun last.
+    begun: Option<(CommandId, C, Instant)>,
     pub(super) commands_in_a_row: u32,
     /// Whether the last exchange was answered.
     pub(super) in_sync: bool,
@@ -46,6 +48,7 @@ impl<C> Default for LaneState<C> {
             under_way: None,
             stops: VecDeque::new(),
             commands: VecDeque::new(),
+            begun: None,
             commands_in_a_row: 0,
             in_sync: false,
             is_known: false,
@@ -111,7 +114,9 @@ impl<C: Clone> LaneState<C> {
 
     /// Whether a stop may begin: nothing is under way, or what gives way to it.
     pub(super) fn may_stop(&self, preempts: bool) -> bool {
-        let gives_way = |exchange: UnderWay| preempts && !matches!(exchange.kind, Kind::Stop(_));
+        let gives_way = |exchange: UnderWay| {
+            (preempts || exchange.is_unsent) && !matches!(exchange.kind, Kind::Stop(_))
+        };
         self.under_way.is_none_or(gives_way)
     }
 
@@ -146,7 +151,37 @@ impl<C: Clone> LaneState<C> {
 
     /// Begins an exchange.
     pub(super) fn begin(&mut self, now: Instant, kind: Kind) {
-        self.under_way = Some(UnderWay { kind, since: now, in_sync: self.in_sync });
+        let in_sync = self.in_sync;
+        self.under_way = Some(UnderWay { kind, since: now, in_sync, is_unsent: false });
+    }
+
+    /// Takes the next command.
+    pub(super) fn begin_command(&mut self, now: Instant) -> Option<(CommandId, C)> {
+        let (id, command, deadline) = self.commands.pop_front()?;
+        self.begun = Some((id, command.clone(), deadline));
+        self.begin(now, Kind::Command(id));
+        Some((id, command))
+    }
+
+    /// The command that has begun waits again, behind the exchange that brings the lane in sync.
+    pub(super) fn recover(&mut self) {
+        let Some(exchange) = &mut self.under_way else { return };
+        if let (Kind::Command(id), Some(begun)) = (exchange.kind, self.begun.take()) {
+            exchange.kind = Kind::Recovery(id);
+            self.commands.push_front(begun);
+        }
+    }
+
+    /// The lane was not brought in sync: the command that waited for it is over.
+    fn judge_recovery(&mut self, id: CommandId, outcome: Outcome) -> Verdict {
+        let is_waiting = self.commands.front().is_some_and(|(first, ..)| *first == id);
+        match outcome {
+            Outcome::Failed | Outcome::Closed if is_waiting => {
+                self.commands.pop_front();
+                Verdict::Command(id)
+            }
+            _ => Verdict::Recovered,
+        }
     }
 
     /// An exchange is over.
@@ -163,6 +198,7 @@ impl<C: Clone> LaneState<C> {
         match exchange.kind {
             Kind::Poll(poll) => Verdict::Poll(poll),
             Kind::Command(id) => Verdict::Command(id),
+            Kind::Recovery(id) => self.judge_recovery(id, outcome),
             Kind::Stop(id) => self.judge_stop(now, id, outcome),
         }
     }

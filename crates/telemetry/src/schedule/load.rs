@@ -150,7 +150,7 @@ impl Load {
         self.durations.push(span);
         match exchange.kind {
             Kind::Poll(poll) => self.costs.entry(poll).or_default().answered(span),
-            Kind::Command(_) | Kind::Stop(_) => self.of_commands += span.0,
+            Kind::Command(_) | Kind::Stop(_) | Kind::Recovery(_) => self.of_commands += span.0,
         }
     }
 

@@ -14,8 +14,11 @@
 //! **Overload.** If a line cannot carry what is asked, all its periods are multiplied by the same
 //! factor ([`Load`]).
 //!
+//! **Recovery.** A lane that is not in sync is brought in sync before a command begins
+//! ([`Schedule::recover`]). The command waits meanwhile, and can expire or be overtaken.
+//!
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
-//! ahead of it.
+//! ahead of it, and none that was not sent yet.
 //!
 //! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
 //! little of the line.
@@ -277,12 +280,26 @@ impl<C: Clone> Schedule<C> {
             .filter_map(|(lane, state)| Some((lane, state.commands.front()?.0)))
             .min_by_key(|(_, id)| *id)?;
         let state = self.lanes.get_mut(&lane)?;
-        let (id, command, _) = state.commands.pop_front()?;
+        let (id, command) = state.begin_command(now)?;
         state.commands_in_a_row += 1;
-        state.begin(now, Kind::Command(id));
         self.under_way += 1;
         self.load.began(now);
         Some((lane, Job::Command(id, command)))
+    }
+
+    /// Puts the command back that has just begun in a lane: an exchange that brings the lane in sync
+    /// goes before it. So it is sent within its time to live, or not at all.
+    pub fn recover(&mut self, lane: Lane) {
+        if let Some(state) = self.lanes.get_mut(&lane) {
+            state.recover();
+        }
+    }
+
+    /// The request under way in a lane was not sent yet. A stop replaces it.
+    pub fn is_unsent(&mut self, lane: Lane) {
+        if let Some(exchange) = self.lanes.get_mut(&lane).and_then(|it| it.under_way.as_mut()) {
+            exchange.is_unsent = true;
+        }
     }
 
     fn next_poll(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {

@@ -1,0 +1,249 @@
+//! Commands and stops while the client below the engine recovers its line, on virtual time.
+
+mod engine;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use motorlink::Clock;
+use motorlink::port::{ByteLink, CanLink, Link, PortError};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Code, MotorId, ReadStatus, SetSpeed, Stop};
+use motorlink_proto::st::{Command, Frame, MAX_FRAME, Profile, Ramp, RegisterId, Request as St};
+use motorlink_proto::time::{Instant, Micros};
+use motorlink_proto::units::CentiDps;
+use motorlink_telemetry::event::{CommandError, What};
+use motorlink_telemetry::line::{Reply, Request};
+use motorlink_telemetry::schedule::CommandId;
+use motorlink_telemetry::subscription::Record;
+
+use engine::{Engine, SECOND, bench, signals, spec, st, st_options};
+
+/// When something was sent.
+type Sent = (Instant, Vec<u8>);
+
+/// What was sent, and whether replies are lost.
+#[derive(Clone, Default)]
+struct Wire {
+    sent: Arc<Mutex<Vec<Sent>>>,
+    is_mute: Arc<AtomicBool>,
+}
+
+impl Wire {
+    fn mute(&self, is_mute: bool) {
+        self.is_mute.store(is_mute, Ordering::SeqCst);
+    }
+
+    fn is_mute(&self) -> bool {
+        self.is_mute.load(Ordering::SeqCst)
+    }
+
+    fn note(&self, at: Instant, bytes: &[u8]) {
+        self.sent.lock().unwrap().push((at, bytes.to_vec()));
+    }
+
+    /// When these bytes were sent.
+    fn times(&self, bytes: &[u8]) -> Vec<Instant> {
+        let sent = self.sent.lock().unwrap();
+        let same = sent.iter().filter(|(_, other)| other.starts_with(bytes));
+        same.map(|(at, _)| *at).collect()
+    }
+}
+
+/// A link whose other end may fall silent.
+struct Watched<L> {
+    link: L,
+    clock: Clock,
+    wire: Wire,
+}
+
+impl<L: Link> Link for Watched<L> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
+impl<L: ByteLink> ByteLink for Watched<L> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.wire.note(self.clock.now(), bytes);
+        self.link.write(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let size = self.link.read(buffer, timeout)?;
+        Ok(if self.wire.is_mute() { 0 } else { size })
+    }
+}
+
+impl<L: CanLink> CanLink for Watched<L> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.wire.note(self.clock.now(), frame.data());
+        self.link.send(frame)
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let frame = self.link.receive(timeout)?;
+        Ok(frame.filter(|_| !self.wire.is_mute()))
+    }
+}
+
+fn st_engine() -> (Engine, Wire) {
+    let (bench, wire) = (bench(), Wire::default());
+    let link = bench.bytes(&spec(""));
+    let link = Watched { clock: link.clock().unwrap(), link, wire: wire.clone() };
+    (Engine::st(link, st_options(Profile::Spec)), wire)
+}
+
+fn rmd_engine() -> (Engine, Wire) {
+    let (bench, wire) = (bench(), Wire::default());
+    let link = bench.can(&spec(""));
+    let link = Watched { clock: link.clock().unwrap(), link, wire: wire.clone() };
+    (Engine::rmd(link), wire)
+}
+
+impl Engine {
+    fn command(&mut self, request: Request, time_to_live: Micros) -> CommandId {
+        self.acquisition.command(&"test".into(), request, time_to_live).unwrap()
+    }
+
+    fn stop(&mut self, request: Request) -> CommandId {
+        let ended = &mut self.ended;
+        self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
+    }
+
+    fn result(&self, id: CommandId) -> &Result<Reply, CommandError> {
+        let ended = self.ended.iter().find(|(ended, _)| *ended == id);
+        &ended.unwrap_or_else(|| panic!("{id:?} is not over: {:?}", self.ended)).1
+    }
+
+    /// A reply is lost. It may still come, so the client recovers the line with the next request.
+    fn lose_line(&mut self, wire: &Wire, read: Request) {
+        let synced = self.command(read.clone(), SECOND);
+        self.run(Micros(5 * SECOND.0));
+        assert!(self.result(synced).is_ok(), "{:?}", self.ended);
+        wire.mute(true);
+        let lost = self.command(read, SECOND);
+        self.run(Micros(5 * SECOND.0));
+        assert!(self.result(lost).is_err(), "{:?}", self.ended);
+        wire.mute(false);
+    }
+}
+
+fn read_status(motor: u8) -> Request {
+    Request::st(motor, St::GetRegister(RegisterId::STATUS))
+}
+
+fn execute(command: Command) -> Request {
+    Request::st(1, St::ExecuteCommand(command))
+}
+
+fn frame_of(command: Command) -> Vec<u8> {
+    let mut bytes = [0; MAX_FRAME];
+    Frame::command(1, &St::ExecuteCommand(command), &mut bytes).unwrap().to_vec()
+}
+
+#[test]
+fn a_start_is_not_sent_after_its_time_to_live_when_a_line_was_recovered() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    let events = engine.subscribe(&[], SECOND);
+    let start = engine.command(execute(Command::StartMotor), Micros(2_000));
+    engine.run(Micros(5 * SECOND.0));
+    assert!(matches!(engine.result(start), Err(CommandError::Expired)), "{:?}", engine.ended);
+    assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
+    // Nobody is told that it was sent.
+    while let Some(record) = events.take() {
+        let Record::Event(event) = record else { continue };
+        assert!(!matches!(event.what, What::Commanded(..)), "{event:?}");
+    }
+    // The line has been recovered.
+    let start = engine.command(execute(Command::StartMotor), Micros(2_000));
+    engine.run(SECOND);
+    assert!(engine.result(start).is_ok(), "{:?}", engine.ended);
+}
+
+#[test]
+fn commands_that_expire_do_not_keep_a_line_from_being_recovered() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    let ramp = Ramp { speed_rpm: 900, duration_ms: 100 };
+    let mut last = None;
+    for _ in 0..3_000 {
+        last = Some(engine.command(Request::st(1, St::SetRamp(ramp)), Micros(1_000)));
+        engine.run(Micros(2_000));
+    }
+    engine.run(SECOND);
+    assert!(engine.result(last.unwrap()).is_ok(), "{:?}", engine.ended.last());
+}
+
+#[test]
+fn a_stop_does_not_wait_for_the_recovery_of_a_poll() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    let start = engine.command(execute(Command::StartMotor), SECOND);
+    let other = engine.command(Request::st(2, St::GetRegister(RegisterId::STATUS)), SECOND);
+    engine.subscribe(&signals(st(1), &["SPEED_MEAS"]), Micros(10_000));
+    engine.run(Micros(1_000));
+    let asked = engine.clock.now();
+    let stop = engine.stop(execute(Command::StopMotor));
+    engine.run(Micros(5 * SECOND.0));
+    let first = wire.times(&frame_of(Command::StopMotor))[0];
+    assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
+    assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+    assert!(matches!(engine.result(start), Err(CommandError::Overtaken)), "{:?}", engine.ended);
+    assert!(engine.result(other).is_ok(), "{:?}", engine.ended);
+    assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
+}
+
+#[test]
+fn a_read_that_was_not_sent_gives_way_to_a_stop() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    let read = engine.command(read_status(2), SECOND);
+    engine.run(Micros(1_000));
+    let asked = engine.clock.now();
+    engine.stop(execute(Command::StopMotor));
+    engine.run(Micros(5 * SECOND.0));
+    let first = wire.times(&frame_of(Command::StopMotor))[0];
+    assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
+    assert!(matches!(engine.result(read), Err(CommandError::Overtaken)), "{:?}", engine.ended);
+}
+
+#[test]
+fn a_request_that_no_line_takes_is_over_at_once() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    let id = MotorId::new(1).unwrap();
+    let turn = SetSpeed { speed: CentiDps::from_dps(360.0) };
+    let refused =
+        [Request::rmd(id, &turn), Request::st(9, St::ExecuteCommand(Command::StartMotor))];
+    let refused = refused.map(|request| engine.command(request, SECOND));
+    engine.run(Micros(5 * SECOND.0));
+    for id in refused {
+        assert!(matches!(engine.result(id), Err(CommandError::Line(_))), "{:?}", engine.ended);
+    }
+}
+
+#[test]
+fn motion_is_not_sent_after_its_time_to_live_when_a_motor_was_silent() {
+    let (mut engine, wire) = rmd_engine();
+    let id = MotorId::new(1).unwrap();
+    engine.lose_line(&wire, Request::rmd(id, &ReadStatus));
+    let turn = Request::rmd(id, &SetSpeed { speed: CentiDps::from_dps(360.0) });
+    wire.mute(true);
+    let lost = engine.command(Request::rmd(id, &ReadStatus), SECOND);
+    engine.run(Micros(200_000));
+    assert!(engine.result(lost).is_err());
+    wire.mute(false);
+    let late = engine.command(turn.clone(), Micros(100));
+    engine.run(Micros(5 * SECOND.0));
+    assert!(matches!(engine.result(late), Err(CommandError::Expired)), "{:?}", engine.ended);
+    assert_eq!(wire.times(&[Code::SetSpeed.into()]), []);
+    let again = engine.command(turn, SECOND);
+    engine.run(SECOND);
+    assert!(engine.result(again).is_ok(), "{:?}", engine.ended);
+    let stop = engine.stop(Request::rmd(id, &Stop));
+    engine.run(SECOND);
+    assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+}
