@@ -45,6 +45,8 @@ struct Command {
     by: Arc<str>,
     request: Request,
     is_stop: bool,
+    /// The end of its time to live; of a stop there is none.
+    deadline: Option<Instant>,
 }
 
 /// The engine of one line. Nothing in it waits, except for the opening of the port: call
@@ -197,7 +199,8 @@ impl Acquisition {
         }
         let lane = self.line.lane(&request);
         let deadline = self.clock.now() + time_to_live;
-        let command = Command { by: Arc::clone(by), request, is_stop: false };
+        let by = Arc::clone(by);
+        let command = Command { by, request, is_stop: false, deadline: Some(deadline) };
         self.schedule.command(lane, Arc::new(command), deadline).map_err(|_| CommandError::TooMany)
     }
 
@@ -206,7 +209,8 @@ impl Acquisition {
     pub fn stop(&mut self, by: &Arc<str>, request: Request, ended: &mut Ended<'_>) -> CommandId {
         let now = self.clock.now();
         let lane = self.line.lane(&request);
-        let command = Command { by: Arc::clone(by), request: request.clone(), is_stop: true };
+        let (by_whom, again) = (Arc::clone(by), request.clone());
+        let command = Command { by: by_whom, request: again, is_stop: true, deadline: None };
         let motor = request.motor();
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
         let keep =
@@ -341,6 +345,9 @@ impl Acquisition {
                 if command.request.is_for_any_lane() || self.line.sends_at_once(lane) {
                     let by = Arc::clone(&command.by);
                     self.tell(What::Commanded(id, by, command.request.clone()));
+                    if let Some(deadline) = command.deadline {
+                        self.line.expire_next(deadline.since(self.clock.now()).into());
+                    }
                     Some(command.request.clone())
                 } else {
                     return self.recover(lane, id, &command, ended);

@@ -4,7 +4,7 @@ mod drives;
 mod shared;
 
 use std::io::{Read, Write};
-use std::os::unix::net::UnixStream;
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::time::{Duration, Instant};
 
 use motorlink::port::{FaultBytes, NotDone, PortError, PortName};
@@ -19,7 +19,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{self, StLine};
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::message::{self, Ask, Text, decode, encode};
+use motorlink_telemetry::share::message::{self, Answer, Ask, Protocol, Text, decode, encode};
 use motorlink_telemetry::share::{VERSION, port};
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -284,4 +284,57 @@ fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
         confirmed += 1;
     }
     assert!(confirmed > 1, "{confirmed}");
+}
+
+/// Answers hello and the question for lines as a share does, and gives the first command.
+fn first_command(socket: &UnixListener) -> Ask {
+    let (mut stream, _) = socket.accept().unwrap();
+    let mut reader = Reader::default();
+    loop {
+        let mut bytes = [0; 4096];
+        let size = stream.read(&mut bytes).unwrap();
+        assert!(size > 0, "the port was closed");
+        reader.push(&bytes[..size]);
+        while let Some(frame) = reader.take().unwrap() {
+            let message::Request { id, ask } = decode(&frame.payload).unwrap();
+            let answer = match ask {
+                Ask::Hello { name, .. } => {
+                    Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
+                }
+                Ask::Lines => {
+                    let line = message::Line {
+                        line: "st0".to_owned(),
+                        protocol: Protocol::St,
+                        port: "test".to_owned(),
+                        profile: Some(Profile::Spec.name().to_owned()),
+                        timeout: 1.0,
+                        t: 0.0,
+                        wall: 0.0,
+                    };
+                    Answer::Lines { lines: vec![line], latched_by: None }
+                }
+                command => return command,
+            };
+            let mut out = Vec::new();
+            frame::append(Kind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
+            stream.write_all(&out).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_command_of_an_engine_lives_no_longer_at_the_share() {
+    let path = drives::path("share-expires", "socket");
+    let socket = UnixListener::bind(&path).unwrap();
+    let share = std::thread::spawn(move || first_command(&socket));
+    port::register();
+    let port: PortName = format!("share:{}/st0", path.display()).parse().unwrap();
+    let line = StLine::open(&port, Default::default()).unwrap();
+    let mut engine = Acquisition::new(Box::new(line));
+    let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
+    engine.command(&"test".into(), start, Micros::from_millis(500)).unwrap();
+    engine.advance(&mut |_, _| {});
+    let Ask::Command { time_to_live, .. } = share.join().unwrap() else { panic!("no command") };
+    assert!((0.0..=0.5).contains(&time_to_live), "{time_to_live}");
+    std::fs::remove_file(path).unwrap();
 }

@@ -55,6 +55,14 @@ pub trait Link: Send {
             within.confirm_next();
         }
     }
+
+    /// The next request must not be sent later than this. A program that holds the port refuses it
+    /// then.
+    fn expire_next(&self, time_to_live: Duration) {
+        if let Some(within) = self.within() {
+            within.expire_next(time_to_live);
+        }
+    }
 }
 
 impl<L: Link + ?Sized> Link for Box<L> {
@@ -76,6 +84,10 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn confirm_next(&self) {
         (**self).confirm_next();
+    }
+
+    fn expire_next(&self, time_to_live: Duration) {
+        (**self).expire_next(time_to_live);
     }
 }
 

@@ -113,6 +113,13 @@ impl EventClient {
         self.driven.session.counters()
     }
 
+    /// The next request to any motor must not be sent later than this, if another program holds the port.
+    pub fn expire_next(&self, time_to_live: Duration) {
+        if let Some(link) = self.driven.port.open_link() {
+            link.expire_next(time_to_live);
+        }
+    }
+
     /// Whether a request to a motor is sent at once. Otherwise late replies of the motor are awaited
     /// first.
     pub fn sends_at_once(&self, id: MotorId) -> bool {

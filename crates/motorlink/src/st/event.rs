@@ -106,6 +106,13 @@ impl EventClient {
         self.driven.session.sync_state()
     }
 
+    /// The next request must not be sent later than this, if another program holds the port.
+    pub fn expire_next(&self, time_to_live: Duration) {
+        if let Some(link) = self.driven.port.open_link() {
+            link.expire_next(time_to_live);
+        }
+    }
+
     /// Whether a request is sent at once. Otherwise the line is recovered first. While an exchange is
     /// under way: whether its request has been sent.
     pub fn sends_at_once(&self) -> bool {

@@ -75,6 +75,10 @@ impl Line for RmdLine {
         MotorId::new(lane.0).is_none_or(|id| self.client.sends_at_once(id))
     }
 
+    fn expire_next(&self, time_to_live: Duration) {
+        self.client.expire_next(time_to_live);
+    }
+
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
         let id = MotorId::new(lane.0).ok_or(LineError::Protocol)?;
         match request {

@@ -219,6 +219,10 @@ impl Line for StLine {
         self.client.sends_at_once()
     }
 
+    fn expire_next(&self, time_to_live: Duration) {
+        self.client.expire_next(time_to_live);
+    }
+
     fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
         self.losses = self.client.counters().losses;
         self.step = match request {

@@ -11,7 +11,7 @@ use motorlink_proto::rmd::{
     Command, MotorId, MotorSet, Payload, SetTorque, SetTorque4, TORQUE4_ID,
 };
 
-use super::connection::{Connection, Ended, TIME_TO_LIVE};
+use super::connection::{Connection, Ended};
 use super::place::{Place, Refusal};
 use crate::share::message::{Answer, Ask, Reason};
 
@@ -46,12 +46,10 @@ impl ShareBus {
         self.pending.remove(&id);
         let (line, motor) = (self.port.line.clone(), id.number());
         let confirmation = match self.confirms.take() {
-            true => Some(self.connection.ask(Ask::Confirm { line: line.clone(), motor })?),
+            true => Some(self.connection.ask(Ask::Confirm { line, motor })?),
             false => None,
         };
-        let bytes = bytes.to_vec();
-        let command = Ask::Command { line, motor, bytes, time_to_live: TIME_TO_LIVE };
-        let command = self.connection.ask(command)?;
+        let command = self.connection.command(motor, bytes.to_vec())?;
         self.pending.insert(id, Pending { command, confirmation });
         Ok(())
     }
@@ -84,6 +82,10 @@ impl Link for ShareBus {
 
     fn confirm_next(&self) {
         self.confirms.set(true);
+    }
+
+    fn expire_next(&self, time_to_live: Duration) {
+        self.connection.expire_next(time_to_live);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The connection of a port to its share.
 
+use std::cell::Cell;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
@@ -20,8 +21,8 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Replies that a share may wait for until it answers: it repeats a stop, and recovers the line before.
 const REPLIES: u32 = 12;
 
-/// A request is not sent later than this after the program has made it, in seconds.
-pub(super) const TIME_TO_LIVE: f64 = 1.0;
+/// A request is not sent later than this after the program has made it.
+const TIME_TO_LIVE: Duration = Duration::from_secs(1);
 
 /// The connection to a share.
 pub(super) struct Connection {
@@ -30,6 +31,8 @@ pub(super) struct Connection {
     reader: Reader,
     last_id: u32,
     holder: Holder,
+    /// The time to live of the next request, if it is shorter.
+    expires: Cell<Duration>,
     /// Why the share closes the connection.
     closing: Option<String>,
 }
@@ -59,6 +62,7 @@ impl Connection {
             reader: Reader::default(),
             last_id: 0,
             holder: Holder { patience: OPENING, profile: None },
+            expires: Cell::new(TIME_TO_LIVE),
             closing: None,
         };
         opened.opening(Ask::Hello { protocol: VERSION, name: own_name() })?;
@@ -105,6 +109,18 @@ impl Connection {
 
     pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
+    }
+
+    /// The next command must not be sent later than this.
+    pub(super) fn expire_next(&self, time_to_live: Duration) {
+        self.expires.set(time_to_live.min(TIME_TO_LIVE));
+    }
+
+    /// Sends a command to a motor; gives its id.
+    pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
+        let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
+        let line = self.port.line.clone();
+        self.ask(Ask::Command { line, motor, bytes, time_to_live })
     }
 
     /// Sends a request; gives its id.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use motorlink::port::{ByteLink, Evented, Holder, Link, PortError};
 use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Parse};
 
-use super::connection::{Connection, Ended, TIME_TO_LIVE};
+use super::connection::{Connection, Ended};
 use super::place::Place;
 use crate::share::message::{Answer, Ask};
 
@@ -59,9 +59,7 @@ impl ShareLine {
         } else {
             (motor, None)
         };
-        let line = line.clone();
-        let command = Ask::Command { line, motor, bytes, time_to_live: TIME_TO_LIVE };
-        let command = self.connection.ask(command)?;
+        let command = self.connection.command(motor, bytes)?;
         self.pending = Some(Pending { motor, command, confirmation });
         Ok(())
     }
@@ -108,6 +106,10 @@ impl Link for ShareLine {
 
     fn confirm_next(&self) {
         self.confirms.set(true);
+    }
+
+    fn expire_next(&self, time_to_live: Duration) {
+        self.connection.expire_next(time_to_live);
     }
 }
 
