@@ -8,6 +8,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -210,6 +211,25 @@ def test_connections_that_say_nothing_lock_nobody_out(share):
     eventually(is_let_in, "a place for a program")
     for connection in silent:
         connection.close()
+
+
+def test_a_share_that_was_frozen_starts_no_motor_and_stops_one(share):
+    program = Client(share.path, "program")
+    program.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
+    program.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+    eventually(lambda: speeds(program)[1] > 300, "a motor that turns")
+    share.process.send_signal(signal.SIGSTOP)
+    state = Path(f"/proc/{share.process.pid}/stat")
+    eventually(lambda: state.read_text().rpartition(")")[2].split()[0] == "T", "a share that is frozen")
+    command = {"line": "st0", "motor": 1, "bytes": list(START), "time_to_live": 0.3}
+    start, stop = program.send("command", **command), program.send("stop")
+    sent = time.monotonic()
+    eventually(lambda: time.monotonic() > sent + 1, "requests that are old")
+    share.process.send_signal(signal.SIGCONT)
+    assert program.until(lambda it: it.get("id") == start)["reason"] == "expired"
+    stopped = program.until(lambda it: it.get("id") == stop)
+    assert [motor.get("failure") for motor in stopped["motors"]] == [None, None], stopped
+    eventually(lambda: are_still(program), "motors that stop")
 
 
 def test_a_share_takes_no_place_of_others(share, drives, run, tmp_path):

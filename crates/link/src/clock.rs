@@ -1,20 +1,22 @@
 //! A clock that follows the machine's clock, or a virtual one that advances only during waits.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::{Duration as Span, Instant as Moment};
+use std::time::Duration as Span;
 
 use motorlink_proto::time::{Instant, Micros};
+use rustix::time::{ClockId, clock_gettime};
 
 /// A clock that starts at 0. Clones share the same clock.
 ///
-/// A running clock follows the machine's clock. A virtual clock advances immediately to the end of
+/// A running clock follows the machine's clock, which also counts while the machine is suspended: what
+/// is too old then is too old. A virtual clock advances immediately to the end of
 /// each wait.
 #[derive(Debug, Clone)]
 pub struct Clock(Arc<Mutex<Pace>>);
 
 #[derive(Debug, Clone, Copy)]
 enum Pace {
-    Running { since: Moment, from: Instant },
+    Running { since: Span, from: Instant },
     Virtual(Instant),
 }
 
@@ -27,7 +29,7 @@ impl Default for Clock {
 impl Clock {
     /// A clock that follows the machine's clock.
     pub fn running() -> Self {
-        let pace = Pace::Running { since: Moment::now(), from: Instant(0) };
+        let pace = Pace::Running { since: uptime(), from: Instant(0) };
         Clock(Arc::new(Mutex::new(pace)))
     }
 
@@ -51,7 +53,7 @@ impl Clock {
         let mut pace = self.lock();
         *pace = match (held, *pace) {
             (true, running @ Pace::Running { .. }) => Pace::Virtual(running.now()),
-            (false, Pace::Virtual(from)) => Pace::Running { since: Moment::now(), from },
+            (false, Pace::Virtual(from)) => Pace::Running { since: uptime(), from },
             (_, same) => same,
         };
     }
@@ -101,10 +103,15 @@ impl WeakClock {
 impl Pace {
     fn now(self) -> Instant {
         match self {
-            Pace::Running { since, from } => from + Micros::from(since.elapsed()),
+            Pace::Running { since, from } => from + Micros::from(uptime().saturating_sub(since)),
             Pace::Virtual(now) => now,
         }
     }
+}
+
+/// The time since the machine was started, with the time in which it was suspended.
+fn uptime() -> Span {
+    Span::try_from(clock_gettime(ClockId::Boottime)).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use motorlink::Clock;
 use motorlink_proto::time::Micros;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -43,6 +44,8 @@ pub struct Runner {
 #[derive(Debug, Clone)]
 pub struct Remote {
     tasks: Sender<Task>,
+    /// Commands may wait for the engine: it opens a port, or this process does not run.
+    clock: Clock,
     wake: Arc<UnixStream>,
 }
 
@@ -64,7 +67,7 @@ impl Runner {
         let engine = Engine { acquisition, waiting: HashMap::new() };
         let thread = std::thread::Builder::new().name(name.to_owned());
         let thread = thread.spawn(move || engine.run(&inbox, woken))?;
-        let remote = Remote { tasks, wake: Arc::new(wake) };
+        let remote = Remote { tasks, clock: Clock::running(), wake: Arc::new(wake) };
         Ok(Runner { remote, thread: Some(thread) })
     }
 
@@ -207,9 +210,17 @@ impl Remote {
         ended: impl FnOnce(CommandResult) + Send + 'static,
     ) -> Result<(), Ended> {
         let by = Arc::clone(by);
-        self.send(move |engine| match engine.acquisition.command(&by, request, time_to_live) {
-            Ok(id) => drop(engine.waiting.insert(id, Box::new(ended))),
-            Err(error) => ended(Err(error)),
+        let (clock, asked) = (self.clock.clone(), self.clock.now());
+        self.send(move |engine| {
+            let waited = clock.now().since(asked);
+            let queued = match time_to_live.0.checked_sub(waited.0) {
+                Some(left) => engine.acquisition.command(&by, request, Micros(left)),
+                None => Err(CommandError::Expired),
+            };
+            match queued {
+                Ok(id) => drop(engine.waiting.insert(id, Box::new(ended))),
+                Err(error) => ended(Err(error)),
+            }
         })
     }
 

@@ -338,3 +338,27 @@ fn a_command_of_an_engine_lives_no_longer_at_the_share() {
     assert!((0.0..=0.5).contains(&time_to_live), "{time_to_live}");
     std::fs::remove_file(path).unwrap();
 }
+
+#[test]
+fn a_start_that_waited_in_a_frozen_share_is_refused() {
+    let share = Share::new("waited");
+    let line = StLine::open(&share.port("st0"), Default::default()).unwrap();
+    let mut engine = Acquisition::new(Box::new(line));
+    let hold = share.freeze();
+    let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
+    engine.command(&"test".into(), start, Micros::from_millis(300)).unwrap();
+    engine.advance(&mut |_, _| {});
+    let sent = Instant::now();
+    while sent.elapsed() < Duration::from_millis(600) {
+        std::thread::yield_now();
+    }
+    drop(hold);
+    let mut refused = None;
+    while refused.is_none() {
+        assert!(sent.elapsed() < LIMIT, "no answer");
+        engine.advance(&mut |_, result| refused = Some(result.unwrap_err().to_string()));
+        std::thread::yield_now();
+    }
+    let refused = refused.unwrap();
+    assert!(refused.contains("the command is too old"), "{refused}");
+}

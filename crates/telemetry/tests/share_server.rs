@@ -7,6 +7,7 @@ use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
@@ -29,6 +30,10 @@ enum Got {
     Text(Text),
     Data(Data),
     End,
+}
+
+fn rmd(motor: u8) -> MotorName {
+    MotorName { line: "rmd0".to_owned(), motor }
 }
 
 struct Program {
@@ -81,6 +86,38 @@ impl Program {
                 Got::End => panic!("the connection has ended"),
                 other => self.others.push(other),
             }
+        }
+    }
+
+    /// The end of a request.
+    fn end_of(&mut self, sent: u32) -> Text {
+        let is_end = |text: &Text| match text {
+            Text::Answer { id, .. } | Text::Refusal { id, .. } => *id == sent,
+            _ => false,
+        };
+        let known = |got: &Got| matches!(got, Got::Text(text) if is_end(text));
+        let at = self.others.iter().position(known);
+        let mut got = at.map(|at| self.others.remove(at));
+        loop {
+            match got.take().unwrap_or_else(|| self.receive()) {
+                Got::Text(text) if is_end(&text) => return text,
+                Got::End => panic!("the connection has ended"),
+                other => self.others.push(other),
+            }
+        }
+    }
+
+    fn answer(&mut self, sent: u32) -> Answer {
+        match self.end_of(sent) {
+            Text::Answer { answer, .. } => answer,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn refusal(&mut self, sent: u32) -> Reason {
+        match self.end_of(sent) {
+            Text::Refusal { reason, .. } => reason,
+            other => panic!("{other:?}"),
         }
     }
 
@@ -420,4 +457,43 @@ fn programs_are_told_when_the_share_ends_and_motors_stop() {
     share.reaches("rmd3.speed_dps", |dps| dps.abs() < 5.0);
     assert_eq!(program.closing(), "the test is over");
     assert!(!share.path.exists());
+}
+
+#[test]
+fn a_share_that_was_frozen_executes_stops_and_no_old_motion() {
+    let share = Share::new("frozen");
+    let mut program = share.join("program");
+    program.turn(1, 360);
+    share.reaches("rmd1.speed_dps", |dps| dps > 100.0);
+    program.ask(Ask::Latch).unwrap();
+    let hold = share.freeze();
+    let frozen = Instant::now();
+    let turn = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
+    let command = |bytes: &[u8], time_to_live| Ask::Command {
+        line: "rmd0".to_owned(),
+        motor: 2,
+        bytes: bytes.to_vec(),
+        time_to_live,
+    };
+    let old = program.send(command(&turn, 0.3));
+    let release = program.send(Ask::Release);
+    let stop = program.send(Ask::Stop { motor: Some(rmd(1)) });
+    let off = program.send(command(&[0x80, 0, 0, 0, 0, 0, 0, 0], 0.3));
+    // Connects, and says all that it wants.
+    let mut other = Program::connect(&share.path);
+    other.send(Ask::Hello { protocol: VERSION, name: "other".to_owned() });
+    let others = other.send(command(&turn, 0.3));
+    while frozen.elapsed() < Duration::from_millis(1_200) {
+        std::thread::yield_now();
+    }
+    drop(hold);
+    assert_eq!(program.refusal(old), Reason::Expired);
+    assert_eq!(program.refusal(release), Reason::Expired);
+    assert!(matches!(program.answer(stop), Answer::Stop { motors } if motors[0].failure.is_none()));
+    program.answer(off);
+    assert_eq!(other.refusal(others), Reason::Expired);
+    share.reaches("rmd1.speed_dps", |dps| dps < 5.0);
+    share.reaches("rmd2.speed_dps", |dps| dps.abs() < 1.0);
+    program.ask(Ask::Release).unwrap();
+    program.turn(2, 360);
 }

@@ -6,8 +6,10 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use motorlink::Clock;
 use motorlink::port::PortError;
 use motorlink_link::serve::{MOST_CLIENTS, UnixServer};
+use motorlink_proto::time::{Instant as Moment, Micros};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
@@ -22,6 +24,10 @@ const BATCH: Duration = Duration::from_millis(16);
 const WAITING: usize = 1 << 16;
 /// How long a connection may have no name: it takes the place of another program.
 const HELLO: Duration = Duration::from_secs(5);
+/// A request that may have waited longer than this before it was read is that much older. The share
+/// looks at its connections more often, except when it does not run: it was stopped, or the machine was
+/// suspended.
+const LATE: Micros = Micros::from_millis(100);
 /// How long a connection that ends may take its last message.
 const LAST: Duration = Duration::from_millis(500);
 
@@ -33,6 +39,9 @@ pub struct Server {
     clients: Vec<Client>,
     woken: UnixStream,
     due: Instant,
+    clock: Clock,
+    /// When no connection waited.
+    accepted: Moment,
 }
 
 /// Why a share cannot begin or go on.
@@ -56,6 +65,8 @@ struct Client {
     since: Instant,
     reader: Reader,
     out: Vec<u8>,
+    /// When no request waited.
+    read: Moment,
     /// When it is closed at the latest.
     until: Option<Instant>,
     is_gone: bool,
@@ -76,7 +87,9 @@ impl Server {
             // It is awake if it has not read the last bytes.
             let _ = (&wake).write(&[0]);
         });
-        Ok(Server { hub, socket, clients: Vec::new(), woken, due: Instant::now() })
+        let (clock, due) = (Clock::running(), Instant::now());
+        let accepted = clock.now();
+        Ok(Server { hub, socket, clients: Vec::new(), woken, due, clock, accepted })
     }
 
     /// The lines.
@@ -92,7 +105,7 @@ impl Server {
         self.wait()?;
         self.accept();
         for client in &mut self.clients {
-            client.receive(&mut self.hub);
+            client.receive(&mut self.hub, self.clock.now());
             if client.since.elapsed() > HELLO && !self.hub.is_named(client.session) {
                 self.hub.close(client.session, format!("no `hello` within {} s", HELLO.as_secs()));
             }
@@ -160,6 +173,7 @@ impl Server {
     }
 
     fn accept(&mut self) {
+        let now = self.clock.now();
         while let Ok((stream, _)) = self.socket.listener().accept() {
             if stream.set_nonblocking(true).is_err() {
                 continue;
@@ -175,21 +189,24 @@ impl Server {
                 since: Instant::now(),
                 reader: Reader::new(LONGEST_REQUEST),
                 out: Vec::new(),
+                read: self.accepted,
                 until: None,
                 is_gone: false,
             });
         }
+        self.accepted = now;
     }
 }
 
 impl Client {
     /// Takes what the program has sent.
-    fn receive(&mut self, hub: &mut Hub) {
+    fn receive(&mut self, hub: &mut Hub, now: Moment) {
+        let waited = Some(now.since(self.read)).filter(|waited| *waited > LATE).unwrap_or_default();
         let mut bytes = [0; 4096];
         while !self.is_gone && hub.is_accepting(self.session) {
             match self.reader.take() {
                 Ok(Some(request)) => {
-                    hub.received(self.session, &request);
+                    hub.received(self.session, &request, waited);
                     continue;
                 }
                 Ok(None) => {}
@@ -199,7 +216,10 @@ impl Client {
                 Ok(0) => self.is_gone = true,
                 Ok(size) => self.reader.push(&bytes[..size]),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    self.read = now;
+                    return;
+                }
                 Err(_) => self.is_gone = true,
             }
         }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,8 @@ pub struct Share {
     pub bench: Bench,
     pub path: PathBuf,
     ends: Arc<AtomicBool>,
+    /// What the share waits for.
+    holds: Sender<Receiver<()>>,
     thread: Option<JoinHandle<Vec<(String, Stopped)>>>,
     _serving: Serving,
 }
@@ -52,14 +55,26 @@ impl Share {
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         let ends = Arc::new(AtomicBool::new(false));
+        let (holds, held) = channel::<Receiver<()>>();
         let told = Arc::clone(&ends);
         let thread = std::thread::spawn(move || {
             while !told.load(Ordering::SeqCst) {
+                if let Ok(hold) = held.try_recv() {
+                    hold.iter().for_each(drop);
+                }
                 server.turn().unwrap();
             }
             server.end("the test is over")
         });
-        Share { bench, path: socket, ends, thread: Some(thread), _serving: serving }
+        Share { bench, path: socket, ends, holds, thread: Some(thread), _serving: serving }
+    }
+
+    /// Stops the share, as SIGSTOP does, until what this gives is dropped.
+    pub fn freeze(&self) -> SyncSender<()> {
+        let (continues, hold) = sync_channel(0);
+        self.holds.send(hold).unwrap();
+        continues.send(()).unwrap();
+        continues
     }
 
     pub fn end(&mut self) -> Vec<(String, Stopped)> {

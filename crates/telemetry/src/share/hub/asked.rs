@@ -31,6 +31,9 @@ const SHORTEST_PERIOD: f64 = 1e-4;
 /// The time to live of a confirmation.
 const CONFIRMATION: Micros = Micros::from_millis(1_000);
 
+/// The time to live of a release.
+const RELEASE: Micros = Micros::from_millis(1_000);
+
 /// Why a request is refused at once.
 type Refused = (Reason, String);
 
@@ -39,13 +42,14 @@ fn usage(message: impl Into<String>) -> Refused {
 }
 
 impl Hub {
-    /// A program has sent a message.
-    pub fn received(&mut self, session: SessionId, frame: &Frame) {
+    /// A program has sent a message. `waited` is how long it may have waited before it was read: it is
+    /// a part of its time to live.
+    pub fn received(&mut self, session: SessionId, frame: &Frame, waited: Micros) {
         if frame.kind != Kind::Text {
             return self.close(session, "a program sends requests only");
         }
         match message::decode::<message::Request>(&frame.payload) {
-            Ok(request) => self.asked(session, request.id, request.ask),
+            Ok(request) => self.asked(session, request.id, request.ask, waited),
             Err(error) => match (self.sessions.get_mut(&session), id_of(&frame.payload)) {
                 (Some(session), Some(id)) => {
                     session.refuse(id, Reason::Usage, error.to_string());
@@ -55,7 +59,7 @@ impl Hub {
         }
     }
 
-    fn asked(&mut self, session: SessionId, id: u32, ask: Ask) {
+    fn asked(&mut self, session: SessionId, id: u32, ask: Ask, waited: Micros) {
         if let Some(session) = self.sessions.get_mut(&session) {
             session.pending += 1;
         }
@@ -63,7 +67,7 @@ impl Hub {
             (None, Ask::Hello { protocol, name }) => self.hello(session, protocol, &name),
             (None, _) => Err(usage("the first request is `hello`")),
             (Some(_), Ask::Hello { .. }) => Err(usage("this program has said hello")),
-            (Some(name), ask) => self.carry_out(session, &name, id, ask),
+            (Some(name), ask) => self.carry_out(session, &name, id, ask, waited),
         };
         let Some(session) = self.sessions.get_mut(&session) else { return };
         match answered {
@@ -114,6 +118,7 @@ impl Hub {
         name: &Arc<str>,
         id: u32,
         ask: Ask,
+        waited: Micros,
     ) -> Result<Option<Answer>, Refused> {
         match ask {
             Ask::Hello { .. } => Ok(None),
@@ -137,7 +142,9 @@ impl Hub {
                 Ok(Some(Answer::Unsubscribe))
             }
             Ask::Command { line, motor, bytes, time_to_live } => {
-                self.command(session, name, id, &MotorName { line, motor }, &bytes, time_to_live)?;
+                let time_to_live = span("the time to live", time_to_live, 0.0)?;
+                let left = time_to_live.0.checked_sub(waited.0).map(Micros);
+                self.command(session, name, id, &MotorName { line, motor }, &bytes, left)?;
                 Ok(None)
             }
             Ask::Confirm { line, motor } => {
@@ -152,6 +159,8 @@ impl Hub {
                 }
                 Ok(Some(Answer::Latch))
             }
+            // Motion may have been refused again meanwhile.
+            Ask::Release if waited > RELEASE => Err(refused(&CommandError::Expired)),
             Ask::Release => {
                 self.latch = None;
                 for held in &self.lines {
@@ -223,7 +232,7 @@ impl Hub {
         id: u32,
         motor: &MotorName,
         bytes: &[u8],
-        time_to_live: f64,
+        time_to_live: Option<Micros>,
     ) -> Result<(), Refused> {
         let line = self.line(&motor.line)?;
         let segments = |segment| {
@@ -233,8 +242,12 @@ impl Hub {
         let request = self.lines[line].request(motor.motor, bytes, segments);
         let (request, configures) = request.map_err(usage)?;
         let motor = request.motor();
-        let time_to_live = span("the time to live", time_to_live, 0.0)?;
         let motion = Motion::of(&request);
+        // A stop is never too old.
+        let time_to_live = match motion {
+            Motion::Stops => Micros(0),
+            _ => time_to_live.ok_or_else(|| refused(&CommandError::Expired))?,
+        };
         let tell = self.teller(session, Some(id), line);
         let held = &mut self.lines[line];
         held.known.extend(motor);
@@ -344,8 +357,11 @@ fn span(what: &str, seconds: f64, least: f64) -> Result<Micros, Refused> {
 }
 
 fn ended(error: crate::runner::Ended) -> Refused {
-    let error = CommandError::from(error);
-    (reason(&error), error.to_string())
+    refused(&error.into())
+}
+
+fn refused(error: &CommandError) -> Refused {
+    (reason(error), error.to_string())
 }
 
 fn is_printable(character: char) -> bool {
