@@ -497,3 +497,29 @@ fn a_share_that_was_frozen_executes_stops_and_no_old_motion() {
     program.ask(Ask::Release).unwrap();
     program.turn(2, 360);
 }
+
+#[test]
+fn a_stop_is_read_however_many_requests_are_under_way() {
+    let share = Share::new("busy");
+    let mut program = share.join("program");
+    program.turn(1, 360);
+    for _ in 0..600 {
+        // No motor has this ID.
+        let (line, motor, time_to_live) = ("rmd0".to_owned(), 20, 60.0);
+        let bytes = vec![0x9A, 0, 0, 0, 0, 0, 0, 0];
+        program.send(Ask::Command { line, motor, bytes, time_to_live });
+    }
+    let stop = program.send(Ask::Stop { motor: Some(rmd(1)) });
+    program.answer(stop);
+    let ended: Vec<Reason> = program.others.iter().filter_map(refused).collect();
+    assert!(ended.len() > 300 && ended.iter().all(|why| *why == Reason::Busy), "{ended:?}");
+    assert_eq!(program.ask(Ask::Rates).unwrap_err().0, Reason::Busy);
+    program.ask(Ask::Latch).unwrap();
+}
+
+fn refused(got: &Got) -> Option<Reason> {
+    match got {
+        Got::Text(Text::Refusal { reason, .. }) => Some(*reason),
+        _ => None,
+    }
+}

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::feed::Feed;
 use super::line::{Held, Motion};
 use super::place::{SessionId, Speaks};
-use super::session::Gathering;
+use super::session::{Gathering, Session};
 use super::{Hub, Sent, Work, reason};
 use crate::event::CommandError;
 use crate::line::Request;
@@ -120,6 +120,10 @@ impl Hub {
         ask: Ask,
         waited: Micros,
     ) -> Result<Option<Answer>, Refused> {
+        let may_stop = matches!(ask, Ask::Stop { .. } | Ask::Latch | Ask::Command { .. });
+        if !may_stop {
+            self.check_busy(session)?;
+        }
         match ask {
             Ask::Hello { .. } => Ok(None),
             Ask::Lines => {
@@ -170,6 +174,13 @@ impl Hub {
                 Ok(Some(Answer::Release))
             }
             Ask::Rates => self.rates(session, id),
+        }
+    }
+
+    fn check_busy(&self, session: SessionId) -> Result<(), Refused> {
+        match self.sessions.get(&session).is_some_and(Session::is_busy) {
+            true => Err(refused(&CommandError::TooMany)),
+            false => Ok(()),
         }
     }
 
@@ -246,7 +257,10 @@ impl Hub {
         // A stop is never too old.
         let time_to_live = match motion {
             Motion::Stops => Micros(0),
-            _ => time_to_live.ok_or_else(|| refused(&CommandError::Expired))?,
+            _ => {
+                self.check_busy(session)?;
+                time_to_live.ok_or_else(|| refused(&CommandError::Expired))?
+            }
         };
         let tell = self.teller(session, Some(id), line);
         let held = &mut self.lines[line];

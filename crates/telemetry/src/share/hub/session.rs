@@ -15,8 +15,12 @@ use crate::signal::Motor;
 
 /// Events that wait for a program.
 const EVENTS: usize = 1000;
-/// Requests of a program that are not finished, or whose answers wait.
+/// Requests of a program that are under way. More are refused, except stops.
 const REQUESTS: usize = 256;
+/// The same with stops. More are not read.
+const WITH_STOPS: usize = 2 * REQUESTS;
+/// Answers that wait for a program, until its requests are not read.
+const ANSWERS: usize = 256;
 
 /// A program at a share.
 #[derive(Default)]
@@ -121,7 +125,12 @@ impl Session {
 
     /// Whether more requests can be taken.
     pub(super) fn is_accepting(&self) -> bool {
-        !self.is_closing() && self.pending + self.answers.len() < REQUESTS
+        !self.is_closing() && self.pending < WITH_STOPS && self.answers.len() < ANSWERS
+    }
+
+    /// Whether too many requests are under way for another one that is no stop.
+    pub(super) fn is_busy(&self) -> bool {
+        self.pending > REQUESTS
     }
 
     pub(super) fn tell(&mut self, event: &Event) {
