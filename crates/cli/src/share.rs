@@ -29,9 +29,10 @@ Lines: st0, st1, .. are the ports with an ST drive; rmd0, rmd1, .. are those wit
 order of -p. A port that can have both, such as sim:, gives both.
 
 Safety: a stop goes before commands, and commands go before reads. When a program ends or is killed, \
-the motors that it turned last stop. A latch refuses motion of all programs until it is released. A \
-share cannot stop a motor if the share is killed with SIGKILL, if the cable to the drive is cut, or if \
-the computer stops. If people can be hurt, use an emergency stop in hardware.
+the motors that it turned last stop. The motors of a program that hangs but does not end turn on. A \
+latch refuses motion of all programs until it is released. A share cannot stop a motor if the share \
+is killed with SIGKILL, if the cable to the drive is cut, or if the computer stops. If people can be \
+hurt, use an emergency stop in hardware.
 
 Output: a line when programs can connect, then one line per event. Lines that are not read in time are \
 dropped. SIGINT, SIGTERM and the other signals that end a program stop the motors first. Exit code 0, \
