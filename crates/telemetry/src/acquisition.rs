@@ -71,8 +71,8 @@ pub struct Acquisition {
     confirmed: BTreeMap<Lane, Instant>,
     /// Lanes whose values are confirmed at each instant, and until when.
     careful: BTreeMap<Lane, Instant>,
-    /// Polls that the drive refused.
-    refused: BTreeSet<PollId>,
+    /// Signals without values: the drive refused their poll, or their values are not plausible.
+    refused: BTreeMap<PollId, Vec<Signal>>,
     /// Registers that have their size in the other profile. Each read of one loses the line, so they are
     /// not read again until the port is opened again, or until somebody else wants them.
     unfit: BTreeSet<Signal>,
@@ -131,7 +131,7 @@ impl Acquisition {
             instants: BTreeMap::new(),
             confirmed: BTreeMap::new(),
             careful: BTreeMap::new(),
-            refused: BTreeSet::new(),
+            refused: BTreeMap::new(),
             unfit: BTreeSet::new(),
             failures: BTreeMap::new(),
         }
@@ -165,7 +165,7 @@ impl Acquisition {
     /// Sends these signals, and all events, to a subscription. What the drive refuses is said again.
     pub fn subscribe(&mut self, subscription: Subscription, wants: Wants) -> ConsumerId {
         self.unfit.retain(|signal| !wants.contains_key(signal));
-        self.refused.retain(|id| {
+        self.refused.retain(|id, _| {
             let poll = self.polls.get(id);
             poll.is_some_and(|poll| !poll.signals.iter().any(|it| wants.contains_key(it)))
         });
@@ -253,8 +253,13 @@ impl Acquisition {
         self.polls.iter().flat_map(|(id, poll)| {
             let asked = poll.period;
             let predicted = self.schedule.predicted_period(asked);
-            let achieved = self.schedule.load().rate(*id);
-            poll.signals.iter().map(move |&signal| Rate { signal, asked, predicted, achieved })
+            let rate = self.schedule.load().rate(*id);
+            let refused = self.refused.get(id);
+            poll.signals.iter().map(move |signal| {
+                let is_refused = refused.is_some_and(|refused| refused.contains(signal));
+                let achieved = if is_refused { 0.0 } else { rate };
+                Rate { signal: *signal, asked, predicted, achieved }
+            })
         })
     }
 

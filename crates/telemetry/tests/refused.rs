@@ -112,3 +112,25 @@ fn each_subscriber_is_told_what_is_refused() {
         assert_eq!(Got::of(&second).refused().len(), 1, "{name}");
     }
 }
+
+#[test]
+fn only_values_count_in_the_rates() {
+    let rates = |engine: &Engine| {
+        let rate = |name: &str| {
+            let signal = signals(st(1), &[name])[0];
+            engine.acquisition.rates().find(|rate| rate.signal == signal).unwrap().achieved
+        };
+        ["SPEED_MEAS", "0xEE", "FLUXWK_BUS"].map(rate)
+    };
+    let wanted = signals(st(1), &["SPEED_MEAS", "0xEE", "FLUXWK_BUS"]);
+    let mut engine = shipped(Profile::Mcsdk54);
+    engine.subscribe(&wanted, Micros(50_000));
+    engine.run(Micros(3 * SECOND.0));
+    let [speed, refused, share] = rates(&engine);
+    assert!(speed > 18.0 && refused == 0.0 && share > 18.0, "{speed} {refused} {share}");
+    // FLUXWK_BUS of shipped firmware has digits of 0.1 %.
+    let mut engine = shipped(Profile::Spec);
+    engine.subscribe(&wanted, Micros(50_000));
+    engine.run(Micros(3 * SECOND.0));
+    assert_eq!(rates(&engine)[1..], [0.0, 0.0]);
+}

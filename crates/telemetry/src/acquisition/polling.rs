@@ -83,7 +83,7 @@ impl Acquisition {
     }
 
     fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: LineError) {
-        if self.refused.insert(id) {
+        if self.refused.insert(id, signals.clone()).is_none() {
             self.tell(What::Refused(signals, Arc::new(why)));
         }
     }
@@ -134,7 +134,7 @@ impl Acquisition {
             );
             self.polls.insert(id, Arc::new(poll));
         }
-        self.refused.retain(|id| self.polls.contains_key(id));
+        self.refused.retain(|id, _| self.polls.contains_key(id));
         // What confirms the values of an instant is the last exchange of it.
         let (confirmations, reads): (Vec<_>, Vec<_>) =
             self.polls.iter().partition(|(_, poll)| poll.read == Read::Confirm);

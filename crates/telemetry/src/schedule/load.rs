@@ -149,7 +149,11 @@ impl Load {
         }
         self.durations.push(span);
         match exchange.kind {
-            Kind::Poll(poll) => self.costs.entry(poll).or_default().answered(span),
+            Kind::Poll(poll) => {
+                let cost = self.costs.entry(poll).or_default();
+                cost.took(span);
+                cost.answers += u32::from(outcome == Outcome::Answered);
+            }
             Kind::Command(_) | Kind::Stop(_) | Kind::Recovery(_) => self.of_commands += span.0,
         }
     }
@@ -212,10 +216,9 @@ impl Load {
 }
 
 impl Cost {
-    fn answered(&mut self, span: Micros) {
+    fn took(&mut self, span: Micros) {
         let span = (span.0 as f64).max(1.0);
         self.mean = if self.mean == 0.0 { span } else { self.mean + (span - self.mean) * WEIGHT };
-        self.answers += 1;
     }
 }
 
