@@ -226,6 +226,12 @@ impl Acquisition {
         id
     }
 
+    /// Whether the motor of a request, or another one of its line if replies do not say which motor they
+    /// are from, has answered since the engine began.
+    pub fn has_answered(&self, request: &Request) -> bool {
+        self.schedule.has_answered(self.line.lane(request))
+    }
+
     /// Refuses all motion from now on, whoever asks, until it is released. Motion that waits to be sent
     /// is refused, too.
     pub fn latch(&mut self, by: &Arc<str>, ended: &mut Ended<'_>) {

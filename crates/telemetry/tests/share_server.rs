@@ -523,3 +523,31 @@ fn refused(got: &Got) -> Option<Reason> {
         _ => None,
     }
 }
+
+#[test]
+fn the_answer_to_a_stop_of_all_does_not_wait_for_a_motor_that_never_answered() {
+    let share = Share::new("unheard");
+    let mut program = share.join("program");
+    program.turn(1, 360);
+    program.subscribe(&[("rmd0", 20, "speed_dps")], 10);
+    // The second one has the id of the first one, whose last stop is not over.
+    let first = program.last + 1;
+    for _ in 0..2 {
+        program.last = first - 1;
+        let Ok(Answer::Stop { motors }) = program.ask(Ask::Stop { motor: None }) else { panic!() };
+        let failed: Vec<_> =
+            motors.iter().map(|it| (it.motor.motor, it.failure.is_some())).collect();
+        assert_eq!(failed, [(1, false), (20, true)], "{motors:?}");
+        let why = motors[1].failure.as_ref().unwrap();
+        assert!(why.contains("never answered"), "{why}");
+    }
+    let stopping = |got: &Got| match got {
+        Got::Text(Text::Event(event)) if event.event == Happening::Stopping => event.motor,
+        _ => None,
+    };
+    while !program.others.iter().filter_map(stopping).any(|motor| motor == 20) {
+        let next = program.receive();
+        program.others.push(next);
+    }
+    share.reaches("rmd1.speed_dps", |dps| dps < 5.0);
+}

@@ -35,6 +35,8 @@ pub(super) struct LaneState<C> {
     pub(super) in_sync: bool,
     /// Whether an exchange was answered since the line was opened.
     pub(super) is_known: bool,
+    /// Whether one was answered ever.
+    pub(super) has_answered: bool,
     /// Exchanges in a row that failed.
     failures: u32,
     /// When the first of them began.
@@ -52,6 +54,7 @@ impl<C> Default for LaneState<C> {
             commands_in_a_row: 0,
             in_sync: false,
             is_known: false,
+            has_answered: false,
             failures: 0,
             silent_since: Instant(0),
             quiet_until: Instant(0),
@@ -189,7 +192,7 @@ impl<C: Clone> LaneState<C> {
         self.in_sync = matches!(outcome, Outcome::Answered | Outcome::Refused);
         match outcome {
             Outcome::Answered | Outcome::Refused => {
-                self.is_known = true;
+                (self.is_known, self.has_answered) = (true, true);
                 self.trust();
             }
             Outcome::Failed => self.failed(now, exchange.since),

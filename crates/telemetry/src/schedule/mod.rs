@@ -238,6 +238,11 @@ impl<C: Clone> Schedule<C> {
             .map_or_else(|| Next::Wait(self.until(now)), |(lane, job)| Next::Begin(lane, job))
     }
 
+    /// Whether an exchange of a lane was answered ever.
+    pub fn has_answered(&self, lane: Lane) -> bool {
+        self.lanes.get(&lane).is_some_and(|lane| lane.has_answered)
+    }
+
     /// Whether [`next`](Self::next) gives a stop now.
     pub fn has_stop(&self, now: Instant) -> bool {
         let preempts = self.rules.stop_preempts;

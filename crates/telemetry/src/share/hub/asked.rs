@@ -9,10 +9,11 @@ use motorlink_proto::time::Micros;
 use serde::Deserialize;
 
 use super::feed::Feed;
-use super::line::{Held, Motion};
+use super::line::{self, Held, Motion};
 use super::place::{SessionId, Speaks};
-use super::session::{Gathering, Session};
+use super::session::Session;
 use super::{Hub, Sent, Work, reason};
+use crate::acquisition::Acquisition;
 use crate::event::CommandError;
 use crate::line::Request;
 
@@ -300,6 +301,7 @@ impl Hub {
         id: u32,
         motor: Option<&MotorName>,
     ) -> Result<Option<Answer>, Refused> {
+        let is_all = motor.is_none();
         let motors: Vec<(usize, Motor)> = match motor {
             Some(motor) => vec![self.motor(motor)?],
             None => {
@@ -312,33 +314,36 @@ impl Hub {
         if motors.is_empty() {
             return Ok(Some(Answer::Stop { motors: Vec::new() }));
         }
-        self.gather(session, id, motors.len())?;
+        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
+        let part = asker.gather(id, motors.len());
         for (line, motor) in motors {
-            self.stop(line, motor, session, Some(id), name);
+            let held = &self.lines[line];
+            if is_all && !held.may_turn(motor) {
+                let tell = self.teller(session, None, line);
+                let task = move |engine: &mut Acquisition| {
+                    if !engine.has_answered(&line::stop(motor)) {
+                        tell(Work::Unheard(part, motor));
+                    }
+                };
+                // If the engine has ended, the stop below says so.
+                let _ = held.remote().post(task);
+            }
+            self.stop(line, motor, session, Some(part), name);
         }
         Ok(None)
     }
 
     fn rates(&mut self, session: SessionId, id: u32) -> Result<Option<Answer>, Refused> {
-        self.gather(session, id, self.lines.len())?;
+        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
+        let part = asker.gather(id, self.lines.len());
         for (line, held) in self.lines.iter().enumerate() {
-            let tell = self.teller(session, Some(id), line);
-            let task = |engine: &mut crate::acquisition::Acquisition| {
-                tell(Work::Rates(engine.rates().collect()));
+            let tell = self.teller(session, None, line);
+            let task = move |engine: &mut Acquisition| {
+                tell(Work::Rates(part, engine.rates().collect()));
             };
             held.remote().post(task).map_err(ended)?;
         }
         Ok(None)
-    }
-
-    /// Waits for several parts of an answer.
-    fn gather(&mut self, session: SessionId, id: u32, missing: usize) -> Result<(), Refused> {
-        let Some(session) = self.sessions.get_mut(&session) else { return Ok(()) };
-        if session.gathering.contains_key(&id) {
-            return Err(usage(format!("request {id} is not finished; use another id")));
-        }
-        session.gathering.insert(id, Gathering { missing, ..Gathering::default() });
-        Ok(())
     }
 }
 

@@ -99,6 +99,12 @@ impl Held {
         self.unstopped.remove(&motor);
     }
 
+    /// Whether a program turned a motor, or tried to.
+    pub(super) fn may_turn(&self, motor: Motor) -> bool {
+        let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
+        is_starting || self.owners.contains_key(&motor) || self.unstopped.contains_key(&motor)
+    }
+
     pub(super) fn remote(&self) -> &Remote {
         self.runner.remote()
     }

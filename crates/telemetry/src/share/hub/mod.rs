@@ -23,7 +23,7 @@ use crate::runner::{CommandResult, Ended};
 use crate::signal::Motor;
 use line::{Configures, Motion};
 use place::{number, wall_now};
-use session::Session;
+use session::{Part, Session};
 
 pub use line::Held;
 pub use place::{SessionId, Speaks};
@@ -66,9 +66,19 @@ struct Done {
 
 enum Work {
     Command(Sent, CommandResult),
-    Confirm { motor: Motor, result: CommandResult },
-    Stop { motor: Motor, by: Arc<str>, result: CommandResult },
-    Rates(Vec<Rate>),
+    Confirm {
+        motor: Motor,
+        result: CommandResult,
+    },
+    Stop {
+        part: Option<Part>,
+        motor: Motor,
+        by: Arc<str>,
+        result: CommandResult,
+    },
+    /// A motor that should stop has never answered.
+    Unheard(Part, Motor),
+    Rates(Part, Vec<Rate>),
 }
 
 /// A command that was handed to an engine.
@@ -259,7 +269,7 @@ impl Hub {
                     Err(error) => session.refuse(id, reason(&error), error.to_string()),
                 }
             }
-            Work::Stop { motor, by, result } => {
+            Work::Stop { part, motor, by, result } => {
                 let Some(held) = self.lines.get_mut(line) else { return };
                 let is_owned = held.owners.contains_key(&motor);
                 match &result {
@@ -274,13 +284,20 @@ impl Hub {
                 if is_owned && result.is_err() && !is_event {
                     self.again.insert((line, motor), Instant::now() + AGAIN);
                 }
-                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
+                    return;
+                };
                 let motor = MotorName { line: held.name.clone(), motor: number(motor) };
-                session.stopped(id, motor, result.err().map(|error| error.to_string()));
+                session.stopped(part, motor, result.err().map(|error| error.to_string()));
             }
-            Work::Rates(rates) => {
+            Work::Unheard(part, motor) => {
                 let Some(held) = self.lines.get(line) else { return };
-                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                let Some(session) = self.sessions.get_mut(&session) else { return };
+                session.unheard(part, MotorName { line: held.name.clone(), motor: number(motor) });
+            }
+            Work::Rates(part, rates) => {
+                let Some(held) = self.lines.get(line) else { return };
+                let Some(session) = self.sessions.get_mut(&session) else { return };
                 let named = |rate: Rate| SignalRate {
                     signal: SignalName {
                         line: held.name.clone(),
@@ -291,7 +308,7 @@ impl Hub {
                     predicted: rate.predicted.0 as f64 / 1e6,
                     achieved: rate.achieved,
                 };
-                session.rates(id, rates.into_iter().map(named).collect());
+                session.rates(part, rates.into_iter().map(named).collect());
             }
         }
     }
@@ -400,18 +417,19 @@ impl Hub {
         line: usize,
         motor: Motor,
         session: SessionId,
-        id: Option<u32>,
+        part: Option<Part>,
         by: &Arc<str>,
     ) {
         let Some(held) = self.lines.get(line) else { return };
-        let tell = self.teller(session, id, line);
+        let tell = self.teller(session, None, line);
         let asker = Arc::clone(by);
         let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
-            tell(Work::Stop { motor, by: asker, result });
+            tell(Work::Stop { part, motor, by: asker, result });
         });
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
-            self.finish(Done { session, id, line, what: Work::Stop { motor, by, result } });
+            let what = Work::Stop { part, motor, by, result };
+            self.finish(Done { session, id: None, line, what });
         }
     }
 

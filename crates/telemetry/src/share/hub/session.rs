@@ -1,6 +1,6 @@
 //! A program at a share: what it asked for, and what waits for it.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use motorlink_proto::st::RegisterId;
@@ -32,7 +32,8 @@ pub(super) struct Session {
     missed: u64,
     /// Requests without an answer.
     pub(super) pending: usize,
-    pub(super) gathering: BTreeMap<u32, Gathering>,
+    gathering: BTreeMap<Part, Gathering>,
+    last_part: Part,
     pub(super) feeds: BTreeMap<u32, Feed>,
     pub(super) last_feed: u32,
     /// Motors that have answered since their last confirmation, and whether the answers are doubtful.
@@ -56,13 +57,22 @@ enum Closing {
     Said,
 }
 
+/// Which answer something is a part of. Programs may use an id again.
+pub(super) type Part = u64;
+
 /// The parts of an answer, of several motors or lines.
 #[derive(Default)]
-pub(super) struct Gathering {
-    pub(super) missing: usize,
-    pub(super) stopped: Vec<StoppedMotor>,
-    pub(super) rates: Option<Vec<SignalRate>>,
+struct Gathering {
+    id: u32,
+    missing: usize,
+    stopped: Vec<StoppedMotor>,
+    /// Motors whose part is missing, and that have never answered.
+    unheard: BTreeSet<MotorName>,
+    rates: Option<Vec<SignalRate>>,
 }
+
+/// What is said of a motor that is not waited for.
+const UNHEARD: &str = "it has never answered: nobody knows whether it received the stop";
 
 impl Session {
     pub(super) fn answer(&mut self, id: u32, answer: Answer) {
@@ -180,30 +190,55 @@ impl Session {
         self.samples.pop_front()
     }
 
+    /// Waits for several parts of an answer.
+    pub(super) fn gather(&mut self, id: u32, missing: usize) -> Part {
+        self.last_part += 1;
+        self.gathering.insert(self.last_part, Gathering { id, missing, ..Gathering::default() });
+        self.last_part
+    }
+
     /// A motor took the stop of a request, or did not.
-    pub(super) fn stopped(&mut self, id: u32, motor: MotorName, failure: Option<String>) {
-        if let Some(gathering) = self.gathering.get_mut(&id) {
+    pub(super) fn stopped(&mut self, part: Part, motor: MotorName, failure: Option<String>) {
+        if let Some(gathering) = self.gathering.get_mut(&part) {
+            gathering.unheard.remove(&motor);
             gathering.stopped.push(StoppedMotor { motor, failure });
-            self.gathered(id);
+            gathering.missing -= 1;
+            self.gathered(part);
+        }
+    }
+
+    /// A motor that should stop has never answered. The answer for the others does not wait for it.
+    pub(super) fn unheard(&mut self, part: Part, motor: MotorName) {
+        if let Some(gathering) = self.gathering.get_mut(&part) {
+            gathering.unheard.insert(motor);
+            self.gathered(part);
         }
     }
 
     /// The rates of a line.
-    pub(super) fn rates(&mut self, id: u32, rates: Vec<SignalRate>) {
-        if let Some(gathering) = self.gathering.get_mut(&id) {
+    pub(super) fn rates(&mut self, part: Part, rates: Vec<SignalRate>) {
+        if let Some(gathering) = self.gathering.get_mut(&part) {
             gathering.rates.get_or_insert_default().extend(rates);
-            self.gathered(id);
+            gathering.missing -= 1;
+            self.gathered(part);
         }
     }
 
-    fn gathered(&mut self, id: u32) {
-        let Some(gathering) = self.gathering.get_mut(&id) else { return };
-        gathering.missing = gathering.missing.saturating_sub(1);
-        if gathering.missing > 0 {
+    fn gathered(&mut self, part: Part) {
+        let is_over = |gathering: &Gathering| {
+            let has_heard = gathering.missing == 0 || !gathering.stopped.is_empty();
+            has_heard && gathering.missing == gathering.unheard.len()
+        };
+        if !self.gathering.get(&part).is_some_and(is_over) {
             return;
         }
-        let Some(Gathering { mut stopped, rates, .. }) = self.gathering.remove(&id) else { return };
+        let Some(Gathering { id, mut stopped, unheard, rates, .. }) = self.gathering.remove(&part)
+        else {
+            return;
+        };
         self.pending -= 1;
+        let failure = || Some(UNHEARD.to_owned());
+        stopped.extend(unheard.into_iter().map(|motor| StoppedMotor { motor, failure: failure() }));
         stopped.sort_by(|one, other| one.motor.cmp(&other.motor));
         self.answer(
             id,
