@@ -229,3 +229,9 @@ def test_each_program_can_be_killed_and_the_others_go_on(share, start, direct, t
     assert len(times) > 50 * ROUNDS
     late = sum(gap > 2 * PERIOD for gap in times)
     print(f"{ROUNDS} rounds, {len(times)} gaps, {late} above {2 * PERIOD} s, longest {times[-1]:.3f} s")
+
+
+def test_the_socket_of_a_share_is_no_port_of_a_drive(share, run):
+    for words in (["st", "-p", f"unix:{share.path}"], ["rmd", "-p", f"slcan:unix:{share.path}"]):
+        failed = run(*words, "status").ended(3)
+        assert "write -p share:PATH/st0, or /rmd0 for RMD motors" in failed.err, failed.err

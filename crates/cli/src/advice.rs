@@ -16,6 +16,10 @@ pub const STOP_PADS: &str = "`motorlink st stop` repeats the stop and completes 
 /// After a motion command to an RMD motor that has an error.
 pub const CLEAR_AND_REPEAT: &str =
     "remove the cause, then `motorlink rmd clear-errors`, and repeat the command";
+const UNIX: &str = "unix:";
+/// After a Unix socket where nothing answers like a drive.
+const SHARE_SOCKET: &str =
+    "if it is the socket of a share, write -p share:PATH/st0, or /rmd0 for RMD motors";
 const TRY_RATES: &str = "`motorlink st scan` tries the usual rates";
 const ACKNOWLEDGE: &str = "remove the cause, then `motorlink st fault-ack`";
 
@@ -27,6 +31,7 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NoHolder { .. } => {
             Some("start it with `motorlink share`, and stop motors that still turn")
         }
+        PortError::Closed { port } if port.contains(UNIX) => Some(SHARE_SOCKET),
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),
         _ => None,
     }
@@ -89,6 +94,9 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
     match error {
         st::Error::Port(error) => port(error),
         st::Error::Unconfirmed { why: Some(why), .. } => st(why),
+        st::Error::Failed { port, failure: Failure::Timeout, .. } if port.contains(UNIX) => {
+            Some(SHARE_SOCKET)
+        }
         st::Error::Failed { failure, .. } => match failure {
             Failure::Timeout | Failure::Header(_) | Failure::Damaged(_) => Some(TRY_RATES),
             Failure::Size { fits: Some(Profile::Mcsdk54), .. } => {
