@@ -3,11 +3,14 @@
 import csv
 import fcntl
 import os
+import signal
 import subprocess
+import sys
+import termios
 
 import pytest
 
-from program import environment
+from program import environment, eventually
 
 
 def read(path):
@@ -88,6 +91,34 @@ def test_a_recording_goes_on_when_stdout_is_not_read(motorlink, tmp_path):
         fcntl.fcntl(recording.stdout, fcntl.F_SETPIPE_SZ, 4096)
         assert recording.wait(30) == 0
     assert len(read(path)) == 1000
+
+
+@pytest.mark.parametrize("words", [(), ("--json",), ("--csv", "-"), ("--count", "1000000")])
+def test_the_first_ctrl_c_ends_a_loop_whose_output_is_not_read(motorlink, words):
+    loop = [motorlink, "st", "-p", "sim:", "get", "STATUS", "--every", "1ms", *words]
+    with subprocess.Popen(loop, stdout=subprocess.PIPE, env=environment()) as running:
+        # Two pages: it is full when the second one has data.
+        size = fcntl.fcntl(running.stdout, fcntl.F_SETPIPE_SZ, 8192)
+
+        def is_full():
+            unread = fcntl.ioctl(running.stdout, termios.FIONREAD, bytes(4))
+            return int.from_bytes(unread, sys.byteorder) > size // 2
+
+        eventually(is_full, "a pipe that is full")
+        running.send_signal(signal.SIGINT)
+        assert running.wait(30) == (130 if "--count" in words else 0)
+
+
+def test_a_count_ends_when_no_motor_answers(start, sim, tmp_path):
+    drives = sim(st=("pty",))
+    path = tmp_path / "run.csv"
+    loop = start("st", "-p", drives.port("pty"), "--timeout", "100ms", "get", "STATUS", "--every", "20ms",
+                 "--count", "100000", "--csv", path)
+    loop.more_lines(4)
+    drives.kill()
+    assert loop.wait() == 3
+    assert any("no sample for 10 s" in line for line in loop.err), loop.err
+    assert len(read(path)) >= 2
 
 
 def test_ctrl_c_leaves_whole_rows_and_tells_a_count_that_was_not_reached(start, tmp_path):

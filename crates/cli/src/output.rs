@@ -3,9 +3,12 @@
 use std::io::{Write, stderr, stdout};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::Hex;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
@@ -106,6 +109,17 @@ pub fn has_json_messages() -> bool {
 pub fn never_wait(missed: fn(u64) -> String) -> &'static Voice {
     never_wait_for_messages();
     RESULTS.get_or_init(|| Voice::new(stdout(), missed))
+}
+
+/// Whether a line can be printed without waiting for the reader of stdout, now or after this time.
+pub fn is_read(within: Duration) -> bool {
+    if RESULTS.get().is_some() {
+        return true;
+    }
+    let out = stdout();
+    let mut fds = [PollFd::new(&out, PollFlags::OUT)];
+    // After another error the next line says why.
+    !matches!(poll(&mut fds, Timespec::try_from(within).ok().as_ref()), Ok(0) | Err(Errno::INTR))
 }
 
 /// As [`never_wait`], for stderr only.

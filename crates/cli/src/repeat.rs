@@ -17,7 +17,7 @@ use crate::columns::Columns;
 use crate::failure::{Failure, Kind, Problem};
 use crate::interrupt;
 use crate::json::{Cell, Line};
-use crate::output::{Printer, missed, missed_text, never_wait, note, print_line};
+use crate::output::{Printer, is_read, missed, missed_text, never_wait, note, print_line};
 use crate::recording::Recording;
 use crate::span::parse_span;
 
@@ -27,6 +27,8 @@ const QUEUE: usize = 100_000;
 const LOOK: Duration = Duration::from_millis(20);
 /// How often to look at the rates, once they are known.
 const SECOND: Duration = Duration::from_secs(1);
+/// With --count: how long no sample may come, besides two periods and the timeout of a reply.
+const PATIENCE: Duration = Duration::from_secs(10);
 /// A period that is longer than asked by this factor is said.
 const SLOWER: f64 = 1.05;
 /// It is said again if it changes by this factor.
@@ -38,7 +40,7 @@ pub struct Repeat {
     /// Repeat at this interval, such as 100ms, until Ctrl-C; a note says if the line is too slow
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub every: Option<Duration>,
-    /// Stop after this many samples
+    /// Stop after this many samples; exit code 3 if none comes for 10 s, two periods and the timeout
     #[arg(long, value_name = "N", requires = "every")]
     count: Option<u64>,
     /// Also write the samples to this file, as comma-separated values; - is stdout, without the table
@@ -70,7 +72,11 @@ where
     /// Prints samples with their time, until the end that `repeat` has. A failed line is tried again
     /// until it works.
     pub fn run(mut self, every: Duration, repeat: &Repeat) -> Result<(), Failure> {
-        let mut sink = Sink::new(repeat, self.output, &self.object)?;
+        let patience = repeat.count.map(|_| {
+            let waits = every.saturating_mul(2).saturating_add(self.line.timeout());
+            PATIENCE.saturating_add(waits)
+        });
+        let mut sink = Sink::new(repeat, self.output, &self.object, patience)?;
         let mut pace = Pace::new(every);
         let wants = self.signals.iter().map(|signal| (*signal, every.into())).collect();
         let mut rows = Rows::new(self.signals);
@@ -79,6 +85,7 @@ where
         let ending = subscription.clone();
         interrupt::take_over_with(move || ending.close());
         let mut left = repeat.count.unwrap_or(u64::MAX);
+        let mut last = Instant::now();
         while left > 0 && !interrupt::interrupted() {
             match subscription.wait(pace.patience()) {
                 Some(record) => rows.take(&record),
@@ -86,6 +93,9 @@ where
                 None => {}
             }
             while let Some(item) = rows.next_item().filter(|_| left > 0) {
+                if !may_print() {
+                    break;
+                }
                 match item {
                     Item::Row(row) => {
                         let cells = (self.shown)(&row.values)?;
@@ -94,6 +104,7 @@ where
                         }
                         sink.row(row.time, cells)?;
                         left -= 1;
+                        last = Instant::now();
                     }
                     Item::Gap(Gap { time, why, unconfirmed }) => {
                         let failure = match why {
@@ -104,6 +115,9 @@ where
                     }
                     Item::Lost(count) => sink.lost(count)?,
                 }
+            }
+            if let Some(patience) = patience.filter(|it| left > 0 && last.elapsed() > *it) {
+                return Err(sink.given_up(patience));
             }
             if left > 0 {
                 pace.look(runner.remote())?;
@@ -158,6 +172,16 @@ impl Pace {
     }
 }
 
+/// Waits until stdout takes more; `false` if a signal ended the wait.
+fn may_print() -> bool {
+    while !interrupt::interrupted() {
+        if is_read(LOOK) {
+            return true;
+        }
+    }
+    false
+}
+
 /// The rate of a period, with two or three digits.
 fn hertz(period: Micros) -> String {
     let rate = 1e6 / period.0.max(1) as f64;
@@ -180,12 +204,19 @@ struct Sink<'a> {
     noted: Vec<String>,
     /// The time of the first sample or event.
     began: Option<Moment>,
-    /// The kind of the outage that lasts.
-    lasting: Option<Kind>,
+    /// Why the outage that lasts began.
+    lasting: Option<Box<Problem>>,
+    /// When an outage ends the loop.
+    patience: Option<Duration>,
 }
 
 impl<'a> Sink<'a> {
-    fn new(repeat: &Repeat, output: Printer, object: &'a Line) -> Result<Self, Failure> {
+    fn new(
+        repeat: &Repeat,
+        output: Printer,
+        object: &'a Line,
+        patience: Option<Duration>,
+    ) -> Result<Self, Failure> {
         let create = |path: &PathBuf| Recording::create(path, repeat.force);
         let recording = repeat.csv.as_ref().map(create).transpose()?;
         let is_stdout = recording.as_ref().is_some_and(Recording::is_stdout);
@@ -208,6 +239,7 @@ impl<'a> Sink<'a> {
             noted: Vec::new(),
             began: None,
             lasting: None,
+            patience,
         })
     }
 
@@ -219,8 +251,8 @@ impl<'a> Sink<'a> {
 
     fn row(&mut self, time: Moment, cells: Vec<Cell>) -> Result<(), Failure> {
         let elapsed = self.since_first(time);
-        if let Some(kind) = self.lasting.take() {
-            self.back(elapsed, kind)?;
+        if let Some(problem) = self.lasting.take() {
+            self.back(elapsed, problem.kind)?;
         }
         self.sample(elapsed, cells)
     }
@@ -233,11 +265,19 @@ impl<'a> Sink<'a> {
                 if self.lasting.is_some() {
                     return Ok(());
                 }
-                self.lasting = Some(problem.kind);
-                self.outage(elapsed, &problem, unconfirmed)
+                self.outage(elapsed, &problem, unconfirmed)?;
+                self.lasting = Some(problem);
+                Ok(())
             }
             other => Err(other),
         }
+    }
+
+    /// No sample has come for too long.
+    fn given_up(&mut self, patience: Duration) -> Failure {
+        let problem = self.lasting.take();
+        let failure = problem.map_or_else(|| Failure::link("no values"), Failure::Failed);
+        failure.then(format!("no sample for {} s", patience.as_secs()))
     }
 
     /// Records that were lost because stdout was not read.
@@ -292,7 +332,11 @@ impl<'a> Sink<'a> {
             };
             return print_line(&Value::from(event));
         }
-        let (text, retry) = (problem.text(), "trying again until Ctrl-C");
+        let retry = match self.patience {
+            Some(patience) => format!("trying again for {} s", patience.as_secs()),
+            None => "trying again until Ctrl-C".to_owned(),
+        };
+        let text = problem.text();
         match problem.kind {
             Kind::Silent => note(format!("{text}; {retry}")),
             _ => note(format!("the line is lost: {text}; {retry}")),
