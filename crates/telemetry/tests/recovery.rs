@@ -152,7 +152,7 @@ fn a_start_is_not_sent_after_its_time_to_live_when_a_line_was_recovered() {
     engine.run(Micros(5 * SECOND.0));
     assert!(matches!(engine.result(start), Err(CommandError::Expired)), "{:?}", engine.ended);
     assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
-    // Nobody is told that it was sent.
+    // No event says that it was sent.
     while let Some(record) = events.take() {
         let Record::Event(event) = record else { continue };
         assert!(!matches!(event.what, What::Commanded(..)), "{event:?}");

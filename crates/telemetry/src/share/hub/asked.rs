@@ -325,7 +325,7 @@ impl Hub {
                         tell(Work::Unheard(part, motor));
                     }
                 };
-                // If the engine has ended, the stop below says so.
+                // If the engine has ended, the stop fails, too.
                 let _ = held.remote().post(task);
             }
             self.stop(line, motor, session, Some(part), name);

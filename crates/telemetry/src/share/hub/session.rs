@@ -72,7 +72,7 @@ struct Gathering {
 }
 
 /// What is said of a motor that is not waited for.
-const UNHEARD: &str = "it has never answered: nobody knows whether it received the stop";
+const UNHEARD: &str = "it has never answered; it is unknown whether it received the stop";
 
 impl Session {
     pub(super) fn answer(&mut self, id: u32, answer: Answer) {
@@ -138,7 +138,7 @@ impl Session {
         !self.is_closing() && self.pending < WITH_STOPS && self.answers.len() < ANSWERS
     }
 
-    /// Whether too many requests are under way for another one that is no stop.
+    /// Whether the only further requests that are taken are stops.
     pub(super) fn is_busy(&self) -> bool {
         self.pending > REQUESTS
     }
