@@ -215,9 +215,6 @@ impl Acquisition {
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
         let keep =
             |queued: &Arc<Command>| !may_move(&queued.request) || is_other(queued.request.motor());
-        if !self.line.sends_at_once(lane) {
-            self.schedule.is_unsent(lane);
-        }
         let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), keep);
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
@@ -287,7 +284,10 @@ impl Acquisition {
             true => self.line.advance(&mut |one| over.push(one)),
             false => Ok(None),
         };
-        let again = (!over.is_empty()).then_some(Duration::ZERO);
+        let line = &self.line;
+        self.schedule.recovering(|lane| !line.sends_at_once(lane));
+        let has_more = !over.is_empty() || self.schedule.has_stop(self.clock.now());
+        let again = has_more.then_some(Duration::ZERO);
         for one in over {
             self.over(one, ended);
         }
@@ -371,7 +371,7 @@ impl Acquisition {
                 match displaced {
                     Some(Displaced::Command(id)) => ended(id, Err(CommandError::Displaced)),
                     Some(Displaced::Unsent(id)) => ended(id, Err(CommandError::Overtaken)),
-                    Some(Displaced::Poll(_) | Displaced::Recovery) | None => {}
+                    Some(Displaced::Poll(_) | Displaced::Recovery | Displaced::Stop) | None => {}
                 }
                 Some(command.request.clone())
             }

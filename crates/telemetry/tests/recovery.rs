@@ -139,8 +139,12 @@ fn execute(command: Command) -> Request {
 }
 
 fn frame_of(command: Command) -> Vec<u8> {
+    frame_to(1, command)
+}
+
+fn frame_to(motor: u8, command: Command) -> Vec<u8> {
     let mut bytes = [0; MAX_FRAME];
-    Frame::command(1, &St::ExecuteCommand(command), &mut bytes).unwrap().to_vec()
+    Frame::command(motor, &St::ExecuteCommand(command), &mut bytes).unwrap().to_vec()
 }
 
 #[test]
@@ -246,4 +250,23 @@ fn motion_is_not_sent_after_its_time_to_live_when_a_motor_was_silent() {
     let stop = engine.stop(Request::rmd(id, &Stop));
     engine.run(SECOND);
     assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+}
+
+#[test]
+fn each_motor_of_a_lost_line_gets_its_stop_at_once() {
+    let (mut engine, wire) = st_engine();
+    engine.lose_line(&wire, read_status(1));
+    engine.subscribe(&signals(st(1), &["SPEED_MEAS"]), Micros(10_000));
+    engine.run(Micros(1_000));
+    let asked = engine.clock.now();
+    let stops =
+        [1, 2].map(|motor| engine.stop(Request::st(motor, St::ExecuteCommand(Command::StopMotor))));
+    engine.run(Micros(5 * SECOND.0));
+    for motor in [1, 2] {
+        let first = wire.times(&frame_to(motor, Command::StopMotor))[0];
+        assert!(first.since(asked) <= Micros(1_000), "{motor}: {:?}", first.since(asked));
+    }
+    for stop in stops {
+        assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+    }
 }

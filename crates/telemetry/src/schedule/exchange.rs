@@ -25,6 +25,8 @@ pub enum Displaced {
     Unsent(CommandId),
     /// A recovery of the lane.
     Recovery,
+    /// A stop, which is repeated later. It was sent ahead of the recovery of the lane.
+    Stop,
 }
 
 /// How an exchange ended.
@@ -73,18 +75,19 @@ pub(super) struct UnderWay {
     pub(super) since: Instant,
     /// Whether the line was in sync when it began. Else its duration is not that of the exchange alone.
     pub(super) in_sync: bool,
-    /// Whether a stop replaces it, because nothing was sent.
+    /// Whether a stop replaces it: the lane is brought in sync, and its request was not sent. A stop was
+    /// sent ahead.
     pub(super) is_unsent: bool,
 }
 
 impl UnderWay {
-    pub(super) fn displaced(self) -> Option<Displaced> {
+    pub(super) fn displaced(self) -> Displaced {
         match self.kind {
-            Kind::Poll(poll) => Some(Displaced::Poll(poll)),
-            Kind::Command(id) if self.is_unsent => Some(Displaced::Unsent(id)),
-            Kind::Command(id) => Some(Displaced::Command(id)),
-            Kind::Recovery(_) => Some(Displaced::Recovery),
-            Kind::Stop(_) => None,
+            Kind::Poll(poll) => Displaced::Poll(poll),
+            Kind::Command(id) if self.is_unsent => Displaced::Unsent(id),
+            Kind::Command(id) => Displaced::Command(id),
+            Kind::Recovery(_) => Displaced::Recovery,
+            Kind::Stop(_) => Displaced::Stop,
         }
     }
 }

@@ -97,11 +97,23 @@ impl<C: Clone> LaneState<C> {
         commands.chain(stops).min()
     }
 
-    /// The stop to begin now.
+    /// The stop to begin now. It becomes the first one.
     pub(super) fn next_stop(&mut self, now: Instant) -> Option<(CommandId, C)> {
-        let stop = self.stops.front_mut().filter(|stop| stop.not_before <= now)?;
+        let mut stop = self.stops.remove(self.due_stop(now)?)?;
         stop.attempts += 1;
-        Some((stop.id, stop.command.clone()))
+        let begun = (stop.id, stop.command.clone());
+        self.stops.push_front(stop);
+        Some(begun)
+    }
+
+    /// What was never sent goes first.
+    fn due_stop(&self, now: Instant) -> Option<usize> {
+        let is_first_due = || self.stops.front().is_some_and(|stop| stop.not_before <= now);
+        self.unsent_stop().or_else(|| is_first_due().then_some(0))
+    }
+
+    fn unsent_stop(&self) -> Option<usize> {
+        self.stops.iter().position(|stop| stop.attempts == 0)
     }
 
     /// When a stop is repeated.
@@ -112,15 +124,15 @@ impl<C: Clone> LaneState<C> {
 
     /// Whether a stop waits that may begin at this time.
     pub(super) fn is_stop_due(&self, now: Instant) -> bool {
-        self.stops.front().is_some_and(|stop| stop.not_before <= now)
+        self.due_stop(now).is_some()
     }
 
     /// Whether a stop may begin: nothing is under way, or what gives way to it.
     pub(super) fn may_stop(&self, preempts: bool) -> bool {
-        let gives_way = |exchange: UnderWay| {
-            (preempts || exchange.is_unsent) && !matches!(exchange.kind, Kind::Stop(_))
-        };
-        self.under_way.is_none_or(gives_way)
+        self.under_way.is_none_or(|exchange| match exchange.kind {
+            Kind::Stop(_) => !preempts && exchange.is_unsent && self.unsent_stop().is_some(),
+            _ => preempts || exchange.is_unsent,
+        })
     }
 
     /// Whether a command or a poll may begin: nothing is under way, and no stop is due.

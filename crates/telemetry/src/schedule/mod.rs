@@ -18,7 +18,8 @@
 //! ([`Schedule::recover`]). The command waits meanwhile, and can expire or be overtaken.
 //!
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
-//! ahead of it, and none that was not sent yet.
+//! ahead of it, and none that was not sent yet. In a lane that is brought in sync each stop is sent
+//! ahead, one after the other.
 //!
 //! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
 //! little of the line.
@@ -264,7 +265,7 @@ impl<C: Clone> Schedule<C> {
                 }
                 state.begin(now, Kind::Stop(id));
                 self.load.began(now);
-                let displaced = displaced.and_then(UnderWay::displaced);
+                let displaced = displaced.map(UnderWay::displaced);
                 return Some((lane, Job::Stop { id, command, displaced }));
             }
         }
@@ -300,10 +301,13 @@ impl<C: Clone> Schedule<C> {
         }
     }
 
-    /// The request under way in a lane was not sent yet. A stop replaces it.
-    pub fn is_unsent(&mut self, lane: Lane) {
-        if let Some(exchange) = self.lanes.get_mut(&lane).and_then(|it| it.under_way.as_mut()) {
-            exchange.is_unsent = true;
+    /// Which lanes are brought in sync: the requests under way there were not sent, and give way to a
+    /// stop.
+    pub fn recovering(&mut self, is_recovering: impl Fn(Lane) -> bool) {
+        for (&lane, state) in &mut self.lanes {
+            if let Some(exchange) = &mut state.under_way {
+                exchange.is_unsent = is_recovering(lane);
+            }
         }
     }
 
