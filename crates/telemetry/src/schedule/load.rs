@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::exchange::{Kind, Outcome, PollId, UnderWay};
+use super::pace::Pace;
 
 /// The part of the time that polls and commands may fill. The rest is for stops and for noise.
 const FULL: f64 = 0.95;
@@ -35,9 +36,7 @@ pub struct Durations {
 struct Cost {
     /// Mean duration in microseconds; 0 before the first answer.
     mean: f64,
-    answers: u32,
-    /// Answers a second in the last window.
-    rate: f64,
+    pace: Pace,
 }
 
 /// The measured load of a line.
@@ -107,9 +106,9 @@ impl Load {
         })
     }
 
-    /// Answers a second of a poll, in the last second.
+    /// Answers a second of a poll, in the last second or over its last period.
     pub fn rate(&self, poll: PollId) -> f64 {
-        self.costs.get(&poll).map_or(0.0, |cost| cost.rate)
+        self.costs.get(&poll).map_or(0.0, |cost| cost.pace.rate())
     }
 
     /// Whether each of the polls was answered once, so that the factor is known.
@@ -152,7 +151,9 @@ impl Load {
             Kind::Poll(poll) => {
                 let cost = self.costs.entry(poll).or_default();
                 cost.took(span);
-                cost.answers += u32::from(outcome == Outcome::Answered);
+                if outcome == Outcome::Answered {
+                    cost.pace.came(now);
+                }
             }
             Kind::Command(_) | Kind::Stop(_) | Kind::Recovery(_) => self.of_commands += span.0,
         }
@@ -208,8 +209,7 @@ impl Load {
         self.overlap = self.overlap();
         self.commands = self.of_commands as f64 / self.overlap / span.0 as f64;
         for cost in self.costs.values_mut() {
-            cost.rate = f64::from(cost.answers) * 1e6 / span.0 as f64;
-            cost.answers = 0;
+            cost.pace.close_window(now);
         }
         (self.window, self.busy, self.filled, self.of_commands) = (Some(now), 0, 0, 0);
     }

@@ -27,6 +27,7 @@
 mod exchange;
 mod lane;
 mod load;
+mod pace;
 
 use std::collections::BTreeMap;
 
