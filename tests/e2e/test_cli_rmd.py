@@ -60,6 +60,17 @@ def test_status_tells_everything_about_a_motor(rmd):
     assert shown.startswith("motor") and "24.0 V" in shown
 
 
+@on_every_port
+def test_status_again_and_again_has_the_product_of_voltage_and_current(rmd):
+    rmd("-i", 4, "speed", 300).ended(0)
+    sample = rmd("-i", 4, "--json", "status", "--every", "20ms", "--count", 1).ended(0)
+    values = sample.values
+    assert values["voltage_times_iq"] == pytest.approx(values["voltage"] * values["iq"], abs=0.06)
+    assert sample.json["values"]["voltage_times_iq"]["unit"] == "VA"
+    raw = rmd("-i", 4, "--json", "--raw", "status", "--every", "20ms", "--count", 1).ended(0)
+    assert "voltage_times_iq" not in raw.values and raw.values["voltage"] == 240
+
+
 def test_raw_values_are_digits(rmd):
     assert rmd("-i", 4, "--json", "--raw", "status").ended(0).values["voltage"] == 240
 

@@ -1,5 +1,6 @@
 //! The engine of one line: signals for its consumers, commands in between, stops before all.
 
+mod derivation;
 mod polling;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,6 +20,7 @@ use crate::schedule::{
 };
 use crate::signal::{Motor, Signal};
 use crate::subscription::{Consumer, Record, Subscription};
+use derivation::Derivation;
 
 /// A consumer of values and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,7 +35,7 @@ pub struct Rate {
     pub asked: Micros,
     /// The period that the line carries, from measured exchanges.
     pub predicted: Micros,
-    /// Values a second, in the last second.
+    /// Values a second, in the last second. Of a derived signal: those of its slower source.
     pub achieved: f64,
 }
 
@@ -59,6 +61,7 @@ pub struct Acquisition {
     clock: Clock,
     schedule: Schedule<Arc<Command>>,
     polls: BTreeMap<PollId, Arc<Poll>>,
+    derivations: Vec<Derivation>,
     last_poll: u32,
     consumers: BTreeMap<ConsumerId, Consumer>,
     last_consumer: u64,
@@ -123,6 +126,7 @@ impl Acquisition {
             schedule: Schedule::new(line.rules()),
             line: StopsAtEnd(Some(line)),
             polls: BTreeMap::new(),
+            derivations: Vec::new(),
             last_poll: 0,
             consumers: BTreeMap::new(),
             last_consumer: 0,
@@ -164,10 +168,12 @@ impl Acquisition {
 
     /// Sends these signals, and all events, to a subscription. What the drive refuses is said again.
     pub fn subscribe(&mut self, subscription: Subscription, wants: Wants) -> ConsumerId {
-        self.unfit.retain(|signal| !wants.contains_key(signal));
+        let sources = wants.keys().filter_map(|signal| signal.derived_from()).flatten();
+        let asked: BTreeSet<Signal> = wants.keys().copied().chain(sources).collect();
+        self.unfit.retain(|signal| !asked.contains(signal));
         self.refused.retain(|id, _| {
             let poll = self.polls.get(id);
-            poll.is_some_and(|poll| !poll.signals.iter().any(|it| wants.contains_key(it)))
+            poll.is_some_and(|poll| !poll.signals.iter().any(|it| asked.contains(it)))
         });
         self.last_consumer += 1;
         let id = ConsumerId(self.last_consumer);
@@ -251,19 +257,30 @@ impl Acquisition {
         self.latch.as_ref()
     }
 
-    /// The rates of all signals.
+    /// The rates of all signals that are read or computed.
     pub fn rates(&self) -> impl Iterator<Item = Rate> {
-        self.polls.iter().flat_map(|(id, poll)| {
-            let asked = poll.period;
+        let rate = |signal, asked, achieved| {
             let predicted = self.schedule.predicted_period(asked);
-            let rate = self.schedule.load().rate(*id);
-            let refused = self.refused.get(id);
-            poll.signals.iter().map(move |signal| {
-                let is_refused = refused.is_some_and(|refused| refused.contains(signal));
-                let achieved = if is_refused { 0.0 } else { rate };
-                Rate { signal: *signal, asked, predicted, achieved }
-            })
-        })
+            Rate { signal, asked, predicted, achieved }
+        };
+        let achieved = |id: &PollId, signal: &Signal| {
+            let is_refused = self.refused.get(id).is_some_and(|refused| refused.contains(signal));
+            if is_refused { 0.0 } else { self.schedule.load().rate(*id) }
+        };
+        let read = self.polls.iter().flat_map(move |(id, poll)| {
+            let signals = poll.signals.iter();
+            signals.map(move |signal| rate(*signal, poll.period, achieved(id, signal)))
+        });
+        let computed = self.derivations.iter().flat_map(move |derivation| {
+            let sources = self.polls.iter().flat_map(|(id, poll)| {
+                let sources = poll.signals.iter().filter(|it| derivation.needs(&[**it]));
+                sources.map(move |source| achieved(id, source))
+            });
+            let slower = sources.fold(f64::INFINITY, f64::min);
+            let poll = derivation.poll();
+            poll.signals.iter().map(move |&signal| rate(signal, poll.period, slower))
+        });
+        read.chain(computed)
     }
 
     /// Whether each poll was answered once, so that the rates are predicted.
@@ -447,6 +464,8 @@ impl Acquisition {
     fn doubt(&mut self, lane: Lane) {
         let since = self.confirmed.get(&lane).copied().unwrap_or_default();
         self.tell_each(lane, |motor| What::Doubtful(motor, since));
+        let motors = self.motors(lane);
+        self.derivations.iter_mut().for_each(|it| it.forget(|motor| motors.contains(&motor)));
         self.distrust(lane);
     }
 
@@ -458,6 +477,8 @@ impl Acquisition {
     fn closed(&mut self, why: LineError, ended: &mut Ended<'_>) -> Option<Duration> {
         let now = self.clock.now();
         self.is_open = false;
+        // It may be another drive after that.
+        self.derivations.iter_mut().for_each(|it| it.forget(|_| true));
         for (_, verdict) in self.schedule.closed(now) {
             match verdict {
                 Verdict::Command(id) => ended(id, Err(CommandError::Closed)),
@@ -484,10 +505,14 @@ impl Acquisition {
 
     /// Tells something of all motors that share a lane.
     fn tell_each(&mut self, lane: Lane, what: impl Fn(Motor) -> What) {
-        let polls = self.polls.values().filter(|poll| self.line.lane(&poll.request()) == lane);
-        let motors: BTreeSet<Motor> = polls.map(|poll| poll.motor).collect();
-        for motor in motors {
+        for motor in self.motors(lane) {
             self.tell(what(motor));
         }
+    }
+
+    /// The motors of a lane that are read.
+    fn motors(&self, lane: Lane) -> BTreeSet<Motor> {
+        let polls = self.polls.values().filter(|poll| self.line.lane(&poll.request()) == lane);
+        polls.map(|poll| poll.motor).collect()
     }
 }

@@ -11,7 +11,7 @@ use crate::signal::Signal;
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The integer that was read; the bits of a float.
+    /// The integer that was read; the bits of a float that was read or computed.
     pub digits: i64,
     /// The value in the unit of the signal.
     pub value: f64,
@@ -26,21 +26,26 @@ impl Sample {
         let reading = reading.plausible()?;
         Ok(Sample { digits: reading.digits(), value: reading.value() })
     }
+
+    /// A value that no drive sent.
+    pub(crate) fn computed(value: f64) -> Self {
+        Sample { digits: value.to_bits() as i64, value }
+    }
 }
 
 /// Values, each or why it is not plausible.
 pub type Samples = Vec<Result<Sample, Implausible>>;
 
-/// The values of one reply.
+/// The values of one reply, or what is computed from the replies of one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     /// The exchange, with the signals in the order of [`samples`](Self::samples).
     pub poll: Arc<Poll>,
     /// The instant that the exchange was planned for.
     pub instant: Instant,
-    /// When the request was sent.
+    /// When the request was sent. Of computed values: the first request.
     pub requested: Instant,
-    /// When the reply was complete.
+    /// When the reply was complete. Of computed values: the last reply.
     pub replied: Instant,
     /// The values.
     pub samples: Samples,
@@ -54,7 +59,12 @@ impl Values {
 
     /// The value of a signal, if the reply has it and it is plausible.
     pub fn get(&self, signal: Signal) -> Option<Sample> {
+        self.sample(signal)?.ok()
+    }
+
+    /// The value of a signal, or why it is not plausible; `None` if the reply does not have it.
+    pub(crate) fn sample(&self, signal: Signal) -> Option<Result<Sample, Implausible>> {
         let at = self.poll.signals.iter().position(|it| *it == signal)?;
-        self.samples.get(at)?.ok()
+        self.samples.get(at).copied()
     }
 }

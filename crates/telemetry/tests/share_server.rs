@@ -202,7 +202,12 @@ fn programs_see_lines_and_signals_and_each_other() {
     let Ok(Answer::Lines { lines, latched_by: None }) = first.ask(Ask::Lines) else { panic!() };
     let names: Vec<_> = lines.iter().map(|it| (it.line.as_str(), it.protocol)).collect();
     assert_eq!(names, [("st0", Protocol::St), ("rmd0", Protocol::Rmd)]);
-    for (line, wanted, unit) in [("st0", "SPEED_MEAS", "rpm"), ("rmd0", "speed_dps", "°/s")] {
+    let wanted = [
+        ("st0", "SPEED_MEAS", "rpm"),
+        ("rmd0", "speed_dps", "°/s"),
+        ("rmd0", "voltage_times_iq_va", "VA"),
+    ];
+    for (line, wanted, unit) in wanted {
         let answer = first.ask(Ask::Signals { line: line.to_owned() });
         let Ok(Answer::Signals { signals }) = answer else { panic!("{answer:?}") };
         assert!(signals.iter().any(|it| it.name == wanted && it.unit == unit), "{signals:?}");
@@ -243,6 +248,43 @@ fn samples_come_with_their_columns_while_another_program_commands() {
     let Ok(Answer::Rates { rates }) = viewer.ask(Ask::Rates) else { panic!() };
     assert_eq!(rates.len(), 3);
     assert!(rates.iter().all(|rate| rate.asked == 0.01), "{rates:?}");
+}
+
+#[test]
+fn a_computed_signal_is_a_group_of_its_own() {
+    let share = Share::new("computed");
+    let (mut viewer, mut tuner) = (share.join("viewer"), share.join("tuner"));
+    viewer.subscribe(&[("rmd0", 2, "iq_amps"), ("rmd0", 2, "voltage_times_iq_va")], 1000);
+    tuner.turn(2, 360);
+    let mut computed = None;
+    loop {
+        let data = viewer.data();
+        let groups = viewer.others.drain(..).filter_map(|got| match got {
+            Got::Text(Text::Group(group)) => Some(group),
+            _ => None,
+        });
+        for group in groups.filter(|group| group.columns[0].name == "voltage_times_iq_va") {
+            assert_eq!((group.columns.len(), group.columns[0].unit.as_str()), (1, "VA"));
+            computed = Some(group.group);
+        }
+        // The motor accelerates.
+        if computed == Some(data.group) && data.columns[2].iter().any(|value| value.abs() > 1.0) {
+            break;
+        }
+    }
+    let Err((Reason::Usage, message)) = viewer.ask(Ask::Subscribe {
+        signals: vec![SignalName {
+            line: "st0".to_owned(),
+            motor: 1,
+            name: "voltage_times_iq_va".to_owned(),
+        }],
+        period: 0.01,
+        queue: 10,
+        drop: DropRule::Oldest,
+    }) else {
+        panic!("an ST drive has no such signal")
+    };
+    assert!(message.ends_with("read MOTOR_POWER"), "{message}");
 }
 
 #[test]

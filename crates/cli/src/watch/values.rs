@@ -69,7 +69,7 @@ fn quantity(name: &str) -> Source {
 pub fn details(motor: Motor) -> Vec<Signal> {
     let sources: Vec<Source> = match motor {
         Motor::St(_) => STATUS.map(Source::Register).to_vec(),
-        Motor::Rmd(_) => Quantity::all().map(Source::Quantity).collect(),
+        Motor::Rmd(_) => Source::all(motor),
     };
     sources.into_iter().map(|source| Signal { motor, source }).collect()
 }
@@ -80,6 +80,7 @@ impl Units {
         match source {
             Source::Register(register) => self.st.text(&self.reading(register, sample)),
             Source::Quantity(quantity) => self.row(quantity, sample).text,
+            Source::Derived(derived) => Row::derived(derived, sample.value).text,
         }
     }
 

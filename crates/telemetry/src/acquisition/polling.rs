@@ -5,13 +5,15 @@ use std::sync::Arc;
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::Acquisition;
+use super::derivation::Derivation;
+use super::{Acquisition, ConsumerId};
 use crate::event::What;
 use crate::line::{LineError, Reply};
-use crate::plan::{Poll, Read, Wants};
+use crate::plan::{Poll, Read, Wants, derived_polls};
 use crate::sample::{Samples, Values};
 use crate::schedule::{Lane, PollId};
 use crate::signal::{Motor, Signal};
+use crate::subscription::Consumer;
 
 /// The time between two confirmations of a motor's values, if they are read more often.
 const CONFIRMATION: Micros = Micros::from_millis(100);
@@ -59,9 +61,13 @@ impl Acquisition {
                     let instant = self.instants.get(&lane).copied().unwrap_or(requested);
                     let replied = self.clock.now();
                     let values = Arc::new(Values { poll, instant, requested, replied, samples });
-                    for consumer in self.consumers.values_mut() {
-                        consumer.values(id, &values);
+                    // What is computed from them comes first: then they complete their row.
+                    for derivation in &mut self.derivations {
+                        if let Some(computed) = derivation.take(&values) {
+                            pass(&mut self.consumers, derivation.id(), &computed);
+                        }
                     }
+                    pass(&mut self.consumers, id, &values);
                 }
                 None => {
                     self.refuse(id, poll.signals.clone(), LineError::Reply);
@@ -82,8 +88,12 @@ impl Acquisition {
         }
     }
 
-    fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: LineError) {
+    /// Tells that there are no values of these signals, and of what is computed from them.
+    fn refuse(&mut self, id: PollId, mut signals: Vec<Signal>, why: LineError) {
         if self.refused.insert(id, signals.clone()).is_none() {
+            let derived = self.derivations.iter().filter(|it| it.needs(&signals));
+            let derived: Vec<_> = derived.flat_map(|it| it.poll().signals.clone()).collect();
+            signals.extend(derived);
             self.tell(What::Refused(signals, Arc::new(why)));
         }
     }
@@ -116,6 +126,7 @@ impl Acquisition {
             *shortest = (*shortest).min(*period);
         }
         let mut polls = self.line.polls(&wants);
+        self.derive(&wants, &polls);
         polls.extend(self.confirmations(&polls));
         let is_known = |poll: &Poll| self.polls.values().any(|known| **known == *poll);
         if polls.len() == self.polls.len() && polls.iter().all(is_known) {
@@ -150,6 +161,19 @@ impl Acquisition {
         true
     }
 
+    /// Computes the derived values that are wanted, from these polls.
+    fn derive(&mut self, wants: &Wants, polls: &[Poll]) {
+        let mut old = std::mem::take(&mut self.derivations);
+        for poll in derived_polls(wants, polls) {
+            let same = old.iter().position(|derivation| *derivation.poll() == poll);
+            let derivation = same.map(|at| old.swap_remove(at)).or_else(|| {
+                self.last_poll += 1;
+                Derivation::new(PollId(self.last_poll), poll)
+            });
+            self.derivations.extend(derivation);
+        }
+    }
+
     /// A confirmation for each lane, at the rate of its fastest poll, but not too often on a good line.
     fn confirmations(&self, polls: &[Poll]) -> Vec<Poll> {
         let mut lanes: BTreeMap<Lane, Poll> = BTreeMap::new();
@@ -169,6 +193,11 @@ impl Acquisition {
         }
         lanes.into_values().collect()
     }
+}
+
+/// Passes values to the consumers that want them.
+fn pass(consumers: &mut BTreeMap<ConsumerId, Consumer>, id: PollId, values: &Arc<Values>) {
+    consumers.values_mut().for_each(|consumer| consumer.values(id, values));
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.

@@ -23,7 +23,7 @@ use motorlink_testbench::{Bench, BenchConfig};
 pub const SECOND: Micros = Micros(1_000_000);
 
 /// A link on virtual time for an event loop that asks it often.
-struct Polled<L>(L);
+pub struct Polled<L>(pub L);
 
 impl<L: Link> Link for Polled<L> {
     fn within(&self) -> Option<&dyn Link> {
