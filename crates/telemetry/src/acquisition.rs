@@ -2,6 +2,8 @@
 
 mod derivation;
 mod polling;
+mod rates;
+mod telling;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Deref, DerefMut};
@@ -19,25 +21,14 @@ use crate::schedule::{
     CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Schedule, Verdict,
 };
 use crate::signal::{Motor, Signal};
-use crate::subscription::{Consumer, Record, Subscription};
+use crate::subscription::{Consumer, Subscription};
 use derivation::Derivation;
+
+pub use rates::Rate;
 
 /// A consumer of values and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConsumerId(u64);
-
-/// How often a signal is read.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rate {
-    /// The signal.
-    pub signal: Signal,
-    /// The shortest period that is asked for.
-    pub asked: Micros,
-    /// The period that the line carries, from measured exchanges.
-    pub predicted: Micros,
-    /// Values a second, in the last second. Of a derived signal: those of its slower source.
-    pub achieved: f64,
-}
 
 /// Receives the end of each command and stop.
 pub type Ended<'a> = dyn FnMut(CommandId, Result<Reply, CommandError>) + 'a;
@@ -64,6 +55,8 @@ pub struct Acquisition {
     derivations: Vec<Derivation>,
     last_poll: u32,
     consumers: BTreeMap<ConsumerId, Consumer>,
+    /// Events that are told once the stops that they are about have gone out.
+    untold: Vec<Arc<Event>>,
     last_consumer: u64,
     /// Who stopped the motors.
     latch: Option<Arc<str>>,
@@ -81,6 +74,13 @@ pub struct Acquisition {
     unfit: BTreeSet<Signal>,
     /// Failures in a row of each lane.
     failures: BTreeMap<Lane, u32>,
+}
+
+/// An exchange that is over, and what it was.
+struct Finished {
+    over: Over,
+    at: Instant,
+    verdict: Option<Verdict>,
 }
 
 /// A line whose motors are stopped when it is dropped. It is there until then.
@@ -114,6 +114,7 @@ impl DerefMut for StopsAtEnd {
 
 impl Drop for Acquisition {
     fn drop(&mut self) {
+        self.tell_stops();
         self.consumers.values().for_each(|consumer| consumer.subscription.close());
     }
 }
@@ -129,6 +130,7 @@ impl Acquisition {
             derivations: Vec::new(),
             last_poll: 0,
             consumers: BTreeMap::new(),
+            untold: Vec::new(),
             last_consumer: 0,
             latch: None,
             is_open: true,
@@ -225,7 +227,8 @@ impl Acquisition {
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
         }
-        self.tell(What::Stopping(id, Arc::clone(by), request));
+        let what = What::Stopping(id, Arc::clone(by), request);
+        self.untold.push(Arc::new(Event { time: now, what }));
         id
     }
 
@@ -257,37 +260,6 @@ impl Acquisition {
         self.latch.as_ref()
     }
 
-    /// The rates of all signals that are read or computed.
-    pub fn rates(&self) -> impl Iterator<Item = Rate> {
-        let rate = |signal, asked, achieved| {
-            let predicted = self.schedule.predicted_period(asked);
-            Rate { signal, asked, predicted, achieved }
-        };
-        let achieved = |id: &PollId, signal: &Signal| {
-            let is_refused = self.refused.get(id).is_some_and(|refused| refused.contains(signal));
-            if is_refused { 0.0 } else { self.schedule.load().rate(*id) }
-        };
-        let read = self.polls.iter().flat_map(move |(id, poll)| {
-            let signals = poll.signals.iter();
-            signals.map(move |signal| rate(*signal, poll.period, achieved(id, signal)))
-        });
-        let computed = self.derivations.iter().flat_map(move |derivation| {
-            let sources = self.polls.iter().flat_map(|(id, poll)| {
-                let sources = poll.signals.iter().filter(|it| derivation.needs(&[**it]));
-                sources.map(move |source| achieved(id, source))
-            });
-            let slower = sources.fold(f64::INFINITY, f64::min);
-            let poll = derivation.poll();
-            poll.signals.iter().map(move |&signal| rate(signal, poll.period, slower))
-        });
-        read.chain(computed)
-    }
-
-    /// Whether each poll was answered once, so that the rates are predicted.
-    pub fn is_predicted(&self) -> bool {
-        self.schedule.load().is_known(self.polls.keys())
-    }
-
     /// Sends and receives what can be sent and received without waiting. `ended` receives the
     /// commands that are over. Gives the time after which to call again if the descriptor is not
     /// readable before; `None`: nothing is planned. It is zero when exchanges ended: a stop can come
@@ -295,18 +267,19 @@ impl Acquisition {
     pub fn advance(&mut self, ended: &mut Ended<'_>) -> Option<Duration> {
         self.reopen_if_due();
         self.trust_again();
-        let until = self.begin_all(ended);
-        let mut over = Vec::new();
-        let moved = match self.is_open {
-            true => self.line.advance(&mut |one| over.push(one)),
-            false => Ok(None),
-        };
-        let line = &self.line;
-        self.schedule.recovering(|lane| !line.sends_at_once(lane));
-        let has_more = !over.is_empty() || self.schedule.has_stop(self.clock.now());
+        let mut until = self.begin_all(ended);
+        let mut finished = Vec::new();
+        let mut moved = self.exchange(&mut finished);
+        if moved.is_ok() && self.schedule.has_stop(self.clock.now()) {
+            // A stop that waited goes out before consumers receive these results.
+            until = self.begin_all(ended);
+            moved = self.exchange(&mut finished);
+        }
+        self.tell_stops();
+        let has_more = !finished.is_empty() || self.schedule.has_stop(self.clock.now());
         let again = has_more.then_some(Duration::ZERO);
-        for one in over {
-            self.over(one, ended);
+        for one in finished {
+            self.pass_on(one, ended);
         }
         let wait = match moved {
             Ok(wait) if self.line.link_state() == LinkState::Open => wait,
@@ -317,6 +290,19 @@ impl Acquisition {
         let now = self.clock.now();
         let planned = until.map(|until| until.since(now).into());
         [wait, planned, self.retry_in(), again].into_iter().flatten().min()
+    }
+
+    /// Sends and receives. Adds the exchanges that are over.
+    fn exchange(&mut self, finished: &mut Vec<Finished>) -> Result<Option<Duration>, LineError> {
+        if !self.is_open {
+            return Ok(None);
+        }
+        let mut over = Vec::new();
+        let moved = self.line.advance(&mut |one| over.push(one));
+        finished.extend(over.into_iter().map(|one| self.finish(one)));
+        let line = &self.line;
+        self.schedule.recovering(|lane| !line.sends_at_once(lane));
+        moved
     }
 
     fn reopen_if_due(&mut self) {
@@ -396,7 +382,9 @@ impl Acquisition {
         let begun = request.map_or(Err(LineError::Protocol), |it| self.line.begin(lane, &it));
         if let Err(error) = begun {
             let sent = self.clock.now();
-            self.over(Over { lane, result: Err(error), sent, shows: Shows::Nothing }, ended);
+            let over = Over { lane, result: Err(error), sent, shows: Shows::Nothing };
+            let finished = self.finish(over);
+            self.pass_on(finished, ended);
         }
     }
 
@@ -416,18 +404,23 @@ impl Acquisition {
         }
     }
 
-    /// The exchange of a lane is over.
-    fn over(&mut self, over: Over, ended: &mut Ended<'_>) {
-        let Over { lane, result, sent, shows } = over;
-        let now = self.clock.now();
-        let outcome = match &result {
+    /// The exchange of a lane is over: the lane is free for another one.
+    fn finish(&mut self, over: Over) -> Finished {
+        let at = self.clock.now();
+        let outcome = match &over.result {
             Ok(_) => Outcome::Answered,
             // The motor answered, and the lane is in sync again.
             Err(error) if error.is_unconfirmed() => Outcome::Answered,
             Err(error) if error.is_line_failure() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
-        let verdict = self.schedule.ended(now, lane, outcome);
+        let verdict = self.schedule.ended(at, over.lane, outcome);
+        Finished { over, at, verdict }
+    }
+
+    /// Tells those who wait for an exchange how it ended.
+    fn pass_on(&mut self, finished: Finished, ended: &mut Ended<'_>) {
+        let Finished { over: Over { lane, result, sent, shows }, at, verdict } = finished;
         match (shows, verdict) {
             (Shows::Match, _) => {
                 self.confirmed.insert(lane, sent);
@@ -439,7 +432,7 @@ impl Acquisition {
         }
         match verdict {
             Some(Verdict::Poll(id)) => {
-                self.polled(lane, id, sent, result);
+                self.polled(lane, id, (sent, at), result);
                 if shows == Shows::Doubt {
                     self.doubt(lane);
                 }
@@ -494,25 +487,5 @@ impl Acquisition {
         }
         self.tell(What::Lost(Arc::new(why)));
         None
-    }
-
-    fn tell(&mut self, what: What) {
-        let event = Arc::new(Event { time: self.clock.now(), what });
-        for consumer in self.consumers.values() {
-            consumer.subscription.push(Record::Event(Arc::clone(&event)));
-        }
-    }
-
-    /// Tells something of all motors that share a lane.
-    fn tell_each(&mut self, lane: Lane, what: impl Fn(Motor) -> What) {
-        for motor in self.motors(lane) {
-            self.tell(what(motor));
-        }
-    }
-
-    /// The motors of a lane that are read.
-    fn motors(&self, lane: Lane) -> BTreeSet<Motor> {
-        let polls = self.polls.values().filter(|poll| self.line.lane(&poll.request()) == lane);
-        polls.map(|poll| poll.motor).collect()
     }
 }

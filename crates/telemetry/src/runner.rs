@@ -286,14 +286,15 @@ impl Engine {
             }
             let Engine { acquisition, waiting } = &mut self;
             let wait = acquisition.advance(&mut |id, result| tell(waiting, id, result));
-            if self.await_next(&woken, wait).is_err() || is_closed(&mut woken) {
-                return self.acquisition.end();
+            match self.await_next(&woken, wait) {
+                Ok(is_woken) if !(is_woken && is_closed(&mut woken)) => {}
+                _ => return self.acquisition.end(),
             }
         }
     }
 
-    /// Waits until there is something to do.
-    fn await_next(&self, woken: &UnixStream, wait: Option<Duration>) -> Result<(), Errno> {
+    /// Waits until there is something to do; whether somebody woke the engine.
+    fn await_next(&self, woken: &UnixStream, wait: Option<Duration>) -> Result<bool, Errno> {
         let line = self.acquisition.descriptor();
         let mut fds: Vec<PollFd<'_>> = line
             .into_iter()
@@ -302,7 +303,8 @@ impl Engine {
             .collect();
         let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
         match poll(&mut fds, wait.as_ref()) {
-            Ok(_) | Err(Errno::INTR) => Ok(()),
+            Ok(_) => Ok(fds.last().is_some_and(|fd| !fd.revents().is_empty())),
+            Err(Errno::INTR) => Ok(false),
             Err(error) => Err(error),
         }
     }
@@ -314,6 +316,7 @@ fn is_closed(woken: &mut UnixStream) -> bool {
     loop {
         match woken.read(&mut bytes) {
             Ok(0) => return true,
+            Ok(count) if count < bytes.len() => return false,
             Ok(_) => {}
             Err(error) => return error.kind() != io::ErrorKind::WouldBlock,
         }

@@ -13,6 +13,7 @@ use motorlink_proto::st;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::signal::Signal;
+use motorlink_telemetry::subscription::Record;
 
 use engine::{Engine, SECOND, bench, rmd, signals, spec, st as st_motor, st_options};
 
@@ -117,6 +118,39 @@ fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
     // The exchange that was under way goes on; none begins.
     assert_eq!(ahead, 0);
     assert!(exchanges < 1.5, "{exchanges}");
+}
+
+#[test]
+fn a_stop_goes_out_before_anybody_is_told_of_the_exchange_ahead() {
+    let bench = bench();
+    let wire = Wire::default();
+    let seen = Arc::clone(&wire);
+    let tap = TapBytes::new(bench.bytes(&spec("")), move |way, _, bytes: &[u8]| {
+        record(&seen, bytes[0] & 0x1F == 0x03, way);
+    });
+    let mut engine = Engine::st(tap, st_options(bench.profile()));
+    let subscription = engine.subscribe(&signals(st_motor(1), &["SPEED_MEAS"]), Micros(500));
+    engine.run(SECOND);
+    for _ in 0..10 {
+        // A request goes out: its exchange is under way.
+        wire.lock().unwrap().clear();
+        while wire.lock().unwrap().is_empty() {
+            engine.run(engine.step);
+        }
+        while subscription.take().is_some() {}
+        let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
+        engine.acquisition.stop(&"test".into(), stop, &mut |_, _| {});
+        let is_told = || {
+            let records = std::iter::from_fn(|| subscription.take());
+            records.filter(|record| matches!(record, Record::Values(_))).count() > 0
+        };
+        while !is_told() {
+            engine.clock.wait(engine.clock.now() + engine.step);
+            engine.advance();
+        }
+        assert_eq!(*wire.lock().unwrap(), [false, true]);
+        engine.run(CENTISECOND);
+    }
 }
 
 #[test]

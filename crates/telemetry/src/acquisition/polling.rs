@@ -43,7 +43,7 @@ impl Acquisition {
         &mut self,
         lane: Lane,
         id: PollId,
-        requested: Instant,
+        (requested, replied): (Instant, Instant),
         result: Result<Reply, LineError>,
     ) {
         let Some(poll) = self.polls.get(&id).cloned() else { return };
@@ -59,7 +59,6 @@ impl Acquisition {
                         None => drop(self.refused.remove(&id)),
                     }
                     let instant = self.instants.get(&lane).copied().unwrap_or(requested);
-                    let replied = self.clock.now();
                     let values = Arc::new(Values { poll, instant, requested, replied, samples });
                     // What is computed from them comes first: then they complete their row.
                     for derivation in &mut self.derivations {
