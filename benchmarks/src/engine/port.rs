@@ -13,7 +13,7 @@ use motorlink_proto::st::{Command, Frame, MotorNumber, Parse, Profile, Request a
 use motorlink_telemetry::acquisition::{Acquisition, ConsumerId};
 use motorlink_telemetry::event::What;
 use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
-use motorlink_telemetry::plan::Wants;
+use motorlink_telemetry::plan::{Read, Wants};
 use motorlink_telemetry::runner::{Remote, Runner};
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -31,36 +31,63 @@ pub(super) struct Port {
     pub(super) name: String,
     pub(super) signals: Vec<Signal>,
     motors: usize,
+    is_bus: bool,
     stops: Vec<Request>,
     runner: Runner,
     wire: Arc<Mutex<Wire>>,
 }
 
-/// What went out since the engine was told to stop.
+/// What a tap saw.
 #[derive(Default)]
 struct Wire {
-    /// Requests before the last of the stops.
+    /// When the engine was told to stop.
+    told: Option<Instant>,
+    /// Requests since then, before the last of the stops.
     ahead: u32,
     others: u32,
     /// When each stop went out.
     stops: Vec<Instant>,
+    /// When the last request went out, and the last bytes came.
+    last: Option<(Instant, Instant)>,
+    /// The same when the first stop went out.
+    before_stops: Option<(Instant, Instant)>,
 }
 
 impl Wire {
-    fn sent(&mut self, is_stop: bool) {
-        if is_stop {
-            self.ahead = self.others;
-            self.stops.push(Instant::now());
-        } else {
-            self.others += 1;
+    fn seen(&mut self, way: Direction, is_stop: bool) {
+        let now = Instant::now();
+        match way {
+            Direction::Received => {
+                if let Some((_, answered)) = &mut self.last {
+                    *answered = now;
+                }
+                return;
+            }
+            Direction::Sent if is_stop => {
+                if self.stops.is_empty() {
+                    self.before_stops = self.last;
+                }
+                self.ahead = self.others;
+                self.stops.push(now);
+            }
+            Direction::Sent => self.others += 1,
         }
+        self.last = Some((now, now));
     }
 }
 
 /// How a stop of all motors of a port went.
 pub(super) struct Stopped {
+    /// From the call until the engine has the stops.
+    pub(super) told: Duration,
+    /// From then until the reply to the exchange ahead. A bus does not wait for it.
+    pub(super) reply: Duration,
+    /// From the call until the first stop goes out.
     pub(super) first: Duration,
     pub(super) last: Duration,
+    /// How long the exchange took that was ahead, from request to reply. On a bus, where a stop goes
+    /// out beside others: the median of the exchanges just before.
+    pub(super) exchange: Duration,
     /// Other requests that went out before the last stop.
     pub(super) ahead: u32,
 }
@@ -92,7 +119,7 @@ impl Port {
         };
         let motors = stops.len();
         let runner = Runner::start(&name, Acquisition::new(line))?;
-        Ok(Port { name, signals, motors, stops, runner, wire })
+        Ok(Port { name, signals, motors, is_bus, stops, runner, wire })
     }
 
     pub(super) fn motors(&self) -> usize {
@@ -122,10 +149,14 @@ impl Port {
 
     /// Stops all motors, and waits until the drives confirm it to the subscription.
     pub(super) fn stop_all(&self, subscription: &Subscription) -> Result<Stopped> {
+        let median = self.durations()?.0;
         let (stops, wire) = (self.stops.clone(), Arc::clone(&self.wire));
         let asked = Instant::now();
         self.remote().post(move |engine| {
-            *lock(&wire) = Wire::default();
+            {
+                let mut wire = lock(&wire);
+                *wire = Wire { told: Some(Instant::now()), last: wire.last, ..Wire::default() };
+            }
             for stop in stops {
                 engine.stop(&"bench".into(), stop, &mut |_, _| {});
             }
@@ -142,10 +173,22 @@ impl Port {
             }
         }
         let wire = lock(&self.wire);
-        let since = |at: Option<&Instant>| at.map(|at| at.duration_since(asked));
-        let (first, last) =
-            since(wire.stops.first()).zip(since(wire.stops.last())).ok_or("no stop")?;
-        Ok(Stopped { first, last, ahead: wire.ahead })
+        let stops = wire.stops.first().zip(wire.stops.last());
+        let (Some(told), Some((begun, answered)), Some((&first, &last))) =
+            (wire.told, wire.before_stops, stops)
+        else {
+            return Err("no stop on a saturated port".into());
+        };
+        let (reply, exchange) = match self.is_bus {
+            true => (Duration::ZERO, median.into()),
+            false => {
+                let reply = answered.saturating_duration_since(told);
+                (reply, answered.saturating_duration_since(begun))
+            }
+        };
+        let since = |at: Instant| at.duration_since(asked);
+        let (told, first, last) = (since(told), since(first), since(last));
+        Ok(Stopped { told, reply, first, last, exchange, ahead: wire.ahead })
     }
 }
 
@@ -170,7 +213,7 @@ pub(super) fn count(
                     if since >= span.0 {
                         break;
                     }
-                    counted.replies += 1;
+                    counted.replies += u64::from(!matches!(values.poll.read, Read::Derived(_)));
                     for (signal, sample) in values.poll.signals.iter().zip(&values.samples) {
                         *counted.values.entry(*signal).or_default() += u64::from(sample.is_ok());
                     }
@@ -196,7 +239,7 @@ fn bus(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
         let wire = Arc::clone(&wire);
         let tap = TapCan::new(link, move |way, _, frame: &motorlink::can::CanFrame| {
             let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
-            sent(&wire, way, code == Some(Code::Stop));
+            lock(&wire).seen(way, code == Some(Code::Stop));
         });
         Box::new(tap) as Box<dyn motorlink::port::EventCan>
     };
@@ -216,7 +259,9 @@ fn line(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
     let wire = Arc::clone(wire);
     let wrap = move |link| {
         let wire = Arc::clone(&wire);
-        let tap = TapBytes::new(link, move |way, _, bytes: &[u8]| sent(&wire, way, is_stop(bytes)));
+        let tap = TapBytes::new(link, move |way, _, bytes: &[u8]| {
+            lock(&wire).seen(way, is_stop(bytes));
+        });
         Box::new(tap) as Box<dyn motorlink::port::EventBytes>
     };
     let client = st::EventClient::open_wrapped(&port, wrap, st::Options::default())?;
@@ -230,12 +275,6 @@ fn line(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
     let stop = StRequest::ExecuteCommand(Command::StopMotor);
     let stops = numbers.map(|number| Request::st(number, stop)).collect();
     Ok((Box::new(StLine::new(client)), signals, stops))
-}
-
-fn sent(wire: &Mutex<Wire>, way: Direction, is_stop: bool) {
-    if way == Direction::Sent {
-        lock(wire).sent(is_stop);
-    }
 }
 
 fn is_stop(bytes: &[u8]) -> bool {
