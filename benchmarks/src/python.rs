@@ -86,13 +86,14 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
 - One exchange: GET_REG SPEED_MEAS on a pty. The other end is a process on the same core. It replies
   immediately.
 - {ROUNDS} rounds. Each round has {EXCHANGES} exchanges of each program, in turn.
-- Rates are medians. The ratio is the rate of motorlink divided by the rate of the row, in the same
-  round.
+- Rates are medians. The ratio is the median of the ratios of the rounds: the rate of motorlink
+  divided by the rate of the row in the same round. It is not the quotient of the two medians.
 - Processor time is that of the process that sends the requests, with its system calls.
 - The kernel and the other end take most of the time of an exchange, for every program.
 - The system calls alone are {:.2} times as fast as framing and checks in Python. No program can be
   faster on this line.
 - *without a line*: a request is encoded, and a reply is checked and decoded. Minimum of 15.
+- *four clients*: four lines in one event loop. The rate is that of all four.
 - Versions: {}.",
             most.median,
             versions.join(", ")
