@@ -275,3 +275,36 @@ fn served_on_ports_the_same_drives_go_on_in_real_time() {
     assert_eq!(bench.now(), time::Instant(stands.0 + SECOND.0));
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+#[test]
+fn what_a_confirmation_says_nothing_about_is_counted_for_each_motor() {
+    let bench = bench();
+    let [near, far] = [1, 9].map(|id| MotorId::new(id).unwrap());
+    let client = rmd(&bench, "");
+    assert!(client.ask(near, &rmd::ReadStatus).is_ok());
+    assert!(client.ask(far, &rmd::ReadStatus).is_err());
+    client.confirm(near).unwrap();
+    assert_eq!([near, far].map(|id| client.losses(id)), [0, 0]);
+    let twice = rmd(&bench, "dup=1,only=received");
+    assert!(twice.ask(near, &rmd::ReadStatus).is_ok());
+    assert!(matches!(twice.confirm(near), Err(rmd::Error::Unconfirmed { .. })));
+    assert_eq!(twice.losses(near), 1);
+}
+
+#[test]
+fn many_motors_are_confirmed_at_once() {
+    let bench = bench();
+    let client = rmd(&bench, "");
+    let [one, two] = [1, 2].map(|id| MotorId::new(id).unwrap());
+    assert!(client.ask(one, &rmd::ReadStatus).is_ok());
+    let sent = client.sent(two);
+    let status = rmd::Asked::Request(rmd::Command::encode(&rmd::ReadStatus));
+    let mut codes = Vec::new();
+    let asked = [(one, rmd::Asked::Confirmation), (two, status)];
+    client.ask_each(&asked, |id, reply| codes.push((id, reply.unwrap()[0]))).unwrap();
+    codes.sort_unstable();
+    assert_ne!(codes[0], (one, rmd::Command::encode(&rmd::ReadStatus)[0]));
+    assert_eq!(codes[1], (two, rmd::Command::encode(&rmd::ReadStatus)[0]));
+    assert!(client.confirmed(one).is_ok());
+    assert!(client.sent(two) > sent);
+}

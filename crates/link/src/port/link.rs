@@ -48,11 +48,11 @@ pub trait Link: Send {
         self.within()?.holder()
     }
 
-    /// The next request asks whether the replies so far belong to their requests. A program that
-    /// holds the port checks this for all requests on the line, also those of others.
-    fn confirm_next(&self) {
+    /// The next request to a motor (0: any) asks whether the replies so far belong to their requests. A
+    /// program that holds the port checks this for all requests to the motor, also those of others.
+    fn confirm_next(&self, motor: u8) {
         if let Some(within) = self.within() {
-            within.confirm_next();
+            within.confirm_next(motor);
         }
     }
 
@@ -82,8 +82,8 @@ impl<L: Link + ?Sized> Link for Box<L> {
         (**self).holder()
     }
 
-    fn confirm_next(&self) {
-        (**self).confirm_next();
+    fn confirm_next(&self, motor: u8) {
+        (**self).confirm_next(motor);
     }
 
     fn expire_next(&self, time_to_live: Duration) {

@@ -38,6 +38,15 @@ const BABBLE: time::Micros = time::Micros::from_millis(100);
 /// IDs that a scan asks at once.
 pub const SCAN_WIDTH: usize = 8;
 
+/// What [`Client::ask_each`] asks a motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// Eight bytes.
+    Request([u8; 8]),
+    /// Whether the replies so far belong to their requests.
+    Confirmation,
+}
+
 /// A CAN bus with RMD motors: shared by reference between threads.
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
@@ -216,9 +225,20 @@ impl Client {
         let mut driven = self.turns.take();
         let question = driven.session.question(id);
         driven.ready([question])?;
-        driven.confirm_next();
+        driven.confirm_next(id);
         self.exchange(driven, id, question)?;
         self.turns.take().session.confirmed(id)
+    }
+
+    /// How often a motor's replies could not be confirmed: they were found unconfirmed, or an exchange was
+    /// given up. A confirmation says nothing about replies before such a loss.
+    pub fn losses(&self, id: MotorId) -> u32 {
+        self.turns.take().session.losses(id)
+    }
+
+    /// When the last frame to a motor was sent.
+    pub fn sent(&self, id: MotorId) -> time::Instant {
+        self.turns.take().session.sent(id)
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -250,6 +270,40 @@ impl Client {
         each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
         self.begin_all(self.turns.take(), requests, Session::ask, each)
+    }
+
+    /// As [`cycle`](Self::cycle), with confirmations among the exchanges. The reply of a confirmation says
+    /// nothing: ask [`confirmed`](Self::confirmed) behind it.
+    ///
+    /// # Errors
+    /// Errors of the port. `each` receives those of single motors.
+    pub fn ask_each(
+        &self,
+        asked: &[(MotorId, Asked)],
+        each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        let mut driven = self.turns.take();
+        let request = |&(id, asked): &(MotorId, Asked)| match asked {
+            Asked::Request(request) => (id, request),
+            Asked::Confirmation => (id, driven.session.question(id)),
+        };
+        let requests: Vec<_> = asked.iter().map(request).collect();
+        driven.ready(requests.iter().map(|(_, request)| *request))?;
+        for (id, asked) in asked {
+            if *asked == Asked::Confirmation {
+                driven.confirm_next(*id);
+            }
+        }
+        self.begin_all(driven, requests.into_iter(), Session::request, each)
+    }
+
+    /// Whether a motor's replies went to their own requests, behind a confirmation of
+    /// [`ask_each`](Self::ask_each).
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`].
+    pub fn confirmed(&self, id: MotorId) -> Result<(), Error> {
+        self.turns.take().session.confirmed(id)
     }
 
     /// Begins these exchanges with `begin` and runs them to their end.
@@ -417,9 +471,9 @@ impl<L: CanLink> Driven<L> {
     }
 
     /// Asks whether the replies of a motor went to their own requests.
-    pub(super) fn confirm_next(&mut self) {
+    pub(super) fn confirm_next(&mut self, id: MotorId) {
         if let Some(link) = self.port.open_link() {
-            link.confirm_next();
+            link.confirm_next(id.number());
         }
     }
 

@@ -11,7 +11,7 @@ use motorlink_proto::time::Instant;
 
 use super::client::{Driven, not_done};
 use super::session::SessionOutput;
-use super::{Client, Error, Options};
+use super::{Asked, Client, Error, Options};
 
 /// Frames that are taken from the bus in one step: the loop has others to serve.
 const STEP: usize = 64;
@@ -23,8 +23,6 @@ const STEP: usize = 64;
 /// different motors overlap; a motor has one at a time.
 pub struct EventClient {
     driven: Driven<Box<dyn EventCan>>,
-    /// When the last frame to each motor was sent.
-    sent: [Instant; MotorId::COUNT],
 }
 
 impl EventClient {
@@ -65,7 +63,7 @@ impl EventClient {
     }
 
     fn driving(port: Reopening<Box<dyn EventCan>>, options: &Options) -> Self {
-        EventClient { driven: Driven::new(port, options), sent: [Instant(0); MotorId::COUNT] }
+        EventClient { driven: Driven::new(port, options) }
     }
 
     /// Whether the port is open.
@@ -95,7 +93,7 @@ impl EventClient {
     /// When the last frame to a motor was sent. Behind an exchange that is over, it is that of its
     /// request, not of a question before it.
     pub fn sent(&self, id: MotorId) -> Instant {
-        self.sent[id.index()]
+        self.driven.session.sent(id)
     }
 
     /// Why frames may not get to the bus, as far as its adapter tells.
@@ -175,6 +173,21 @@ impl EventClient {
         self.driven.session.request(now, id, request)
     }
 
+    /// Begins an exchange, as one of those of [`Client::ask_each`]: a motor in quarantine is an error.
+    ///
+    /// # Errors
+    /// Those of [`ask`](Self::ask).
+    pub fn begin(&mut self, id: MotorId, asked: Asked) -> Result<(), Error> {
+        match asked {
+            Asked::Request(request) => self.request(id, request),
+            Asked::Confirmation => {
+                self.request(id, self.driven.session.question(id))?;
+                self.driven.confirm_next(id);
+                Ok(())
+            }
+        }
+    }
+
     /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Client::set_torque4`].
     ///
     /// # Errors
@@ -194,7 +207,7 @@ impl EventClient {
     pub fn begin_confirmation(&mut self, id: MotorId) -> Result<[u8; 8], Error> {
         let question = self.driven.session.question(id);
         self.driven.listen_for([question])?;
-        self.driven.confirm_next();
+        self.driven.confirm_next(id);
         let now = self.driven.port.now();
         self.driven.session.ask(now, id, question)?;
         Ok(question)
@@ -207,6 +220,11 @@ impl EventClient {
     /// [`Error::Unconfirmed`].
     pub fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
         self.driven.session.confirmed(id)
+    }
+
+    /// As [`Client::losses`].
+    pub fn losses(&self, id: MotorId) -> u32 {
+        self.driven.session.losses(id)
     }
 
     /// Gives up the exchange with a motor, if there is one. Its reply is not taken for another's.
@@ -244,7 +262,7 @@ impl EventClient {
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let EventClient { driven: Driven { port, session, .. }, sent } = self;
+        let Driven { port, session, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(None) };
         let mut listens = STEP;
@@ -255,11 +273,6 @@ impl EventClient {
                     if let Err(error) = link.send(&frame) {
                         let (id, why) = not_done(error)?;
                         session.not_done(now, id, why);
-                    }
-                    let id =
-                        frame.eight_bytes().and_then(|(id, _)| MotorId::from_can_id(id.into()));
-                    if let Some(id) = id {
-                        sent[id.index()] = now;
                     }
                 }
                 SessionOutput::Done(id, result) => {

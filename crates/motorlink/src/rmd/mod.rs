@@ -28,7 +28,7 @@ pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
 pub use arrival::ArrivalOptions;
-pub use client::{Client, SCAN_WIDTH, ScanResult};
+pub use client::{Asked, Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;

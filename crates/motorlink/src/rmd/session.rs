@@ -44,6 +44,10 @@ pub(super) struct Session {
     /// Motors whose torques were given up, and the reason. Each is an outcome of its own.
     unsent: MotorSet,
     unsent_for: Option<RequestError>,
+    /// When the last frame to each motor was sent.
+    sent: [Instant; MotorId::COUNT],
+    /// How often the replies of each motor could not be confirmed any more.
+    losses: [u32; MotorId::COUNT],
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// Whether another program holds the port.
@@ -105,6 +109,8 @@ impl Session {
             held: None,
             unsent: MotorSet::EMPTY,
             unsent_for: None,
+            sent: [Instant(0); MotorId::COUNT],
+            losses: [0; MotorId::COUNT],
             is_retired: false,
             is_held: false,
             timeout: options.timeout,
@@ -186,6 +192,7 @@ impl Session {
         for id in self.busy() {
             self.cancel(now, id);
         }
+        MotorSet::ALL.into_iter().for_each(|id| self.lost(id));
         self.host.reopened(now);
     }
 
@@ -197,9 +204,27 @@ impl Session {
     /// Whether the motor's replies since the last confirmation went to their own requests.
     pub(super) fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
         match self.host.take_stray(id) {
-            true => Err(Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }),
+            true => {
+                self.lost(id);
+                Err(Error::Unconfirmed { port: Arc::clone(&self.port), motor: id })
+            }
             false => Ok(()),
         }
+    }
+
+    /// When the last frame to a motor was sent.
+    pub(super) fn sent(&self, id: MotorId) -> Instant {
+        self.sent[id.index()]
+    }
+
+    /// See [`Client::losses`](super::Client::losses).
+    pub(super) fn losses(&self, id: MotorId) -> u32 {
+        self.losses[id.index()]
+    }
+
+    fn lost(&mut self, id: MotorId) {
+        let losses = &mut self.losses[id.index()];
+        *losses = losses.wrapping_add(1);
     }
 
     /// Declares that no motor still has to reply to an earlier host.
@@ -309,6 +334,11 @@ impl Session {
             match self.host.poll(now) {
                 proto::Output::Transmit(frame) => {
                     self.moved_by(&frame);
+                    if let Some(id) =
+                        frame.eight_bytes().and_then(|(id, _)| MotorId::from_can_id(id.into()))
+                    {
+                        self.sent[id.index()] = now;
+                    }
                     return SessionOutput::Transmit(frame);
                 }
                 proto::Output::Done { id, result: Err(proto::Failure::Quarantined) }
@@ -329,6 +359,10 @@ impl Session {
                     if result.as_ref().is_ok_and(ends_motion) {
                         self.moving.remove(id);
                         self.unexpected.remove(id);
+                    }
+                    // The motor's quarantine forgets it.
+                    if result.is_err() && self.host.has_stray(id) {
+                        self.lost(id);
                     }
                     let failed = |error| match error {
                         proto::Failure::Quarantined if is_outlasted => self.shared(id),
@@ -410,6 +444,9 @@ impl Session {
 
     /// Gives up the exchange with a motor, if there is one. Its reply may still come.
     pub(super) fn cancel(&mut self, now: Instant, id: MotorId) {
+        if self.busy().contains(id) {
+            self.lost(id);
+        }
         self.insisting.remove(id);
         self.waiting.remove(id);
         self.unsent.remove(id);

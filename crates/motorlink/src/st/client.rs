@@ -14,7 +14,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::{self, Instant};
 
-use super::session::{Rules, Session};
+use super::session::{Exchanged, Rules, Session};
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
 use proto::{Effect, Started};
@@ -178,6 +178,11 @@ impl Client {
         let result = act();
         self.turns.take().session.set_recovery(before);
         result
+    }
+
+    /// The last exchange. If other threads use the client, it may be one of theirs, which was later.
+    pub fn exchanged(&self) -> Exchanged {
+        self.turns.take().session.exchanged()
     }
 
     /// What came without being asked for.
@@ -385,7 +390,7 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
         self.ready()?;
         if let Some(link) = self.port.open_link() {
-            link.confirm_next();
+            link.confirm_next(0);
         }
         self.session.ask(confirmation)
     }

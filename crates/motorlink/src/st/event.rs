@@ -12,7 +12,7 @@ use motorlink_proto::st::{
 use motorlink_proto::time::Instant;
 
 use super::client::{Driven, of_profile};
-use super::{Client, Error, Options};
+use super::{Client, Error, Exchanged, Options};
 
 /// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when
 /// the descriptor is readable and when the time that it said has passed.
@@ -21,7 +21,6 @@ use super::{Client, Error, Options};
 /// that is abandoned loses the line, and the next one recovers it.
 pub struct EventClient {
     driven: Driven<Box<dyn EventBytes>>,
-    sent: Instant,
 }
 
 /// How far an exchange is.
@@ -64,7 +63,7 @@ impl EventClient {
     ) -> Result<Self, Error> {
         let open = of_profile(name, open, options.profile);
         let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventClient { driven: Driven::new(port, &options), sent: Instant(0) })
+        Ok(EventClient { driven: Driven::new(port, &options) })
     }
 
     /// Whether the port is open.
@@ -122,7 +121,12 @@ impl EventClient {
     /// When the last frame was sent. Behind an exchange that is over, it is that of its request, not of
     /// a recovery before it.
     pub fn sent(&self) -> Instant {
-        self.sent
+        self.exchanged().sent
+    }
+
+    /// The last exchange.
+    pub fn exchanged(&self) -> Exchanged {
+        self.driven.session.exchanged()
     }
 
     /// What came without being asked for.
@@ -221,7 +225,7 @@ impl EventClient {
         &mut self,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<Progress<T>, PortError> {
-        let EventClient { driven: Driven { port, session, received, .. }, sent } = self;
+        let Driven { port, session, received, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(Progress::Wait(None)) };
         // What is left in the port wakes the loop again; it has others to serve.
@@ -231,7 +235,6 @@ impl EventClient {
             match session.poll(now) {
                 Output::Transmit(bytes) => {
                     link.write(bytes)?;
-                    *sent = now;
                     listens = link.descriptor().is_none();
                 }
                 Output::Wait(until) => {

@@ -44,5 +44,6 @@ pub use motorlink_proto::st::{
 };
 pub use options::Options;
 pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan_baud};
+pub use session::Exchanged;
 pub use stop_on_drop::{StopOnDrop, Stopped};
 pub use transcript::Transcript;

@@ -35,11 +35,27 @@ pub(super) struct Session {
     account: Account,
     pending: PendingRequest,
     last: LastExchange,
+    /// What had come unasked before the last exchange.
+    before: Counters,
+    /// When the last frame was sent.
+    sent: Instant,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// Whether another program holds the port.
     is_held: bool,
     timeout: Duration,
+}
+
+/// An exchange in the history of its line.
+#[derive(Debug, Clone, Copy)]
+pub struct Exchanged {
+    /// What had come unasked before it.
+    pub before: Counters,
+    /// What had come unasked after it.
+    pub after: Counters,
+    /// When its last frame was sent. Behind an exchange that is over, it is that of its request, not of
+    /// a recovery before it.
+    pub sent: Instant,
 }
 
 /// The request under way.
@@ -89,6 +105,8 @@ impl Session {
         Session {
             port,
             rules,
+            before: master.counters(),
+            sent: Instant(0),
             master,
             account: Account::new(options.limits),
             pending: asked,
@@ -97,6 +115,10 @@ impl Session {
             is_held: false,
             timeout: options.timeout,
         }
+    }
+
+    pub(super) fn exchanged(&self) -> Exchanged {
+        Exchanged { before: self.before, after: self.counters(), sent: self.sent }
     }
 
     /// How long a reply may take.
@@ -201,6 +223,7 @@ impl Session {
             return Err(Error::TooLong(what.to_string()));
         }
         self.pending = PendingRequest { motor, what };
+        self.before = self.counters();
         Ok(())
     }
 
@@ -209,7 +232,11 @@ impl Session {
     }
 
     pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
-        self.master.poll(now)
+        let output = self.master.poll(now);
+        if matches!(output, Output::Transmit(_)) {
+            self.sent = now;
+        }
+        output
     }
 
     /// The exchange is over: with what the reader of replies made of the acknowledge's payload, and

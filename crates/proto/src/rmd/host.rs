@@ -292,10 +292,15 @@ impl Host {
         question_behind(self.slots[id.index()].data[0])
     }
 
+    /// What [`take_stray`](Self::take_stray) would return.
+    pub fn has_stray(&self, id: MotorId) -> bool {
+        self.strays.contains(id)
+    }
+
     /// Whether a motor sent a reply without a request, since it was trusted or since the last call.
     /// A duplicate reply is detected at the latest by the reply to a request with another code.
     pub fn take_stray(&mut self, id: MotorId) -> bool {
-        let is_stray = self.strays.contains(id);
+        let is_stray = self.has_stray(id);
         self.strays.remove(id);
         is_stray
     }

@@ -21,7 +21,8 @@ pub(super) struct ShareBus {
     connection: Connection,
     /// The last request to each motor.
     pending: BTreeMap<MotorId, Pending>,
-    confirms: Cell<bool>,
+    /// Motors whose next request is a confirmation.
+    confirms: Cell<MotorSet>,
 }
 
 /// A request to a motor.
@@ -37,7 +38,7 @@ impl ShareBus {
             port: place.clone(),
             connection: Connection::open(place)?,
             pending: BTreeMap::new(),
-            confirms: Cell::new(false),
+            confirms: Cell::new(MotorSet::EMPTY),
         })
     }
 
@@ -45,7 +46,9 @@ impl ShareBus {
     fn request(&mut self, id: MotorId, bytes: [u8; 8]) -> Result<(), PortError> {
         self.pending.remove(&id);
         let (line, motor) = (self.port.line.clone(), id.number());
-        let confirmation = match self.confirms.take() {
+        let confirms = self.confirms.get();
+        self.confirms.set(confirms.without(id.into()));
+        let confirmation = match confirms.contains(id) {
             true => Some(self.connection.ask(Ask::Confirm { line, motor })?),
             false => None,
         };
@@ -80,8 +83,9 @@ impl Link for ShareBus {
         Some(self.connection.holder())
     }
 
-    fn confirm_next(&self) {
-        self.confirms.set(true);
+    fn confirm_next(&self, motor: u8) {
+        let motor = MotorId::new(motor).map_or(MotorSet::EMPTY, MotorSet::from);
+        self.confirms.set(self.confirms.get().union(motor));
     }
 
     fn expire_next(&self, time_to_live: Duration) {

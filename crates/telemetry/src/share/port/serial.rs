@@ -104,7 +104,8 @@ impl Link for ShareLine {
         Some(self.connection.holder())
     }
 
-    fn confirm_next(&self) {
+    /// The requests to all motors of a line share its replies.
+    fn confirm_next(&self, _: u8) {
         self.confirms.set(true);
     }
 
