@@ -109,7 +109,7 @@ where
                     Item::Gap(Gap { time, why, unconfirmed }) => {
                         let failure = match why {
                             Trouble::Failed(error) => Failure::from(&*error),
-                            Trouble::Doubtful => (self.doubt)(),
+                            Trouble::Doubtful(_) => (self.doubt)(),
                         };
                         sink.gap(time, failure, unconfirmed)?;
                     }

@@ -26,6 +26,9 @@ use derivation::Derivation;
 
 pub use rates::Rate;
 
+/// The time between two confirmations of a motor's values, if they are read more often.
+pub const CONFIRMATION: Micros = Micros::from_millis(100);
+
 /// A consumer of values and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConsumerId(u64);
@@ -74,6 +77,8 @@ pub struct Acquisition {
     unfit: BTreeSet<Signal>,
     /// Failures in a row of each lane.
     failures: BTreeMap<Lane, u32>,
+    /// The shortest time between two confirmations on a good line.
+    confirmation: Micros,
 }
 
 /// An exchange that is over, and what it was.
@@ -140,6 +145,7 @@ impl Acquisition {
             refused: BTreeMap::new(),
             unfit: BTreeSet::new(),
             failures: BTreeMap::new(),
+            confirmation: CONFIRMATION,
         }
     }
 
@@ -258,6 +264,27 @@ impl Acquisition {
     /// Who stopped the motors, if motion is refused.
     pub fn latched(&self) -> Option<&Arc<str>> {
         self.latch.as_ref()
+    }
+
+    /// Confirms the values of a motor not more often than this. Values come later if it is longer, and
+    /// the line carries less if it is shorter. It is [`CONFIRMATION`] at first.
+    pub fn confirm_every(&mut self, shortest: Micros) {
+        self.confirmation = shortest;
+        self.replan();
+    }
+
+    /// Gives up the polls that a relayed line has begun, where the owner has not carried them out or has
+    /// given them up. Their instants are read anew. Call this after a pause in
+    /// [`advance`](Self::advance), too.
+    pub fn give_up_polls(&mut self) {
+        for lane in self.schedule.give_up_polls(&self.instants) {
+            self.line.cancel(lane);
+        }
+    }
+
+    /// The first instant at which signals are read; `None` without consumers.
+    pub fn first_instant(&self) -> Option<Instant> {
+        self.schedule.first_instant()
     }
 
     /// Sends and receives what can be sent and received without waiting. `ended` receives the

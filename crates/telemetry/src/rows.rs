@@ -15,6 +15,10 @@ use crate::subscription::Record;
 /// The values of all signals at one instant.
 #[derive(Debug, Clone)]
 pub struct Row {
+    /// The instant that the row was planned for.
+    pub instant: Instant,
+    /// When the first request was sent.
+    pub requested: Instant,
     /// The middle between the first request and the last reply.
     pub time: Instant,
     /// The values, in the order of the signals.
@@ -61,8 +65,8 @@ pub struct Gap {
 pub enum Trouble {
     /// The motor did not answer, or the port failed.
     Failed(Arc<LineError>),
-    /// A reply came twice or late, so that values may be those of other signals.
-    Doubtful,
+    /// A reply came twice or late, so that values of this motor may be those of other signals.
+    Doubtful(Motor),
 }
 
 /// Makes rows from the records of a subscription. All signals must be wanted at the same period.
@@ -148,8 +152,10 @@ impl Rows {
                 let unconfirmed = self.drop_unconfirmed(|row| {
                     row.replied.get(motor).is_some_and(|replied| replied > since)
                 });
-                self.gap(event.time, Trouble::Doubtful, unconfirmed);
+                self.gap(event.time, Trouble::Doubtful(*motor), unconfirmed);
             }
+            // The values come, too, each with the reason.
+            What::Refused(_, why) if matches!(**why, LineError::Implausible(_)) => {}
             What::Refused(signals, why) => {
                 self.refused.extend(signals.iter().map(|signal| (*signal, Arc::clone(why))));
                 self.complete();
@@ -174,6 +180,13 @@ impl Rows {
         if is_known { self.items.pop_front() } else { None }
     }
 
+    /// Whether a row of an earlier instant than this one is not complete or not confirmed.
+    pub fn is_pending_before(&self, instant: Instant) -> bool {
+        let is_pending = |item: &Item| matches!(item, Item::Row(row) if row.instant < instant);
+        self.partial.as_ref().is_some_and(|partial| partial.instant < instant)
+            || self.items.iter().any(is_pending)
+    }
+
     fn has(&self, motor: Motor) -> bool {
         self.signals.iter().any(|signal| signal.motor == motor)
     }
@@ -193,8 +206,9 @@ impl Rows {
         let Some(values) = self.signals.iter().map(value).collect() else { return };
         let ended = partial.replied.values().max().copied().unwrap_or(partial.began);
         let time = Instant(partial.began.0.midpoint(ended.0));
-        let row = Row { time, values, replied: partial.replied.clone() };
-        self.last = Some(partial.instant);
+        let Partial { instant, began: requested, .. } = *partial;
+        let row = Row { instant, requested, time, values, replied: partial.replied.clone() };
+        self.last = Some(instant);
         self.partial = None;
         self.items.push_back(Item::Row(row));
     }
@@ -203,7 +217,9 @@ impl Rows {
     fn refuse_all(&mut self, time: Instant) {
         let refused = |signal| Some(Err(Absent::Refused(Arc::clone(self.refused.get(signal)?))));
         if let Some(values) = self.signals.iter().map(refused).collect() {
-            self.items.push_back(Item::Row(Row { time, values, replied: BTreeMap::new() }));
+            let (instant, requested) = (time, time);
+            let replied = BTreeMap::new();
+            self.items.push_back(Item::Row(Row { instant, requested, time, values, replied }));
         }
     }
 
@@ -238,6 +254,7 @@ mod tests {
     use super::*;
     use crate::plan::{Poll, Read};
     use motorlink_proto::rmd::{Code, MotorId};
+    use motorlink_proto::st::{Profile, Reading, RegisterId};
     use motorlink_proto::time::Micros;
 
     const READS: [(&str, Code); 2] =
@@ -336,6 +353,18 @@ mod tests {
         assert!(taken(&mut rows, [voltage]).is_empty());
         let records = row(200).into_iter().chain([confirmed(250)]);
         assert_eq!(taken(&mut rows, records), ["215 1 2"]);
+    }
+
+    #[test]
+    fn a_value_that_is_not_plausible_comes_in_its_row() {
+        let mut rows = Rows::new(signals());
+        let reading =
+            Reading { register: RegisterId::HEATS_TEMP, bits: 0xFFF6, profile: Profile::Spec };
+        let why = Arc::new(LineError::from(reading.plausible().unwrap_err()));
+        let refusal = event(7, What::Refused(signals(), why));
+        assert!(taken(&mut rows, [refusal]).is_empty());
+        let records = row(100).into_iter().chain([confirmed(140)]);
+        assert_eq!(taken(&mut rows, records), ["115 1 2"]);
     }
 
     #[test]

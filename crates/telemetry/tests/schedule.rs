@@ -153,6 +153,21 @@ fn instants_do_not_drift_in_an_hour() {
 }
 
 #[test]
+fn a_poll_that_is_given_up_is_begun_anew_for_its_instant() {
+    let mut line = Line::new(SERIAL, taking(1_000));
+    line.polls(&[(1, 1, 100)]);
+    line.run(10_000);
+    assert_eq!(line.under_way.len(), 1);
+    let instants = BTreeMap::from([(Lane(1), Instant(10_000))]);
+    assert_eq!(line.schedule.give_up_polls(&instants), [Lane(1)]);
+    line.under_way.clear();
+    line.now = Instant(14_000);
+    line.run(10_000);
+    let begun: Vec<_> = line.times(1).into_iter().skip(1).map(|(at, it)| (at.0, it.0)).collect();
+    assert_eq!(begun, [(10_000, 10_000), (14_000, 10_000), (20_000, 20_000)]);
+}
+
+#[test]
 fn polls_of_a_group_are_read_at_the_same_instants() {
     let mut line = Line::new(SERIAL, taking(1_000));
     line.polls(&[(1, 0, 50), (2, 0, 50), (3, 0, 50)]);

@@ -42,7 +42,7 @@ impl Drive<'_> {
         let around = connection.around_event_line(drive.profile)?;
         let line = StLine::new(EventClient::open_wrapped(port, around, options(drive))?);
         let line = match segment {
-            Some(segment) => line.using_segment(segment),
+            Some(segment) => line.using_segments(&[segment]),
             None => line,
         };
         let signal =

@@ -15,8 +15,6 @@ use crate::schedule::{Lane, PollId};
 use crate::signal::{Motor, Signal};
 use crate::subscription::Consumer;
 
-/// The time between two confirmations of a motor's values, if they are read more often.
-const CONFIRMATION: Micros = Micros::from_millis(100);
 /// For this time after a doubt, the values of each instant are confirmed: one more takes
 /// only those of its instant.
 const CAREFUL: Micros = Micros::from_millis(10_000);
@@ -180,7 +178,7 @@ impl Acquisition {
             let lane = self.line.lane(&poll.request());
             let period = match self.careful.contains_key(&lane) {
                 true => poll.period,
-                false => poll.period.max(CONFIRMATION),
+                false => poll.period.max(self.confirmation),
             };
             let confirmation = lanes.entry(lane).or_insert_with(|| Poll {
                 motor: poll.motor,

@@ -1,5 +1,7 @@
 //! One open port with a client for either protocol: one exchange a lane at a time.
 
+mod driver;
+mod relay;
 mod rmd;
 mod st;
 
@@ -17,6 +19,8 @@ use crate::sample::Samples;
 use crate::schedule::{Lane, LineRules};
 use crate::signal::Motor;
 
+pub use driver::{StExchange, StStep};
+pub use relay::{Relay, RmdOver, RmdRelay, StOver, StRelay};
 pub use rmd::RmdLine;
 pub use st::StLine;
 

@@ -1,12 +1,15 @@
 //! A CAN bus with RMD motors: each motor is a lane.
 
 use std::os::fd::BorrowedFd;
+use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink::rmd::{Error, EventClient, Options};
+use motorlink::rmd::{Asked, Error, EventClient, Options};
 use motorlink::{Clock, LinkState, port::PortName};
 use motorlink_proto::rmd::{Command, MotorId, MotorSet};
 
+use super::driver::{DirectRmd, RmdDriver};
+use super::relay::{RelayedRmd, RmdRelay};
 use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
 use crate::plan::{Poll, Read, Wants, rmd_polls};
 use crate::sample::{Sample, Samples};
@@ -15,7 +18,7 @@ use crate::signal::{Motor, Signal, Source};
 
 /// A CAN bus with RMD motors.
 pub struct RmdLine {
-    client: EventClient,
+    driver: Box<dyn RmdDriver>,
     /// Motors whose exchange is a confirmation.
     confirming: MotorSet,
     /// Motors with a cancelled exchange. They had sent a reply without a request before it.
@@ -33,7 +36,16 @@ impl RmdLine {
 
     /// Uses a client that is open.
     pub fn new(client: EventClient) -> Self {
-        RmdLine { client, confirming: MotorSet::EMPTY, strayed: MotorSet::EMPTY }
+        Self::over(Box::new(DirectRmd::new(client)))
+    }
+
+    /// Uses a bus that has other users, and stays theirs. `port` is for messages.
+    pub fn relayed(relay: RmdRelay, port: Arc<str>, clock: Clock) -> Self {
+        Self::over(Box::new(RelayedRmd::new(relay, port, clock)))
+    }
+
+    fn over(driver: Box<dyn RmdDriver>) -> Self {
+        RmdLine { driver, confirming: MotorSet::EMPTY, strayed: MotorSet::EMPTY }
     }
 }
 
@@ -52,40 +64,40 @@ impl Line for RmdLine {
     }
 
     fn clock(&self) -> Clock {
-        self.client.clock()
+        self.driver.clock()
     }
 
     fn timeout(&self) -> Duration {
-        self.client.timeout()
+        self.driver.timeout()
     }
 
     fn link_state(&self) -> LinkState {
-        self.client.link_state()
+        self.driver.link_state()
     }
 
     fn reopen(&mut self) -> Result<(), LineError> {
-        Ok(self.client.reopen()?)
+        self.driver.reopen()
     }
 
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.client.descriptor()
+        self.driver.descriptor()
     }
 
     fn sends_at_once(&self, lane: Lane) -> bool {
-        MotorId::new(lane.0).is_none_or(|id| self.client.sends_at_once(id))
+        MotorId::new(lane.0).is_none_or(|id| self.driver.sends_at_once(id))
     }
 
     fn expire_next(&self, time_to_live: Duration) {
-        self.client.expire_next(time_to_live);
+        self.driver.expire_next(time_to_live);
     }
 
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
         let id = MotorId::new(lane.0).ok_or(LineError::Protocol)?;
         match request {
             // A motor whose late reply is awaited gets what stops it at once, and nothing else.
-            Request::Rmd(_, request) => self.client.ask(id, *request)?,
+            Request::Rmd(_, request) => self.driver.begin(id, Asked::Request(*request))?,
             Request::Confirm(_) => {
-                self.client.begin_confirmation(id)?;
+                self.driver.begin(id, Asked::Confirmation)?;
                 self.confirming.insert(id);
             }
             Request::St(..) | Request::Raw(..) | Request::Segment(..) => {
@@ -98,16 +110,16 @@ impl Line for RmdLine {
     fn cancel(&mut self, lane: Lane) {
         if let Some(id) = MotorId::new(lane.0) {
             self.confirming.remove(id);
-            if self.client.confirmed(id).is_err() {
+            if self.driver.confirmed(id).is_err() {
                 self.strayed.insert(id);
             }
-            self.client.cancel(id);
+            self.driver.cancel(id);
         }
     }
 
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
         let mut over = Vec::new();
-        let wait = self.client.advance(|id, result| over.push((id, result)));
+        let wait = self.driver.advance(&mut |id, result| over.push((id, result)));
         for (id, result) in over {
             let is_confirmation = self.confirming.contains(id);
             self.confirming.remove(id);
@@ -115,8 +127,8 @@ impl Line for RmdLine {
             let mut result = result.map(Reply::Rmd).map_err(LineError::from);
             // A motor whose replies were shifted by one sends one that is not expected if it is asked
             // something else, or if it does not receive a request.
-            if is_confirmation || result.is_err() {
-                let judged = self.client.confirmed(id);
+            if is_confirmation || result.as_ref().is_err_and(LineError::is_line_failure) {
+                let judged = self.driver.confirmed(id);
                 shows = if judged.is_ok() { Shows::Match } else { Shows::Doubt };
                 if is_confirmation && result.is_ok() {
                     result = judged.map(|()| Reply::Confirmed).map_err(LineError::from);
@@ -126,7 +138,7 @@ impl Line for RmdLine {
                 shows = Shows::Doubt;
             }
             self.strayed.remove(id);
-            done(Over { lane: lane(id), result, sent: self.client.sent(id), shows });
+            done(Over { lane: lane(id), result, sent: self.driver.sent(id), shows });
         }
         if wait.is_err() {
             self.confirming = MotorSet::EMPTY;
@@ -135,14 +147,7 @@ impl Line for RmdLine {
     }
 
     fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        let client = self.client.into_client();
-        let stopped = client.stop_on_drop().stop_now().into_iter();
-        stopped
-            .map(|one| Stopped {
-                motor: Motor::Rmd(one.id),
-                result: one.result.map_err(LineError::from),
-            })
-            .collect()
+        self.driver.stop_started()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {

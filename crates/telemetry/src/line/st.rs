@@ -2,36 +2,36 @@
 
 use std::collections::BTreeSet;
 use std::os::fd::BorrowedFd;
+use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink::st::{Error, EventClient, Options, Progress};
+use motorlink::st::{Error, EventClient, Exchanged, LimitError, Options, Progress};
 use motorlink::{Clock, LinkState, port::PortName};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Confirmation, Counters, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
+    Counters, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
 };
 
+use super::driver::{DirectSt, StDriver, StStep};
+use super::relay::{RelayedSt, StRelay};
 use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
 use crate::plan::{Poll, Read, Wants, st_polls};
 use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
-use crate::signal::Motor;
 
 /// A serial line has one exchange at a time.
 const LANE: Lane = Lane(0);
 
 /// The line to an ST drive.
 pub struct StLine {
-    client: EventClient,
+    driver: Box<dyn StDriver>,
     step: Step,
     /// The registers of each data segment that this line configured.
     configured: [Option<Vec<RegisterId>>; SEGMENTS],
     segments: Vec<u8>,
     /// Registers of data segments that the drive refused.
     alone: BTreeSet<RegisterId>,
-    /// How often the line had been lost when the exchange began.
-    losses: u32,
-    /// How often it had been lost when the replies were judged last.
+    /// How often the line had been lost when the replies were judged last.
     judged: u32,
     /// The unasked bytes up to a reply with the size of the other profile. If more come until the next
     /// confirmation, the reply belonged to another request.
@@ -46,7 +46,7 @@ enum Step {
     /// A data segment is configured before it is read.
     Configuring(Segment),
     Reading(Segment),
-    Confirming(Confirmation),
+    Confirming,
 }
 
 #[derive(Debug, Clone)]
@@ -70,32 +70,41 @@ impl StLine {
 
     /// Uses a client that is open. Other users of the client must not configure data segments.
     pub fn new(client: EventClient) -> Self {
-        let segments = match client.profile() {
+        Self::over(Box::new(DirectSt::new(client)))
+    }
+
+    /// Uses a line that has other users, and stays theirs. `port` is for messages.
+    pub fn relayed(relay: StRelay, port: Arc<str>, clock: Clock, profile: Profile) -> Self {
+        Self::over(Box::new(RelayedSt::new(relay, port, clock, profile)))
+    }
+
+    fn over(driver: Box<dyn StDriver>) -> Self {
+        let segments = match driver.profile() {
             Profile::Spec => (0..SEGMENTS as u8).rev().collect(),
             Profile::Mcsdk54 => Vec::new(),
         };
         StLine {
-            client,
+            driver,
             step: Step::Idle,
             configured: Default::default(),
             segments,
             alone: BTreeSet::new(),
-            losses: 0,
             judged: 0,
             unasked: None,
         }
     }
 
-    /// Uses this data segment only, and none in the profile that has none.
-    pub fn using_segment(mut self, segment: u8) -> Self {
-        self.segments.retain(|it| *it == segment);
+    /// Uses these data segments only, and none in the profile that has none.
+    pub fn using_segments(mut self, segments: &[u8]) -> Self {
+        self.segments.retain(|it| segments.contains(it));
         self
     }
 
     fn begin_segment(&mut self, segment: Segment) -> Result<Step, Error> {
         let configured = &self.configured[usize::from(segment.number)];
         if configured.as_ref() == Some(&segment.registers) {
-            self.client.begin(segment.motor, &proto::Request::GetSegment(segment.number))?;
+            let Segment { motor, number, registers, .. } = &segment;
+            self.driver.begin(StStep::Segment(*motor, *number, registers.clone()))?;
             return Ok(Step::Reading(segment));
         }
         self.configure(segment)
@@ -105,7 +114,7 @@ impl StLine {
         let ids: Vec<u8> = segment.registers.iter().map(|register| register.0).collect();
         let configure =
             proto::Request::ConfigureSegment { segment: segment.number, registers: &ids };
-        self.client.begin(segment.motor, &configure)?;
+        self.driver.begin(StStep::Request(segment.motor, OwnedRequest::from(configure)))?;
         Ok(Step::Configuring(Segment { is_fresh: true, ..segment }))
     }
 
@@ -127,8 +136,9 @@ impl StLine {
                 }
                 Err(Err(error))
             }
-            // A drive that was restarted has forgotten its segments.
-            (Step::Reading(segment), Err(Error::Refused { .. })) if !segment.is_fresh => {
+            // A drive that was restarted has forgotten its segments. So has a port that another user of
+            // the line opened again.
+            (Step::Reading(segment), Err(error)) if !segment.is_fresh && is_forgotten(&error) => {
                 self.configure(segment).map_err(Err)
             }
             (Step::Reading(segment), Err(error)) => {
@@ -150,10 +160,11 @@ impl StLine {
             Err(Error::Unconfirmed { why: Some(why), .. }) if why.is_line_failure() => Err(*why),
             result => result,
         };
-        let was_lost = self.losses != self.judged;
+        let Exchanged { before, after, sent } = self.driver.exchanged();
+        let was_lost = before.losses != self.judged;
         let shows_silence = result.as_ref().is_err_and(shows_no_reply);
         let result = result.map_err(LineError::from);
-        let Counters { losses, unasked_bytes, .. } = self.client.counters();
+        let Counters { losses, unasked_bytes, .. } = after;
         let is_another = self.unasked.is_some_and(|before| before != unasked_bytes);
         let shows = match &result {
             Ok(Reply::Confirmed) if is_another => Shows::Doubt,
@@ -170,8 +181,14 @@ impl StLine {
             self.judged = losses;
             self.unasked = None;
         }
-        Over { lane: LANE, result, sent: self.client.sent(), shows }
+        Over { lane: LANE, result, sent, shows }
     }
+}
+
+/// Whether the drive, or the client of a port that was opened again, does not know the segment.
+fn is_forgotten(error: &Error) -> bool {
+    let is_limited = |exceeded: &LimitError| matches!(exceeded, LimitError::NotConfigured { .. });
+    error.is_refusal() || matches!(error, Error::Limit { exceeded, .. } if is_limited(exceeded))
 }
 
 /// Whether no whole reply came for the request, or it was not sent because the line was lost before.
@@ -191,54 +208,56 @@ impl Line for StLine {
     }
 
     fn clock(&self) -> Clock {
-        self.client.clock()
+        self.driver.clock()
     }
 
     fn timeout(&self) -> Duration {
-        self.client.timeout()
+        self.driver.timeout()
     }
 
     fn link_state(&self) -> LinkState {
-        self.client.link_state()
+        self.driver.link_state()
     }
 
     fn reopen(&mut self) -> Result<(), LineError> {
-        self.client.reopen()?;
+        self.driver.reopen()?;
         self.configured = Default::default();
         self.alone.clear();
-        self.judged = self.client.counters().losses;
+        self.judged = self.driver.exchanged().after.losses;
         self.unasked = None;
         Ok(())
     }
 
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.client.descriptor()
+        self.driver.descriptor()
     }
 
     fn sends_at_once(&self, _: Lane) -> bool {
-        self.client.sends_at_once()
+        self.driver.sends_at_once()
     }
 
     fn expire_next(&self, time_to_live: Duration) {
-        self.client.expire_next(time_to_live);
+        self.driver.expire_next(time_to_live);
     }
 
     fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
-        self.losses = self.client.counters().losses;
         self.step = match request {
             Request::St(motor, request) => {
-                self.client.begin(*motor, &request.request())?;
+                self.driver.begin(StStep::Request(*motor, request.clone()))?;
                 Step::Once
             }
             Request::Raw(motor, code, payload) => {
-                self.client.begin_raw(*motor, *code, payload)?;
+                self.driver.begin(StStep::Raw(*motor, *code, payload.clone()))?;
                 Step::Once
             }
             Request::Segment(motor, number, registers) => {
                 let (motor, number, registers) = (*motor, *number, registers.clone());
                 self.begin_segment(Segment { motor, number, registers, is_fresh: false })?
             }
-            Request::Confirm(_) => Step::Confirming(self.client.begin_confirmation()?),
+            Request::Confirm(_) => {
+                self.driver.begin(StStep::Confirm)?;
+                Step::Confirming
+            }
             Request::Rmd(..) => return Err(LineError::Protocol),
         };
         Ok(())
@@ -246,37 +265,21 @@ impl Line for StLine {
 
     fn cancel(&mut self, _: Lane) {
         self.step = Step::Idle;
-        self.client.abandon();
+        self.driver.abandon();
     }
 
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
         loop {
-            let progress = match &mut self.step {
-                Step::Confirming(confirmation) => {
-                    match self.client.advance_confirmation(confirmation) {
-                        Progress::Done(result) => Progress::Done(result.map(|()| Vec::new())),
-                        Progress::Wait(wait) => Progress::Wait(wait),
-                    }
-                }
-                Step::Reading(segment) => self.client.advance(|payload| {
-                    let values = segment_values(&segment.registers, payload)?;
-                    (values.count() == segment.registers.len()).then(|| payload.to_vec())
-                }),
-                // What comes unasked is read, too.
-                Step::Idle | Step::Once | Step::Configuring(_) => {
-                    self.client.advance(|payload| Some(payload.to_vec()))
-                }
-            };
-            let result = match progress {
-                Progress::Wait(wait) => return Ok(wait),
-                Progress::Done(Err(Error::Port(error))) if !error.leaves_open() => {
+            let result = match self.driver.advance() {
+                Ok(Progress::Wait(wait)) => return Ok(wait),
+                Ok(Progress::Done(result)) => result,
+                Err(error) => {
                     self.step = Step::Idle;
-                    return Err(Error::Port(error).into());
+                    return Err(error.into());
                 }
-                Progress::Done(result) => result,
             };
             let over = match std::mem::replace(&mut self.step, Step::Idle) {
-                Step::Confirming(_) => result.map(|_| Reply::Confirmed),
+                Step::Confirming => result.map(|_| Reply::Confirmed),
                 step => match self.after(step, result) {
                     Ok(step) => {
                         self.step = step;
@@ -290,14 +293,7 @@ impl Line for StLine {
     }
 
     fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        let client = self.client.into_client();
-        let stopped = client.stop_on_drop().stop_now().into_iter();
-        stopped
-            .map(|one| Stopped {
-                motor: Motor::St(one.motor),
-                result: one.result.map_err(LineError::from),
-            })
-            .collect()
+        self.driver.stop_started()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {
@@ -306,7 +302,7 @@ impl Line for StLine {
 
     fn samples(&self, poll: &Poll, reply: &Reply) -> Option<Samples> {
         let Reply::St(payload) = reply else { return None };
-        let profile = self.client.profile();
+        let profile = self.driver.profile();
         let sample = |register, bits| Sample::of(Reading { register, bits, profile });
         match &poll.read {
             Read::Register(register) => {

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use motorlink::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
 use motorlink_proto::time::{Instant, Micros};
 
-use super::exchange::{CommandId, Kind, Outcome, UnderWay, Verdict};
+use super::exchange::{CommandId, Kind, Outcome, PollId, UnderWay, Verdict};
 
 /// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
 /// silence: on a line that loses bytes they are common.
@@ -197,6 +197,15 @@ impl<C: Clone> LaneState<C> {
             }
             _ => Verdict::Recovered,
         }
+    }
+
+    /// Gives up the poll that is under way, if there is one: what it is, and when it began.
+    pub(super) fn give_up_poll(&mut self) -> Option<(PollId, Instant)> {
+        let Some(UnderWay { kind: Kind::Poll(poll), since, .. }) = self.under_way else {
+            return None;
+        };
+        self.under_way = None;
+        Some((poll, since))
     }
 
     /// An exchange is over.

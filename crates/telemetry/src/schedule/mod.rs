@@ -404,6 +404,28 @@ impl<C: Clone> Schedule<C> {
         }
     }
 
+    /// Gives up the polls that are under way. Their duration is not measured. `instants` are theirs, which
+    /// are read again from the beginning. Gives their lanes.
+    pub fn give_up_polls(&mut self, instants: &BTreeMap<Lane, Instant>) -> Vec<Lane> {
+        let mut given_up = Vec::new();
+        for (&lane, state) in &mut self.lanes {
+            let Some((poll, since)) = state.give_up_poll() else { continue };
+            self.under_way -= 1;
+            self.load.over(since, since);
+            given_up.push(lane);
+            let group = self.groups.iter_mut().find(|group| group.polls.contains(&poll));
+            if let Some((group, instant)) = group.zip(instants.get(&lane)) {
+                (group.position, group.due) = (0, *instant);
+            }
+        }
+        given_up
+    }
+
+    /// The first instant; `None` without polls.
+    pub fn first_instant(&self) -> Option<Instant> {
+        self.anchor
+    }
+
     /// The measured load of the line.
     pub fn load(&self) -> &Load {
         &self.load

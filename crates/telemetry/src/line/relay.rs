@@ -1,0 +1,273 @@
+//! Lines whose exchanges somebody else carries out: the owner of a client that has other users.
+//!
+//! The other users are threads or tasks of the same program. They can lose the line between two
+//! exchanges of the engine, so the owner passes on what its client counts.
+
+use std::collections::BTreeMap;
+use std::os::fd::BorrowedFd;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use motorlink::st::{Counters, Exchanged, Profile, Progress};
+use motorlink::{Clock, LinkState, rmd, st};
+use motorlink_proto::rmd::MotorId;
+use motorlink_proto::time::Instant;
+
+use super::driver::{Driver, RmdDriver, RmdEnded, StDriver, StStep};
+use super::{LineError, Stopped};
+
+/// The exchanges of a relayed line, for the owner of its client. Clones share them.
+///
+/// The owner carries out what [`pending`](Self::pending) gives, and reports each with
+/// [`ended`](Self::ended). Then it advances the engine.
+#[derive(Debug)]
+pub struct Relay<K, S, E>(Arc<Mutex<Exchanges<K, S, E>>>);
+
+/// The exchanges of a line to an ST drive: one step at a time.
+pub type StRelay = Relay<(), StStep, StOver>;
+
+/// The exchanges of a CAN bus, by motor.
+pub type RmdRelay = Relay<MotorId, rmd::Asked, RmdOver>;
+
+/// How an exchange with an ST drive ended.
+#[derive(Debug)]
+pub struct StOver {
+    /// The payload of the acknowledge, or why there is none.
+    pub result: Result<Vec<u8>, st::Error>,
+    /// The exchange in the history of the client; `None` if nothing was sent.
+    pub exchanged: Option<Exchanged>,
+}
+
+/// How an exchange with an RMD motor ended.
+#[derive(Debug)]
+pub struct RmdOver {
+    /// The reply, or why there is none. The reply of a confirmation says nothing.
+    pub result: Result<[u8; 8], rmd::Error>,
+    /// How often the client had lost the motor after it; `None` if the port was lost.
+    pub losses: Option<u32>,
+    /// When the request was sent.
+    pub sent: Instant,
+}
+
+#[derive(Debug)]
+struct Exchanges<K, S, E> {
+    pending: BTreeMap<K, S>,
+    over: BTreeMap<K, E>,
+}
+
+impl<K, S, E> Clone for Relay<K, S, E> {
+    fn clone(&self) -> Self {
+        Relay(Arc::clone(&self.0))
+    }
+}
+
+impl<K, S, E> Default for Relay<K, S, E> {
+    fn default() -> Self {
+        let (pending, over) = (BTreeMap::new(), BTreeMap::new());
+        Relay(Arc::new(Mutex::new(Exchanges { pending, over })))
+    }
+}
+
+impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
+    /// The exchanges that wait to be carried out.
+    pub fn pending(&self) -> Vec<(K, S)> {
+        self.lock().pending.iter().map(|(key, step)| (*key, step.clone())).collect()
+    }
+
+    /// An exchange is over. One that was given up meanwhile is ignored.
+    pub fn ended(&self, key: K, over: E) {
+        let mut exchanges = self.lock();
+        if exchanges.pending.remove(&key).is_some() {
+            exchanges.over.insert(key, over);
+        }
+    }
+
+    fn begin(&self, key: K, step: S) {
+        self.lock().pending.insert(key, step);
+    }
+
+    fn cancel(&self, key: K) {
+        let mut exchanges = self.lock();
+        exchanges.pending.remove(&key);
+        exchanges.over.remove(&key);
+    }
+
+    fn take_over(&self) -> BTreeMap<K, E> {
+        std::mem::take(&mut self.lock().over)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Exchanges<K, S, E>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A port that has other users, and stays theirs.
+pub(super) struct Relayed<R> {
+    port: Arc<str>,
+    clock: Clock,
+    exchanges: R,
+}
+
+pub(super) type RelayedSt = Relayed<Drive>;
+pub(super) type RelayedRmd = Relayed<Motors>;
+
+/// The exchanges with an ST drive.
+pub(super) struct Drive {
+    relay: StRelay,
+    profile: Profile,
+    is_confirming: bool,
+    exchanged: Exchanged,
+    /// The losses at the last confirmation or failure; `None` before the first exchange.
+    losses: Option<u32>,
+}
+
+/// The exchanges with RMD motors.
+pub(super) struct Motors {
+    relay: RmdRelay,
+    seen: BTreeMap<MotorId, Seen>,
+}
+
+/// The last exchange with a motor.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    sent: Instant,
+    losses: Option<u32>,
+    /// The losses when the motor's replies were judged last.
+    judged: Option<u32>,
+}
+
+impl<R: Send> Driver for Relayed<R> {
+    fn clock(&self) -> Clock {
+        self.clock.clone()
+    }
+
+    /// The owner waits for the reply.
+    fn timeout(&self) -> Duration {
+        Duration::MAX
+    }
+
+    /// An exchange opens the port again, if it is closed.
+    fn link_state(&self) -> LinkState {
+        LinkState::Open
+    }
+
+    fn reopen(&mut self) -> Result<(), LineError> {
+        Ok(())
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    /// No commands go through the relay.
+    fn expire_next(&self, _: Duration) {}
+
+    /// The owner stops its motors.
+    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
+        Vec::new()
+    }
+}
+
+impl RelayedSt {
+    pub(super) fn new(relay: StRelay, port: Arc<str>, clock: Clock, profile: Profile) -> Self {
+        let seen = Counters::default();
+        let exchanged = Exchanged { before: seen, after: seen, sent: Instant(0) };
+        let exchanges = Drive { relay, profile, is_confirming: false, exchanged, losses: None };
+        Relayed { port, clock, exchanges }
+    }
+}
+
+impl StDriver for RelayedSt {
+    fn profile(&self) -> Profile {
+        self.exchanges.profile
+    }
+
+    /// The owner brings the line in sync.
+    fn sends_at_once(&self) -> bool {
+        true
+    }
+
+    fn begin(&mut self, step: StStep) -> Result<(), st::Error> {
+        self.exchanges.is_confirming = step == StStep::Confirm;
+        self.exchanges.relay.begin((), step);
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<Progress<Vec<u8>>, st::Error> {
+        let drive = &mut self.exchanges;
+        let Some(StOver { result, exchanged }) = drive.relay.take_over().remove(&()) else {
+            return Ok(Progress::Wait(None));
+        };
+        drive.exchanged = exchanged.unwrap_or(drive.exchanged);
+        let losses = drive.exchanged.after.losses;
+        // A confirmation of another user may have been the one that found the loss.
+        let was_lost = drive.losses.is_some_and(|before| before != losses);
+        let result = match result {
+            Ok(_) if drive.is_confirming && was_lost => {
+                Err(st::Error::Unconfirmed { port: Arc::clone(&self.port), why: None })
+            }
+            result => result,
+        };
+        let is_failure = result.as_ref().is_err_and(st::Error::is_line_failure);
+        if drive.is_confirming || is_failure || drive.losses.is_none() {
+            drive.losses = Some(losses);
+        }
+        Ok(Progress::Done(result))
+    }
+
+    fn abandon(&mut self) {
+        self.exchanges.relay.cancel(());
+    }
+
+    fn exchanged(&self) -> Exchanged {
+        self.exchanges.exchanged
+    }
+}
+
+impl RelayedRmd {
+    pub(super) fn new(relay: RmdRelay, port: Arc<str>, clock: Clock) -> Self {
+        Relayed { port, clock, exchanges: Motors { relay, seen: BTreeMap::new() } }
+    }
+}
+
+impl RmdDriver for RelayedRmd {
+    /// The owner brings the motor in sync.
+    fn sends_at_once(&self, _: MotorId) -> bool {
+        true
+    }
+
+    fn begin(&mut self, id: MotorId, asked: rmd::Asked) -> Result<(), rmd::Error> {
+        self.exchanges.relay.begin(id, asked);
+        Ok(())
+    }
+
+    fn advance(&mut self, each: &mut RmdEnded<'_>) -> Result<Option<Duration>, rmd::Error> {
+        let Motors { relay, seen } = &mut self.exchanges;
+        for (id, RmdOver { result, losses, sent }) in relay.take_over() {
+            let judged = seen.get(&id).map_or(losses, |motor| motor.judged);
+            seen.insert(id, Seen { sent, losses, judged });
+            each(id, result);
+        }
+        Ok(None)
+    }
+
+    fn cancel(&mut self, id: MotorId) {
+        self.exchanges.relay.cancel(id);
+    }
+
+    fn confirmed(&mut self, id: MotorId) -> Result<(), rmd::Error> {
+        let Some(seen) = self.exchanges.seen.get_mut(&id) else { return Ok(()) };
+        let before = std::mem::replace(&mut seen.judged, seen.losses);
+        match before.is_some() && before == seen.losses {
+            true => Ok(()),
+            false => {
+                let port = Arc::clone(&self.port);
+                Err(rmd::Error::Unconfirmed { port, motor: id })
+            }
+        }
+    }
+
+    fn sent(&self, id: MotorId) -> Instant {
+        self.exchanges.seen.get(&id).map_or(Instant(0), |seen| seen.sent)
+    }
+}
