@@ -5,6 +5,7 @@ use std::fmt::Display;
 use motorlink::port::{NotDone, PortError};
 use motorlink::st::{ErrorCode, Failure, Implausible, Target};
 use motorlink::{rmd, st};
+use motorlink_telemetry::line::LineError;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -235,6 +236,18 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         _ => (Kind::InvalidValue, facts(None)),
     };
     kind.raise(py, error, facts)
+}
+
+/// An error of a line.
+pub(crate) fn line_error(py: Python<'_>, error: &LineError) -> PyErr {
+    match error {
+        LineError::St(error) => st_error(py, error),
+        LineError::Rmd(error) => rmd_error(py, error),
+        LineError::Implausible(why) => implausible(py, why),
+        LineError::Protocol | LineError::Reply | LineError::Closed => {
+            Kind::Link.raise(py, error, Facts::default())
+        }
+    }
 }
 
 /// An error of a port. An exception of Python code in the port is its cause. KeyboardInterrupt and

@@ -1,9 +1,18 @@
-//! Reading again and again at instants that do not drift, without the interpreter.
+//! Sampling: rows from the engine of a line, whose exchanges the client of the program carries out.
 
 use std::time::{Duration, Instant};
 
 use motorlink::{Clock, LOOK};
 use motorlink_proto::time;
+use motorlink_proto::time::Micros;
+use motorlink_proto::units::Scale;
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{Line, LineError};
+use motorlink_telemetry::plan::Wants;
+use motorlink_telemetry::rows::{Absent, Gap, Item, Row, Rows, Trouble};
+use motorlink_telemetry::sample::Sample;
+use motorlink_telemetry::signal::{Motor, Signal};
+use motorlink_telemetry::subscription::{Full, Subscription};
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -12,17 +21,24 @@ use crate::number::span;
 
 /// More rows than this need more memory than a machine has.
 const MOST: f64 = 1e8;
+/// Rows that a program reads one by one are confirmed at least this often, so that they are new.
+const LIVE: Micros = Micros::from_millis(10);
+
+/// If other users of a line lose it again and again, so that no row is confirmed for this time, it is an
+/// error.
+const UNCONFIRMED: Micros = Micros::from_millis(1_000);
 
 /// When to sample.
 pub(crate) struct Plan {
-    period: Duration,
+    period: Micros,
     instants: u64,
 }
 
 impl Plan {
     /// `rate` instants a second, from the first one for `seconds`; `None`: without end.
     pub(crate) fn new(py: Python<'_>, rate: f64, seconds: Option<f64>) -> PyResult<Self> {
-        let period = span(py, "a time between samples", 1.0 / rate)?;
+        let period = span(py, "a time between samples", 1.0 / rate)?.as_secs_f64() * 1e6;
+        let period = Micros((period.round() as u64).max(1));
         let Some(seconds) = seconds else {
             return Ok(Plan { period, instants: u64::MAX });
         };
@@ -32,23 +48,58 @@ impl Plan {
         }
         Ok(Plan { period, instants: instants as u64 })
     }
+
+    /// When the instants are over that began with this one.
+    fn end(&self, first: time::Instant) -> time::Instant {
+        first + Micros(self.period.0.saturating_mul(self.instants))
+    }
 }
 
-/// Rows, instant by instant. A row is a time in s and values of eight bytes, as NumPy reads them.
-pub(crate) struct Rows {
-    plan: Plan,
-    /// The time of the first instant.
-    began: Option<Duration>,
-    /// The instant after the current one.
-    next: u64,
-    /// Time from the first instant to the first request of the current row, s.
-    time: f64,
-    /// The instant after that of the last row.
-    expected: u64,
-    taken: Taken,
+/// A value of a row.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Column {
+    pub(crate) signal: Signal,
+    /// The scale of the value, if it is not that of the signal.
+    pub(crate) scale: Option<Scale>,
 }
 
-/// Rows that were not taken before.
+impl Column {
+    fn cell(&self, raw: bool, value: &Result<Sample, Absent>) -> Result<[u8; 8], Absent> {
+        match value {
+            Ok(sample) if raw => Ok(sample.digits.to_ne_bytes()),
+            Ok(sample) => {
+                let scaled = self.scale.map(|scale| scale.value(sample.digits));
+                Ok(scaled.unwrap_or(sample.value).to_ne_bytes())
+            }
+            // Digits are what was read, in any profile.
+            Err(Absent::Implausible(why)) if raw => Ok(why.read.digits().to_ne_bytes()),
+            Err(absent) => Err(absent.clone()),
+        }
+    }
+}
+
+/// Why there are no more rows.
+pub(crate) enum Ending {
+    /// An exchange failed.
+    Failed(LineError),
+    /// The values of a motor cannot be confirmed.
+    Doubtful(Motor),
+    /// A signal has no value.
+    Absent(Signal, Absent),
+}
+
+/// What to do next.
+pub(crate) enum Next {
+    /// Carry out the exchanges of the relay.
+    CarryOut,
+    /// Nothing for this time.
+    Wait(Duration),
+    /// There are as many rows as were asked for, or no more come.
+    Enough,
+}
+
+/// Rows that were not taken before. A row is a time in s and values of eight bytes, as NumPy reads
+/// them.
 #[derive(Default)]
 pub(crate) struct Taken {
     bytes: Vec<u8>,
@@ -64,69 +115,235 @@ impl Taken {
     }
 }
 
-impl Rows {
-    pub(crate) fn new(plan: Plan) -> Self {
-        Rows { plan, began: None, next: 0, time: 0.0, expected: 0, taken: Taken::default() }
+/// A sampling without its line.
+pub(crate) struct Sampler {
+    plan: Plan,
+    columns: Vec<Column>,
+    raw: bool,
+    reading: Option<Reading>,
+    taken: Taken,
+    /// Why the next gap is there.
+    doubt: Option<LineError>,
+    /// Since when rows are left out without an error.
+    gap: Option<time::Instant>,
+}
+
+/// The engine, once the first row was asked for.
+struct Reading {
+    engine: Acquisition,
+    subscription: Subscription,
+    rows: Rows,
+    first: Option<time::Instant>,
+    /// The number of the instant after that of the last row.
+    expected: u64,
+    /// When the last call ended.
+    left: Option<time::Instant>,
+    /// The time between the calls since the line was read last.
+    idle: Micros,
+    /// Rows that were read before this are old.
+    fresh: time::Instant,
+}
+
+impl Sampler {
+    pub(crate) fn new(plan: Plan, columns: Vec<Column>, raw: bool) -> Self {
+        let taken = Taken::default();
+        Sampler { plan, columns, raw, reading: None, taken, doubt: None, gap: None }
     }
 
-    /// How long to wait at this time; zero begins a row, and `None` is the end. The first call is the
-    /// first instant. An instant whose period has passed is skipped.
-    fn after(&mut self, now: Duration) -> Option<Duration> {
-        let since = now.saturating_sub(*self.began.get_or_insert(now));
-        let (passed, period) = (since.as_nanos(), self.plan.period.as_nanos());
-        let due = period * u128::from(self.next);
-        if self.next < self.plan.instants && passed < due {
-            return Some(Duration::from_nanos(u64::try_from(due - passed).unwrap_or(u64::MAX)));
+    /// Begins to read `most` rows, or all. The first call begins the sampling, on the line that `line`
+    /// gives. A later call, also after a pause, continues with new values.
+    pub(crate) fn begin(&mut self, most: Option<u64>, line: impl FnOnce() -> Box<dyn Line>) {
+        let period = self.plan.period;
+        let Some(reading) = &mut self.reading else {
+            let signals: Vec<_> = self.columns.iter().map(|column| column.signal).collect();
+            let mut engine = Acquisition::new(line());
+            if most.is_some() {
+                engine.confirm_every(LIVE);
+            }
+            // Nothing is dropped: the records are taken after each step.
+            let subscription = Subscription::new(usize::MAX, Full::DropNewest);
+            let wants: Wants = signals.iter().map(|signal| (*signal, period)).collect();
+            engine.subscribe(subscription.clone(), wants);
+            let rows = Rows::new(signals);
+            self.reading = Some(Reading {
+                engine,
+                subscription,
+                rows,
+                first: None,
+                expected: 0,
+                left: None,
+                idle: Micros(0),
+                fresh: time::Instant(0),
+            });
+            return;
+        };
+        let now = reading.engine.clock().now();
+        let pause = reading.left.map_or(Micros(0), |left| now.since(left));
+        reading.engine.give_up_polls();
+        reading.idle = Micros(reading.idle.0 + pause.0);
+        if reading.idle >= period.max(LIVE) {
+            reading.fresh = now;
         }
-        let current = u64::try_from(passed / period).unwrap_or(u64::MAX).max(self.next);
-        self.next = current.saturating_add(1);
-        self.time = since.as_secs_f64();
-        (current < self.plan.instants).then_some(Duration::ZERO)
     }
 
-    /// As [`after`](Self::after) for an event loop, in s.
-    pub(crate) fn after_seconds(&mut self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
-        let now = Duration::try_from_secs_f64(now)
-            .map_err(|_| invalid_value(py, format_args!("{now} s is not a time of a clock")))?;
-        Ok(self.after(now).map(|wait| wait.as_secs_f64()))
+    /// Says why the next gap is there, more exactly than the engine does.
+    pub(crate) fn doubt(&mut self, error: LineError) {
+        self.doubt = Some(error);
     }
 
-    /// Ends the current row.
-    pub(crate) fn push(&mut self, values: &[[u8; 8]]) {
-        self.taken.bytes.extend_from_slice(&self.time.to_ne_bytes());
-        self.taken.bytes.extend_from_slice(values.as_flattened());
-        self.taken.rows += 1;
-        self.taken.skipped += self.next - 1 - self.expected;
-        self.expected = self.next;
+    /// A signal handler used the client, so that what was pending was given up. The rows before cannot be
+    /// confirmed.
+    pub(crate) fn gave_up(&mut self) {
+        if let Some(reading) = &mut self.reading {
+            reading.engine.give_up_polls();
+        }
     }
 
-    /// The rows since the last call.
+    /// Ends a call: the rows since the last one.
     pub(crate) fn take(&mut self) -> Taken {
+        if let Some(reading) = &mut self.reading {
+            reading.left = Some(reading.engine.clock().now());
+        }
         std::mem::take(&mut self.taken)
     }
 
-    /// Calls `row` at each instant, until the end or until there are `most` rows. `look` is called now
-    /// and then; an error of it ends the sampling.
-    pub(crate) fn run(
+    /// One step towards `most` rows, or all. With `skip` a line that fails costs only rows.
+    /// `is_pending` says whether the relay has exchanges.
+    pub(crate) fn next(
         &mut self,
-        clock: &Clock,
-        look: impl Fn(Python<'_>) -> PyResult<()>,
         most: Option<u64>,
-        mut row: impl FnMut(&mut Self) -> PyResult<()>,
-    ) -> PyResult<()> {
-        let mut looked = Instant::now();
+        skip: bool,
+        is_pending: impl Fn() -> bool,
+    ) -> Result<Next, Ending> {
+        if self.give(most, skip)? {
+            return Ok(Next::Enough);
+        }
+        let Some(reading) = &mut self.reading else { return Ok(Next::Enough) };
+        reading.idle = Micros(0);
+        let wait = reading.engine.advance(&mut |_, _| {});
+        while let Some(record) = reading.subscription.take() {
+            reading.rows.take(&record);
+        }
+        if self.give(most, skip)? {
+            return Ok(Next::Enough);
+        }
+        if is_pending() {
+            return Ok(Next::CarryOut);
+        }
+        let Some(reading) = &mut self.reading else { return Ok(Next::Enough) };
+        let (now, first) = (reading.engine.clock().now(), reading.engine.first_instant());
+        let end = self.plan.end(first.unwrap_or(now));
+        if now < end {
+            let left: Duration = end.since(now).into();
+            return Ok(Next::Wait(wait.map_or(left, |wait| wait.min(left))));
+        }
+        if !reading.rows.is_pending_before(end) {
+            return Ok(Next::Enough);
+        }
+        // The next instant confirms the last rows.
+        reading.engine.confirm_every(Micros(0));
+        Ok(Next::Wait(wait.unwrap_or_default()))
+    }
+
+    /// Takes rows that are known; whether they are enough.
+    fn give(&mut self, most: Option<u64>, skip: bool) -> Result<bool, Ending> {
         while most != Some(self.taken.rows) {
-            if looked.elapsed() >= LOOK {
-                looked = Instant::now();
-                Python::attach(|py| py.check_signals().and_then(|()| look(py)))?;
+            let Some(reading) = &mut self.reading else { return Ok(true) };
+            if reading.expected >= self.plan.instants {
+                return Ok(true);
             }
-            match self.after(clock.now().since(time::Instant(0)).into()) {
-                None => break,
-                Some(Duration::ZERO) => row(self)?,
-                Some(wait) => pass(clock, wait.min(LOOK)),
+            match reading.rows.next_item() {
+                Some(Item::Row(row)) => self.push(&row)?,
+                Some(Item::Gap(gap)) => self.gap(gap, skip)?,
+                Some(Item::Lost(_)) => {}
+                None => return Ok(false),
             }
         }
+        Ok(true)
+    }
+
+    fn push(&mut self, row: &Row) -> Result<(), Ending> {
+        let Some(reading) = &mut self.reading else { return Ok(()) };
+        let first = reading.engine.first_instant().unwrap_or(row.instant);
+        let first = *reading.first.get_or_insert(first.min(row.instant));
+        // On a slow line instants are rarer than asked. There is one row at most for each that was asked.
+        // A data segment is configured at the first instant, which may take longer than a period.
+        let number = match row.instant > first {
+            true => row.requested.since(first).0 / self.plan.period.0,
+            false => 0,
+        };
+        if row.requested < reading.fresh || number < reading.expected {
+            return Ok(());
+        }
+        let skipped = number - reading.expected;
+        reading.expected = number + 1;
+        if number >= self.plan.instants {
+            return Ok(());
+        }
+        let mut cells = Vec::with_capacity(row.values.len());
+        for (column, value) in self.columns.iter().zip(&row.values) {
+            let cell = column.cell(self.raw, value);
+            cells.push(cell.map_err(|absent| Ending::Absent(column.signal, absent))?);
+        }
+        // The first instant is when the request of its row was sent.
+        let since = if number == 0 { Micros(0) } else { row.requested.since(first) };
+        self.taken.bytes.extend_from_slice(&seconds(since).to_ne_bytes());
+        self.taken.bytes.extend_from_slice(cells.as_flattened());
+        self.taken.rows += 1;
+        self.gap = None;
+        self.taken.skipped += skipped;
         Ok(())
+    }
+
+    fn gap(&mut self, gap: Gap, skip: bool) -> Result<(), Ending> {
+        let error = match (self.doubt.take(), gap.why) {
+            (Some(error), _) => error,
+            (None, Trouble::Failed(error)) => (*error).clone(),
+            // Another user of the line has lost it.
+            (None, Trouble::Doubtful(motor)) => {
+                let since = *self.gap.get_or_insert(gap.time);
+                return match !skip && gap.time.since(since) >= UNCONFIRMED {
+                    true => Err(Ending::Doubtful(motor)),
+                    false => Ok(()),
+                };
+            }
+        };
+        match skip && error.is_line_failure() {
+            true => Ok(()),
+            false => Err(Ending::Failed(error)),
+        }
+    }
+}
+
+/// Takes steps until there are enough rows, and carries their exchanges out. `look` is called now and
+/// then; an error of it ends the sampling.
+pub(crate) fn run(
+    clock: &Clock,
+    look: impl Fn(Python<'_>) -> PyResult<()>,
+    mut step: impl FnMut() -> PyResult<Next>,
+    mut carry_out: impl FnMut() -> PyResult<()>,
+) -> PyResult<()> {
+    let mut looked = Instant::now();
+    loop {
+        if looked.elapsed() >= LOOK {
+            looked = Instant::now();
+            Python::attach(|py| py.check_signals().and_then(|()| look(py)))?;
+        }
+        match step()? {
+            Next::Enough => return Ok(()),
+            Next::CarryOut => carry_out()?,
+            Next::Wait(wait) => pass(clock, wait.min(LOOK)),
+        }
+    }
+}
+
+/// The wait of a step for an event loop, s; 0: there are exchanges to carry out, `None`: enough.
+pub(crate) fn wait_seconds(next: &Next) -> Option<f64> {
+    match next {
+        Next::CarryOut => Some(0.0),
+        // Never zero, which would be an exchange to carry out.
+        Next::Wait(wait) => Some(wait.as_secs_f64().max(1e-6)),
+        Next::Enough => None,
     }
 }
 
@@ -152,9 +369,4 @@ fn pass(clock: &Clock, span: Duration) {
     // A part of a microsecond is one: virtual time would never pass it.
     let micros = span.as_nanos().div_ceil(1000);
     clock.wait(clock.now() + time::Micros(micros.try_into().unwrap_or(u64::MAX)));
-}
-
-/// A value of a row: a float, or an integer where digits are wanted.
-pub(crate) fn cell(raw: bool, digits: i64, value: f64) -> [u8; 8] {
-    if raw { digits.to_ne_bytes() } else { value.to_ne_bytes() }
 }

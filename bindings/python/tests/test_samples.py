@@ -13,7 +13,7 @@ from collections.abc import Callable
 import pytest
 
 import motorlink
-from conftest import Served, eventually
+from conftest import PATIENT, Served, eventually
 from motorlink import aio, rmd, sim, st
 
 PAIR = ["SPEED_MEAS", "BUS_VOLTAGE"]
@@ -55,14 +55,26 @@ def test_a_slow_loop_gets_new_values_and_the_number_of_skipped_instants() -> Non
         bench.run(0.035)
     # Rows belong to instants 0, 3 and 7: a row is read late rather than an instant moved.
     assert skipped == [0, 2, 3]
-    assert times == pytest.approx([0, 0.036, 0.072], abs=1e-3)
+    assert times == pytest.approx([0, 0.0375, 0.075], abs=1e-3)
+
+
+def test_a_loop_that_is_a_little_too_slow_gets_values_that_are_new() -> None:
+    bench = sim.Bench()
+    ages = []
+    began = None
+    for row in bench.st.samples(["SPEED_MEAS"], rate=400, seconds=1):
+        began = bench.now if began is None else began
+        ages.append(bench.now - began - row.t)
+        bench.run(0.009)
+    assert max(ages) < 0.03
 
 
 def test_instants_do_not_drift() -> None:
     bench = sim.Bench()
     for number, row in enumerate(bench.st.samples(["SPEED_MEAS"], rate=400, seconds=10)):
         assert row.skipped == 0
-        assert row.t == pytest.approx(number / 400, abs=1e-5)
+        # A confirmation each 10 ms takes longer than a period. The row behind it is late.
+        assert 0 <= row.t - number / 400 + 1e-9 < 2e-3
     assert number == 3999
 
 
@@ -124,7 +136,7 @@ def test_failed_rows_are_skipped_where_the_program_says_so() -> None:
     bench = sim.Bench()
     with rmd.open(bench.port(fault="drop=0.05,seed=7"), timeout=0.02, quarantine=0.01) as client:
         rows = list(client.samples(["speed_dps"], rate=100, seconds=2, on_error="skip"))
-    assert 100 < len(rows) < 200
+    assert 80 < len(rows) < 200
     instants = [int(row.t * 100 + 1e-3) for row in rows]
     assert instants[-1] + 1 - len(rows) == sum(row.skipped for row in rows) > 0
 
@@ -207,7 +219,7 @@ def test_async_rows_are_the_blocking_rows(served: Served) -> None:
     asked = {1: ["SPEED_KP", "BUS_VOLTAGE"], 2: ["SPEED_KP"]}
     with st.open(served.st) as plain:
         row = next(plain.samples(asked, rate=50, raw=True))
-    with rmd.open(served.can) as motors:
+    with rmd.open(served.can, timeout=PATIENT) as motors:
         status = next(motors.samples(rmd.QUANTITIES, rate=50))
 
     async def main() -> None:
@@ -220,7 +232,7 @@ def test_async_rows_are_the_blocking_rows(served: Served) -> None:
                 assert segments_in_use(client) == {3}
                 break
             assert segments_in_use(client) == set()
-        async with aio.rmd.open(served.can) as bus:
+        async with aio.rmd.open(served.can, timeout=PATIENT) as bus:
             async for one in bus.samples(rmd.QUANTITIES, rate=50, seconds=0.1):
                 assert list(one) == list(status)
 

@@ -104,6 +104,29 @@ def test_tasks_use_a_share(share: Share, served: Served) -> None:
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
+def test_lines_of_a_share_are_sampled(share: Share) -> None:
+    names = ["SPEED_MEAS", "BUS_VOLTAGE"]
+    quantities = {id: ["voltage_volts", "encoder"] for id in (1, 2, 3, 4)}
+    with motorlink.st.open(share.st) as client:
+        values = client.sample(names, rate=50, seconds=0.5, on_error="skip")
+        assert len(values) > 1 and set(values["BUS_VOLTAGE"]) == {325}
+    with motorlink.rmd.open(share.rmd) as bus:
+        # A busy machine may be late with a reply.
+        row = next(bus.samples(quantities, rate=50, on_error="skip"))
+        assert {row[f"voltage_volts_{id}"] for id in quantities} == {24}
+
+    async def main() -> None:
+        async with aio.st.open(share.st) as client, aio.rmd.open(share.rmd) as bus:
+            values, others = await asyncio.gather(
+                client.sample(names, rate=50, seconds=0.5, on_error="skip"),
+                bus.sample(quantities, rate=50, seconds=0.5, on_error="skip"),
+            )
+        assert len(values) > 1 and set(values["BUS_VOLTAGE"]) == {325}
+        assert len(others) > 1 and set(others["voltage_volts_4"]) == {24}
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
 def test_the_end_of_a_share_is_told(share: Share) -> None:
     with motorlink.st.open(share.st, on_close="nothing") as client:
         client.motor(1).status()

@@ -268,7 +268,8 @@ def test_registers_are_sampled_on_virtual_time() -> None:
     before = bench.now
     samples = bench.st.sample(["SPEED_MEAS", "TORQUE_MEAS"], rate=100, seconds=1)
     assert len(samples) == 100
-    assert bench.now - before == pytest.approx(0.99, abs=0.02)
+    # The instant after the last one confirms the last rows.
+    assert bench.now - before == pytest.approx(1, abs=0.03)
     np.testing.assert_allclose(np.diff(samples["t"]), 0.01, atol=1e-6)
     assert samples["SPEED_MEAS"].mean() == pytest.approx(1000, abs=20)
 

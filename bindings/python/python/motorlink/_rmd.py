@@ -158,7 +158,9 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         """Checks with one more exchange that no late reply of a motor was taken for another reply. Call it
         before you rely on values that you read.
 
-        Raises ``LinkError`` if there was a reply without a request: read again.
+        Raises ``LinkError`` if there was a reply without a request: read again. After a confirmation or a
+        failure of another thread or task, or of a sampling, it says nothing about values that were read before
+        that.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
@@ -237,11 +239,14 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
         :data:`QUANTITIES` lists the names. A list of names samples ``motor``; its fields have no motor number.
         ``t`` is the time from the first instant to the first requests of the row, s. The other fields are in
-        their units, or in digits with ``raw=True``. All motors are asked in the same cycle. Values of different
-        commands need one cycle each.
+        their units, or in digits with ``raw=True``. All motors are asked at the same instants. One exchange
+        reads all values of a reply.
 
-        Instants do not drift. If the bus is too slow for an instant, its row is missing: look at ``t``. No row
-        is invented.
+        Instants are whole microseconds apart and do not drift. If the bus is too slow for an instant, its row
+        is missing: look at ``t``. No row is invented.
+
+        Each value is confirmed to belong to its request. If another thread or task loses a motor's reply, the
+        rows since the last confirmation are left out. If no row is left for 1 s, it raises.
 
         A failed row raises. The exception has the rows that were read before in ``samples``. With
         ``on_error="skip"`` a row without a motor's reply is left out. Ctrl-C and the cancellation of a task
@@ -273,8 +278,9 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         of :meth:`sample`. Without ``seconds`` the iterator has no end. A row is a
         :class:`motorlink.Sample`, a ``dict``.
 
-        A row is read when the loop asks for it, so its values are new. If the loop is slower than ``rate``, it
-        gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
+        A row is read when the loop asks for it, so its values are new. They are confirmed before the loop gets
+        them, at least every 10 ms: at a higher rate some rows come together. If the loop is slower than
+        ``rate``, it gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
 
         ``break`` ends the sampling and does not stop a motor. An error or Ctrl-C is raised in the loop, after
         the rows that were read before. The end of ``with`` then stops motors, as ``on_close`` says.
@@ -294,7 +300,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         skip = skips(on_error)
         wanted, names = by_motor(quantities, motor, str)
         motors = [(id, some, self._core.gear_ratio(id)) for id, some in wanted]
-        rows = _core.RmdSampling(motors, rate, seconds, raw)
+        rows = self._core.sampling(motors, rate, seconds, raw)
         take = functools.partial(self._sample, rows, skip)
         return self._Sampling(self, take, names, raw=raw, release=lambda: None)
 

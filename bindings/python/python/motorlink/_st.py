@@ -169,7 +169,8 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         """Checks with one more exchange that no late or repeated reply was taken for another reply. Call it
         before you rely on values that you read.
 
-        Raises ``LinkError`` if a reply came twice or late: read again.
+        Raises ``LinkError`` if a reply came twice or late: read again. After a confirmation or a failure of
+        another thread or task, or of a sampling, it says nothing about values that were read before that.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:
@@ -209,8 +210,8 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         ('t', 'SPEED_MEAS', 'BUS_VOLTAGE')
 
         ``t`` is the time from the first instant to the first request of the row, s. The other fields are in
-        their units, or in digits with ``raw=True``. Instants do not drift. If the line is too slow for an
-        instant, its row is missing: look at ``t``. No row is invented.
+        their units, or in digits with ``raw=True``. Instants are whole microseconds apart and do not drift. If
+        the line is too slow for an instant, its row is missing: look at ``t``. No row is invented.
 
         A list samples ``motor``. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; the fields
         are ``SPEED_MEAS_1`` and ``SPEED_MEAS_2``.
@@ -219,6 +220,9 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         segment. Each motor needs one. The client takes free segments from number 3 down. It does not take
         those that ``configure_segment`` or another sampling uses. Without a free segment it reads the
         registers one after the other.
+
+        Each value is confirmed to belong to its request. If another thread or task loses the line, the rows
+        since the last confirmation are left out. If no row is left for 1 s, it raises.
 
         A failed row raises. The exception has the rows that were read before in ``samples``. With
         ``on_error="skip"`` a row that the line lost is left out. Ctrl-C and the cancellation of a task end
@@ -250,8 +254,9 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         of :meth:`sample`. Without ``seconds`` the iterator has no end. A row is a
         :class:`motorlink.Sample`, a ``dict``.
 
-        A row is read when the loop asks for it, so its values are new. If the loop is slower than ``rate``, it
-        gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
+        A row is read when the loop asks for it, so its values are new. They are confirmed before the loop gets
+        them, at least every 10 ms: at a higher rate some rows come together. If the loop is slower than
+        ``rate``, it gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
 
         ``break`` ends the sampling and does not stop a motor. An error or Ctrl-C is raised in the loop, after
         the rows that were read before. The end of ``with`` then stops motors, as ``on_close`` says.
@@ -273,7 +278,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         motors = [(number, some, self._full_scale_amps) for number, some in wanted]
         segments, release = self._segments.for_sampling(len(motors))
         try:
-            rows = _core.StSampling(self._profile, motors, segments, rate, seconds, raw)
+            rows = self._core.sampling(self._profile, motors, segments, rate, seconds, raw)
             take = functools.partial(self._sample, rows, skip)
             return self._Sampling(self, take, names, raw=raw, release=release)
         except BaseException:

@@ -1,8 +1,10 @@
 //! A CAN bus with RMD motors, for event loops.
 
-use motorlink::LinkState;
+use std::sync::Arc;
+
 use motorlink::port::PortName;
-use motorlink::rmd::{Error, EventClient, MotorId, ScanResult, StopAction};
+use motorlink::rmd::{Asked, Error, EventClient, MotorId, ScanResult, StopAction};
+use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -11,15 +13,17 @@ use super::{Driven, fileno, outcome, seconds};
 use crate::can::{CanPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::rmd::{
-    Gears, LimitChange, RmdOptions, RmdRequest, four_currents, motor_id, motor_ids, not_stopped,
-    scan_result,
+    Gears, LimitChange, RmdOptions, RmdRequest, RmdSampling, RmdWanted, Sampled, four_currents,
+    judges, motor_id, motor_ids, not_stopped, scan_result,
 };
+use crate::sampling::Plan;
 
 /// A CAN bus with one exchange per motor at a time. Call `ask`. Then call `advance` when the
 /// descriptor is readable and when the returned time has passed.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdEventClient {
     driven: Driven<Motors>,
+    clock: Clock,
     gears: Gears,
     /// The threads of a bus of python-can.
     threads: Option<Threads>,
@@ -47,6 +51,8 @@ enum ReplyKind {
     Value(RmdRequest),
     /// The result of a scan for this ID.
     ScanResult,
+    /// A step of a sampling, which takes the reply.
+    Sampling(Arc<Py<RmdSampling>>, Asked),
 }
 
 impl RmdEventClient {
@@ -57,9 +63,21 @@ impl RmdEventClient {
         threads: Option<Threads>,
     ) -> Self {
         options.geared.iter().for_each(|(id, limits)| bus.set_limits(*id, *limits));
+        let clock = bus.clock();
         let motors = Motors { bus, asked: [const { ReplyKind::ScanResult }; MotorId::COUNT] };
-        RmdEventClient { driven: Driven::new(motors, port), gears: options.gears, threads }
+        RmdEventClient { driven: Driven::new(motors, port), clock, gears: options.gears, threads }
     }
+}
+
+/// What a step of a sampling has become.
+fn sampled(
+    bus: &mut EventClient,
+    id: MotorId,
+    asked: Asked,
+    result: Result<[u8; 8], Error>,
+) -> Sampled {
+    let confirmed = if judges(asked, &result) { bus.confirmed(id) } else { Ok(()) };
+    Sampled { result, confirmed, losses: bus.losses(id), sent: bus.sent(id) }
 }
 
 #[pymethods]
@@ -136,6 +154,39 @@ impl RmdEventClient {
         confirmed.map_err(|error| rmd_error(py, &error))
     }
 
+    /// A sampling of quantities of motors `(id, quantities, gear_ratio)`.
+    fn sampling(
+        &self,
+        py: Python<'_>,
+        motors: Vec<RmdWanted>,
+        rate: f64,
+        seconds: Option<f64>,
+        raw: bool,
+    ) -> PyResult<RmdSampling> {
+        let plan = Plan::new(py, rate, seconds)?;
+        RmdSampling::new(py, (self.port(), self.clock.clone()), motors, plan, raw)
+    }
+
+    /// Begins what is pending in a sampling for a motor. The sampling takes the reply, also an error
+    /// that is not the port's; the value is `None`.
+    fn ask_sampling(&self, py: Python<'_>, id: i64, sampling: Py<RmdSampling>) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        let begun = self.driven.step(py, |motors| {
+            let Some(asked) = sampling.get().pending(id) else { return Ok(()) };
+            match motors.bus.begin(id, asked) {
+                Ok(()) => motors.expect(id, ReplyKind::Sampling(Arc::new(sampling), asked)),
+                Err(error @ Error::Port(_)) => return Err(error),
+                Err(error) => {
+                    let over = sampled(&mut motors.bus, id, asked, Err(error.clone()));
+                    sampling.get().ended(id, over);
+                    return Err(error);
+                }
+            }
+            Ok(())
+        })?;
+        begun.map_err(|error| rmd_error(py, &error))
+    }
+
     /// Begins the scan for one ID. Its value is the result, `None` if nothing replies.
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
@@ -170,11 +221,18 @@ impl RmdEventClient {
             let wait = bus.advance(|id, result| {
                 over.push((id, asked[id.index()].clone(), result));
             });
+            for (id, asked, result) in &mut over {
+                if let ReplyKind::Sampling(sampling, asked) = asked {
+                    let result = std::mem::replace(result, Ok([0; 8]));
+                    sampling.get().ended(*id, sampled(bus, *id, *asked, result));
+                }
+            }
             (wait, over)
         })?;
         let wait = wait.map_err(|error| rmd_error(py, &error))?;
         let value = |(id, asked, result)| {
             let value = match asked {
+                ReplyKind::Sampling(..) => Ok(py.None()),
                 ReplyKind::ScanResult => match result {
                     Err(error @ Error::Port(_)) => Err(rmd_error(py, &error)),
                     result => ScanResult::of(id, result)

@@ -1,21 +1,26 @@
 //! A serial line with an ST drive, for event loops.
 
-use motorlink::LinkState;
 use motorlink::port::PortName;
-use motorlink::st::{Confirmation, EventClient, Progress};
+use motorlink::st::{Confirmation, Error, EventClient, Progress};
+use motorlink::{Clock, LinkState};
+use motorlink_telemetry::line::StExchange;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::{Driven, fileno, outcome, seconds};
 use crate::error::{invalid_value, st_error};
-use crate::st::{Answer, StOptions, StRequest, frame_code, motor_number, not_stopped};
+use crate::sampling::Plan;
+use crate::st::{
+    Answer, StOptions, StRequest, StSampling, StWanted, frame_code, motor_number, not_stopped,
+};
 
 /// A master on a serial line with one exchange at a time. Call `begin`. Then call `advance` when
 /// the descriptor is readable and when the returned time has passed, until it is done.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StEventClient {
     driven: Driven<InFlight>,
+    clock: Clock,
 }
 
 struct InFlight {
@@ -30,6 +35,10 @@ enum Asked {
     /// A request for bytes, or for nothing.
     Raw,
     Confirmation(Confirmation),
+    /// A step of a sampling, which takes the reply.
+    Sampling(Py<StSampling>, StExchange),
+    /// Such a step is over.
+    Sampled,
 }
 
 /// A reply that fits its request.
@@ -37,9 +46,22 @@ enum Read {
     Answer(u8, Py<StRequest>, Answer),
     Bytes(Vec<u8>),
     Confirmed,
+    Sampled,
 }
 
 impl InFlight {
+    /// Begins what is pending in a sampling. An error is one of the port; the sampling has others.
+    fn begin_sampling(&mut self, sampling: Py<StSampling>) -> Result<(), Error> {
+        self.asked = Asked::Sampled;
+        let Some(step) = sampling.get().pending() else { return Ok(()) };
+        match StExchange::begin(&mut self.client, step) {
+            Ok(exchange) => self.asked = Asked::Sampling(sampling, exchange),
+            Err(error @ Error::Port(_)) => return Err(error),
+            Err(error) => sampling.get().ended(Err(error), self.client.exchanged()),
+        }
+        Ok(())
+    }
+
     fn advance(&mut self, py: Python<'_>) -> Progress<Read> {
         let InFlight { client, asked } = self;
         let progress = match asked {
@@ -51,6 +73,14 @@ impl InFlight {
             Asked::Confirmation(confirmation) => match client.advance_confirmation(confirmation) {
                 Progress::Done(result) => Progress::Done(result.map(|()| Read::Confirmed)),
                 Progress::Wait(wait) => Progress::Wait(wait),
+            },
+            Asked::Sampled => Progress::Done(Ok(Read::Sampled)),
+            Asked::Sampling(sampling, exchange) => match exchange.advance(client) {
+                Progress::Wait(wait) => Progress::Wait(wait),
+                Progress::Done(result) => {
+                    sampling.get().ended(result, client.exchanged());
+                    Progress::Done(Ok(Read::Sampled))
+                }
             },
         };
         if matches!(progress, Progress::Done(_)) {
@@ -68,8 +98,9 @@ impl StEventClient {
         let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
         let client = py.detach(|| EventClient::open(&name, options.0));
         let client = client.map_err(|error| st_error(py, &error))?;
+        let clock = client.clock();
         let line = InFlight { client, asked: Asked::Raw };
-        Ok(StEventClient { driven: Driven::new(line, name.to_string()) })
+        Ok(StEventClient { driven: Driven::new(line, name.to_string()), clock })
     }
 
     /// Whether the port is open.
@@ -128,6 +159,29 @@ impl StEventClient {
         begun.map_err(|error| st_error(py, &error))
     }
 
+    /// A sampling of registers of motors `(motor, registers, full_scale_amps)`, each motor in one of
+    /// `segments` if possible.
+    fn sampling(
+        &self,
+        py: Python<'_>,
+        profile: &str,
+        motors: Vec<StWanted<'_>>,
+        segments: Vec<u8>,
+        rate: f64,
+        seconds: Option<f64>,
+        raw: bool,
+    ) -> PyResult<StSampling> {
+        let plan = Plan::new(py, rate, seconds)?;
+        let line = (self.port(), self.clock.clone());
+        StSampling::new(py, line, profile, motors, segments, plan, raw)
+    }
+
+    /// Begins what is pending in a sampling, which takes the reply; its value is `None`.
+    fn begin_sampling(&self, py: Python<'_>, sampling: Py<StSampling>) -> PyResult<()> {
+        let begun = self.driven.step(py, |line| line.begin_sampling(sampling))?;
+        begun.map_err(|error| st_error(py, &error))
+    }
+
     /// Does what it can without waiting. Returns `(True, value)` or `(True, exception)` for a
     /// completed exchange. Otherwise returns `False` and the time until the next step in s, `None`
     /// without an exchange.
@@ -148,7 +202,7 @@ impl StEventClient {
                 request.value(py, answer)
             }
             Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
-            Read::Confirmed => Ok(py.None()),
+            Read::Confirmed | Read::Sampled => Ok(py.None()),
         });
         Ok((true, Some(outcome(py, value))))
     }

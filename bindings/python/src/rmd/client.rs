@@ -14,11 +14,11 @@ use pyo3::types::{PyByteArray, PyDict, PyList};
 use super::gears::Gears;
 use super::options::{LimitChange, RmdOptions};
 use super::request::{RmdRequest, motor_id, said};
-use super::sample::RmdSampling;
+use super::sample::{RmdSampling, Wanted};
 use crate::can::{AnyPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
-use crate::sampling::{self, seconds};
+use crate::sampling::{self, Plan, seconds};
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -159,6 +159,19 @@ impl RmdClient {
         found.into_iter().map(|one| scan_result(py, one)).collect()
     }
 
+    /// A sampling of quantities of motors `(id, quantities, gear_ratio)`.
+    fn sampling(
+        &self,
+        py: Python<'_>,
+        motors: Vec<Wanted>,
+        rate: f64,
+        seconds: Option<f64>,
+        raw: bool,
+    ) -> PyResult<RmdSampling> {
+        let plan = Plan::new(py, rate, seconds)?;
+        RmdSampling::new(py, (self.bus.port(), self.clock.clone()), motors, plan, raw)
+    }
+
     /// Samples until the end, an error, or `most` rows. Returns the new rows, the instants that were
     /// skipped, and the error.
     fn sample<'py>(
@@ -170,8 +183,7 @@ impl RmdClient {
     ) -> PyResult<(Bound<'py, PyByteArray>, u64, Option<PyErr>)> {
         let bus = self.bus.get(py)?;
         let look = |py: Python<'_>| self.bus.get(py).map(drop);
-        let clock = &self.clock;
-        let (taken, outcome) = py.detach(|| sampling.run(&bus, clock, look, skip, most));
+        let (taken, outcome) = py.detach(|| sampling.run(&bus, look, skip, most));
         let (rows, skipped) = taken.into_python(py);
         Ok((rows, skipped, outcome.err()))
     }

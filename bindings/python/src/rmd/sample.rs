@@ -1,182 +1,247 @@
-//! Sampling values of motors, all of them in the same cycles.
+//! Sampling values of motors, all of them at the same instants.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
 use motorlink::port::PortError;
-use motorlink::rmd::{Client, Error, GearRatio, MotorId};
-use motorlink_proto::rmd::{Code, Field};
-use motorlink_telemetry::signal::Quantity;
+use motorlink::rmd::{Asked, Client, Error, MotorId};
+use motorlink::time::{self, Micros};
+use motorlink_telemetry::line::{LineError, RmdLine, RmdOver, RmdRelay};
+use motorlink_telemetry::rows::Absent;
+use motorlink_telemetry::signal::{Motor, Quantity, Signal, Source};
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use super::gear::{behind, gear};
-use super::request::{RmdRequest, motor_id};
-use crate::error::{invalid_value, rmd_error};
-use crate::sampling::{Plan, Rows, Taken, cell};
+use super::gear::gear;
+use super::request::motor_id;
+use crate::error::{invalid_value, line_error, rmd_error};
+use crate::sampling::{self, Column, Ending, Next, Plan, Sampler, Taken, wait_seconds};
 
-/// The quantities of one motor.
-struct Lane {
-    id: MotorId,
-    gear: Option<GearRatio>,
-    /// The command that reads each quantity, and where it is in the reply.
-    quantities: Vec<(Code, &'static Field)>,
+/// How a pending exchange ended.
+pub(crate) struct Sampled {
+    pub(crate) result: Result<[u8; 8], Error>,
+    /// Whether the replies up to it went to their own requests, if it [`judges`] them.
+    pub(crate) confirmed: Result<(), Error>,
+    /// How often the client has lost the motor.
+    pub(crate) losses: u32,
+    /// When the request was sent.
+    pub(crate) sent: time::Instant,
 }
 
-/// The requests of a row, and its values in the replies.
-struct Questions {
-    lanes: Vec<Lane>,
-    /// One request per motor in each cycle, until all requests are sent.
-    cycles: Vec<Vec<(MotorId, [u8; 8])>>,
-    raw: bool,
+/// Whether the end of an exchange says something about the replies before it.
+pub(crate) fn judges(asked: Asked, result: &Result<[u8; 8], Error>) -> bool {
+    match result {
+        Ok(_) => asked == Asked::Confirmation,
+        Err(Error::Quarantined { .. }) => false,
+        Err(_) => true,
+    }
+}
+
+/// How long a motor in quarantine is waited for.
+const PATIENCE: Micros = Micros::from_millis(2_000);
+/// The time between two attempts to ask it. Other users of the bus have it in between.
+const RETRY: Micros = Micros::from_millis(1);
+
+/// A motor in quarantine, whose exchange stays pending.
+#[derive(Debug, Clone, Copy)]
+struct Rest {
+    since: time::Instant,
+    until: time::Instant,
 }
 
 /// A motor's ID, its quantities and its gear ratio.
-type Wanted = (i64, Vec<String>, Option<f64>);
+pub(crate) type Wanted = (i64, Vec<String>, Option<f64>);
 
-/// The replies of a row: motor, command, reply.
-type Replies = Vec<(MotorId, Code, [u8; 8])>;
-
-impl Questions {
-    /// The requests for the quantities of motors.
-    fn new(py: Python<'_>, motors: Vec<Wanted>, raw: bool) -> PyResult<Self> {
-        let mut lanes = Vec::with_capacity(motors.len());
-        for (id, names, gear_ratio) in motors {
-            let named = |name: &String| Quantity::named(name).map(Quantity::read);
-            let quantities: Result<_, _> = names.iter().map(named).collect();
-            let quantities = quantities.map_err(|unknown| invalid_value(py, unknown))?;
-            let (id, gear) = (motor_id(py, id)?, gear(py, gear_ratio)?);
-            lanes.push(Lane { id, gear, quantities });
-        }
-        let mut cycles: Vec<Vec<(MotorId, [u8; 8])>> = Vec::new();
-        for lane in &lanes {
-            let mut codes: Vec<Code> = Vec::new();
-            for (code, _) in &lane.quantities {
-                if !codes.contains(code) {
-                    codes.push(*code);
-                }
-            }
-            cycles.resize_with(cycles.len().max(codes.len()), Vec::new);
-            for (cycle, code) in cycles.iter_mut().zip(codes) {
-                // The request of a read is its code.
-                cycle.push((lane.id, [code.number(), 0, 0, 0, 0, 0, 0, 0]));
-            }
-        }
-        Ok(Questions { lanes, cycles, raw })
-    }
-
-    fn values(&self, replies: &Replies) -> Vec<[u8; 8]> {
-        let mut values = Vec::new();
-        for lane in &self.lanes {
-            for (code, field) in &lane.quantities {
-                let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
-                // Each request has a reply, otherwise the row has failed.
-                let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
-                let value = behind(lane.gear, field.scale).value(digits);
-                values.push(cell(self.raw, digits, value));
-            }
-        }
-        values
-    }
-}
-
-fn replies(bus: &Client, questions: &Questions) -> Result<Replies, Error> {
-    let mut replies = Replies::new();
-    for requests in &questions.cycles {
-        let mut failed = None;
-        bus.cycle(requests, |id, outcome| match outcome {
-            Ok(reply) => {
-                let asked = requests.iter().find(|(of, _)| *of == id);
-                replies.extend(asked.map(|(_, request)| (id, Code::from(request[0]), reply)));
-            }
-            Err(error) => failed = Some(error),
-        })?;
-        if let Some(error) = failed {
-            return Err(error);
-        }
-    }
-    Ok(replies)
-}
-
-/// Rows of quantities. A blocking client calls [`RmdSampling::run`]. An event loop sends one cycle
-/// after the other.
+/// Rows of quantities. A blocking client calls [`RmdSampling::run`]. An event loop calls `next`, and
+/// carries out what is pending.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdSampling {
-    rows: Mutex<Rows>,
-    questions: Questions,
+    sampler: Mutex<Sampler>,
+    relay: RmdRelay,
+    resting: Mutex<BTreeMap<MotorId, Rest>>,
+    port: Arc<str>,
+    clock: Clock,
 }
 
 impl RmdSampling {
-    fn lock(&self) -> MutexGuard<'_, Rows> {
-        self.rows.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Quantities of motors.
+    pub(crate) fn new(
+        py: Python<'_>,
+        (port, clock): (&str, Clock),
+        motors: Vec<Wanted>,
+        plan: Plan,
+        raw: bool,
+    ) -> PyResult<Self> {
+        let mut columns = Vec::new();
+        for (id, names, gear_ratio) in motors {
+            let (id, gear) = (motor_id(py, id)?, gear(py, gear_ratio)?);
+            for name in names {
+                let quantity = Quantity::named(&name);
+                let quantity = quantity.map_err(|unknown| invalid_value(py, unknown))?;
+                let source = Source::Quantity(quantity);
+                let scale = gear.map(|gear| gear.scale(quantity.read().1.scale));
+                columns.push(Column { signal: Signal { motor: Motor::Rmd(id), source }, scale });
+            }
+        }
+        Ok(RmdSampling {
+            sampler: Mutex::new(Sampler::new(plan, columns, raw)),
+            relay: RmdRelay::default(),
+            resting: Mutex::default(),
+            port: port.into(),
+            clock,
+        })
     }
 
     /// Samples until the end, an error, or `most` rows. Returns the new rows in each case. With
-    /// `skip` a motor that does not reply costs only the row. So does a signal handler that uses
-    /// the bus.
-    pub(super) fn run(
+    /// `skip` a motor that does not reply costs only rows. So does a signal handler that uses the bus.
+    pub(crate) fn run(
         &self,
         bus: &Client,
-        clock: &Clock,
         look: impl Fn(Python<'_>) -> PyResult<()>,
         skip: bool,
         most: Option<u64>,
     ) -> (Taken, PyResult<()>) {
-        let mut rows = self.lock();
-        let outcome = rows.run(clock, &look, most, |rows| {
-            match replies(bus, &self.questions) {
-                Ok(replies) => rows.push(&self.questions.values(&replies)),
-                Err(error) if skip && error.is_line_failure() => {}
-                Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look)?,
-                Err(error) => return Err(Python::attach(|py| rmd_error(py, &error))),
+        self.begin_rows(most);
+        let step = || self.next_step(skip, most);
+        let outcome = sampling::run(&self.clock, &look, step, || self.carry_out(bus, &look));
+        (self.lock().take(), outcome)
+    }
+
+    /// The pending exchanges, in one cycle.
+    fn carry_out(&self, bus: &Client, look: &impl Fn(Python<'_>) -> PyResult<()>) -> PyResult<()> {
+        let ready: BTreeMap<_, _> = self.ready().collect();
+        let asked: Vec<_> = ready.iter().map(|(id, asked)| (*id, *asked)).collect();
+        let mut results = Vec::with_capacity(asked.len());
+        let cycle = bus.ask_each(&asked, |id, result| results.push((id, result)));
+        for (id, result) in results {
+            let confirmed = if judges(ready[&id], &result) { bus.confirmed(id) } else { Ok(()) };
+            let (losses, sent) = (bus.losses(id), bus.sent(id));
+            self.ended(id, Sampled { result, confirmed, losses, sent });
+        }
+        let Err(error) = cycle else { return Ok(()) };
+        match &error {
+            // A signal handler used the bus. The row is lost.
+            Error::Port(PortError::Overtaken { .. }) => {
+                self.lock().gave_up();
+                Python::attach(look)
             }
-            Ok(())
+            Error::Port(port) if port.is_interruption() => {
+                Err(Python::attach(|py| rmd_error(py, &error)))
+            }
+            _ => {
+                self.fail_pending(&error);
+                Ok(())
+            }
+        }
+    }
+
+    /// The port was lost, with the pending exchanges.
+    fn fail_pending(&self, why: &Error) {
+        self.lock().doubt(why.clone().into());
+        for (id, _) in self.relay.pending() {
+            let sent = self.clock.now();
+            self.relay.ended(id, RmdOver { result: Err(why.clone()), losses: None, sent });
+        }
+    }
+
+    /// The pending exchanges that can be carried out now.
+    fn ready(&self) -> impl Iterator<Item = (MotorId, Asked)> {
+        let (now, resting) = (self.clock.now(), self.resting().clone());
+        let is_ready =
+            move |id: &MotorId| resting.get(id).is_none_or(|rest: &Rest| rest.until <= now);
+        self.relay.pending().into_iter().filter(move |(id, _)| is_ready(id))
+    }
+
+    /// What is pending for a motor.
+    pub(crate) fn pending(&self, id: MotorId) -> Option<Asked> {
+        self.ready().find_map(|(of, asked)| (of == id).then_some(asked))
+    }
+
+    /// Lets a motor in quarantine rest; false if it was waited for too long.
+    fn rest(&self, id: MotorId) -> bool {
+        let now = self.clock.now();
+        let mut resting = self.resting();
+        let rest = resting.entry(id).or_insert(Rest { since: now, until: now });
+        rest.until = now + RETRY;
+        now.since(rest.since) < PATIENCE
+    }
+
+    /// What was pending for a motor is over, or is repeated if the motor is in quarantine.
+    pub(crate) fn ended(&self, id: MotorId, over: Sampled) {
+        let Sampled { result, confirmed, losses, sent } = over;
+        if matches!(result, Err(Error::Quarantined { .. })) && self.rest(id) {
+            return;
+        }
+        self.resting().remove(&id);
+        let error = result.as_ref().err().filter(|error| error.is_line_failure());
+        if let Some(error) = error.or(confirmed.as_ref().err()) {
+            self.lock().doubt(error.clone().into());
+        }
+        self.relay.ended(id, RmdOver { result, losses: Some(losses), sent });
+    }
+
+    fn begin_rows(&self, most: Option<u64>) {
+        self.lock().begin(most, || {
+            let (port, clock) = (Arc::clone(&self.port), self.clock.clone());
+            Box::new(RmdLine::relayed(self.relay.clone(), port, clock))
         });
-        (rows.take(), outcome)
+    }
+
+    fn next_step(&self, skip: bool, most: Option<u64>) -> PyResult<Next> {
+        let next = self.lock().next(most, skip, || self.ready().next().is_some());
+        match next {
+            Ok(Next::Wait(wait)) if !self.relay.pending().is_empty() => {
+                Ok(Next::Wait(wait.min(RETRY.into())))
+            }
+            Ok(next) => Ok(next),
+            Err(ending) => Err(Python::attach(|py| self.raised(py, &ending))),
+        }
+    }
+
+    fn raised(&self, py: Python<'_>, ending: &Ending) -> PyErr {
+        match ending {
+            Ending::Absent(_, Absent::Refused(error)) => line_error(py, error),
+            Ending::Absent(_, Absent::Implausible(why)) => line_error(py, &(*why).into()),
+            Ending::Doubtful(Motor::Rmd(motor)) => {
+                let (port, motor) = (Arc::clone(&self.port), *motor);
+                rmd_error(py, &Error::Unconfirmed { port, motor })
+            }
+            Ending::Doubtful(Motor::St(_)) => line_error(py, &LineError::Protocol),
+            Ending::Failed(error) => line_error(py, error),
+        }
+    }
+
+    fn resting(&self) -> MutexGuard<'_, BTreeMap<MotorId, Rest>> {
+        self.resting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Sampler> {
+        self.sampler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 #[pymethods]
 impl RmdSampling {
-    /// Quantities of motors.
-    #[new]
-    fn new(
-        py: Python<'_>,
-        motors: Vec<Wanted>,
-        rate: f64,
-        seconds: Option<f64>,
-        raw: bool,
-    ) -> PyResult<Self> {
-        let rows = Mutex::new(Rows::new(Plan::new(py, rate, seconds)?));
-        Ok(RmdSampling { rows, questions: Questions::new(py, motors, raw)? })
+    /// Begins to read `most` rows, or all. Later calls go on after a pause.
+    fn begin(&self, most: Option<u64>) {
+        self.begin_rows(most);
     }
 
-    /// The wait at this time of the event loop, s. 0 begins a row, `None` is the end.
-    fn after(&self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
-        self.lock().after_seconds(py, now)
+    /// The wait of an event loop, s. 0: exchanges are pending, `None`: there are enough rows.
+    fn next(&self, skip: bool, most: Option<u64>) -> PyResult<Option<f64>> {
+        Ok(wait_seconds(&self.next_step(skip, most)?))
     }
 
-    /// The cycles of a row: requests by ID. Their replies are bytes.
+    /// The motors with a pending exchange.
     #[getter]
-    fn cycles(&self) -> Vec<BTreeMap<u8, RmdRequest>> {
-        let named =
-            |&(id, request): &(MotorId, [u8; 8])| (id.number(), RmdRequest::for_bytes(request));
-        self.questions.cycles.iter().map(|cycle| cycle.iter().map(named).collect()).collect()
+    fn motors(&self) -> Vec<u32> {
+        self.ready().map(|(id, _)| id.number().into()).collect()
     }
 
-    /// Ends the row with the replies of its cycles.
-    fn push(&self, py: Python<'_>, answers: Vec<BTreeMap<i64, [u8; 8]>>) -> PyResult<()> {
-        let mut replies = Replies::new();
-        for (cycle, answers) in self.questions.cycles.iter().zip(answers) {
-            for (id, reply) in answers {
-                let id = motor_id(py, id)?;
-                let asked = cycle.iter().find(|(of, _)| *of == id);
-                replies.extend(asked.map(|(_, request)| (id, Code::from(request[0]), reply)));
-            }
-        }
-        self.lock().push(&self.questions.values(&replies));
-        Ok(())
+    /// The port could not be used for what is pending.
+    fn fail(&self) {
+        self.fail_pending(&PortError::Closed { port: self.port.to_string() }.into());
     }
 
     /// The new rows, each a time in s and values of eight bytes, and the skipped instants.

@@ -9,9 +9,9 @@ use pyo3::types::{PyByteArray, PyBytes, PyList};
 
 use super::options::StOptions;
 use super::request::{StRequest, motor_number};
-use super::sample::StSampling;
+use super::sample::{StSampling, Wanted};
 use crate::error::{invalid_value, st_error};
-use crate::sampling::{self, seconds};
+use crate::sampling::{self, Plan, seconds};
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -112,6 +112,23 @@ impl StClient {
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
 
+    /// A sampling of registers of motors `(motor, registers, full_scale_amps)`, each motor in one of
+    /// `segments` if possible.
+    fn sampling(
+        &self,
+        py: Python<'_>,
+        profile: &str,
+        motors: Vec<Wanted<'_>>,
+        segments: Vec<u8>,
+        rate: f64,
+        seconds: Option<f64>,
+        raw: bool,
+    ) -> PyResult<StSampling> {
+        let plan = Plan::new(py, rate, seconds)?;
+        let line = (self.client.port(), self.clock.clone());
+        StSampling::new(py, line, profile, motors, segments, plan, raw)
+    }
+
     /// Samples until the end, an error, or `most` rows. Returns the new rows, the instants that were
     /// skipped, and the error.
     fn sample<'py>(
@@ -123,8 +140,7 @@ impl StClient {
     ) -> PyResult<(Bound<'py, PyByteArray>, u64, Option<PyErr>)> {
         let client = self.client.get(py)?;
         let look = |py: Python<'_>| self.client.get(py).map(drop);
-        let clock = &self.clock;
-        let (taken, outcome) = py.detach(|| sampling.run(&client, clock, look, skip, most));
+        let (taken, outcome) = py.detach(|| sampling.run(&client, look, skip, most));
         let (rows, skipped) = taken.into_python(py);
         Ok((rows, skipped, outcome.err()))
     }

@@ -19,7 +19,7 @@ pub(crate) use options::StOptions;
 pub(crate) use profile::named as profile_named;
 pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
-pub(crate) use sample::StSampling;
+pub(crate) use sample::{StSampling, Wanted as StWanted};
 pub(crate) use scale::Scale;
 pub(crate) use scan::{st_scan_baud, st_scan_rates};
 pub(crate) use starting::StStarting;

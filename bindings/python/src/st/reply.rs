@@ -9,7 +9,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use super::scale::Scale;
-use crate::sampling::cell;
 use crate::values;
 
 /// What the payload of the acknowledge becomes.
@@ -74,24 +73,6 @@ impl Reply {
                 values.try_for_each(|(register, bits)| scale.plausible(*register, *bits))
             }
             _ => Ok(()),
-        }
-    }
-
-    /// The numbers of a reply as a sample has them; `None` if it has others.
-    pub(super) fn cells(&self, scale: &Scale, answer: Answer) -> Option<Vec<[u8; 8]>> {
-        let cell = |raw, register, bits| {
-            cell(raw, scale.raw(register, bits), scale.physical(register, bits))
-        };
-        match (answer, self) {
-            (Answer::Nothing, _) => Some(Vec::new()),
-            (Answer::Bits(bits), Reply::Number { register, raw }) => {
-                Some(vec![cell(*raw, *register, bits)])
-            }
-            (Answer::Values(values), Reply::Segment { registers, raw }) => {
-                let values = registers.iter().zip(values);
-                Some(values.map(|(register, bits)| cell(*raw, *register, bits)).collect())
-            }
-            _ => None,
         }
     }
 

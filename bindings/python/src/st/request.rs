@@ -79,11 +79,6 @@ impl StRequest {
         Self::asked(scale, Request::GetSegment(segment), reply)
     }
 
-    /// The numbers of a reply as a sample has them.
-    pub(super) fn cells(&self, answer: Answer) -> Option<Vec<[u8; 8]>> {
-        self.reply.cells(&self.scale, answer)
-    }
-
     /// The value for Python.
     pub(crate) fn value(&self, py: Python<'_>, answer: Answer) -> PyResult<Py<PyAny>> {
         self.reply.value(py, &self.scale, answer)
@@ -399,9 +394,12 @@ impl StRequest {
 /// A motor number, 0 to 7, where 0 is the motor that the drive has selected.
 pub(crate) fn motor_number(py: Python<'_>, motor: i64) -> PyResult<u8> {
     let number = u8::try_from(motor).ok().filter(|number| *number <= MotorNumber::MAX);
-    number.ok_or_else(|| {
-        invalid_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
-    })
+    number.ok_or_else(|| no_such_motor(py, motor))
+}
+
+/// The error of a motor number that no drive has.
+pub(super) fn no_such_motor(py: Python<'_>, motor: i64) -> PyErr {
+    invalid_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
 }
 
 fn named_command(py: Python<'_>, name: &str) -> PyResult<Command> {

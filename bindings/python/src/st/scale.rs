@@ -4,6 +4,7 @@ use motorlink::st::register::{Type, Unit};
 use motorlink::st::{
     FullScale, Implausible, Profile, Reading, RegisterId, find_register, parse_value,
 };
+use motorlink_proto::units;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -79,6 +80,11 @@ impl Scale {
             Some(full_scale) if is_current(register) => full_scale.scale().value(bits.into()),
             _ => self.reading(register, bits).value(),
         }
+    }
+
+    /// The scale of a register that is a current, if the full scale is known.
+    pub(super) fn of_current(&self, register: RegisterId) -> Option<units::Scale> {
+        self.full_scale.filter(|_| is_current(register)).map(|full_scale| full_scale.scale())
     }
 
     /// Checks that the profile may be right for a read value.

@@ -12,40 +12,34 @@ from motorlink.errors import LinkError, ReplyTimeoutError
 
 
 class Rows(Protocol):
-    """The rows of both protocols, of the extension module."""
+    """A sampling of either protocol, of the extension module."""
 
-    def after(self, now: float) -> float | None: ...
+    def begin(self, most: int | None) -> None: ...
+    def next(self, skip: bool, most: int | None) -> float | None: ...
+    def fail(self) -> None: ...
     def take(self) -> tuple[bytearray, int]: ...
 
 
-async def nothing() -> None:
-    """The preparation of a sampling that needs none."""
-
-
 async def sampled(
-    rows: Rows,
-    row: Callable[[], Awaitable[None]],
-    *,
-    skip: bool,
-    most: int | None,
-    prepare: Callable[[], Awaitable[None]] = nothing,
+    rows: Rows, carry_out: Callable[[], Awaitable[None]], *, skip: bool, most: int | None
 ) -> tuple[bytearray, int, BaseException | None]:
-    """Reads a row at each instant. Returns the new rows, the skipped instants and the error."""
-    loop = asyncio.get_running_loop()
+    """Drives a sampling. Returns the new rows, the skipped instants and the error.
+
+    ``carry_out`` carries out the pending exchanges. It raises only errors of the port.
+    """
     ended: BaseException | None = None
-    count = 0
     try:
-        await prepare()
-        while count != most and (wait := rows.after(loop.time())) is not None:
+        rows.begin(most)
+        while (wait := rows.next(skip, most)) is not None:
             if wait:
                 await asyncio.sleep(wait)
                 continue
             try:
-                await row()
-                count += 1
+                await carry_out()
             except (LinkError, ReplyTimeoutError):
                 if not skip:
                     raise
+                rows.fail()
     except BaseException as error:
         ended = error
     return (*rows.take(), ended)

@@ -111,18 +111,12 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
         return found
 
     async def _sample(self, sampling: RmdSampling, skip: bool, most: int | None) -> Any:
-        cycles = sampling.cycles
+        async def carry_out() -> None:
+            await self._gather(
+                sampling.motors, lambda id: self._core.ask_sampling(id, sampling)
+            )
 
-        async def row() -> None:
-            answers = []
-            for cycle in cycles:
-                answers.append(await self._cycle(list(cycle.items())))
-                for answer in answers[-1].values():
-                    if isinstance(answer, MotorlinkError):
-                        raise answer
-            sampling.push(answers)
-
-        return await sampled(sampling, row, skip=skip, most=most)
+        return await sampled(sampling, carry_out, skip=skip, most=most)
 
     async def _gather(self, ids: Iterable[int], ask: Callable[[int], None]) -> dict[int, Any]:
         """Asks each motor. Returns each reply, or why the motor was not asked, by ID."""

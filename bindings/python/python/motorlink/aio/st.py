@@ -28,13 +28,7 @@ from motorlink._st_motor import StMotor
 from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._settings import Settings
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
-from motorlink.errors import (
-    InvalidValueError,
-    LinkError,
-    MotorlinkError,
-    RefusedError,
-    ReplyTimeoutError,
-)
+from motorlink.errors import LinkError, MotorlinkError, ReplyTimeoutError
 
 __all__ = ["Client", "Motor", "Opening", "RegisterNames", "open", "scan"]
 
@@ -99,21 +93,9 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Samp
 
     async def _sample(self, sampling: StSampling, skip: bool, most: int | None) -> Any:
         async def carry_out() -> None:
-            while (asked := sampling.request()) is not None:
-                try:
-                    value = await self._exchange(*asked)
-                except (RefusedError, InvalidValueError):
-                    # A segment that the drive lost, or that was configured before the port was opened again.
-                    if not sampling.refused():
-                        raise
-                else:
-                    sampling.answered(value)
+            await self._carry_out(lambda: self._core.begin_sampling(sampling))
 
-        async def row() -> None:
-            await carry_out()
-            sampling.push()
-
-        return await sampled(sampling, row, skip=skip, most=most, prepare=carry_out)
+        return await sampled(sampling, carry_out, skip=skip, most=most)
 
     async def _carry_out(self, begin: Callable[[], None]) -> Any:
         async with self._turn:
