@@ -6,9 +6,11 @@ import threading
 
 import pytest
 
+from peers import device
 from program import eventually
 from st_wire import SET_REG, header
 from test_json import check
+from test_settings import drive, value
 
 #: Each protocol with two settings, an RMD motor's with a motor that answers a busy machine.
 PROTOCOLS = {
@@ -355,19 +357,71 @@ def test_after_kill_the_difference_shows_what_was_not_written(slow_restore):
     command("diff", file).ended(0)
 
 
+PUTTING_BACK = "putting the old values back; another Ctrl-C leaves the settings mixed"
+
+
 def test_ctrl_c_puts_the_old_values_back(slow_restore):
     slow, command, file, before = slow_restore()
     slow.interrupt()
+    slow.says(PUTTING_BACK)
     assert slow.wait(within=30) == 130
     (said,) = [line for line in slow.err if line.startswith("interrupted")]
     assert "rolled back to the old values: SPEED_KP, SPEED_KI, TORQUE_KP" in said
     assert command("dump").ended(0).out == before
 
 
-def test_a_second_ctrl_c_ends_a_restore_at_once(slow_restore):
-    slow, command, file, _ = slow_restore()
+def test_ctrl_c_puts_the_old_values_back_until_all_are_read_again(slow_restore):
+    slow, command, file, before = slow_restore()
+    # The last write, its read-back, and the first register of the last check.
+    slow.says(f"SET_REG {[*MANY][-1]}")
+    slow.until(lambda: sum("GET_REG SPEED_KP" in line for line in slow.err) == 3, "the last check", within=30)
     slow.interrupt()
-    slow.says("SET_REG SPEED_KP")
+    slow.says(PUTTING_BACK)
+    assert slow.wait(within=30) == 130
+    assert command("dump").ended(0).out == before
+
+
+def test_a_second_ctrl_c_names_the_settings_that_are_mixed(slow_restore):
+    slow, command, file, before = slow_restore()
+    slow.interrupt()
+    slow.says("SET_REG SPEED_KI")
+    slow.until(lambda: sum("SET_REG SPEED_KI" in line for line in slow.err) == 2, "its roll-back")
     slow.interrupt()
     assert slow.wait() == 130
-    assert command("diff", file).ended(1).out
+    (said,) = [line for line in slow.err if line.startswith("interrupted")]
+    assert "unknown, old or new: SPEED_KI; as in the file: SPEED_KP; all others are as before" in said
+    assert "rolled back to the old values: TORQUE_KP" in said
+    assert f"diff {file}` shows what differs" in said
+    # The message is right.
+    left = command("diff", file, "--json").ended(1).json["values"]
+    assert {"SPEED_KP", "TORQUE_KP"} & left.keys() == {"TORQUE_KP"}
+
+
+def test_a_third_ctrl_c_ends_a_restore_that_waits_for_a_reply(start, tmp_path):
+    file = tmp_path / "motor1.toml"
+    file.write_text('[st]\nprofile = "spec"\n[st.settings]\nSPEED_KP = 9\n')
+    answer = drive(lambda: value(700), lambda _: None)
+    # No write is answered.
+    with device(tmp_path / "st0", lambda request: b"" if request[0] == header(SET_REG, 1) else answer(request)) as port:
+        slow = start("st", "-p", port, "--timeout", "60s", "--trace", "restore", file)
+        slow.says("SET_REG SPEED_KP")
+        slow.interrupt()
+        slow.says(PUTTING_BACK)
+        slow.interrupt()
+        # Another signal: two of a kind that come at once are one.
+        slow.process.terminate()
+        assert slow.wait() == 130
+    assert slow.err[-1] == f"interrupted; the roll-back did not end; `motorlink st -p {port} diff {file}` shows what differs"
+
+
+def test_ctrl_c_before_the_first_write_changes_nothing(run, start, sim, tmp_path):
+    port = sim(st=("pty",), rmd=()).st
+    file = tmp_path / "motor1.toml"
+    before = run("st", "-p", port, "dump").ended(0).out
+    file.write_text(changed(before, MANY))
+    slow = start("st", "-p", port, "--trace", "--fault", "delay=100ms", "restore", file)
+    slow.says("GET_REG SPEED_KP")
+    slow.interrupt()
+    assert slow.wait() == 130
+    assert slow.err[-1] == "interrupted; nothing was changed"
+    assert not any("SET_REG" in line for line in slow.err)

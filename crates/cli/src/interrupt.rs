@@ -5,7 +5,7 @@
 
 use std::ops::RangeInclusive;
 use std::process::exit;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -30,11 +30,12 @@ const LINUX: [RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
 const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 
 static HANDLE: OnceLock<Handle> = OnceLock::new();
-static TAKEN_OVER: AtomicBool = AtomicBool::new(false);
-static HOLDS: AtomicBool = AtomicBool::new(false);
-/// The motors of a stop that is not confirmed.
-static STOPPING: Mutex<Option<String>> = Mutex::new(None);
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// How many signals came.
+static COUNT: AtomicUsize = AtomicUsize::new(0);
+/// How many signals do not end the process at once.
+static LEFT: AtomicUsize = AtomicUsize::new(0);
+/// Printed when a signal ends the process at once.
+static AT_END: Mutex<Option<String>> = Mutex::new(None);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
 /// Ends what a loop waits for.
@@ -58,12 +59,12 @@ pub fn install() {
 /// From now on the caller polls [`interrupted`] and ends in order. A second signal ends the process at
 /// once.
 pub fn take_over() {
-    TAKEN_OVER.store(true, Ordering::SeqCst);
+    LEFT.store(1, Ordering::SeqCst);
 }
 
-/// Whether a second signal, too, leaves the end to the caller of [`take_over`].
+/// Whether all signals leave the end to the caller, or the first one, as after [`take_over`].
 pub fn hold_on(holds: bool) {
-    HOLDS.store(holds, Ordering::SeqCst);
+    LEFT.store(if holds { usize::MAX } else { 1 }, Ordering::SeqCst);
 }
 
 /// As [`take_over`], and `end` ends what the caller waits for. A signal calls it in another thread.
@@ -72,11 +73,16 @@ pub fn take_over_with(end: impl Fn() + Send + 'static) {
     take_over();
 }
 
+/// As [`take_over_with`], and a second signal does not end the process either. A third one does.
+pub fn take_over_two_with(end: impl Fn() + Send + 'static) {
+    take_over_with(end);
+    LEFT.store(2, Ordering::SeqCst);
+}
+
 /// As [`take_over`], if motors depend on this process: all signals that would end it are handled, a second
 /// signal does not end it at once, and no signal suspends it.
 pub fn hold() {
     hold_on(true);
-    take_over();
     let Some(handle) = HANDLE.get() else { return };
     let killing: Vec<i32> = KILLING.into_iter().chain(LINUX.into_iter().flatten()).collect();
     for signal in obeyed(&killing).into_iter().chain(SUSPENDING) {
@@ -90,18 +96,24 @@ pub fn hold() {
 /// bounded. A second signal ends the process and prints that the motors may still be turning.
 pub fn complete_stop(motors: impl Into<String>) {
     never_wait_for_messages();
-    *stopping() = Some(motors.into());
+    let motors = motors.into();
+    note_at_end(format!("{motors} may still be turning: a signal ended the stop; {STOP_AGAIN}"));
     take_over();
+}
+
+/// A signal that ends the process at once prints this.
+pub fn note_at_end(text: String) {
+    *at_end() = Some(text);
 }
 
 /// The stop has its outcome: signals end the process at once again.
 pub fn stop_is_complete() {
-    TAKEN_OVER.store(false, Ordering::SeqCst);
-    *stopping() = None;
+    LEFT.store(0, Ordering::SeqCst);
+    *at_end() = None;
 }
 
-fn stopping() -> MutexGuard<'static, Option<String>> {
-    STOPPING.lock().unwrap_or_else(PoisonError::into_inner)
+fn at_end() -> MutexGuard<'static, Option<String>> {
+    AT_END.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn obey(signal: i32) {
@@ -110,10 +122,10 @@ fn obey(signal: i32) {
             "not suspended: motors depend on this program; to run it in the background start it with `&`",
         );
     }
-    let is_first = !INTERRUPTED.swap(true, Ordering::SeqCst);
-    if !TAKEN_OVER.load(Ordering::SeqCst) || !(is_first || HOLDS.load(Ordering::SeqCst)) {
-        if let Some(motors) = stopping().take() {
-            note(format!("{motors} may still be turning: a signal ended the stop; {STOP_AGAIN}"));
+    let count = COUNT.fetch_add(1, Ordering::SeqCst) + 1;
+    if count > LEFT.load(Ordering::SeqCst) {
+        if let Some(text) = at_end().take() {
+            note(text);
             finish();
         }
         exit(INTERRUPTED_CODE);
@@ -139,7 +151,12 @@ fn ignored(status: &str) -> u64 {
 
 /// Whether a signal came.
 pub fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::SeqCst)
+    COUNT.load(Ordering::SeqCst) > 0
+}
+
+/// Whether a second signal came.
+pub fn is_repeated() -> bool {
+    COUNT.load(Ordering::SeqCst) > 1
 }
 
 /// As [`wait`], by a port's clock, which may be virtual.

@@ -109,7 +109,8 @@ enum Failed<E> {
 impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     /// Writes the settings that differ, reads each back, and returns when the motor has all of them. With
     /// [`Permissions::rom`] gains are made permanent at the end, also if they did not differ: the values in
-    /// ROM cannot be read. `is_interrupted` ends the restore before the next write.
+    /// ROM cannot be read. `is_interrupted` is asked before each write, and after the last read-back. It
+    /// ends the restore, and the old values are written again.
     ///
     /// # Errors
     /// Nothing was written, or the old values were written again, as far as the line allowed.
@@ -245,6 +246,9 @@ impl<'a, Id: Copy + PartialEq + Send + Sync, E: StepError> Restoring<'a, Id, E> 
             && let Err(cause) = self.check_all().await
         {
             return Err(self.undo(cause).await.into());
+        }
+        if !self.written.is_empty() && is_interrupted() {
+            return Err(self.undo(Cause::Interrupted).await.into());
         }
         for block in comparison.to_keep(permissions) {
             if is_interrupted() {

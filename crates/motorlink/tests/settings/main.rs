@@ -249,7 +249,7 @@ fn an_interrupted_restore_puts_the_old_values_back() {
     let before = text(&motor);
     let other = changed(&before, &[("SPEED_KP", 5), ("SPEED_KI", 6), ("FF_2", 7)]);
     let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
-    for writes in 0..3 {
+    for writes in 0..=3 {
         let comparison = Comparison::read(&motor, &file).unwrap();
         let mut asked = 0;
         let result = comparison.restore(&motor, RAM, || {

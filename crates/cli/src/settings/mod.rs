@@ -1,5 +1,7 @@
 //! `dump`, `diff` and `restore`: settings of a motor as text, for both protocols.
 
+mod interruption;
+
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -13,9 +15,11 @@ use motorlink_link::printable;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::{Line, Row};
-use crate::output::{Printer, never_wait_for_messages, note};
+use crate::output::{Printer, note};
 use crate::outputs::{self, Output};
-use crate::pasteable::quoted;
+use crate::pasteable::{self, quoted};
+
+use interruption::{Ended, Interruptible};
 
 /// The name of stdin.
 const STDIN: &str = "-";
@@ -120,21 +124,24 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
     /// `restore`: shows the settings that differ, writes them and reads them back.
     fn restore(self, args: &RestoreArgs) -> Result<(), Failure> {
         let permissions = Permissions { rom: self.write_rom, running: args.running };
+        interruption::begin();
         let comparison = self.compare(&args.file)?;
         self.show(&comparison, &args.file)?;
+        let motor = Interruptible::new(&self.motor);
         let failed = |error| self.not_restored(error, &args.file);
         if args.dry_run {
-            comparison.check(&self.motor, permissions).map_err(failed)?;
+            comparison.check(&motor, permissions).map_err(failed)?;
             if !self.output.json {
                 note("nothing was written");
             }
             return Ok(());
         }
-        // A signal ends the restore before its next write.
-        never_wait_for_messages();
-        interrupt::take_over();
-        let restored = comparison.restore(&self.motor, permissions, interrupt::interrupted);
-        restored.map_err(failed)?;
+        let mixed = format!("interrupted; the roll-back did not end; {}", self.advice(&args.file));
+        motor.take_over(pasteable::complete(&mixed, None));
+        comparison.restore(&motor, permissions, interrupt::interrupted).map_err(failed)?;
+        if interrupt::interrupted() {
+            note("interrupted too late: all settings are written");
+        }
         let differences: Vec<Difference> = comparison.differences().collect();
         let before = differences.iter().map(|one| row(one.setting, one.now)).collect::<Vec<_>>();
         let after = differences.iter().map(|one| row(one.setting, one.file)).collect::<Vec<_>>();
@@ -226,7 +233,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         Ok(())
     }
 
-    fn not_restored(&self, error: RestoreError<M::Error>, args: &FileArg) -> Failure {
+    fn not_restored(&self, error: RestoreError<Ended<M::Error>>, args: &FileArg) -> Failure {
         let text = error.to_string();
         match error {
             RestoreError::Rom { .. } => Failure::usage(text)
@@ -235,18 +242,28 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
                 let stop = format!("`motorlink {} stop`", self.motor.tuning().kind().protocol);
                 Failure::refused(text).trying(format!("stop it first: {stop}; or add --running"))
             }
-            RestoreError::Before(error) => error.into().then("nothing was written"),
+            RestoreError::Before(Ended::Interrupted) => {
+                note(text);
+                Failure::Interrupted
+            }
+            RestoreError::Before(Ended::Exchange(error)) => {
+                error.into().then("nothing was written")
+            }
             RestoreError::Undone(undone) => self.undone(text, *undone, args),
             _ => Failure::usage(text),
         }
     }
 
-    /// The failure of a restore that ended early, with the state of the motor.
-    fn undone(&self, text: String, undone: Undone<M::Error>, args: &FileArg) -> Failure {
+    /// How the settings of a motor are shown that was not restored.
+    fn advice(&self, args: &FileArg) -> String {
         let Kind { protocol, .. } = self.motor.tuning().kind();
-        let diff =
-            format!("`motorlink {protocol} diff {}`", quoted(&args.file.display().to_string()));
-        let show = format!("{diff} shows what differs");
+        let file = quoted(&args.file.display().to_string());
+        format!("`motorlink {protocol} diff {file}` shows what differs")
+    }
+
+    /// The failure of a restore that ended early, with the state of the motor.
+    fn undone(&self, text: String, undone: Undone<Ended<M::Error>>, args: &FileArg) -> Failure {
+        let show = self.advice(args);
         let is_complete = undone.is_complete();
         let states = [
             ("rolled_back", &undone.rolled_back),
@@ -259,14 +276,14 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
             line = line.with(name, settings.clone());
         }
         let failure = match undone.cause {
-            Cause::Interrupted => {
+            Cause::Interrupted | Cause::Exchange { error: Ended::Interrupted, .. } => {
                 note(match is_complete {
                     true => text,
-                    false => format!("{text}; {}", crate::pasteable::complete(&show, None)),
+                    false => format!("{text}; {}", pasteable::complete(&show, None)),
                 });
                 return Failure::Interrupted;
             }
-            Cause::Exchange { error, .. } => error.into().saying(text),
+            Cause::Exchange { error: Ended::Exchange(error), .. } => error.into().saying(text),
             Cause::Differs { .. } => Failure::refused(text),
         };
         let failure = if is_complete { failure } else { failure.trying_also(&show) };
