@@ -156,6 +156,11 @@ def test_a_motor_that_turns_is_restored_on_request_only(motor, tmp_path, protoco
         (("SPEED_KD = 0", "SPEED_KD = 99999999999999999999"), 2, "is outside -32768 to 32767 s16A/unit"),
         (("SPEED_KD = 0", "SPEED_KD = '0 A'"), 2, "line 14: SPEED_KD is '0 A', and not a number: write the number alone"),
         (("SPEED_KD = 0", "OBSERVER_CR_C1 = 1"), 1, "drives that are built with: state observer with CORDIC; remove the line"),
+        (("SPEED_KD = 0", "OBSERVER_CR_C1 = 1\nOBSERVER_CR_C2 = 1"), 1, "error: OBSERVER_CR_C1, OBSERVER_CR_C2 of /"),
+        (("SPEED_KD = 0", "OBSERVER_CR_C1 = 1\nOBSERVER_CR_C2 = 1"), 1, "remove these lines if the drive does not have these settings"),
+        (("SPEED_KD = 0", "TORQUE_REF = 1"), 2, "line 14: TORQUE_REF is a register but not a setting: a write could turn the motor or charge a bus; nothing was sent; remove the line, and use `motorlink st"),
+        (("SPEED_KD = 0", "DAC_OUT1 = 1"), 2, "DAC_OUT1 is a register but not a setting: it belongs to one measurement"),
+        (("SPEED_KD = 0", "SPEED_MEAS = 1"), 2, "SPEED_MEAS is a register but not a setting: it cannot be both read and written; nothing was sent; remove the line"),
     ],
 )
 def test_a_file_that_is_not_for_this_motor_is_refused(motor, tmp_path, change, code, said):

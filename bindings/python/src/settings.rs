@@ -301,9 +301,10 @@ fn value(py: Python<'_>, setting: &Setting, digits: i64) -> PyResult<Py<PyAny>> 
 
 /// The exception for settings of a file that cannot be read.
 fn not_read(py: Python<'_>, tuning: impl Tuning, unread: Unread<Raised>) -> PyErr {
-    let advice = match unread.error.is_refusal() {
-        true => "; remove the line if the drive does not have this setting",
-        false => "",
+    let advice = match (unread.error.is_refusal(), unread.settings.len()) {
+        (false, _) => "",
+        (true, 1) => "; remove the line if the drive does not have this setting",
+        (true, _) => "; remove these lines if the drive does not have these settings",
     };
     let message = format!("{unread}; nothing was written{advice}");
     settings_error(py, message, tuning.kind().motor, [&[], &[], &[], &[]], unread.error.cause())

@@ -7,8 +7,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use motorlink::settings::{
-    self, Cause, Comparison, Difference, Id, Kind, Permissions, Problem, RestoreError, Setting,
-    SettingsFile, StepError, Tunable, Tuning, Undone, Unread,
+    self, Cause, Comparison, Difference, Id, Kind, NotASetting, Permissions, Problem, RestoreError,
+    Setting, SettingsFile, StepError, Tunable, Tuning, Undone, Unread,
 };
 use motorlink_link::printable;
 
@@ -173,22 +173,30 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
                 Problem::OtherProfile { file, .. } => {
                     failure.trying(format!("add --profile {file} if the drive speaks it"))
                 }
+                Problem::NotASetting {
+                    name,
+                    why: NotASetting::Acts | NotASetting::OneMeasurement,
+                } => failure.trying(format!("remove the line, and use `motorlink st set {name}`")),
+                Problem::NotASetting { .. } => failure.trying("remove the line"),
                 _ => failure,
             }
         })?;
         Comparison::read(&self.motor, &file).map_err(|unread| {
             let names = unread.settings.join(", ");
             let is_refusal = unread.error.is_refusal();
+            let count = unread.settings.len();
             let failure = (self.unread)(unread);
             let failure = match names.is_empty() {
                 true => failure,
                 false => failure.with_fact(format!("{names} of {name} cannot be read")),
             };
-            match is_refusal {
-                true => {
+            match (is_refusal, count) {
+                (false, _) => failure,
+                (true, 1) => {
                     failure.trying_also("remove the line if the drive does not have this setting")
                 }
-                false => failure,
+                (true, _) => failure
+                    .trying_also("remove these lines if the drive does not have these settings"),
             }
         })
     }

@@ -1,7 +1,7 @@
 //! Compares the settings of a motor with those of a file.
 
 use super::procedure::{Line, Procedure};
-use super::{Setting, SettingsFile, Tunable, Tuning, Writing, list};
+use super::{Setting, SettingsFile, StepError, Tunable, Tuning, Writing, list};
 
 /// The settings of a motor that a file has, too.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Difference<'a> {
 pub struct Unread<E> {
     /// The names of the settings; empty if it is about all of them.
     pub settings: Vec<String>,
-    /// The error of the exchange.
+    /// The error of the first exchange that failed.
     pub error: E,
 }
 
@@ -57,7 +57,7 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     /// Reads the settings that the file has.
     ///
     /// # Errors
-    /// Those of an exchange. The motor does not have a setting of the file.
+    /// Those of an exchange. The motor does not have settings of the file: the error has all of them.
     pub fn read<M>(motor: &M, file: &SettingsFile) -> Result<Self, Unread<M::Error>>
     where
         M: Tunable<Tuning: Tuning<Id = Id>>,
@@ -73,29 +73,37 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     where
         T: Tuning<Id = Id> + Send + Sync + 'a,
         Id: 'a,
-        E: Send + 'a,
+        E: StepError + Send + 'a,
     {
         let file = file.clone();
         Procedure::new(|line| async move { Self::ask(&tuning, &line, &file).await })
     }
 
-    async fn ask<T: Tuning<Id = Id>, E>(
+    async fn ask<T: Tuning<Id = Id>, E: StepError>(
         tuning: &T,
         line: &Line<Id, E>,
         file: &SettingsFile,
     ) -> Result<Self, Unread<E>> {
         let mut blocks = Vec::new();
+        let mut refused: Option<Unread<E>> = None;
         for block in tuning.blocks() {
             let wanted = block.settings.iter().map(|setting| file.digits(setting));
             let wanted: Vec<Option<i64>> = wanted.collect();
             if wanted.iter().all(Option::is_none) {
                 continue;
             }
-            let now = line.read(block.id).await.map_err(|error| {
-                let named = block.settings.iter().zip(&wanted).filter(|(_, file)| file.is_some());
-                let settings = named.map(|(setting, _)| setting.name.clone()).collect();
-                Unread { settings, error }
-            })?;
+            let named = block.settings.iter().zip(&wanted).filter(|(_, file)| file.is_some());
+            let names = named.map(|(setting, _)| setting.name.clone());
+            let now = match line.read(block.id).await {
+                Ok(now) => now,
+                // The other settings are read as well, so that one error has all names.
+                Err(error) if error.is_refusal() => {
+                    let refused = refused.get_or_insert(Unread { settings: Vec::new(), error });
+                    refused.settings.extend(names);
+                    continue;
+                }
+                Err(error) => return Err(Unread { settings: names.collect(), error }),
+            };
             let file: Vec<i64> =
                 wanted.iter().zip(&now).map(|(file, now)| file.unwrap_or(*now)).collect();
             let expected = tuning.expected(block.id, file.clone());
@@ -104,7 +112,10 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
         }
         let confirmed = line.confirm().await;
         confirmed.map_err(|error| Unread { settings: Vec::new(), error })?;
-        Ok(Comparison { blocks })
+        match refused {
+            Some(unread) => Err(unread),
+            None => Ok(Comparison { blocks }),
+        }
     }
 
     /// The settings that differ, in the order of the file.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use motorlink_link::printable;
+use motorlink_proto::st::NotASetting;
 use motorlink_proto::units::Unfit;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
@@ -104,6 +105,14 @@ pub enum Problem {
         /// The most similar name, if there is one.
         nearest: Option<String>,
     },
+    /// A register has this name, and is not a setting.
+    #[error("{name} is a register but not a setting: {}", reason(*.why))]
+    NotASetting {
+        /// The name.
+        name: String,
+        /// Why it is not.
+        why: NotASetting,
+    },
     /// Not a number.
     #[error("{name} is {text}, and not a number{}", unit_alone(.unit))]
     NotANumber {
@@ -138,6 +147,14 @@ fn suggestion(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
+fn reason(why: NotASetting) -> &'static str {
+    match why {
+        NotASetting::Acts => "a write could turn the motor or charge a bus",
+        NotASetting::OneMeasurement => "it belongs to one measurement",
+        NotASetting::NotReadAndWritten => "it cannot be both read and written",
+    }
+}
+
 fn unit_alone(unit: &str) -> String {
     match unit {
         "" => String::new(),
@@ -154,14 +171,34 @@ impl SettingsFile {
     /// # Errors
     /// The text has another form, or is for another kind of motor.
     pub fn parse<T: Tuning>(text: &str, tuning: &T) -> Result<Self, FileError> {
-        let settings: Vec<Setting> =
-            tuning.blocks().into_iter().flat_map(|block| block.settings).collect();
-        Text { text }.settings(&tuning.kind(), &settings)
+        let settings = tuning.blocks().into_iter().flat_map(|block| block.settings).collect();
+        let names = Names { settings, not_a_setting: &|name| tuning.not_a_setting(name) };
+        Text { text }.settings(&tuning.kind(), &names)
     }
 
     /// The digits of a setting, if the file has it.
     pub(super) fn digits(&self, setting: &Setting) -> Option<i64> {
         self.values.get(&setting.name).copied()
+    }
+}
+
+/// The names that a motor has.
+struct Names<'a> {
+    settings: Vec<Setting>,
+    /// Why another name is not a setting.
+    not_a_setting: &'a dyn Fn(&str) -> Option<NotASetting>,
+}
+
+impl Names<'_> {
+    fn setting(&self, name: &str) -> Result<&Setting, Problem> {
+        if let Some(setting) = self.settings.iter().find(|setting| setting.name == name) {
+            return Ok(setting);
+        }
+        if let Some(why) = (self.not_a_setting)(name) {
+            return Err(Problem::NotASetting { name: name.to_owned(), why });
+        }
+        let known: Vec<String> = self.settings.iter().map(|setting| setting.name.clone()).collect();
+        Err(unknown(name, &known))
     }
 }
 
@@ -171,7 +208,7 @@ struct Text<'a> {
 }
 
 impl Text<'_> {
-    fn settings(&self, kind: &Kind, settings: &[Setting]) -> Result<SettingsFile, FileError> {
+    fn settings(&self, kind: &Kind, names: &Names<'_>) -> Result<SettingsFile, FileError> {
         if self.text.len() > SettingsFile::MAX_SIZE {
             return Err(self.error(0..0, Problem::TooLong));
         }
@@ -187,7 +224,7 @@ impl Text<'_> {
             match key.get_ref().as_ref() {
                 PROFILE if kind.profile.is_some() => profile = Some(self.profile(kind, value)?),
                 MOTOR => self.motor(kind, value)?,
-                SETTINGS => values = Some(self.values(settings, key.span(), value)?),
+                SETTINGS => values = Some(self.values(names, key.span(), value)?),
                 name => {
                     let known = [PROFILE, MOTOR, SETTINGS].map(str::to_owned);
                     return Err(self.error(key.span(), unknown(name, &known)));
@@ -274,7 +311,7 @@ impl Text<'_> {
 
     fn values(
         &self,
-        settings: &[Setting],
+        names: &Names<'_>,
         place: Range<usize>,
         value: &Spanned<DeValue<'_>>,
     ) -> Result<BTreeMap<String, i64>, FileError> {
@@ -285,11 +322,7 @@ impl Text<'_> {
         let mut values = BTreeMap::new();
         for (key, value) in in_order(table) {
             let name = key.get_ref().as_ref();
-            let Some(setting) = settings.iter().find(|setting| setting.name == name) else {
-                let known: Vec<String> =
-                    settings.iter().map(|setting| setting.name.clone()).collect();
-                return Err(self.error(key.span(), unknown(name, &known)));
-            };
+            let setting = names.setting(name).map_err(|why| self.error(key.span(), why))?;
             let digits = self.digits(setting, value).map_err(|why| self.error(key.span(), why))?;
             if value.span().end == self.text.len() {
                 return Err(self.error(key.span(), Problem::CutOff(setting.name.clone())));

@@ -25,6 +25,7 @@ mod restore;
 mod rmd;
 mod st;
 
+pub use motorlink_proto::st::NotASetting;
 use motorlink_proto::units::Scale;
 
 pub use compare::{Comparison, Difference, Unread};
@@ -123,6 +124,9 @@ pub trait Tuning {
 
     /// The blocks of its protocol, in the order of a file. The motor may not have all of them.
     fn blocks(&self) -> Vec<Block<Self::Id>>;
+
+    /// Why a name is not that of a setting, if it is that of another register.
+    fn not_a_setting(&self, name: &str) -> Option<NotASetting>;
 
     /// The request that asks this.
     fn request(&self, ask: &Ask<Self::Id>) -> Self::Request;

@@ -6,7 +6,7 @@ use motorlink_proto::rmd::{
     WriteEncoderOffsetRom, WritePidRam, WritePidRom,
 };
 
-use super::{Answer, Ask, Block, Kind, Setting, StepError, Tunable, Tuning, Writing};
+use super::{Answer, Ask, Block, Kind, NotASetting, Setting, StepError, Tunable, Tuning, Writing};
 use crate::rmd::{Error, Motor};
 
 /// What one request of an RMD motor writes.
@@ -61,6 +61,10 @@ impl Tuning for RmdTuning {
                 heading: "Zero of the encoder in counts, of this one motor; it is in ROM",
             },
         ]
+    }
+
+    fn not_a_setting(&self, _: &str) -> Option<NotASetting> {
+        None
     }
 
     fn request(&self, ask: &Ask<RmdBlock>) -> [u8; 8] {

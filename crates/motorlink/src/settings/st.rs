@@ -8,7 +8,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::Scale;
 
-use super::{Answer, Ask, Block, Kind, Setting, StepError, Tunable, Tuning, Writing};
+use super::{Answer, Ask, Block, Kind, NotASetting, Setting, StepError, Tunable, Tuning, Writing};
 use crate::st::{Error, Motor};
 
 /// The heading of the phases of the rev-up.
@@ -44,6 +44,10 @@ impl Tuning for StTuning {
 
     fn blocks(&self) -> Vec<Block<Id>> {
         Id::all(self.profile).map(|id| self.block(id)).collect()
+    }
+
+    fn not_a_setting(&self, name: &str) -> Option<NotASetting> {
+        RegisterId::named(name)?.not_a_setting(self.profile)
     }
 
     fn request(&self, ask: &Ask<Id>) -> (u8, OwnedRequest) {

@@ -1,6 +1,6 @@
 //! The text of a file, and errors with their line.
 
-use motorlink::settings::{Comparison, FileError, Problem, SettingsFile, Tunable};
+use motorlink::settings::{Comparison, FileError, SettingsFile, Tunable};
 
 use super::{bench, rmd, st, text};
 use crate::cut::Cut;
@@ -54,9 +54,19 @@ fn a_name_that_is_unknown_has_the_nearest_one() {
     );
     let error = in_settings("speed_kp = 1");
     assert!(error.to_string().ends_with("did you mean `SPEED_KP`?"), "{error}");
-    // A mode is not a setting.
-    let error = in_settings("CONTROL_MODE = 1");
-    assert!(matches!(error.problem, Problem::Unknown { .. }), "{error}");
+}
+
+#[test]
+fn a_register_that_is_not_a_setting_is_refused_with_the_reason() {
+    let why = |line: &str| in_settings(line).problem.to_string();
+    for acts in ["CONTROL_MODE", "TORQUE_REF", "PFC_DCBUS_REF", "RAMP_FINAL_SPEED"] {
+        let said = format!(
+            "{acts} is a register but not a setting: a write could turn the motor or charge a bus"
+        );
+        assert_eq!(why(&format!("{acts} = 1")), said);
+    }
+    assert!(why("DAC_OUT1 = 1").ends_with("it belongs to one measurement"));
+    assert!(why("STATUS = 1").ends_with("it cannot be both read and written"));
 }
 
 #[test]

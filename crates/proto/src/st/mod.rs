@@ -112,7 +112,7 @@ pub use message::{
 #[cfg(feature = "std")]
 pub use owned::OwnedRequest;
 pub use register::{Feature, Features, RegisterId, segment_values};
-pub use settings::Setting;
+pub use settings::{NotASetting, Setting};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
 pub use started::{Effect, Started};
 pub use starting::{NotStarted, Starting};

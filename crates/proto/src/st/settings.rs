@@ -25,21 +25,41 @@ impl Setting {
     }
 }
 
+/// Why a settings file does not have a register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NotASetting {
+    /// A reference or a mode: a write could turn a motor or charge a bus.
+    Acts,
+    /// An input of the motor profiler or of the DAC: it belongs to one measurement.
+    OneMeasurement,
+    /// It cannot be both read and written.
+    NotReadAndWritten,
+}
+
 impl RegisterId {
     /// Whether a settings file has the register: it tunes the motor, and keeps its value until it is
-    /// written or the drive loses its supply. References and modes are not settings, because a write
-    /// could turn a motor or charge a bus. Inputs of the motor profiler and of the DAC are not, because
-    /// they are those of one measurement.
+    /// written or the drive loses its supply.
     pub fn is_setting(self, profile: Profile) -> bool {
-        let Some(shape) = self.shape() else { return false };
+        self.not_a_setting(profile).is_none()
+    }
+
+    /// Why a settings file does not have the register; `None` if it has it.
+    pub fn not_a_setting(self, profile: Profile) -> Option<NotASetting> {
+        let Some(shape) = self.shape() else { return Some(NotASetting::NotReadAndWritten) };
         let built = Features::NONE.with(shape.feature);
+        let is_read = shape.read_size(profile, built).is_some();
         let is_written = matches!(shape.writing(profile, built), Writing::Takes(_));
-        let is_tuning = is_written
-            && shape.access == Access::ReadWrite
-            && !acts(self)
-            && self != RegisterId::PFC_DCBUS_REF
-            && !matches!(shape.feature, Feature::Dac | Feature::Profiler);
-        shape.read_size(profile, built).is_some() && (is_tuning || self.is_divisor())
+        if is_read && self.is_divisor() {
+            return None;
+        }
+        if is_written && (acts(self) || self == RegisterId::PFC_DCBUS_REF) {
+            return Some(NotASetting::Acts);
+        }
+        if !is_read || !is_written || shape.access != Access::ReadWrite {
+            return Some(NotASetting::NotReadAndWritten);
+        }
+        let is_measurement = matches!(shape.feature, Feature::Dac | Feature::Profiler);
+        is_measurement.then_some(NotASetting::OneMeasurement)
     }
 
     /// Whether the register cannot be written, and gives the gains of other settings their meaning.
