@@ -163,15 +163,29 @@ def test_a_register_is_written_and_read_back(bench, watch, run):
     assert "777" in run("st", "-p", bench.st, *PATIENT, "get", "SPEED_KP").ended(0).out
 
 
+def test_a_register_that_the_drive_refuses_is_not_edited(bench, watch):
+    terminal = watch(*bench.ports)
+    terminal.shows("can0:4")
+    terminal.press("r", "/", "OBSERVER_CR_C1", "enter")
+    terminal.shows("OBSERVER_CR_C1 exists only in drives", "that are built with: state observer with CORDIC")
+    (line,) = (line for line in terminal.text.splitlines() if ">OBSERVER_CR_C1" in line)
+    assert " e Observer gain" not in line
+    terminal.press("e")
+    terminal.shows("OBSERVER_CR_C1 cannot be edited: refused: GET_WRITE_ONLY")
+
+
 def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run):
     terminal = watch("-p", bench.can, "--id", 3)
     terminal.shows("can0:3")
     terminal.press("r")
     terminal.shows("position_kp", "acceleration")
+    terminal.shows("Kp of the position loop (`anglePidKp`), no unit, 0 to", "255")
     terminal.press("/", "speed_kp", "enter", "e", "77", "enter")
     terminal.shows("speed_kp was", "is 77 (read back)")
     terminal.press("e", "256", "enter")
-    terminal.shows("NOT WRITTEN", "0 to 255")
+    terminal.shows("NOT WRITTEN: `256` is not a gain: a gain is a whole number", "from 0 to 255; type the number alone")
+    terminal.press("e", "speed_kp=9", "enter")
+    terminal.shows("NOT WRITTEN: `speed_kp=9` is not a gain", "type the number alone; nothing was sent")
     terminal.press("esc")
     terminal.shows_no("with `speed_kp`")
     terminal.press("end", "e", "1500", "enter")

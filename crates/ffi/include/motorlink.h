@@ -136,7 +136,7 @@ enum motorlink_st_reg
   : uint8_t
 #endif
  {
-  MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< RW u8: Motor that motor number 0 addresses, counted from 0 */
+  MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< RW u8: Motor that motor number 0 addresses; the value 0 is motor 1 */
   MOTORLINK_ST_REG_FLAGS                 = 0x01, /**< R  u32: Faults: low half occurred, high half present */
   MOTORLINK_ST_REG_STATUS                = 0x02, /**< R  u8: State of the state machine */
   MOTORLINK_ST_REG_CONTROL_MODE          = 0x03, /**< RW u8: Torque (0) or speed (1) control */
@@ -1124,27 +1124,27 @@ typedef struct motorlink_rmd_data {
  */
 typedef struct motorlink_rmd_pid {
   /**
-   * `anglePidKp`, no unit.
+   * Kp of the position loop (`anglePidKp`), no unit.
    */
   uint8_t position_kp;
   /**
-   * `anglePidKi`, no unit.
+   * Ki of the position loop (`anglePidKi`), no unit.
    */
   uint8_t position_ki;
   /**
-   * `speedPidKp`, no unit.
+   * Kp of the speed loop (`speedPidKp`), no unit.
    */
   uint8_t speed_kp;
   /**
-   * `speedPidKi`, no unit.
+   * Ki of the speed loop (`speedPidKi`), no unit.
    */
   uint8_t speed_ki;
   /**
-   * `iqPidKp`, no unit.
+   * Kp of the current loop (`iqPidKp`), no unit.
    */
   uint8_t torque_kp;
   /**
-   * `iqPidKi`, no unit.
+   * Ki of the current loop (`iqPidKi`), no unit.
    */
   uint8_t torque_ki;
 } motorlink_rmd_pid;

@@ -13,7 +13,7 @@ pub use args::Args;
 use args::{Act, Command, Read};
 use session::connect;
 pub use session::wanted;
-pub use settings::GainChange;
+pub use settings::{GainChange, gain_alone, range};
 
 use motorlink::rmd::MotorId;
 

@@ -1,6 +1,6 @@
 //! Settings of a motor, with their value before and after: gains, acceleration limit, encoder offset.
 
-use motorlink::rmd::{Acceleration, DpsPerSecond, EncoderOffset, Error, Payload, Pid};
+use motorlink::rmd::{Acceleration, DpsPerSecond, EncoderOffset, Error, Field, Payload, Pid};
 
 use super::session::Session;
 use crate::failure::Failure;
@@ -172,10 +172,22 @@ fn named_gain(word: &str) -> Result<(usize, u8), Failure> {
 }
 
 fn gain(word: &str) -> Result<u8, Failure> {
+    gain_alone(word).map_err(|failure| failure.trying(format!("write it as {}", example())))
+}
+
+/// A gain without its name.
+pub fn gain_alone(word: &str) -> Result<u8, Failure> {
     word.parse().map_err(|_| {
-        Failure::usage(format!("`{word}` is not a gain: a gain is a whole number from 0 to 255"))
-            .trying(format!("write it as {}", example()))
+        Failure::usage(format!(
+            "`{word}` is not a gain: a gain is a whole number from {}",
+            range(&Pid::FIELDS[0])
+        ))
     })
+}
+
+/// The range of a field, in digits.
+pub fn range(field: &Field) -> String {
+    format!("{} to {}", field.scale.least, field.scale.most)
 }
 
 /// How a gain is set, for advice.

@@ -18,6 +18,7 @@ use args::{Act, Command, DriveArgs, Read};
 use motorlink::port::PortName;
 use motorlink::st::SCAN_TIMEOUT;
 pub use read::STATUS;
+pub use refusal::reason_of_read;
 use session::connect;
 pub use units::StUnits;
 

@@ -27,7 +27,18 @@ pub fn is_about_register(error: &Error) -> bool {
 
 /// A refusal to read a register.
 pub fn of_read(error: Error, register: RegisterId, profile: Profile) -> Failure {
-    explained(error, unreadable(register, profile).or_else(|| built_without(register)))
+    explained(error, unread(register, profile))
+}
+
+/// Why a drive refused to read a register, if the error is about the register and the tables say why.
+pub fn reason_of_read(error: &Error, register: RegisterId, profile: Profile) -> Option<String> {
+    let known = unread(register, profile).filter(|_| is_about_register(error));
+    known.map(|known| known.fact)
+}
+
+/// Why a drive does not read the register.
+fn unread(register: RegisterId, profile: Profile) -> Option<Known> {
+    unreadable(register, profile).or_else(|| built_without(register))
 }
 
 /// A refusal to write a register.

@@ -111,7 +111,7 @@ impl Place {
         let search = self.search.to_lowercase();
         let is_found = |item: &&Item| {
             let is_in = |text: &str| text.to_lowercase().contains(&search);
-            is_in(&item.name()) || is_in(item.meaning())
+            is_in(&item.name()) || is_in(&item.meaning())
         };
         self.items.iter().filter(is_found).copied().collect()
     }

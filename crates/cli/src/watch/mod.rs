@@ -182,7 +182,15 @@ impl Watch {
     fn press(&mut self, key: KeyEvent) -> Option<Ask> {
         let (model, before) = (&self.model, (self.place.view, self.place.row));
         let list = |row: usize| Item::of(model.rows[row].motor, &model.units);
-        let asked = self.place.press(key, list, |item| item.unwritable(&model.units));
+        let (read, row) = (&self.read, self.place.row);
+        let unwritable = |item: Item| {
+            let unread = || match read.get(&(row, item)) {
+                Some(Err(why)) => Some(format!("{} cannot be edited: {why}", item.name())),
+                _ => None,
+            };
+            item.unwritable(&model.units).or_else(unread)
+        };
+        let asked = self.place.press(key, list, unwritable);
         if before != (self.place.view, self.place.row) {
             self.went();
         }

@@ -1,6 +1,7 @@
 //! Registers of ST drives and gains of RMD motors: reads, and writes with a read-back. All requests
 //! go through the engine.
 
+use std::borrow::Cow;
 use std::convert::Infallible;
 use std::sync::Arc;
 
@@ -20,7 +21,8 @@ use motorlink_telemetry::signal::Motor;
 
 use super::values::Units;
 use crate::failure::Failure;
-use crate::rmd::{GainChange, wanted};
+use crate::rmd::{GainChange, gain_alone, range, wanted};
+use crate::st::reason_of_read;
 
 /// A command that is not sent in this time is refused.
 pub const TIME_TO_LIVE: Micros = Micros(2_000_000);
@@ -62,11 +64,14 @@ impl Item {
     }
 
     /// Its description.
-    pub fn meaning(&self) -> &'static str {
+    pub fn meaning(&self) -> Cow<'static, str> {
         match self {
-            Item::Register(register) => register.text().map_or("", |text| text.doc),
-            Item::Gain(place) => Pid::FIELDS[*place].doc,
-            Item::Acceleration => Acceleration::FIELDS[0].doc,
+            Item::Register(register) => register.text().map_or("", |text| text.doc).into(),
+            Item::Gain(place) => {
+                let field = &Pid::FIELDS[*place];
+                format!("{}, {}", field.doc.trim_end_matches('.'), range(field)).into()
+            }
+            Item::Acceleration => acceleration().doc.into(),
         }
     }
 
@@ -162,9 +167,10 @@ impl Access {
     }
 
     fn write_gain(&self, place: usize, text: &str) -> Result<(), String> {
-        let word = format!("{}={text}", Pid::FIELDS[place].name);
-        let change = GainChange::parse(&[word]).map_err(|failure| failure.text())?;
-        let wanted = change.on(Pid::decode(&self.ask(&ReadPid)?));
+        let gain = gain_alone(text).map_err(|failure| {
+            format!("{}; type the number alone; nothing was sent", failure.text())
+        })?;
+        let wanted = GainChange::Some(vec![(place, gain)]).on(Pid::decode(&self.ask(&ReadPid)?));
         self.ask(&WritePidRam(wanted))?;
         match Pid::decode(&self.ask(&ReadPid)?) {
             read if read == wanted => Ok(()),
@@ -189,14 +195,25 @@ impl Access {
     }
 
     fn register_bits(&self, register: RegisterId) -> Result<i32, String> {
-        let payload = self.st(StRequest::GetRegister(register))?;
-        let bits = register.decode(self.units.st.profile, &payload);
+        let profile = self.units.st.profile;
+        let request = StRequest::GetRegister(register);
+        let payload = self.st_with(request, |error| reason_of_read(error, register, profile))?;
+        let bits = register.decode(profile, &payload);
         bits.ok_or_else(|| "the reply has another size: is --profile right?".to_owned())
     }
 
     fn st(&self, request: StRequest<'_>) -> Result<Vec<u8>, String> {
+        self.st_with(request, |_| None)
+    }
+
+    /// One exchange. `reason` may know why it was refused.
+    fn st_with(
+        &self,
+        request: StRequest<'_>,
+        reason: impl Fn(&Error) -> Option<String>,
+    ) -> Result<Vec<u8>, String> {
         let Motor::St(motor) = self.motor else { return Err(LineError::Protocol.to_string()) };
-        match self.send(Request::st(motor.number(), request))? {
+        match self.send(Request::st(motor.number(), request), reason)? {
             Reply::St(payload) => Ok(payload),
             Reply::Rmd(_) | Reply::Confirmed => Err(LineError::Protocol.to_string()),
         }
@@ -204,7 +221,7 @@ impl Access {
 
     fn ask(&self, command: &impl Command) -> Result<[u8; 8], String> {
         let Motor::Rmd(id) = self.motor else { return Err(LineError::Protocol.to_string()) };
-        match self.send(Request::rmd(id, command))? {
+        match self.send(Request::rmd(id, command), |_| None)? {
             Reply::Rmd(data) => Ok(data),
             Reply::St(_) | Reply::Confirmed => Err(LineError::Protocol.to_string()),
         }
@@ -212,14 +229,19 @@ impl Access {
 
     /// Confirms that the replies belong to their requests.
     fn confirm(&self) -> Result<(), String> {
-        self.send(Request::Confirm(self.motor)).map(drop)
+        self.send(Request::Confirm(self.motor), |_| None).map(drop)
     }
 
-    fn send(&self, request: Request) -> Result<Reply, String> {
+    fn send(
+        &self,
+        request: Request,
+        reason: impl Fn(&Error) -> Option<String>,
+    ) -> Result<Reply, String> {
         self.remote.command(&self.by, request, TIME_TO_LIVE).map_err(|error| match error {
             // The screen shows the motor and the register already.
-            CommandError::Line(LineError::St(Error::Refused { code, .. })) => {
-                format!("refused: {code}: {}", code.doc())
+            CommandError::Line(LineError::St(ref refusal @ Error::Refused { code, .. })) => {
+                let why = reason(refusal).unwrap_or_else(|| code.doc().to_owned());
+                format!("refused: {code}: {why}")
             }
             error => error.to_string(),
         })

@@ -10,17 +10,17 @@ use core::fmt;
 payload! {
     /// Gains of the three loops (3, Read PID parameter command). V3 and V4 use the reverse order.
     pub struct Pid {
-        /// `anglePidKp`, no unit.
+        /// Kp of the position loop (`anglePidKp`), no unit.
         2 position_kp: u8,
-        /// `anglePidKi`, no unit.
+        /// Ki of the position loop (`anglePidKi`), no unit.
         3 position_ki: u8,
-        /// `speedPidKp`, no unit.
+        /// Kp of the speed loop (`speedPidKp`), no unit.
         4 speed_kp: u8,
-        /// `speedPidKi`, no unit.
+        /// Ki of the speed loop (`speedPidKi`), no unit.
         5 speed_ki: u8,
-        /// `iqPidKp`, no unit.
+        /// Kp of the current loop (`iqPidKp`), no unit.
         6 torque_kp: u8,
-        /// `iqPidKi`, no unit.
+        /// Ki of the current loop (`iqPidKi`), no unit.
         7 torque_ki: u8,
     }
 }

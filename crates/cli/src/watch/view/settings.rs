@@ -55,18 +55,19 @@ pub fn lines(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> V
     let listed_lines = height.saturating_sub(lines.len() + last).max(1);
     let begin = first(place.item, listed_lines);
     for (at, item) in found.iter().enumerate().skip(begin).take(listed_lines) {
-        let value = match shown.read.get(&(place.row, *item)) {
+        let read = shown.read.get(&(place.row, *item));
+        let value = match read {
             Some(Ok(value)) => value.clone(),
             Some(Err(why)) => format!("({why})"),
             None => "...".to_owned(),
         };
-        let is_writable = item.unwritable(&model.units).is_none();
+        let is_writable = item.unwritable(&model.units).is_none() && !matches!(read, Some(Err(_)));
         let text = format!(
             "{} {} {} {}",
             fit(&item.name(), NAME),
             fit(&value, VALUE),
             if is_writable { "e" } else { " " },
-            fit(item.meaning(), width.saturating_sub(FIXED))
+            fit(&item.meaning(), width.saturating_sub(FIXED))
         );
         lines.push(listed(vec![Span::raw(text)], at == place.item, theme));
     }

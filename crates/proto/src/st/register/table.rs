@@ -88,7 +88,7 @@ macro_rules! optional_pair {
 }
 
 registers! {
-    0x00 TARGET_MOTOR: u8, MotorIndex, ReadWrite, Core, Table3, "Motor that motor number 0 addresses, counted from 0";
+    0x00 TARGET_MOTOR: u8, MotorIndex, ReadWrite, Core, Table3, "Motor that motor number 0 addresses; the value 0 is motor 1";
     0x01 FLAGS: u32, Flags, ReadOnly, Core, Table3, "Faults: low half occurred, high half present";
     0x02 STATUS: u8, Status, ReadOnly, Core, Table3, "State of the state machine";
     0x03 CONTROL_MODE: u8, ControlMode, ReadWrite, Core, Table3, "Torque (0) or speed (1) control";
