@@ -114,11 +114,10 @@ def test_a_filter_that_no_register_passes_is_told(run):
 
 
 @pytest.mark.parametrize("st", ["pty", "tcp"], indirect=True)
-def test_scan_tells_at_which_rates_a_drive_answers(st):
-    findings = st("--json", "scan", 115200, 9600).ended(0).lines
-    assert (findings[0]["baud"], findings[0]["finding"]) == (115200, "drive")
-    assert findings[0]["text"] == "ST MC SDK 5.4.4"
-    assert "115200 baud  ST MC SDK" in st("scan", 115200).ended(0).out
+def test_scan_tells_what_answers_on_a_port_without_a_rate(st):
+    (found,) = (line for line in st("--json", "scan", 115200, 9600).ended(0).lines if "finding" in line)
+    assert (found["finding"], found["text"]) == ("drive", "ST MC SDK 5.4.4") and "baud" not in found
+    assert st("scan", 115200).ended(0).out == "ST MC SDK 5.4.4\n"
 
 
 @on_every_port
@@ -487,3 +486,9 @@ def test_a_start_while_the_motor_stops_has_no_effect_and_is_an_error(run, sim, t
     eventually(is_fast, "motor 1 turns fast")
     st("stop").ended(0)
     assert "still stopping" in st("start").ended(1).err
+
+
+def test_a_loop_without_a_time_or_a_sample_is_refused(run):
+    words = ("st", "-p", "sim:", "get", "STATUS", "--every")
+    assert "it must be 1ms to 86400s" in run(*words, "0").ended(2).err
+    assert "0 is not in 1.." in run(*words, "10ms", "--count", "0").ended(2).err

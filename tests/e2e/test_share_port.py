@@ -9,6 +9,7 @@ import pytest
 
 from program import eventually
 from sharing import Client, event
+from test_json import check
 from terminal import Terminal
 
 #: Programs that are killed. ROUNDS=50 for more.
@@ -61,7 +62,11 @@ def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
     run(*st, "set", "SPEED_KP", "123").ended(0)
     assert run(*st, "get", "SPEED_KP", "--json").values["SPEED_KP"] == 123
     assert "SDK" in run(*st, "info").ended(0).out
-    assert "SDK" in run(*st, "scan").ended(0).out
+    scan = run(*st, "scan").ended(0)
+    assert "SDK" in scan.out and "baud" not in scan.out and "has no baud rate" in scan.err
+    found = run(*st, "scan", "--json").ended(0)
+    check(found.out + found.err)
+    assert found.json["finding"] == "drive" and "baud" not in found.json
     run(*st, "segment", "0", "SPEED_MEAS", "STATUS").ended(0)
     run(*st, "dump", str(tmp_path / "m.toml")).ended(0)
     run(*st, "set", "SPEED_KP", "124").ended(0)
@@ -97,6 +102,12 @@ def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path, start
     assert "cannot be used as a serial line" in error(share.rmd, 2)
     other = error(share.st, 2, "--profile", "mcsdk-5.4")
     assert "profile spec; nothing was sent" in other and "--profile spec" in other
+
+
+@pytest.mark.parametrize("protocol", ["st", "rmd"])
+def test_the_kit_needs_a_port_of_its_own(share, run, protocol):
+    told = run("conformance", protocol, "-p", getattr(share, protocol)).ended(2)
+    assert "the kit needs a port of its own; end the share" in told.err and told.out == ""
 
 
 def test_a_latch_refuses_motion_and_the_readers_go_on(share, run, start, direct):

@@ -30,7 +30,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     });
     match args.command {
         Command::St { port, run, motor, profile } => {
-            let name = port.name()?;
+            let name = own(port.name()?)?;
             let link = name.open_bytes()?;
             let byte_time = byte_time(&name);
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
@@ -40,7 +40,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             conduct("st", &run, st::suite(profile), bench, |report| other_profile(profile, report))
         }
         Command::Rmd { port, run, write_rom, id, encoder } => {
-            let link = port.name()?.open_can()?;
+            let link = own(port.name()?)?.open_can()?;
             let mut allowed = run.allowed();
             allowed.extend(write_rom.then_some(Need::Rom));
             let options = rmd::Options { id, encoder, allowed };
@@ -58,6 +58,17 @@ pub fn run(args: Args) -> Result<(), Failure> {
         }
         Command::Clauses { which: Which::St } => output::print_line(&st::table().trim_end()),
         Command::Clauses { which: Which::Rmd } => output::print_line(&rmd::table().trim_end()),
+    }
+}
+
+/// A port that no other program holds. The holder would not pass on the frames of most cases.
+fn own(name: PortName) -> Result<PortName, Failure> {
+    match name.is_held() {
+        true => Err(Failure::usage(format!(
+            "`{name}` is held by another program, and the kit needs a port of its own"
+        ))
+        .trying("end the share, and give the port that it holds")),
+        false => Ok(name),
     }
 }
 

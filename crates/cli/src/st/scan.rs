@@ -24,31 +24,32 @@ pub fn run(
         return Err(Failure::usage("a scan of baud rates cannot be used with --fault"));
     }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
-    let rates = match port.at_baud(rates[0]) {
-        Some(_) => rates,
-        None => {
-            note(format!("note: {port} has no baud rate, so it is asked once"));
-            &rates[..1]
-        }
-    };
+    let has_rate = port.at_baud(rates[0]).is_some();
+    let rates = if has_rate { rates } else { &rates[..1] };
+    if !has_rate {
+        note(format!("note: {port} has no baud rate, so it is asked once"));
+    }
     let output = connection.output();
     let bar = crate::output::progress(rates.len());
     let (mut is_found, mut echoes) = (false, false);
     for &rate in rates {
-        bar.set_message(format!("{rate} baud"));
+        let place = Place { port, rate: has_rate.then_some(rate) };
+        if has_rate {
+            bar.set_message(format!("{rate} baud"));
+        }
         let finding = scan_baud(port, rate, patience);
         bar.inc(1);
         if let Err(Error::Port(error @ PortError::BaudRefused { .. })) = &finding {
             bar.suspend(|| {
-                let text = format!("{rate:>8} baud  not possible on this port");
-                output.result(text, found(port, rate, "impossible", &error.to_string()))
+                let text = place.shown("not possible on this port");
+                output.result(text, place.found("impossible", &error.to_string()))
             })?;
             continue;
         }
         let finding = finding?;
         echoes |= matches!(finding, ScanResult::Echo);
         is_found |= matches!(finding, ScanResult::Drive(_) | ScanResult::Refuses(_));
-        report(&bar, output, port, rate, &finding)?;
+        report(&bar, output, &place, &finding)?;
     }
     bar.finish_and_clear();
     if is_found {
@@ -68,8 +69,7 @@ pub fn run(
 fn report(
     bar: &ProgressBar,
     output: Printer,
-    port: &PortName,
-    rate: u32,
+    place: &Place<'_>,
     finding: &ScanResult,
 ) -> Result<(), Failure> {
     let (word, text) = match finding {
@@ -84,11 +84,49 @@ fn report(
         ScanResult::Echo => ("echo", "each sent byte is received again".to_owned()),
         ScanResult::Silence => ("silence", "silence".to_owned()),
     };
-    bar.suspend(|| output.result(format!("{rate:>8} baud  {text}"), found(port, rate, word, &text)))
+    bar.suspend(|| output.result(place.shown(&text), place.found(word, &text)))
 }
 
-/// What was found at a rate, for programs.
-fn found(port: &PortName, rate: u32, finding: &str, text: &str) -> Line {
-    let line = Line::about(&port.to_string(), None).with("baud", rate);
-    line.with("finding", finding).with("text", text)
+/// Where a drive is looked for.
+struct Place<'a> {
+    port: &'a PortName,
+    /// `None` on a port without a baud rate.
+    rate: Option<u32>,
+}
+
+impl Place<'_> {
+    /// What was found, for people.
+    fn shown(&self, text: &str) -> String {
+        match self.rate {
+            Some(rate) => format!("{rate:>8} baud  {text}"),
+            None => text.to_owned(),
+        }
+    }
+
+    /// What was found, for programs.
+    fn found(&self, finding: &str, text: &str) -> Line {
+        let line = Line::about(&self.port.to_string(), None);
+        let line = match self.rate {
+            Some(rate) => line.with("baud", rate),
+            None => line,
+        };
+        line.with("finding", finding).with("text", text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+
+    #[test]
+    fn a_finding_has_its_rate_if_the_port_has_rates() {
+        let port = "serial:/dev/ttyACM0".parse().unwrap();
+        let at = |rate| Place { port: &port, rate };
+        assert_eq!(at(Some(9600)).shown("silence"), "    9600 baud  silence");
+        assert_eq!(at(None).shown("silence"), "silence");
+        let baud = |rate| Value::from(at(rate).found("silence", "")).get("baud").cloned();
+        assert_eq!([baud(Some(9600)), baud(None)], [Some(9600.into()), None]);
+    }
 }
