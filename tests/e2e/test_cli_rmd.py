@@ -509,3 +509,9 @@ def test_error_bits_that_mean_nothing_are_no_errors(run, tmp_path):
         bits["state"] = "F7"
         kept = run(*words, "--json").ended(1)
         assert kept.values["errors"] == ["LOW_VOLTAGE"]
+
+
+def test_samples_of_several_motors_are_refused_with_other_ways(run):
+    told = run("rmd", "-p", "sim:", "--id", "1-4", "status", "--every", "1s").ended(2).err
+    assert "--every is for one motor: give one --id" in told
+    assert "`motorlink watch -p sim:`" in told and "`samples({1: [...], 2: [...]})`" in told

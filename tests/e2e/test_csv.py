@@ -59,6 +59,8 @@ def test_a_folder_and_a_missing_folder_are_told(run, tmp_path):
     words = ("st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--count", 1, "--force", "--csv")
     for path in (tmp_path, tmp_path / "none" / "run.csv"):
         assert f"cannot write `{path}`" in run(*words, path).ended(3).err
+    missing = tmp_path / "none"
+    assert f"make its folder first: `mkdir -p {missing}`" in run(*words, missing / "run.csv").ended(3).err
 
 
 def test_csv_and_json_do_not_share_stdout(run):

@@ -217,7 +217,7 @@ def test_line_ends_and_marks_of_other_editors_are_read(motor, tmp_path, protocol
         ("rmd --encoder-bits 14 dump", "leave out --encoder-bits"),
         ("rmd --id 1,2 dump", "give one --id"),
         ("rmd --id 1,2 restore x.toml", "give one --id"),
-        ("rmd diff /nothing/there.toml", "cannot read `/nothing/there.toml`"),
+        ("rmd diff /nothing/there.toml", "cannot read `/nothing/there.toml`: No such file or directory (os error 2); nothing was sent; `motorlink rmd -p sim: dump /nothing/there.toml` writes such a file"),
     ],
 )
 def test_options_that_have_no_meaning_for_a_file_are_refused(run, words, said):

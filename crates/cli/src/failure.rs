@@ -1,5 +1,7 @@
 //! Failures: kinds, exit codes, messages.
 
+use std::path::Path;
+
 use motorlink::port::{NameError, NotDone, PortError};
 use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
@@ -100,9 +102,16 @@ impl Failure {
     }
 
     /// After a file could not be written.
-    pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
+    pub fn file(path: &Path, error: &std::io::Error) -> Self {
         let message = format!("cannot write `{}`: {error}", printable(&path.display().to_string()));
-        Problem::new(Kind::Output, message).into()
+        let failure: Failure = Problem::new(Kind::Output, message).into();
+        match path.parent().filter(|folder| *folder != Path::new("") && !folder.exists()) {
+            Some(folder) => {
+                let folder = pasteable::quoted(&folder.display().to_string());
+                failure.trying(format!("make its folder first: `mkdir -p {folder}`"))
+            }
+            None => failure,
+        }
     }
 
     /// Two failures of one command. Both are reported; the exit code is that of the first, except that

@@ -41,7 +41,7 @@ pub struct Repeat {
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub every: Option<Duration>,
     /// Stop after this many samples; exit code 3 if none comes for 10 s, two periods and the timeout
-    #[arg(long, value_name = "N", requires = "every")]
+    #[arg(long, value_name = "N", requires = "every", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// Also write the samples to this file, as comma-separated values; - is stdout, without the table
     #[arg(long, value_name = "FILE", requires = "every", value_hint = clap::ValueHint::FilePath)]

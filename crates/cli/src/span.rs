@@ -14,9 +14,15 @@ pub fn parse_span(text: &str) -> Result<Duration, String> {
 pub fn span_up_to(
     longest: Duration,
 ) -> impl Fn(&str) -> Result<Duration, String> + Clone + Send + Sync + 'static {
-    move |text| match Duration::try_from_secs_f64(seconds(text)?) {
-        Ok(span) if (SHORTEST..=longest).contains(&span) => Ok(span),
-        _ => Err(format!("it must be 1ms to {}s", longest.as_secs())),
+    move |text| {
+        // A number without a unit is refused for its unit only if a unit would help.
+        let is_positive = text.trim().parse::<f64>().map_or(true, |number| number > 0.0);
+        let span = match is_positive {
+            true => Duration::try_from_secs_f64(seconds(text)?).ok(),
+            false => None,
+        };
+        span.filter(|span| (SHORTEST..=longest).contains(span))
+            .ok_or_else(|| format!("it must be 1ms to {}s", longest.as_secs()))
     }
 }
 
@@ -78,9 +84,12 @@ mod tests {
 
     #[test]
     fn a_number_without_a_unit_is_refused_with_both_spellings() {
-        for number in ["100", "0", "-1", "0.5"] {
+        for number in ["100", "0.5"] {
             let refused = parse_span(number).unwrap_err();
             assert_eq!(refused, format!("the unit is missing: write {number}ms or {number}s"));
+        }
+        for number in ["0", "-1", " 0 ", "NaN"] {
+            assert_eq!(parse_span(number).unwrap_err(), "it must be 1ms to 86400s", "{number}");
         }
     }
 

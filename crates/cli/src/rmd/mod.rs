@@ -20,6 +20,7 @@ use motorlink::rmd::MotorId;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{keep_error, kept_error};
+use crate::pasteable::quoted;
 use crate::settings::Task;
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -53,7 +54,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
         && let Some(every) = repeat.every
     {
         let [id] = ids.collect::<Vec<_>>()[..] else {
-            return Err(Failure::usage("--every is for one motor: give one --id"));
+            return Err(Failure::usage("--every is for one motor: give one --id").trying(format!(
+                "for several motors use `motorlink watch -p {}`, or `samples({{1: [...], 2: [...]}})` of the \
+                 Python package",
+                quoted(connection.port_text())
+            )));
         };
         let bus = every::Bus { connection: &connection, motor: &motor, port: &port };
         let done = bus.watch(id, reads, (every, repeat));

@@ -3,7 +3,7 @@
 mod interruption;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use motorlink::settings::{
@@ -165,8 +165,18 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
 
     fn compare(&self, args: &FileArg) -> Result<Comparison<Id<M>>, Failure> {
         let name = shown(&args.file);
-        let text = read(&args.file)
-            .map_err(|error| Failure::usage(format!("cannot read `{name}`: {error}")))?;
+        let text = read(&args.file).map_err(|error| {
+            let failure =
+                Failure::usage(format!("cannot read `{name}`: {error}; nothing was sent"));
+            match error.kind() {
+                ErrorKind::NotFound => {
+                    let Kind { protocol, .. } = self.motor.tuning().kind();
+                    let file = quoted(&args.file.display().to_string());
+                    failure.trying(format!("`motorlink {protocol} dump {file}` writes such a file"))
+                }
+                _ => failure,
+            }
+        })?;
         let file = SettingsFile::parse(&text, &self.motor.tuning()).map_err(|error| {
             let failure = Failure::usage(format!("{name}: {error}; nothing was sent"));
             match error.problem {
