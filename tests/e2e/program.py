@@ -58,9 +58,9 @@ def plain(line):
     }
 
 
-def halted(part):
-    """What a guard says of a part that has accepted its stop: it is stopped, or it is stopping."""
-    return f"{part} is stop"
+def says_halted(line, part, before=""):
+    """Whether a guard says, behind these words, that a part has accepted its stop."""
+    return any(f"{before}{part} {what}" in line for what in ("is stop", "acknowledged its stop ("))
 
 
 @dataclass
@@ -141,6 +141,10 @@ class Running:
     def says(self, text, within=15):
         """Waits for `text` on stderr."""
         self.until(lambda: any(text in line for line in self.err), f"`{text}` on stderr", within)
+
+    def says_halted(self, part, before=""):
+        """Waits until a guard says that a part has accepted its stop."""
+        self.until(lambda: any(says_halted(line, part, before) for line in self.err), f"the stop of {part}")
 
     def more_lines(self, count=3):
         """Waits for `count` further lines of output and gives them."""

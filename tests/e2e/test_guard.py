@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from program import children, environment, eventually, halted
+from program import children, environment, eventually, says_halted
 from st_wire import ACK, EXECUTE, GET_REG, Line, frame, header
 
 STATUS, SPEED_KP = 0x02, 0x05
@@ -85,7 +85,7 @@ def test_a_killed_program_leaves_no_motor_spinning(sim, guard, client):
     event = next(json.loads(text) for text in process.out if '"stopped"' in text)
     assert event["reason"] == "client-gone"
     assert [(motor["motor"], motor["stopped"]) for motor in event["motors"]] == [(1, True), (2, True)]
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
     # The next program gets the line.
     with Line(process.port) as line:
         assert line.get(STATUS, motor=1) == 0
@@ -119,7 +119,7 @@ def test_a_motor_that_its_program_stopped_is_left_alone(sim, guard, client):
     program = client(process.port, "1:1", "2:1", "1:2")
     runs(drives, 2)
     program.kill()
-    process.says(halted("motor 2"))
+    process.says_halted("motor 2")
     assert not any("motor 1" in text for text in process.err), process.err
     rests(drives, 2)
 
@@ -133,7 +133,7 @@ def test_motor_number_0_is_whichever_motor_it_may_be(sim, guard, client):
     runs(drives, 2)
     program.kill()
     rests(drives, 2)
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
     assert not any("motor 3" in text for text in process.err), "this drive has two"
 
 
@@ -146,7 +146,7 @@ def test_a_program_that_dies_in_the_middle_of_a_request(sim, guard, run, tmp_pat
         runs(drives, 1)
         line.send([0x07, 0x06, 0x00])
     rests(drives, 1)
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
     run("st", "-p", process.port, "--profile", "mcsdk-5.4", "info").ended(0)
 
 
@@ -185,7 +185,7 @@ def test_a_stopped_program_is_noticed_by_its_silence(sim, guard, client):
     process = guard(drives.st, "--silence", "500ms")
     program = client(process.port, "1:1")
     program.send_signal(signal.SIGSTOP)
-    process.says("the program is silent: " + halted("motor 1"))
+    process.says_halted("motor 1", "the program is silent: ")
     rests(drives, 1)
     program.send_signal(signal.SIGCONT)
 
@@ -215,7 +215,7 @@ def test_an_interrupted_guard_stops_the_motors(sim, guard, client, tmp_path, num
     runs(drives, 1)
     process.process.send_signal(number)
     assert process.wait() == 0
-    assert any("the guard ends: " + halted("motor 1") in text for text in process.err), process.err
+    assert any(says_halted(text, "motor 1", "the guard ends: ") for text in process.err), process.err
     rests(drives, 1)
     assert not os.path.lexists(tmp_path / "drive")
 
@@ -230,7 +230,7 @@ def test_a_drive_that_is_unplugged_is_stopped_when_it_is_back(sim, guard, client
     process.says("motor 1 MAY STILL TURN")
     drives = sim(rmd=())
     process.says("the port of the drive works again")
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
     with Line(process.port) as line:
         assert line.get(STATUS, motor=1) == 0
 
@@ -245,7 +245,7 @@ def test_a_drive_that_hangs_is_stopped_when_it_goes_on(sim, guard, client):
     process.says("motor 1 MAY STILL TURN")
     drives.process.send_signal(signal.SIGCONT)
     rests(drives, 1)
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
 
 
 def test_a_guard_whose_drive_is_silent_says_so_when_it_ends(sim, guard, client):

@@ -6,7 +6,6 @@ import signal
 import pytest
 
 from guarded import PORT, PTY, is_told_to_stop, rests, turns, where
-from program import halted
 
 
 @pytest.mark.parametrize("serve", ["pty", "unix-listen", "tcp-listen"])
@@ -26,7 +25,7 @@ def test_a_program_that_continues_turns_no_motor_and_gets_an_error(
     program = client(protocol, port, "command")
     turns(drives, protocol)
     program.send_signal(signal.SIGSTOP)
-    process.says("the program is silent: " + halted("motor 1"))
+    process.says_halted("motor 1", "the program is silent: ")
     process.says("closed the connection of the silent program")
     rests(drives, protocol)
     program.send_signal(signal.SIGCONT)

@@ -7,7 +7,7 @@ import pytest
 
 from guarded import PORT, rests, turns
 from lines import Meddler, RawLine
-from program import eventually, halted, plain
+from program import eventually, plain
 from st_wire import ACK, EXECUTE, frame, header
 
 
@@ -130,7 +130,7 @@ def test_two_requests_at_once_do_not_hide_which_motor_is_started(sim, guard):
             line.say(bytes([0x42, 0x01, 0x02, 0x45]), b"\xf0\x01")
             os.write(line.end, bytes([*before, 0x03, 0x01, 0x01, 0x05]))
             turns(drives, "st")
-        process.says(halted("motor 1"))
+        process.says_halted("motor 1")
         rests(drives, "st")
         process.interrupt()
         assert process.wait() == 0

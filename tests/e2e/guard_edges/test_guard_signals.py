@@ -7,7 +7,7 @@ import time
 import pytest
 
 from guarded import ENDING, PORT, SUSPENDING, rests, turns
-from program import environment, halted
+from program import environment, says_halted
 
 
 @pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
@@ -25,7 +25,7 @@ def test_a_second_signal_does_not_keep_the_motors_from_being_stopped(
         for _ in range(3):
             process.process.send_signal(second)
         assert process.wait() == 0
-        assert any("the guard ends: " + halted("motor 1") in text for text in process.err), process.err
+        assert any(says_halted(text, "motor 1", "the guard ends: ") for text in process.err), process.err
         rests(drives, protocol)
         drives.end()
 
@@ -51,7 +51,7 @@ def test_a_guard_is_not_suspended(bench, guard, client, number):
     process.says("not suspended")
     program.kill()
     rests(drives, "st")
-    process.says(halted("motor 1"))
+    process.says_halted("motor 1")
 
 
 def test_what_a_guard_was_told_to_ignore_does_not_end_it(bench, guard, client, motorlink, tmp_path):
