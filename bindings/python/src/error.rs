@@ -259,10 +259,10 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
         }
         PortError::NotDone { port, motor, kind, .. } => {
             let kind = match kind {
-                NotDone::Refused => Kind::Refused,
+                NotDone::Refused | NotDone::Unsent => Kind::Refused,
                 NotDone::Usage => Kind::InvalidValue,
                 NotDone::Silent => Kind::ReplyTimeout,
-                NotDone::Line => Kind::Link,
+                NotDone::Unconfirmed | NotDone::Line => Kind::Link,
             };
             let motor = Some(*motor).filter(|motor| *motor != 0);
             return kind.raise(py, error, Facts { port: Some(port), motor, ..Facts::default() });

@@ -438,7 +438,8 @@ impl Acquisition {
             Ok(_) => Outcome::Answered,
             // The motor answered, and the lane is in sync again.
             Err(error) if error.is_unconfirmed() => Outcome::Answered,
-            Err(error) if error.is_line_failure() => Outcome::Failed,
+            Err(error) if self.line.is_given_up(error) => Outcome::GivenUp,
+            Err(error) if !error.is_answer() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
         let verdict = self.schedule.ended(at, over.lane, outcome);

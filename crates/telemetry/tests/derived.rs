@@ -81,6 +81,10 @@ impl Line for Changed {
         self.line.expire_next(time_to_live);
     }
 
+    fn is_given_up(&self, error: &LineError) -> bool {
+        self.line.is_given_up(error)
+    }
+
     fn cancel(&mut self, lane: Lane) {
         self.line.cancel(lane);
     }

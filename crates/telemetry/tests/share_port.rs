@@ -5,25 +5,29 @@ mod shared;
 
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motorlink::port::{FaultBytes, NotDone, PortError, PortName};
 use motorlink::st::{self, Profile, RegisterId, Status};
 use motorlink::{LinkState, rmd};
 use motorlink_link::fault::Faults;
-use motorlink_proto::rmd::{MotorId, ReadStatus, SetSpeed, SetTorque4};
+use motorlink_proto::rmd::{MotorId, MotorSet, ReadStatus, SetSpeed, SetTorque4, Stop};
 use motorlink_proto::st::{Command, ErrorCode, MotorNumber, Ramp, Request};
 use motorlink_proto::time::Micros;
 use motorlink_proto::units::{CentiDps, IqCommand, Quantity};
 use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{self, StLine};
+use motorlink_telemetry::event::{CommandError, What};
+use motorlink_telemetry::line::{self, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::message::{self, Answer, Ask, Protocol, Text, decode, encode};
+use motorlink_telemetry::share::message::{
+    self, Answer, Ask, Happening, Protocol, Text, decode, encode,
+};
 use motorlink_telemetry::share::{VERSION, port};
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
-use shared::{LIMIT, Share};
+use shared::{LIMIT, PATIENT, Share};
 
 impl Share {
     fn port(&self, line: &str) -> PortName {
@@ -41,33 +45,58 @@ impl Share {
 }
 
 /// A program that speaks the messages of the share.
-struct Operator(UnixStream);
+struct Operator {
+    socket: UnixStream,
+    reader: Reader,
+}
 
 impl Operator {
+    fn joined(share: &Share) -> Self {
+        let socket = UnixStream::connect(&share.path).unwrap();
+        let mut operator = Operator { socket, reader: Reader::default() };
+        operator.ask(Ask::Hello { protocol: VERSION, name: "operator".to_owned() });
+        operator
+    }
+
     /// Joins a share, and latches it.
     fn at(share: &Share) -> Self {
-        let mut operator = Operator(UnixStream::connect(&share.path).unwrap());
-        operator.ask(Ask::Hello { protocol: VERSION, name: "operator".to_owned() });
+        let mut operator = Self::joined(share);
         operator.ask(Ask::Latch);
         operator
     }
 
-    fn ask(&mut self, ask: Ask) {
+    /// Asks, and gives how many stops are told before the answer.
+    fn ask(&mut self, ask: Ask) -> usize {
         let mut bytes = Vec::new();
         frame::append(Kind::Text, &encode(&message::Request { id: 1, ask }), &mut bytes).unwrap();
-        self.0.write_all(&bytes).unwrap();
-        let mut reader = Reader::default();
+        self.socket.write_all(&bytes).unwrap();
+        let mut stops = 0;
         loop {
-            let mut bytes = [0; 4096];
-            let size = self.0.read(&mut bytes).unwrap();
-            reader.push(&bytes[..size]);
-            while let Some(frame) = reader.take().unwrap() {
-                if matches!(decode(&frame.payload).unwrap(), Text::Answer { .. }) {
-                    return;
+            while let Some(frame) = self.reader.take().unwrap() {
+                match decode(&frame.payload).unwrap() {
+                    Text::Event(event) if event.event == Happening::Stopping => stops += 1,
+                    Text::Answer { .. } => return stops,
+                    _ => {}
                 }
             }
+            let mut bytes = [0; 4096];
+            let size = self.socket.read(&mut bytes).unwrap();
+            self.reader.push(&bytes[..size]);
         }
     }
+
+    /// The stops since the last call. Answers overtake events, so it asks twice.
+    fn stops(&mut self) -> usize {
+        self.ask(Ask::Latch) + self.ask(Ask::Lines)
+    }
+}
+
+/// A share whose ST drive receives nothing, and whose RMD motors answer soon or never.
+fn deaf(name: &str) -> Share {
+    let faults: Faults = "drop=1".parse().unwrap();
+    let faults = faults.on_serial().unwrap();
+    let around = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<_>;
+    Share::with(name, Duration::from_millis(100), around)
 }
 
 fn start(client: &st::Client) {
@@ -247,6 +276,31 @@ fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
 }
 
 #[test]
+fn a_drive_that_never_answers_is_silent_and_nothing_else() {
+    let share = deaf("silent");
+    let line = StLine::open(&share.port("st0"), Default::default()).unwrap();
+    let mut engine = Acquisition::new(Box::new(line));
+    let motor = Motor::St(MotorNumber::new(1).unwrap());
+    let signals = ["SPEED_MEAS", "STATUS"].map(|name| Signal::named(motor, name).unwrap());
+    let wants: Wants = signals.iter().map(|signal| (*signal, Micros(5_000))).collect();
+    let subscription = Subscription::new(10_000, Full::DropOldest);
+    engine.subscribe(subscription.clone(), wants);
+    // Long enough for requests to wait behind others at the share until they are too old.
+    let end = Instant::now() + Duration::from_secs(8);
+    let mut told = Vec::new();
+    while Instant::now() < end {
+        let wait = engine.advance(&mut |_, _| {});
+        while let Some(record) = subscription.take() {
+            if let Record::Event(event) = record {
+                told.push(event.what.clone());
+            }
+        }
+        std::thread::sleep(wait.unwrap_or_default().min(Duration::from_millis(20)));
+    }
+    assert!(matches!(told[..], [What::Unanswered(..), What::Silent(..)]), "{told:?}");
+}
+
+#[test]
 fn the_end_of_a_share_is_told_at_once() {
     let mut share = Share::new("end");
     let client = share.st();
@@ -265,7 +319,7 @@ fn the_end_of_a_share_is_told_at_once() {
 fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
     let faults: Faults = "dup=0.02".parse().unwrap();
     let mut faults = faults.on_serial().unwrap();
-    let share = Share::with("repeats", move |link| {
+    let share = Share::with("repeats", PATIENT, move |link| {
         faults.seed += 1;
         Box::new(FaultBytes::new(link, &faults))
     });
@@ -361,4 +415,53 @@ fn a_start_that_waited_in_a_frozen_share_is_refused() {
     }
     let refused = refused.unwrap();
     assert!(refused.contains("the command is too old"), "{refused}");
+}
+
+#[test]
+fn a_client_does_not_repeat_a_stop_that_the_share_has_repeated() {
+    let share = deaf("once");
+    let mut witness = Operator::joined(&share);
+    let client = share.st();
+    let failed = client.motor(1).unwrap().stop_until_confirmed().unwrap_err();
+    assert!(failed.to_string().contains("no reply in time"), "{failed}");
+    assert_eq!(witness.stops(), 1);
+    let client = share.rmd();
+    let failed = client.motor(9).unwrap().stop_until_confirmed().unwrap_err();
+    assert!(matches!(failed, rmd::Error::Timeout { .. }), "{failed}");
+    assert_eq!(witness.stops(), 1);
+}
+
+#[test]
+fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
+    let share = deaf("engine-stops");
+    let mut witness = Operator::joined(&share);
+    let st = StLine::open(&share.port("st0"), Default::default()).unwrap();
+    let rmd = RmdLine::open(&share.port("rmd0"), Default::default()).unwrap();
+    let stop = Request::ExecuteCommand(Command::StopMotor);
+    let engines = [
+        (Acquisition::new(Box::new(st)), line::Request::st(1, stop)),
+        (Acquisition::new(Box::new(rmd)), line::Request::rmd(id(9), &Stop)),
+    ];
+    for (mut engine, request) in engines {
+        engine.stop(&Arc::from("operator"), request, &mut |_, _| {});
+        let until = Instant::now() + LIMIT;
+        let mut ends: Vec<Result<_, CommandError>> = Vec::new();
+        while ends.is_empty() {
+            assert!(Instant::now() < until, "the stop has no end");
+            engine.advance(&mut |_, result| ends.push(result));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(matches!(ends[..], [Err(CommandError::Line(_))]), "{ends:?}");
+        assert_eq!(witness.stops(), 1);
+    }
+}
+
+#[test]
+fn a_stop_of_all_ids_of_a_share_is_certain_of_the_ids_without_a_motor() {
+    let share = deaf("all");
+    let client = share.rmd();
+    let stopping = client.stop_all_until_confirmed(Default::default());
+    assert!(stopping.failed.is_empty(), "{stopping:?}");
+    assert!(stopping.is_silence_certain(), "{stopping:?}");
+    assert_eq!(stopping.confirmed.len() + stopping.silent.len(), MotorSet::ALL.len());
 }

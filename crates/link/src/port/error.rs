@@ -301,7 +301,11 @@ pub enum NotDone {
     Usage,
     /// The motor does not answer.
     Silent,
-    /// The line failed, or replies cannot be trusted.
+    /// It was not sent: it waited too long, or too much waits.
+    Unsent,
+    /// The drive answered, but replies before may have been those to other requests.
+    Unconfirmed,
+    /// The line failed.
     Line,
 }
 
@@ -314,9 +318,15 @@ impl PortError {
 
     /// Whether nothing can be said about the drives, because the port failed.
     pub fn is_line_failure(&self) -> bool {
-        let is_answered =
-            matches!(self, PortError::NotDone { kind: NotDone::Refused | NotDone::Usage, .. });
+        use NotDone::{Refused, Unsent, Usage};
+        let is_answered = matches!(self, PortError::NotDone { kind: Refused | Usage | Unsent, .. });
         !self.is_interruption() && !is_answered
+    }
+
+    /// Whether the program that holds the port has no reply of the drive. What stops a motor it has
+    /// repeated before.
+    pub fn is_given_up(&self) -> bool {
+        matches!(self, PortError::NotDone { kind: NotDone::Silent | NotDone::Line, .. })
     }
 
     /// Whether a wait was ended because the caller wants to do something else. The port stays open,

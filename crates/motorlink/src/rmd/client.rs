@@ -263,6 +263,16 @@ impl Client {
         })
     }
 
+    /// Whether another program holds the port.
+    pub(super) fn is_held(&self) -> bool {
+        self.turns.take().session.is_held
+    }
+
+    /// Whether this is what a program that holds the port says after it has repeated a stop.
+    pub(super) fn is_given_up(&self, error: &Error) -> bool {
+        self.turns.take().session.is_given_up(error)
+    }
+
     /// As [`cycle`](Self::cycle). A motor in quarantine is waited for.
     pub(super) fn insist(
         &self,

@@ -227,6 +227,16 @@ impl EventClient {
         self.driven.session.losses(id)
     }
 
+    /// Whether another program holds the port.
+    pub fn is_held(&self) -> bool {
+        self.driven.session.is_held
+    }
+
+    /// Whether this is what a program that holds the port says after it has repeated a stop.
+    pub fn is_given_up(&self, error: &Error) -> bool {
+        self.driven.session.is_given_up(error)
+    }
+
     /// Gives up the exchange with a motor, if there is one. Its reply is not taken for another's.
     pub fn cancel(&mut self, id: MotorId) {
         let now = self.driven.port.now();

@@ -51,7 +51,7 @@ pub(super) struct Session {
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// Whether another program holds the port.
-    is_held: bool,
+    pub(super) is_held: bool,
     timeout: Duration,
     /// What the program that holds the port has no reply to, and why.
     not_done: Vec<(MotorId, PortError)>,
@@ -128,6 +128,14 @@ impl Session {
         self.is_held = true;
         self.timeout = holder.patience;
         self.host.set_timeout(holder.patience.into());
+    }
+
+    /// Whether another program holds the port, and this is what it says after it has repeated a stop.
+    pub(super) fn is_given_up(&self, error: &Error) -> bool {
+        match error {
+            Error::Port(error) => error.is_given_up(),
+            error => self.is_held && matches!(error, Error::Timeout { .. }),
+        }
     }
 
     /// No late reply comes to the motors that have no exchange under way.
@@ -500,9 +508,13 @@ impl Session {
         }
     }
 
-    /// If the motor does not answer the other program, the error is that of a port of one's own.
+    /// If the motor does not answer the other program, or a reply of it cannot be trusted, the error is
+    /// that of a port of one's own.
     fn undone(&self, id: MotorId, why: PortError) -> Error {
         match why {
+            PortError::NotDone { kind: NotDone::Unconfirmed, .. } => {
+                Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }
+            }
             PortError::NotDone { kind: NotDone::Silent, .. } => {
                 let [code, ..] = self.pending[id.index()].request;
                 let port = Arc::clone(&self.port);

@@ -41,7 +41,8 @@ pub struct Stopping {
     pub failed: Vec<(MotorId, Error)>,
     /// IDs without any reply. See [`is_silence_certain`](Self::is_silence_certain).
     pub silent: MotorSet,
-    /// The number of requests to each motor in `failed` and each ID in `silent`.
+    /// The number of requests to each motor in `failed` and each ID in `silent`, at least: another
+    /// program that holds the port may have sent more.
     pub attempts: u32,
     /// The number of requests to motors in `confirmed`, and the number of those without a reply.
     pub sent: u32,
@@ -70,7 +71,8 @@ impl Stopping {
 impl Client {
     /// Stops motors, or switches them off, also motors that another program moved. Repeats the request
     /// until each motor has confirmed it: at least 4 times and for 2 s. It is not repeated after an
-    /// answer that repeating cannot change, such as that of a motor of another protocol.
+    /// answer that repeating cannot change, such as that of a motor of another protocol, or that of a
+    /// program that holds the port and has repeated it.
     ///
     /// Each attempt sends the request at once, also to a motor whose late reply is awaited
     /// ([`Host::request`](super::Host::request) has the exception).
@@ -107,8 +109,7 @@ impl Client {
         let mut left = ids;
         while !left.is_empty() {
             let port = stopping.attempt(self, left, action, !left.without(expected).is_empty());
-            left =
-                stopping.failed.iter().filter(|(_, error)| is_repeatable(error)).map(id).collect();
+            left = self.repeatable(&stopping.failed);
             if stopping.attempts >= STOP_ATTEMPTS && port.is_ok() {
                 stopping.measure(self);
             }
@@ -126,6 +127,12 @@ impl Client {
         stopping.ask_the_silent(self, unexpected.map(id).collect::<MotorSet>().without(expected));
         stopping
     }
+
+    /// The motors whose stop may be answered otherwise if it is repeated.
+    fn repeatable(&self, failed: &[(MotorId, Error)]) -> MotorSet {
+        let is_meant = |error: &Error| is_repeatable(error) && !self.is_given_up(error);
+        failed.iter().filter(|(_, error)| is_meant(error)).map(id).collect()
+    }
 }
 
 impl Stopping {
@@ -141,7 +148,9 @@ impl Stopping {
         action: StopAction,
         probe: bool,
     ) -> Result<(), Error> {
-        self.attempts += 1;
+        let before = self.attempts;
+        // A program that holds the port repeats them itself.
+        self.attempts += if bus.is_held() { STOP_ATTEMPTS } else { 1 };
         self.failed.retain(|(id, _)| !left.contains(*id));
         let probed = if probe { self.confirmed } else { MotorSet::EMPTY };
         let stops = left.map(|id| (id, action.request()));
@@ -158,8 +167,8 @@ impl Stopping {
                 }
                 Ok(_) => {
                     self.confirmed.insert(id);
-                    self.sent += self.attempts;
-                    self.lost += self.attempts - 1;
+                    self.sent += before + 1;
+                    self.lost += before;
                 }
                 Err(error) => self.failed.push((id, error)),
             }

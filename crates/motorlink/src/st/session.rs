@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{Holder, PortError};
+use motorlink_link::port::{Holder, NotDone, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_FRAME,
@@ -287,6 +287,9 @@ impl Session {
         match answer {
             Ok(()) if is_same_line => Ok(()),
             Ok(()) => Err(Error::Unconfirmed { port, why: None }),
+            Err(Error::Port(PortError::NotDone { kind: NotDone::Unconfirmed, .. })) => {
+                Err(Error::Unconfirmed { port, why: None })
+            }
             Err(Error::Port(error)) => Err(Error::Port(error)),
             Err(why) => {
                 self.master.lost();

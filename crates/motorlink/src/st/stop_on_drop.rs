@@ -1,5 +1,6 @@
 //! Stops motors at the end of a scope, however it is left.
 
+use motorlink_link::port::PortError;
 use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, SyncState};
 
 use super::{Client, Error, Motor};
@@ -77,14 +78,25 @@ impl Client {
     fn stop_and_confirm(&self, motor: MotorNumber) -> Result<(), Error> {
         let result = self.motor(motor.number())?.stop();
         if result.is_ok() || result.as_ref().is_err_and(Error::is_refusal) {
-            self.confirm().inspect_err(|_| {
+            self.confirm().map_err(|error| {
                 // The acknowledge may be that of another request.
                 let mut started = self.hand_over();
                 started.presume(motor.number());
                 self.take_over(started);
+                unconfirmed(error)
             })?;
         }
         result
+    }
+}
+
+/// An acknowledged stop without a confirmation is repeated, also where another program holds the port.
+fn unconfirmed(error: Error) -> Error {
+    match &error {
+        Error::Port(PortError::NotDone { port, .. }) => {
+            Error::Unconfirmed { port: port.as_str().into(), why: Some(Box::new(error)) }
+        }
+        _ => error,
     }
 }
 
@@ -95,18 +107,24 @@ fn echo_of(stopped: &Stopped) -> Option<Failure> {
     }
 }
 
-/// The stops to repeat, and those that are done or refused.
+/// The stops to repeat, and those that are done, refused, or given up by the program that holds the
+/// port.
 fn divided(stopped: Vec<Stopped>) -> (Vec<Stopped>, Vec<Stopped>) {
     stopped.into_iter().partition(is_to_be_repeated)
 }
 
 fn is_to_be_repeated(stopped: &Stopped) -> bool {
-    stopped.result.as_ref().is_err_and(|error| !error.is_refusal())
+    let is_over = |error: &Error| match error {
+        Error::Port(error) => error.is_given_up(),
+        error => error.is_refusal(),
+    };
+    stopped.result.as_ref().is_err_and(|error| !is_over(error))
 }
 
 impl Motor<'_> {
     /// Stops the motor, also one that another program started. Sends STOP_MOTOR until the drive
-    /// acknowledges it and the replies and requests match, at most 4 times. On a lost line padding
+    /// acknowledges it and the replies and requests match, at most 4 times; through a port that another
+    /// program holds only until that program says that it gave up. On a lost line padding
     /// completes what a 5.x drive may wait for ([`Recovery::Pad`](super::Recovery::Pad)).
     ///
     /// # Errors

@@ -45,7 +45,7 @@ impl Acquisition {
         result: Result<Reply, LineError>,
     ) {
         let Some(poll) = self.polls.get(&id).cloned() else { return };
-        if !result.as_ref().is_err_and(LineError::is_line_failure) {
+        if result.as_ref().err().is_none_or(LineError::is_answer) {
             self.answered(lane);
         }
         match result {
@@ -71,7 +71,7 @@ impl Acquisition {
                 }
             },
             Err(error) if error.is_unconfirmed() => {}
-            Err(error) if error.is_line_failure() => self.failed(lane, poll.motor, error),
+            Err(error) if !error.is_answer() => self.failed(lane, poll.motor, error),
             Err(error) if error.is_of_other_profile() => {
                 self.refuse(id, poll.signals.clone(), error);
                 self.unfit.extend(&poll.signals);

@@ -43,6 +43,8 @@ pub(super) trait RmdDriver: Driver {
     fn advance(&mut self, each: &mut RmdEnded<'_>) -> Result<Option<Duration>, rmd::Error>;
     fn cancel(&mut self, id: MotorId);
     fn confirmed(&mut self, id: MotorId) -> Result<(), rmd::Error>;
+    fn is_held(&self) -> bool;
+    fn is_given_up(&self, error: &rmd::Error) -> bool;
     fn sent(&self, id: MotorId) -> Instant;
 }
 
@@ -287,6 +289,14 @@ impl RmdDriver for DirectRmd {
 
     fn confirmed(&mut self, id: MotorId) -> Result<(), rmd::Error> {
         self.client.confirmed(id)
+    }
+
+    fn is_held(&self) -> bool {
+        self.client.is_held()
+    }
+
+    fn is_given_up(&self, error: &rmd::Error) -> bool {
+        self.client.is_given_up(error)
     }
 
     fn sent(&self, id: MotorId) -> Instant {

@@ -8,6 +8,7 @@ mod st;
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
+use motorlink::port::{NotDone, PortError};
 use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Code, MotorId, ReadStatus};
 use motorlink_proto::st as proto;
@@ -84,6 +85,20 @@ impl LineError {
             LineError::Closed => true,
             LineError::Protocol | LineError::Reply | LineError::Implausible(_) => false,
         }
+    }
+
+    /// Whether something was sent, and the line did not fail.
+    pub(crate) fn is_answer(&self) -> bool {
+        use motorlink::{rmd, st};
+        let is_unsent = matches!(
+            self,
+            LineError::St(st::Error::Port(PortError::NotDone { kind: NotDone::Unsent, .. }))
+                | LineError::Rmd(rmd::Error::Port(PortError::NotDone {
+                    kind: NotDone::Unsent,
+                    ..
+                }))
+        );
+        !is_unsent && !self.is_line_failure()
     }
 
     /// Whether the reply has the size of the other profile.
@@ -188,6 +203,9 @@ pub trait Line: Send {
     /// # Errors
     /// What forbids the request, or the port's. No exchange is under way then.
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError>;
+
+    /// Whether this is what a program that holds the port says after it has repeated a stop.
+    fn is_given_up(&self, error: &LineError) -> bool;
 
     /// Gives up the exchange of a lane. Its reply is not taken for another's.
     fn cancel(&mut self, lane: Lane);

@@ -267,6 +267,15 @@ impl RmdDriver for RelayedRmd {
         }
     }
 
+    // Its other users stop motors.
+    fn is_held(&self) -> bool {
+        false
+    }
+
+    fn is_given_up(&self, _: &rmd::Error) -> bool {
+        false
+    }
+
     fn sent(&self, id: MotorId) -> Instant {
         self.exchanges.seen.get(&id).map_or(Instant(0), |seen| seen.sent)
     }

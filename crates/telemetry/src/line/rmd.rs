@@ -107,6 +107,10 @@ impl Line for RmdLine {
         Ok(())
     }
 
+    fn is_given_up(&self, error: &LineError) -> bool {
+        matches!(error, LineError::Rmd(error) if self.driver.is_given_up(error))
+    }
+
     fn cancel(&mut self, lane: Lane) {
         if let Some(id) = MotorId::new(lane.0) {
             self.confirming.remove(id);
@@ -129,7 +133,13 @@ impl Line for RmdLine {
             // something else, or if it does not receive a request.
             if is_confirmation || result.as_ref().is_err_and(LineError::is_line_failure) {
                 let judged = self.driver.confirmed(id);
-                shows = if judged.is_ok() { Shows::Match } else { Shows::Doubt };
+                shows = match &result {
+                    Err(error) if error.is_unconfirmed() => Shows::Doubt,
+                    _ if judged.is_err() => Shows::Doubt,
+                    // Whoever holds the port tells at the next confirmation.
+                    Err(_) if self.driver.is_held() => Shows::Nothing,
+                    _ => Shows::Match,
+                };
                 if is_confirmation && result.is_ok() {
                     result = judged.map(|()| Reply::Confirmed).map_err(LineError::from);
                 }

@@ -170,6 +170,8 @@ impl StLine {
             Ok(Reply::Confirmed) if is_another => Shows::Doubt,
             Ok(Reply::Confirmed) => Shows::Match,
             Err(_) if !was_lost && shows_silence => Shows::Match,
+            // Whoever holds the port tells at the next confirmation.
+            Err(error) if self.is_given_up(error) => Shows::Nothing,
             Err(error) if error.is_line_failure() => Shows::Doubt,
             Err(error) if error.is_of_other_profile() => {
                 self.unasked.get_or_insert(unasked_bytes);
@@ -261,6 +263,10 @@ impl Line for StLine {
             Request::Rmd(..) => return Err(LineError::Protocol),
         };
         Ok(())
+    }
+
+    fn is_given_up(&self, error: &LineError) -> bool {
+        matches!(error, LineError::St(Error::Port(error)) if error.is_given_up())
     }
 
     fn cancel(&mut self, _: Lane) {

@@ -38,6 +38,8 @@ pub enum Outcome {
     Refused,
     /// Without a reply that could be read.
     Failed,
+    /// As failed, at a port that another program holds: it has repeated a stop itself.
+    GivenUp,
     /// The line was closed.
     Closed,
 }

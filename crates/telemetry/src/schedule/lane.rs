@@ -191,7 +191,7 @@ impl<C: Clone> LaneState<C> {
     fn judge_recovery(&mut self, id: CommandId, outcome: Outcome) -> Verdict {
         let is_waiting = self.commands.front().is_some_and(|(first, ..)| *first == id);
         match outcome {
-            Outcome::Failed | Outcome::Closed if is_waiting => {
+            Outcome::Failed | Outcome::GivenUp | Outcome::Closed if is_waiting => {
                 self.commands.pop_front();
                 Verdict::Command(id)
             }
@@ -216,7 +216,7 @@ impl<C: Clone> LaneState<C> {
                 (self.is_known, self.has_answered) = (true, true);
                 self.trust();
             }
-            Outcome::Failed => self.failed(now, exchange.since),
+            Outcome::Failed | Outcome::GivenUp => self.failed(now, exchange.since),
             Outcome::Closed => {}
         }
         match exchange.kind {
@@ -242,7 +242,7 @@ impl<C: Clone> LaneState<C> {
         let is_given_up = stop.attempts >= STOP_ATTEMPTS && now >= stop.give_up;
         match outcome {
             Outcome::Answered => return Verdict::Stopped(id),
-            Outcome::Refused => return Verdict::StopFailed(id),
+            Outcome::Refused | Outcome::GivenUp => return Verdict::StopFailed(id),
             Outcome::Failed | Outcome::Closed if is_given_up => return Verdict::StopFailed(id),
             Outcome::Failed | Outcome::Closed => {}
         }

@@ -19,6 +19,8 @@ use motorlink_testbench::{Bench, Serving};
 use crate::drives::{path, served};
 
 pub const LIMIT: Duration = Duration::from_secs(30);
+/// A busy machine may be late with a reply.
+pub const PATIENT: Duration = Duration::from_secs(5);
 
 /// A share of simulated drives on ptys: the line st0 and the line rmd0.
 pub struct Share {
@@ -33,12 +35,14 @@ pub struct Share {
 
 impl Share {
     pub fn new(name: &str) -> Self {
-        Self::with(name, |link| link)
+        Self::with(name, PATIENT, |link| link)
     }
 
-    /// As [`new`](Self::new), with something around the serial line.
+    /// As [`new`](Self::new), with something around the serial line. RMD motors have this time for a
+    /// reply.
     pub fn with(
         name: &str,
+        timeout: Duration,
         around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
     ) -> Self {
         let (bench, serving, st, rmd) = served(&format!("share-{name}"));
@@ -46,8 +50,6 @@ impl Share {
         let line = StLine::new(client.unwrap());
         let speaks = Speaks::St(Profile::Spec);
         let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
-        // A busy machine may be late with a reply.
-        let timeout = Duration::from_secs(5);
         let options = motorlink::rmd::Options { timeout, ..Default::default() };
         let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
         let engine = Acquisition::new(Box::new(line.unwrap()));

@@ -262,11 +262,18 @@ impl Hub {
                 let lane = self.lines.get(line).and_then(|held| held.lane(motor));
                 let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
                 session.pending -= 1;
-                let is_certain = session.confirmed(line, lane);
                 match result {
-                    Ok(_) if is_certain => session.answer(id, message::Answer::Confirm),
+                    Ok(_) if session.confirmed(line, lane) => {
+                        session.answer(id, message::Answer::Confirm);
+                    }
                     Ok(_) => session.refuse(id, Reason::Unconfirmed, UNCONFIRMED),
-                    Err(error) => session.refuse(id, reason(&error), error.to_string()),
+                    Err(error) => {
+                        // Without an answer of the drive the doubts stay until they are told.
+                        if reason(&error) == Reason::Unconfirmed {
+                            session.confirmed(line, lane);
+                        }
+                        session.refuse(id, reason(&error), error.to_string());
+                    }
                 }
             }
             Work::Stop { part, motor, by, result } => {

@@ -46,14 +46,12 @@ impl Place {
     ) -> PortError {
         let kind = match reason {
             Reason::Usage | Reason::Version => NotDone::Usage,
-            Reason::Latched
-            | Reason::Expired
-            | Reason::Overtaken
-            | Reason::Busy
-            | Reason::Refused => NotDone::Refused,
+            Reason::Latched | Reason::Overtaken | Reason::Refused => NotDone::Refused,
+            Reason::Expired | Reason::Busy => NotDone::Unsent,
             Reason::Silent => NotDone::Silent,
+            Reason::Unconfirmed => NotDone::Unconfirmed,
             // It is unknown what the drive did.
-            Reason::Displaced | Reason::Unconfirmed | Reason::Line | Reason::Later => NotDone::Line,
+            Reason::Displaced | Reason::Line | Reason::Later => NotDone::Line,
         };
         let port = self.name();
         PortError::NotDone { motor, kind, why: format!("`{port}`: {message}"), port }
