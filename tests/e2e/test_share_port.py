@@ -128,10 +128,14 @@ def test_a_latch_refuses_motion_and_the_readers_go_on(share, run, start, direct)
 
 
 def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, direct):
-    run("st", "-p", share.st, "start", "--ramp", "1500", "100").ended(0)
+    said = "the share stops the motor now, because this command ends"
+    assert said in run("st", "-p", share.st, "start", "--ramp", "1500", "100").ended(0).err
     direct.until(event("stopped", line="st0", motor=1))
-    run("rmd", "-p", share.rmd, "--id", "3", "speed", "300").ended(0)
+    assert said in run("rmd", "-p", share.rmd, "--id", "3", "speed", "300").ended(0).err
     direct.until(event("stopped", line="rmd0", motor=3))
+    waited = run("rmd", "-p", share.rmd, "--id", "3", "position", "90", "--max-speed", "360", "--wait")
+    assert said not in waited.ended(0).err
+    assert said not in run("st", "-p", share.st, "ramp", "1000", "100").ended(0).err
     eventually(lambda: abs(rpm(direct)) < 30 and abs(dps(direct, 3)) < 5, "motors that stop")
 
 

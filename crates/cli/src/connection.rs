@@ -11,7 +11,7 @@ use motorlink_link::fault::{FaultError, Faults};
 
 use crate::failure::Failure;
 use crate::help;
-use crate::output::Printer;
+use crate::output::{Printer, note};
 use crate::trace;
 
 #[derive(clap::Args)]
@@ -157,6 +157,16 @@ impl Wrap {
             faults.seed = faults.seed.wrapping_add(1);
         }
         if self.trace { tapped(link) } else { link }
+    }
+}
+
+/// After a command that lets motors turn on: whoever holds the port stops them when the command ends.
+pub fn tell_of_stop(port: &PortName) {
+    if port.is_held() {
+        note(
+            "the share stops the motor now, because this command ends: on a share a motor turns as long \
+             as the program that turned it. Use a move with --wait, or a program that stays",
+        );
     }
 }
 

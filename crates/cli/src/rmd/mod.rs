@@ -17,6 +17,7 @@ pub use settings::{GainChange, gain_alone, range};
 
 use motorlink::rmd::MotorId;
 
+use crate::connection::tell_of_stop;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{keep_error, kept_error};
@@ -74,7 +75,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
                 (true, 1) => session.of_motion(failure, session.id),
                 (true, _) => failure.of_motion("the motors", "motorlink rmd stop --all"),
                 _ => failure,
-            })
+            })?;
+            if act.can_turn() {
+                tell_of_stop(&port);
+            }
+            Ok(())
         }
         Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
         Command::Read(Read::Dump(_) | Read::Diff(_)) if ids.len() > 1 => {

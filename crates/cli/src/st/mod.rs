@@ -22,7 +22,7 @@ pub use refusal::reason_of_read;
 use session::connect;
 pub use units::StUnits;
 
-use crate::connection::Connection;
+use crate::connection::{Connection, tell_of_stop};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::keep_error;
@@ -57,7 +57,12 @@ fn run_at(
     match command {
         Command::Act(act) => {
             keep_error();
-            act::run(&connect()?, act)
+            let session = connect()?;
+            act::run(&session, act)?;
+            if session.client.started().next().is_some() {
+                tell_of_stop(port);
+            }
+            Ok(())
         }
         Command::Read(read) => match read {
             Read::Registers { filter } => registers::list(connection.output(), &filter),
