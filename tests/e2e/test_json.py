@@ -34,6 +34,8 @@ RMD = [
     *("torque4 0 0 0 0", "torque4 0 0 0 0 --expect 1,2", "torque 1 --current-limit 1", "raw 9a"),
     *("status --gear-ratio 6 --encoder-bits 14", "encoder --encoder-bits 14", "acceleration 9 --gear-ratio 6"),
 ]
+#: What a running share is asked for.
+SHARE = ["stop", "latch", "release"]
 #: What reads or writes a file of settings.
 FILES = ["dump", "dump FILE --overwrite", "diff FILE", "restore FILE", "restore FILE --dry-run"]
 SCAN = "`motorlink rmd -p sim: scan` lists the motors that answer"
@@ -79,6 +81,7 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK, *FILES]} | {"scan"}
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "completions", "man"}
+    assert subcommands(run, "share") == set(SHARE)
     assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "conformance"} | others
 
 
@@ -265,7 +268,7 @@ def test_a_guard_tells_what_happens(sim, start, run, tmp_path):
     assert check("\n".join(guard.out)) and check("\n".join(guard.err))
 
 
-def test_a_share_tells_what_happens(sim, start, tmp_path):
+def test_a_share_tells_what_happens(sim, start, checked, tmp_path):
     drives, path = sim(), tmp_path / "share"
     share = start("share", "-p", drives.st, "--at", f"unix:{path}", "--json")
     share.line(0)
@@ -274,6 +277,9 @@ def test_a_share_tells_what_happens(sim, start, tmp_path):
     share.until(lambda: any('"commanded"' in line for line in share.out), "a command")
     client.socket.close()
     share.until(lambda: any('"stopped"' in line for line in share.out), "the motor is stopped")
+    for request, event in zip(SHARE, ("stopped", "latched", "released")):
+        (told,), _ = checked("share", request, "--at", f"unix:{path}")
+        assert told["event"] == event, told
     share.interrupt()
     share.wait()
     assert len(check("\n".join(share.out))) > 4

@@ -139,6 +139,28 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     eventually(lambda: abs(rpm(direct)) < 30 and abs(dps(direct, 3)) < 5, "motors that stop")
 
 
+def test_a_command_latches_stops_and_releases(share, run, direct):
+    at = ["--at", f"unix:{share.path}"]
+    direct.command("st0", 1, 3, 1)
+    run("share", "latch", *at).ended(0)
+    refused = run("st", "-p", share.st, "start").ended(1).err
+    assert "motion is refused until the latch is released" in refused
+    assert "`motorlink share release --at unix:PATH` releases the latch" in refused
+    assert "st0, motor 1: it confirmed the stop" in run("share", "stop", *at).ended(0).out
+    eventually(lambda: is_idle(direct), "a motor that rests")
+    run("share", "release", *at).ended(0)
+    run("st", "-p", share.st, "start").ended(0)
+    missing = run("share", "release", "--at", f"unix:{share.path}-not").ended(3).err
+    assert "is --at that of a running `motorlink share`?" in missing
+
+
+def test_a_stop_that_a_drive_does_not_confirm_is_an_error(share, run, drives, direct):
+    direct.command("rmd0", 9, 0xA2, *7 * [0])
+    done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(3)
+    assert "rmd0, motor 9: it may still be turning" in done.out
+    assert "not all confirmed" in done.err
+
+
 def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start, run, drives):
     reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms")
     reads.line(3)

@@ -259,7 +259,7 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
         }
         PortError::NotDone { port, motor, kind, .. } => {
             let kind = match kind {
-                NotDone::Refused | NotDone::Unsent => Kind::Refused,
+                NotDone::Refused | NotDone::Latched | NotDone::Unsent => Kind::Refused,
                 NotDone::Usage => Kind::InvalidValue,
                 NotDone::Silent => Kind::ReplyTimeout,
                 NotDone::Unconfirmed | NotDone::Line => Kind::Link,

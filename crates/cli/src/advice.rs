@@ -1,7 +1,7 @@
 //! Advice after errors of the library: a command or an option to try.
 
 use motorlink::arrival::NotArrived;
-use motorlink::port::{NameError, PortError};
+use motorlink::port::{NameError, NotDone, PortError};
 use motorlink::relay::RelayError;
 use motorlink::st::{ErrorCode, Failure, Profile, Unverifiable};
 use motorlink::{rmd, st};
@@ -30,6 +30,9 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         }
         PortError::NoHolder { .. } => {
             Some("start it with `motorlink share`, and stop motors that still turn")
+        }
+        PortError::NotDone { kind: NotDone::Latched, .. } => {
+            Some("`motorlink share release --at unix:PATH` releases the latch of this share")
         }
         PortError::Closed { port } if port.contains(UNIX) => Some(SHARE_SOCKET),
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),

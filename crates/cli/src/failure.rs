@@ -394,7 +394,10 @@ impl From<&PortError> for Failure {
             PortError::WrongKind { .. }
             | PortError::HeldInProfile { .. }
             | PortError::NotDone { kind: NotDone::Usage, .. } => Kind::Usage,
-            PortError::NotDone { kind: NotDone::Refused | NotDone::Unsent, .. } => Kind::Refused,
+            PortError::NotDone {
+                kind: NotDone::Refused | NotDone::Latched | NotDone::Unsent,
+                ..
+            } => Kind::Refused,
             _ => Kind::Link,
         };
         let failure: Failure = Problem::of(kind, error, advice::port(error)).into();

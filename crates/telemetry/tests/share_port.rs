@@ -174,7 +174,7 @@ fn a_refusal_of_the_share_is_told_in_words_and_leaves_the_connection_open() {
     let motor = other.motor(1).unwrap();
     for _ in 0..2 {
         let (kind, why) = not_done(motor.start().unwrap_err());
-        assert_eq!(kind, NotDone::Refused);
+        assert_eq!(kind, NotDone::Latched);
         assert!(why.contains("motion is refused until the latch is released"), "{why}");
     }
     other.confirm().unwrap();

@@ -1,23 +1,19 @@
 //! The latch of a share. It holds for all programs of the share, that of an engine here does not.
 
-use std::io::{self, Read, Write};
-use std::os::unix::net::UnixStream;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::message::{self, Answer, Ask, Request, Text};
+use motorlink_telemetry::share::message::{Answer, Ask};
 
 use super::model::Latch;
 use super::work::{Done, Work};
+use crate::share::Connection;
 
 /// Time between two looks at the latch.
 const LOOK: Duration = Duration::from_millis(500);
-/// The longest time for an answer of the share.
-const ANSWER: Duration = Duration::from_secs(5);
 
 /// A share that has some of the ports.
 pub struct Share {
@@ -117,51 +113,6 @@ impl Watcher {
         match connection.ask(Ask::Lines)? {
             Answer::Lines { latched_by, .. } => Ok(latched_by.map(Arc::from)),
             _ => Err(io::Error::other("the share gives another answer")),
-        }
-    }
-}
-
-struct Connection {
-    socket: UnixStream,
-    reader: Reader,
-    last_id: u32,
-}
-
-impl Connection {
-    fn open(path: &Path, by: &str) -> io::Result<Self> {
-        let socket = UnixStream::connect(path)?;
-        socket.set_read_timeout(Some(ANSWER))?;
-        socket.set_write_timeout(Some(ANSWER))?;
-        let mut opened = Connection { socket, reader: Reader::default(), last_id: 0 };
-        opened.ask(Ask::Hello { protocol: VERSION, name: by.to_owned() })?;
-        Ok(opened)
-    }
-
-    /// Sends a request and waits for its answer.
-    fn ask(&mut self, ask: Ask) -> io::Result<Answer> {
-        self.last_id = self.last_id.wrapping_add(1);
-        let request = message::encode(&Request { id: self.last_id, ask });
-        let mut stream = Vec::new();
-        frame::append(Kind::Text, &request, &mut stream).map_err(io::Error::other)?;
-        self.socket.write_all(&stream)?;
-        let mut bytes = [0; 4096];
-        loop {
-            while let Some(frame) = self.reader.take().map_err(io::Error::other)? {
-                if frame.kind != Kind::Text {
-                    continue;
-                }
-                match message::decode(&frame.payload).map_err(io::Error::other)? {
-                    Text::Answer { id, answer } if id == self.last_id => return Ok(answer),
-                    Text::Refusal { id, message, .. } if id == self.last_id => {
-                        return Err(io::Error::other(message));
-                    }
-                    _ => {}
-                }
-            }
-            match self.socket.read(&mut bytes)? {
-                0 => return Err(io::Error::other("the share closed the connection")),
-                count => self.reader.push(&bytes[..count]),
-            }
         }
     }
 }

@@ -297,6 +297,8 @@ pub enum PortError {
 pub enum NotDone {
     /// It refuses the request now.
     Refused,
+    /// Motion is refused until a latch is released.
+    Latched,
     /// The request is not possible.
     Usage,
     /// The motor does not answer.
@@ -318,8 +320,9 @@ impl PortError {
 
     /// Whether nothing can be said about the drives, because the port failed.
     pub fn is_line_failure(&self) -> bool {
-        use NotDone::{Refused, Unsent, Usage};
-        let is_answered = matches!(self, PortError::NotDone { kind: Refused | Usage | Unsent, .. });
+        use NotDone::{Latched, Refused, Unsent, Usage};
+        let is_answered =
+            matches!(self, PortError::NotDone { kind: Refused | Latched | Usage | Unsent, .. });
         !self.is_interruption() && !is_answered
     }
 

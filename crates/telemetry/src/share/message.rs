@@ -1,5 +1,7 @@
 //! The texts of both sides, as JSON.
 
+use std::time::Duration;
+
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +15,11 @@ pub const MOST_SIGNALS: usize = 1024;
 pub const MOST_SUBSCRIPTIONS: usize = 16;
 /// The longest time to live of a command and the longest period, in seconds.
 pub const LONGEST_TIME: f64 = 3600.0;
+
+/// How long a share may take for an answer, besides the waiting for replies.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Replies that a share may wait for until it answers: it repeats a stop, and recovers the line before.
+const REPLIES: u32 = 12;
 
 /// A request of a program. It gets one answer or one refusal with the same id.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -238,6 +245,14 @@ pub struct Line {
     pub t: f64,
     /// The wall clock at the same moment, in seconds since 1970.
     pub wall: f64,
+}
+
+impl Line {
+    /// How long the share may take for an answer.
+    pub fn patience(&self) -> Duration {
+        let timeout = Duration::try_from_secs_f64(self.timeout).unwrap_or_default();
+        PATIENCE.saturating_add(timeout.saturating_mul(REPLIES))
+    }
 }
 
 /// What the drives of a line speak.

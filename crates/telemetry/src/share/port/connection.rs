@@ -16,10 +16,6 @@ use crate::share::message::{self, Answer, Ask, LONGEST_NAME, Line, Request, Text
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
-/// How long a share may take for any other answer, besides the waiting for replies.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Replies that a share may wait for until it answers: it repeats a stop, and recovers the line before.
-const REPLIES: u32 = 12;
 
 /// A request is not sent later than this after the program has made it.
 const TIME_TO_LIVE: Duration = Duration::from_secs(1);
@@ -93,8 +89,7 @@ impl Connection {
             let why = format!("the share has no such line; its lines are {}", names.join(", "));
             return Err(self.port.failed(why));
         };
-        let timeout = Duration::try_from_secs_f64(line.timeout).unwrap_or_default();
-        let patience = PATIENCE.saturating_add(timeout.saturating_mul(REPLIES));
+        let patience = line.patience();
         let Some(name) = &line.profile else { return Ok(Holder { patience, profile: None }) };
         let profile = Profile::ALL.into_iter().find(|profile| profile.name() == name);
         match profile {

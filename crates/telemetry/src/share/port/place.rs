@@ -46,7 +46,8 @@ impl Place {
     ) -> PortError {
         let kind = match reason {
             Reason::Usage | Reason::Version => NotDone::Usage,
-            Reason::Latched | Reason::Overtaken | Reason::Refused => NotDone::Refused,
+            Reason::Latched => NotDone::Latched,
+            Reason::Overtaken | Reason::Refused => NotDone::Refused,
             Reason::Expired | Reason::Busy => NotDone::Unsent,
             Reason::Silent => NotDone::Silent,
             Reason::Unconfirmed => NotDone::Unconfirmed,

@@ -1,5 +1,9 @@
 //! `motorlink share`: holds ports and lets several programs use the drives at the same time.
 
+mod asking;
+
+use std::fmt::Display;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,7 +13,7 @@ use motorlink::{rmd, st};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{Line, RmdLine, StLine, Stopped};
 use motorlink_telemetry::share::hub::{Held, Speaks};
-use motorlink_telemetry::share::message::{Event, Protocol};
+use motorlink_telemetry::share::message::{Answer, Ask, Event, Protocol};
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::json;
@@ -18,7 +22,9 @@ use crate::connection::missing_port;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 use crate::span::span_up_to;
-use crate::{hint, output};
+use crate::{advice, hint, output};
+
+pub use asking::Connection;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -43,7 +49,7 @@ pub struct Args {
         value_hint = clap::ValueHint::AnyPath)]
     ports: Vec<String>,
     /// Where programs connect: unix:PATH. Only you can connect
-    #[arg(long, value_name = "PORT", default_value = "unix:./share",
+    #[arg(long, value_name = "PORT", default_value = "unix:./share", global = true,
         value_hint = clap::ValueHint::AnyPath)]
     at: String,
     /// What the ST drives speak: the document, or the firmware of MCSDK 5.4
@@ -53,12 +59,28 @@ pub struct Args {
     #[arg(long, value_name = "TIME", value_parser = span_up_to(Duration::from_secs(60)))]
     timeout: Option<Duration>,
     /// Print JSON, one object per line
-    #[arg(long)]
+    #[arg(long, global = true)]
     json: bool,
+    #[command(subcommand)]
+    request: Option<AskFor>,
+}
+
+/// What a running share is asked for.
+#[derive(clap::Subcommand, Clone, Copy)]
+enum AskFor {
+    /// Stop all motors that were started or read through the share
+    Stop,
+    /// Refuse motion of all programs until it is released
+    Latch,
+    /// Release the latch of whoever set it: motion is possible again
+    Release,
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let path = path(&args.at)?;
+    if let Some(request) = args.request {
+        return ask(request, &path, args);
+    }
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     let lines = open(&args.ports, args.profile, args.timeout)?;
@@ -78,9 +100,46 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let stopped = server.end(&why);
     stopped.iter().try_for_each(|(line, one)| tell_stopped(line, one, args.json))?;
     if stopped.iter().any(|(_, one)| one.result.is_err()) {
-        return Err(Failure::link("motors may still turn: not all confirmed that they stop"));
+        return Err(Failure::link(UNCONFIRMED));
     }
     outcome
+}
+
+/// Asks a running share, and says what it did.
+fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
+    let failed = |error: io::Error| {
+        Failure::link(format!("the share at {}: {error}", args.at))
+            .trying("is --at that of a running `motorlink share`?")
+    };
+    let name = format!("motorlink {}", std::process::id());
+    let mut share = Connection::open(path, &name).map_err(failed)?;
+    let done = |event: &str, message: &str| match args.json {
+        true => output::print_line(&json!({ "event": event, "message": message })),
+        false => output::print_line(&message),
+    };
+    match request {
+        AskFor::Stop => {
+            let Answer::Stop { motors } = share.stop().map_err(failed)? else {
+                return Err(failed(io::Error::other("it gives another answer")));
+            };
+            for one in &motors {
+                let result = one.failure.as_ref().map_or(Ok(()), Err);
+                tell_stop(&one.motor.line, one.motor.motor, result, args.json)?;
+            }
+            match motors.iter().any(|one| one.failure.is_some()) {
+                true => Err(Failure::link(UNCONFIRMED).trying(advice::STOP_AGAIN)),
+                false => Ok(()),
+            }
+        }
+        AskFor::Latch => {
+            share.ask(Ask::Latch).map_err(failed)?;
+            done("latched", "motion is refused until the latch is released; motors turn on")
+        }
+        AskFor::Release => {
+            share.ask(Ask::Release).map_err(failed)?;
+            done("released", "motion is possible")
+        }
+    }
 }
 
 fn path(at: &str) -> Result<PathBuf, Failure> {
@@ -90,6 +149,8 @@ fn path(at: &str) -> Result<PathBuf, Failure> {
             .trying("give --at unix:PATH, such as --at unix:./share")),
     }
 }
+
+const UNCONFIRMED: &str = "motors may still turn: not all confirmed that they stop";
 
 /// Opens each port, once for each protocol that it can have.
 fn open(
@@ -171,6 +232,15 @@ fn tell_stopped(
         Motor::St(motor) => motor.number(),
         Motor::Rmd(id) => id.number(),
     };
+    tell_stop(line, motor, result.as_ref().copied(), json)
+}
+
+fn tell_stop(
+    line: &str,
+    motor: u8,
+    result: Result<(), impl Display>,
+    json: bool,
+) -> Result<(), Failure> {
     let (event, words) = match result {
         Ok(()) => ("stopped", "it confirmed the stop".to_owned()),
         Err(error) => ("stop-failed", format!("it may still be turning: {error}")),
