@@ -76,7 +76,8 @@ def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
     samples = run(*st, "get", "SPEED_MEAS", "STATUS", "--every", "10ms", "--count", "20", "--json").ended(0)
     assert len(samples.lines) >= 20
     refused = run(*st, "-m", "5", "stop").ended(1)
-    assert "BAD_MOTOR_SELECTED" in refused.err
+    assert "BAD_MOTOR_SELECTED" in refused.err and "no motor of this number" in refused.err
+    assert "may still be turning" not in refused.err
     assert "BAD_FRAME_ID" in run(*st, "raw", "0x1f").ended(1).err
 
 

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use motorlink::st::{
-    ArrivalOptions, Command as Execute, CurrentReference, Effect, Flags, Frame, PositionMove,
-    Profile, REVUP_PHASES, Ramp, Reading, RegisterId, Request, RevupPhase, TorqueRamp,
-    VERIFY_ATTEMPTS, register::Unit,
+    ArrivalOptions, Command as Execute, CurrentReference, Effect, Error, ErrorCode, Flags, Frame,
+    PositionMove, Profile, REVUP_PHASES, Ramp, Reading, RegisterId, Request, RevupPhase,
+    TorqueRamp, VERIFY_ATTEMPTS, register::Unit,
 };
 use motorlink::time;
 
@@ -46,7 +46,11 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Stop => {
             let stopped = motor.stop_until_confirmed();
             interrupt::stop_is_complete();
-            stopped?;
+            stopped.map_err(|error| match error {
+                // What does not exist does not turn.
+                Error::Refused { code: ErrorCode::BadMotorSelected, .. } => error.into(),
+                error => Failure::from(error).of_stop(motor.number()),
+            })?;
             session.acknowledged(format!("{}: {} acknowledged", motor.number(), Execute::StopMotor))
         }
         Act::StartStop => execute(session, Execute::StartStop),

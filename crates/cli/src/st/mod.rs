@@ -40,10 +40,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
         interrupt::complete_stop(format!("motor {}", drive.motor));
     }
     let done = run_at(&connection, &drive, &port, command);
-    done.map_err(
-        |failure| if is_stop { failure.of_stop(format!("motor {}", drive.motor)) } else { failure },
-    )
-    .map_err(|failure| failure.about(&port.to_string(), drive.motor))
+    done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
 }
 
 fn run_at(
@@ -57,7 +54,11 @@ fn run_at(
     match command {
         Command::Act(act) => {
             keep_error();
-            let session = connect()?;
+            let of_stop = |failure: Failure| match act {
+                Act::Stop => failure.of_stop(format!("motor {}", drive.motor)),
+                _ => failure,
+            };
+            let session = connect().map_err(of_stop)?;
             act::run(&session, act)?;
             if session.client.started().next().is_some() {
                 tell_of_stop(port);

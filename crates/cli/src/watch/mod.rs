@@ -318,6 +318,7 @@ impl Watch {
         match done {
             Done::Rates(port, rates) => self.model.rates(port, &rates),
             Done::Stopped(stop, result) => self.model.stopped(stop.row, stop.number, result),
+            Done::NoMotor(stop) => self.model.has_no_motor(stop.row, stop.number),
             Done::Found(port, found) => self.found(port, found),
             Done::Latch(share, latch) => {
                 let ports = &self.shares[share].ports;

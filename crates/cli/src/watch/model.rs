@@ -236,6 +236,16 @@ impl Model {
         }
     }
 
+    /// As [`stopped`](Self::stopped), if the drive has no such motor: then nothing turns.
+    pub fn has_no_motor(&mut self, at: usize, number: u64) {
+        let row = &mut self.rows[at];
+        if row.stop_number == number {
+            (row.stop, row.unconfirmed) = (Stop::None, None);
+            let text = format!("{}: the drive has no such motor", row.name);
+            self.say(Some(at), text, true);
+        }
+    }
+
     /// Rows whose stop was not confirmed and is due to be repeated.
     pub fn due_stops(&self, now: Instant) -> Vec<usize> {
         let rows = self.rows.iter().enumerate();

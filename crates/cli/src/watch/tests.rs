@@ -221,6 +221,21 @@ fn a_stop_that_is_not_confirmed_is_said_in_bold_words_in_every_view() {
 }
 
 #[test]
+fn a_stop_of_a_motor_that_the_drive_does_not_have_is_no_alarm() {
+    let mut model = model();
+    let number = model.stopping(0);
+    model.has_no_motor(0, number);
+    assert_eq!(model.rows[0].stop, Stop::None);
+    assert!(model.due_stops(std::time::Instant::now()).is_empty());
+    let lines = lines(&drawn(&model, &Place::new(5), 80, 24));
+    assert!(!lines.iter().any(|line| line.contains("NOT CONFIRMED")), "{lines:?}");
+    assert!(
+        lines.iter().any(|line| line.contains("st0:1: the drive has no such motor")),
+        "{lines:?}"
+    );
+}
+
+#[test]
 fn a_stop_that_is_not_confirmed_is_repeated_when_the_motor_answers_until_it_is_confirmed() {
     let mut model = model();
     let later = || std::time::Instant::now() + Duration::from_secs(2);

@@ -4,8 +4,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
+use motorlink::st::{Error, ErrorCode};
 use motorlink::time::Micros;
 use motorlink_telemetry::acquisition::{ConsumerId, Rate};
+use motorlink_telemetry::event::CommandError;
+use motorlink_telemetry::line::LineError;
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::Remote;
 use motorlink_telemetry::signal::Motor;
@@ -29,6 +32,8 @@ const CAPACITY: usize = 4096;
 pub enum Done {
     Rates(usize, Vec<Rate>),
     Stopped(Stopping, Result<(), String>),
+    /// The drive has no motor of this number.
+    NoMotor(Stopping),
     /// Motors that a search found at a port, and their subscription.
     Found(usize, Result<(Vec<Motor>, Subscription), String>),
     /// The latch of a share.
@@ -176,7 +181,14 @@ impl Work {
 
 fn stop(remote: &Remote, by: &Arc<str>, it: Stopping, sender: &SyncSender<Done>) {
     let result = remote.stop(by, stop_of(it.motor));
-    let _ = sender.send(Done::Stopped(it, result.map(drop).map_err(|why| why.to_string())));
+    let done = match result {
+        Err(CommandError::Line(LineError::St(Error::Refused {
+            code: ErrorCode::BadMotorSelected,
+            ..
+        }))) => Done::NoMotor(it),
+        result => Done::Stopped(it, result.map(drop).map_err(|why| why.to_string())),
+    };
+    let _ = sender.send(done);
 }
 
 /// Subscribes to the signals of rows, and to the events of their port.
