@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import socket
 import struct
@@ -244,19 +245,23 @@ def test_a_share_takes_no_place_of_others(share, drives, run, tmp_path):
 
 def test_the_log_says_who_did_what(start, sim, tmp_path):
     drives, path = sim(), tmp_path / "share"
-    running = start("share", "-p", drives.st, "--at", f"unix:{path}")
+    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "60s"]
+    running = start("share", *words)
     running.line(0)
     client = Client(path, "tuner")
+    client.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
     client.command("st0", 1, *START)
     client.ask("stop", motor={"line": "st0", "motor": 1})
     client.ask("latch")
     client.socket.close()
     for said in (
         "tuner sends EXECUTE_CMD START_MOTOR",
-        "tuner stops it",
+        "st0, motor 1: tuner stops it",
+        "rmd0, motor 2: tuner sends 0xA2 ",
+        "rmd0, motor 2: the share stops it, because tuner has left",
         "it confirmed the stop",
         "tuner refuses motion",
         "tuner left",
     ):
         running.until(lambda: any(said in line for line in running.out), said)
-    assert running.out[1] == "tuner joined"
+    assert re.fullmatch(r"\d\d:\d\d:\d\d tuner joined", running.out[1]), running.out[1]

@@ -1,6 +1,6 @@
-//! Time spans on the command line: a number with its unit, such as `100ms` or `0.5s`.
+//! Time spans on the command line: a number with its unit, such as `100ms` or `0.5s`; times of day.
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 const SHORTEST: Duration = Duration::from_millis(1);
 const LONGEST: Duration = Duration::from_secs(86_400);
@@ -66,6 +66,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     number
         .map(|number| number * scale)
         .map_err(|_| "write a number and its unit, such as 100ms or 0.5s".to_owned())
+}
+
+/// The time of day, UTC.
+pub fn utc(time: SystemTime) -> String {
+    let seconds = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (hours, minutes) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{hours:02}:{minutes:02}:{:02}", seconds % 60)
 }
 
 #[cfg(test)]

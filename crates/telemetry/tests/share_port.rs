@@ -421,12 +421,14 @@ fn a_start_that_waited_in_a_frozen_share_is_refused() {
 fn a_client_does_not_repeat_a_stop_that_the_share_has_repeated() {
     let share = deaf("once");
     let mut witness = Operator::joined(&share);
+    let bus = share.rmd();
+    // No motor, but the share does not know.
+    bus.ask(id(9), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap_err();
     let client = share.st();
     let failed = client.motor(1).unwrap().stop_until_confirmed().unwrap_err();
     assert!(failed.to_string().contains("no reply in time"), "{failed}");
     assert_eq!(witness.stops(), 1);
-    let client = share.rmd();
-    let failed = client.motor(9).unwrap().stop_until_confirmed().unwrap_err();
+    let failed = bus.motor(9).unwrap().stop_until_confirmed().unwrap_err();
     assert!(matches!(failed, rmd::Error::Timeout { .. }), "{failed}");
     assert_eq!(witness.stops(), 1);
 }
@@ -437,6 +439,8 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
     let mut witness = Operator::joined(&share);
     let st = StLine::open(&share.port("st0"), Default::default()).unwrap();
     let rmd = RmdLine::open(&share.port("rmd0"), Default::default()).unwrap();
+    let client = share.rmd();
+    client.ask(id(9), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap_err();
     let stop = Request::ExecuteCommand(Command::StopMotor);
     let engines = [
         (Acquisition::new(Box::new(st)), line::Request::st(1, stop)),
@@ -459,9 +463,12 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
 #[test]
 fn a_stop_of_all_ids_of_a_share_is_certain_of_the_ids_without_a_motor() {
     let share = deaf("all");
+    let mut operator = Operator::joined(&share);
     let client = share.rmd();
     let stopping = client.stop_all_until_confirmed(Default::default());
     assert!(stopping.failed.is_empty(), "{stopping:?}");
     assert!(stopping.is_silence_certain(), "{stopping:?}");
     assert_eq!(stopping.confirmed.len() + stopping.silent.len(), MotorSet::ALL.len());
+    // The IDs without a motor are no alarm.
+    assert!(operator.stops() <= stopping.confirmed.len());
 }

@@ -5,7 +5,7 @@ mod asking;
 use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink::port::PortName;
 use motorlink::st::Profile;
@@ -21,7 +21,7 @@ use serde_json::json;
 use crate::connection::missing_port;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
-use crate::span::span_up_to;
+use crate::span::{span_up_to, utc};
 use crate::{advice, hint, output};
 
 pub use asking::Connection;
@@ -218,7 +218,10 @@ fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
 fn tell(event: &Event, json: bool) -> Result<(), Failure> {
     match json {
         true => output::print_line(&json!(event)),
-        false => output::print_line(&event.message),
+        false => {
+            let at = UNIX_EPOCH + Duration::try_from_secs_f64(event.wall).unwrap_or_default();
+            output::print_line(&format!("{} {}", utc(at), event.message))
+        }
     }
 }
 

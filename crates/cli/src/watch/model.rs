@@ -13,6 +13,7 @@ use motorlink_telemetry::subscription::Record;
 use super::ports::Protocol;
 use super::row::{Row, Stop, remember};
 use super::values::{self, Units};
+use crate::span::utc;
 
 /// Events that are kept.
 const EVENTS: usize = 200;
@@ -379,11 +380,4 @@ pub fn span(time: Duration) -> String {
         seconds @ 100..=5999 => format!("{}min", seconds / 60),
         seconds => format!("{}h", seconds / 3600),
     }
-}
-
-/// The time of day, UTC.
-fn utc(time: SystemTime) -> String {
-    let seconds = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let (hours, minutes) = (seconds / 3600 % 24, seconds / 60 % 60);
-    format!("{hours:02}:{minutes:02}:{:02}", seconds % 60)
 }

@@ -18,7 +18,7 @@ use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
-use crate::share::message::{Event, Line, Protocol};
+use crate::share::message::{Event, Happening, Line, Protocol};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
 
@@ -43,6 +43,8 @@ pub struct Held {
     pub(super) starting: Vec<(Motor, SessionId)>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
+    /// The motors that have answered.
+    pub(super) heard: BTreeSet<Motor>,
     /// The motors that did not confirm a stop, and who asked for it.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
 }
@@ -88,6 +90,7 @@ impl Held {
             owners: BTreeMap::new(),
             starting: Vec::new(),
             known: BTreeSet::new(),
+            heard: BTreeSet::new(),
             unstopped: BTreeMap::new(),
             runner: Runner::start(name, acquisition)?,
         })
@@ -95,6 +98,7 @@ impl Held {
 
     /// A motor has confirmed a stop: nobody is responsible for it any more.
     pub(super) fn stopped(&mut self, motor: Motor) {
+        self.heard.insert(motor);
         self.owners.remove(&motor);
         self.unstopped.remove(&motor);
     }
@@ -148,9 +152,11 @@ impl Held {
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
+                What::Confirmed(motor, _) => drop(self.heard.insert(*motor)),
                 _ => {}
             }
             let told = self.words.of(&self.name, self.speaks, &event.what);
+            let told = told.filter(|told| !self.is_of_no_motor(told));
             events.extend(told.map(|told| Event {
                 wall: self.wall(event.time),
                 line: Some(self.name.clone()),
@@ -160,6 +166,19 @@ impl Held {
         }
         let has_ended = events.is_empty() && self.events.is_closed();
         (!has_ended).then_some(events)
+    }
+
+    /// Whether it is the stop of an ID that never answered, and that no program turned: there may be no
+    /// motor. Whoever asked for it is told.
+    fn is_of_no_motor(&self, told: &Event) -> bool {
+        let is_of_stop = matches!(told.event, Happening::Stopping | Happening::StopFailed);
+        let Some(id) = told.motor.and_then(MotorId::new).filter(|_| is_of_stop) else {
+            return false;
+        };
+        let motor = Motor::Rmd(id);
+        let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
+        let is_turned = is_starting || self.owners.contains_key(&motor);
+        self.speaks == Speaks::Rmd && !self.heard.contains(&motor) && !is_turned
     }
 
     /// The motor, if replies say which motor they are from; `None` means all motors of the line.
@@ -277,9 +296,4 @@ pub(super) fn stop(motor: Motor) -> Request {
         }
         Motor::Rmd(id) => Request::rmd(id, &Stop),
     }
-}
-
-/// The name of whoever the share acts for when they have left.
-pub(super) fn after(name: &Arc<str>) -> Arc<str> {
-    format!("share, after {name}").into()
 }

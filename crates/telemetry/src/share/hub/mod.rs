@@ -129,7 +129,7 @@ impl Hub {
         }
         let Some(name) = session.name else { return };
         self.say(Happening::Left, &name, format!("{name} left"));
-        let by = line::after(&name);
+        let by = words::after(&name);
         for line in 0..self.lines.len() {
             for motor in self.orphans(line, id) {
                 self.stop(line, motor, id, None, &by);
@@ -330,6 +330,9 @@ impl Hub {
     ) {
         let Sent { motor, motion, configures } = sent;
         if let Some(motor) = motor {
+            if let Some(held) = self.lines.get_mut(line).filter(|_| result.is_ok()) {
+                held.heard.insert(motor);
+            }
             self.command_ended(session, line, motor, motion, &result);
             self.told_of(line, motor, &result);
         }

@@ -1,6 +1,7 @@
 //! The events of an engine for programs and people.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use motorlink::st::Transcript;
 use motorlink_proto::can::CanFrame;
@@ -76,7 +77,7 @@ impl Words {
             What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => None,
             What::Stopping(id, by, request) => {
                 self.stops.insert(*id, (request.motor(), by.to_string()));
-                let message = format!("{by} stops it");
+                let message = stops(by);
                 event(Happening::Stopping, request.motor(), Some(by), message)
             }
             What::Stopped(id) => {
@@ -115,8 +116,27 @@ fn described(speaks: Speaks, request: &Request) -> String {
             frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
         }
         (Request::Rmd(id, data), _) => {
-            describe(CanFrame::new(id.can_id(), *data), Direction::HostToDrive).to_string()
+            let frame = CanFrame::new(id.can_id(), *data);
+            let text = describe(frame, Direction::HostToDrive).to_string();
+            // The motor is told already.
+            text.split_once(" > ").map_or(text.clone(), |(_, request)| request.to_owned())
         }
         _ => String::new(),
+    }
+}
+
+/// Between the share and whoever it acts for when they have left.
+const AFTER: &str = "share, after ";
+
+/// The name of whoever the share acts for when they have left.
+pub(super) fn after(name: &Arc<str>) -> Arc<str> {
+    format!("{AFTER}{name}").into()
+}
+
+/// That a program stops a motor, or the share for one that has left.
+fn stops(by: &str) -> String {
+    match by.strip_prefix(AFTER) {
+        Some(name) => format!("the share stops it, because {name} has left"),
+        None => format!("{by} stops it"),
     }
 }
