@@ -101,24 +101,23 @@ impl Words {
     }
 }
 
-/// A request with names and units.
+/// A request with names and units, without its motor, which is told already.
 fn described(speaks: Speaks, request: &Request) -> String {
     match (request, speaks) {
-        (Request::St(motor, request), Speaks::St(profile)) => {
+        (Request::St(_, request), Speaks::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
-            let frame = Frame::command(*motor, &request.request(), &mut bytes);
+            let frame = Frame::command(0, &request.request(), &mut bytes);
             frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
         }
-        (Request::Raw(motor, code, payload), Speaks::St(profile)) => {
+        (Request::Raw(_, code, payload), Speaks::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
-            let frame = Frame { header: Frame::header(*code, *motor), payload };
+            let frame = Frame { header: Frame::header(*code, 0), payload };
             let frame = frame.encode(&mut bytes);
             frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
         }
         (Request::Rmd(id, data), _) => {
             let frame = CanFrame::new(id.can_id(), *data);
             let text = describe(frame, Direction::HostToDrive).to_string();
-            // The motor is told already.
             text.split_once(" > ").map_or(text.clone(), |(_, request)| request.to_owned())
         }
         _ => String::new(),
