@@ -40,8 +40,13 @@ def serves(words):
     if words[:2] == ["motorlink", "guard"]:
         return "--prove" not in words
     if words[:2] == ["motorlink", "share"]:
-        return True
+        return not asks_a_share(words)
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
+
+
+def asks_a_share(words):
+    """Whether a command needs a share that runs."""
+    return words[:2] == ["motorlink", "share"] and bool({"stop", "latch", "release"} & set(words))
 
 
 def is_view(words):

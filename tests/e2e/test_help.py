@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shell import Shell, lines as commands
+from shell import Shell, asks_a_share, lines as commands
 
 ROOT = Path(__file__).parents[2]
 #: What a bare `motorlink` needs: position control and the other features of a servo.
@@ -55,7 +55,10 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
         with Shell(tmp_path, PATH=path) as shell:
             if "motorlink sim" not in line:
                 shell.run(*next(commands(f"motorlink sim {config} --st pty:./st0 --rmd slcan-pty:./can0 &")))
-            shell.run(*next(commands(line)))
+            command = next(commands(line))
+            if asks_a_share(command[1]):
+                shell.run(*next(commands("motorlink share -p ./st0 -p slcan:./can0 --at unix:./share &")))
+            shell.run(*command)
         for made in ("run.csv", "run.svg", "motorlink.bash"):
             (tmp_path / made).unlink(missing_ok=True)
 
