@@ -27,7 +27,8 @@ def test_a_file_has_a_row_a_sample_with_units_and_the_table_stays_on_stdout(run,
     assert len(rows) == 4 and len(table.splitlines()) == 6
     assert [(row["SPEED_MEAS [rpm]"], row["STATUS"], row["event"]) for row in rows] == 4 * [("0", "0", "")]
     times = [float(row["t [s]"]) for row in rows]
-    assert times == sorted(times) and times[-1] >= 0.014
+    # The first sample may be late: the data segment is configured before it.
+    assert times == sorted(times) and times[-1] > 0.009
 
 
 def test_rmd_values_have_their_units_and_raw_values_none(run, tmp_path):

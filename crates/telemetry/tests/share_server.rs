@@ -583,13 +583,5 @@ fn the_answer_to_a_stop_of_all_does_not_wait_for_a_motor_that_never_answered() {
         let why = motors[1].failure.as_ref().unwrap();
         assert!(why.contains("never answered"), "{why}");
     }
-    let stopping = |got: &Got| match got {
-        Got::Text(Text::Event(event)) if event.event == Happening::Stopping => event.motor,
-        _ => None,
-    };
-    while !program.others.iter().filter_map(stopping).any(|motor| motor == 20) {
-        let next = program.receive();
-        program.others.push(next);
-    }
     share.reaches("rmd1.speed_dps", |dps| dps < 5.0);
 }
