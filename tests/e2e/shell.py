@@ -3,6 +3,7 @@
 import re
 import shlex
 import subprocess
+import time
 from pathlib import Path
 
 from program import Running
@@ -92,16 +93,24 @@ class Shell:
             return
         if is_view(words):
             return self._view(line, expected)
+        code, command = self._ended(line, words)
+        # A person waits until the motor of an earlier line rests.
+        deadline = time.monotonic() + LIMIT
+        while any("it is still stopping" in text for text in command.err) and time.monotonic() < deadline:
+            code, command = self._ended(line, words)
+        said = "\n".join([*command.out[-40:], *command.err[-40:]])
+        assert code == expected, f"exit code {code}, not {expected}: {line}\n{said}"
+
+    def _ended(self, line, words):
+        """Runs a line to its end. Gives the exit code and what it said."""
         command = self._start(line)
         try:
             if runs_on(words):
                 command.line(announcements(words) - 1 if serves(words) else 0, LIMIT)
                 command.interrupt()
-            code = command.wait(LIMIT)
+            return command.wait(LIMIT), command
         finally:
             command.end()
-        said = "\n".join([*command.out[-40:], *command.err[-40:]])
-        assert code == expected, f"exit code {code}, not {expected}: {line}\n{said}"
 
     def _view(self, line, expected):
         view = Terminal(["bash", "-c", f"exec {line}"], folder=self.folder, **self.variables)
