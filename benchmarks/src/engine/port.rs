@@ -40,7 +40,7 @@ pub(super) struct Port {
 /// What a tap saw.
 #[derive(Default)]
 struct Wire {
-    /// When the engine was told to stop.
+    /// When the engine got the order to stop.
     told: Option<Instant>,
     /// Requests since then, before the last of the stops.
     ahead: u32,

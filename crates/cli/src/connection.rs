@@ -160,7 +160,7 @@ impl Wrap {
     }
 }
 
-/// After a command that lets motors turn on: whoever holds the port stops them when the command ends.
+/// Says, after a command that leaves motors turning, that the holder of the port stops them now.
 pub fn tell_of_stop(port: &PortName) {
     if port.is_held() {
         note(

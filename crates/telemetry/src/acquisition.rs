@@ -454,7 +454,7 @@ impl Acquisition {
                 self.confirmed.insert(lane, sent);
                 self.tell_each(lane, |motor| What::Confirmed(motor, sent));
             }
-            // The reason of a failed poll is told first.
+            // The reason of a failed poll comes first.
             (Shows::Nothing, _) | (Shows::Doubt, Some(Verdict::Poll(_))) => {}
             (Shows::Doubt, _) => self.doubt(lane),
         }

@@ -113,8 +113,8 @@ fn bad_line(
 /// A register and its value, which is constant, and its period in ms.
 type Constant = (&'static str, f64, u32);
 
-/// What a consumer was told of values of a bad line: how many are confirmed, and how many moments are
-/// in doubt. Each register has a period of its own, so that there is no data segment. A wrong value that
+/// Reads these registers on a bad line. Gives how many values were confirmed, and how many doubts there
+/// were. Each register has a period of its own, so that there is no data segment. A wrong value that
 /// is confirmed fails.
 fn judged(mut engine: Engine, constants: &[Constant], line: &str) -> (usize, usize) {
     let wanted: Vec<Signal> =

@@ -102,16 +102,21 @@ fn a_stop_can_come_between_exchanges_that_are_answered_at_once() {
     }
 }
 
-#[test]
-fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
+/// The engine of a serial line, and what goes over it.
+fn on_a_serial_line() -> (Engine, Wire) {
     let bench = bench();
     let wire = Wire::default();
     let seen = Arc::clone(&wire);
-    // EXECUTE_CMD of motor 1.
+    // EXECUTE_CMD.
     let tap = TapBytes::new(bench.bytes(&spec("")), move |way, _, bytes: &[u8]| {
         record(&seen, bytes[0] & 0x1F == 0x03, way);
     });
-    let mut engine = Engine::st(tap, st_options(bench.profile()));
+    (Engine::st(tap, st_options(bench.profile())), wire)
+}
+
+#[test]
+fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
+    let (mut engine, wire) = on_a_serial_line();
     engine.subscribe(&signals(st_motor(1), &["SPEED_MEAS", "BUS_VOLTAGE", "STATUS"]), Micros(500));
     let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
     let (ahead, exchanges) = stopped_on_a_saturated_line(&mut engine, &wire, &stop);
@@ -122,13 +127,7 @@ fn a_stop_goes_out_behind_one_exchange_of_a_saturated_serial_line() {
 
 #[test]
 fn a_stop_goes_out_before_anybody_is_told_of_the_exchange_ahead() {
-    let bench = bench();
-    let wire = Wire::default();
-    let seen = Arc::clone(&wire);
-    let tap = TapBytes::new(bench.bytes(&spec("")), move |way, _, bytes: &[u8]| {
-        record(&seen, bytes[0] & 0x1F == 0x03, way);
-    });
-    let mut engine = Engine::st(tap, st_options(bench.profile()));
+    let (mut engine, wire) = on_a_serial_line();
     let subscription = engine.subscribe(&signals(st_motor(1), &["SPEED_MEAS"]), Micros(500));
     engine.run(SECOND);
     for _ in 0..10 {

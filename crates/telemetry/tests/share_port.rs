@@ -242,17 +242,22 @@ fn each_client_has_its_own_data_segments() {
     }
 }
 
-#[test]
-fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
-    let share = Share::new("engine");
-    let port = share.port("st0");
-    let line = StLine::open(&port, Default::default()).unwrap();
+/// An engine on a line of a share, which reads two registers, and what it gives.
+fn reading(port: &PortName) -> (Acquisition, Subscription) {
+    let line = StLine::open(port, Default::default()).unwrap();
     let mut engine = Acquisition::new(Box::new(line));
     let motor = Motor::St(MotorNumber::new(1).unwrap());
     let signals = ["SPEED_MEAS", "STATUS"].map(|name| Signal::named(motor, name).unwrap());
     let wants: Wants = signals.iter().map(|signal| (*signal, Micros(5_000))).collect();
     let subscription = Subscription::new(10_000, Full::DropOldest);
     engine.subscribe(subscription.clone(), wants);
+    (engine, subscription)
+}
+
+#[test]
+fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
+    let share = Share::new("engine");
+    let (mut engine, subscription) = reading(&share.port("st0"));
     let program = Operator::at(&share);
     let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
     let command = engine.command(&"test".into(), start, Micros::from_millis(5_000)).unwrap();
@@ -278,13 +283,7 @@ fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
 #[test]
 fn a_drive_that_never_answers_is_silent_and_nothing_else() {
     let share = deaf("silent");
-    let line = StLine::open(&share.port("st0"), Default::default()).unwrap();
-    let mut engine = Acquisition::new(Box::new(line));
-    let motor = Motor::St(MotorNumber::new(1).unwrap());
-    let signals = ["SPEED_MEAS", "STATUS"].map(|name| Signal::named(motor, name).unwrap());
-    let wants: Wants = signals.iter().map(|signal| (*signal, Micros(5_000))).collect();
-    let subscription = Subscription::new(10_000, Full::DropOldest);
-    engine.subscribe(subscription.clone(), wants);
+    let (mut engine, subscription) = reading(&share.port("st0"));
     // Long enough for requests to wait behind others at the share until they are too old.
     let end = Instant::now() + Duration::from_secs(8);
     let mut told = Vec::new();

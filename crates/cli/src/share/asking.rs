@@ -30,7 +30,7 @@ impl Connection {
         Ok(opened)
     }
 
-    /// Asks for a stop of all motors. The share tells what happens meanwhile.
+    /// Asks for a stop of all motors. The share sends its events meanwhile.
     pub fn stop(&mut self) -> io::Result<Answer> {
         let patience = match self.ask(Ask::Lines)? {
             Answer::Lines { lines, .. } => lines.iter().map(Line::patience).max(),

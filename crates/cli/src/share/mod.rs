@@ -72,7 +72,7 @@ enum AskFor {
     Stop,
     /// Refuse motion of all programs until it is released
     Latch,
-    /// Release the latch of whoever set it: motion is possible again
+    /// Release the latch, also that of another program: motion is possible again
     Release,
 }
 

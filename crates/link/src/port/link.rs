@@ -10,7 +10,7 @@ use crate::clock::Clock;
 
 /// Another program that holds the port, and sends requests to the drives for this one. Its replies
 /// are always those of the last request to a motor. If there is none, it says why:
-/// [`PortError::NotDone`]. What stops a motor it repeats itself before it says so.
+/// [`PortError::NotDone`]. It repeats stops itself before it gives a reason.
 #[derive(Debug, Clone, Copy)]
 pub struct Holder {
     /// The longest time that it takes for a reply or a reason.

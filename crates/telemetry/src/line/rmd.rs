@@ -136,7 +136,7 @@ impl Line for RmdLine {
                 shows = match &result {
                     Err(error) if error.is_unconfirmed() => Shows::Doubt,
                     _ if judged.is_err() => Shows::Doubt,
-                    // Whoever holds the port tells at the next confirmation.
+                    // The holder of the port knows. It says so at the next confirmation.
                     Err(_) if self.driver.is_held() => Shows::Nothing,
                     _ => Shows::Match,
                 };

@@ -170,7 +170,7 @@ impl StLine {
             Ok(Reply::Confirmed) if is_another => Shows::Doubt,
             Ok(Reply::Confirmed) => Shows::Match,
             Err(_) if !was_lost && shows_silence => Shows::Match,
-            // Whoever holds the port tells at the next confirmation.
+            // The holder of the port knows. It says so at the next confirmation.
             Err(error) if self.is_given_up(error) => Shows::Nothing,
             Err(error) if error.is_line_failure() => Shows::Doubt,
             Err(error) if error.is_of_other_profile() => {

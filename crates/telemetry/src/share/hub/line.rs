@@ -96,7 +96,7 @@ impl Held {
         })
     }
 
-    /// A motor has confirmed a stop: nobody is responsible for it any more.
+    /// A motor has confirmed a stop: no program owns it any more.
     pub(super) fn stopped(&mut self, motor: Motor) {
         self.heard.insert(motor);
         self.owners.remove(&motor);
@@ -169,7 +169,7 @@ impl Held {
     }
 
     /// Whether it is the stop of an ID that never answered, and that no program turned: there may be no
-    /// motor. Whoever asked for it is told.
+    /// motor. Only the program that asked for the stop gets the failure.
     fn is_of_no_motor(&self, told: &Event) -> bool {
         let is_of_stop = matches!(told.event, Happening::Stopping | Happening::StopFailed);
         let Some(id) = told.motor.and_then(MotorId::new).filter(|_| is_of_stop) else {

@@ -101,7 +101,7 @@ impl Words {
     }
 }
 
-/// A request with names and units, without its motor, which is told already.
+/// A request with names and units, without its motor: the message has named it before.
 fn described(speaks: Speaks, request: &Request) -> String {
     match (request, speaks) {
         (Request::St(_, request), Speaks::St(profile)) => {
@@ -124,10 +124,10 @@ fn described(speaks: Speaks, request: &Request) -> String {
     }
 }
 
-/// Between the share and whoever it acts for when they have left.
+/// The begin of the share's name when it acts for a program that has left.
 const AFTER: &str = "share, after ";
 
-/// The name of whoever the share acts for when they have left.
+/// The name of the share when it acts for this program, which has left.
 pub(super) fn after(name: &Arc<str>) -> Arc<str> {
     format!("{AFTER}{name}").into()
 }
