@@ -31,8 +31,9 @@ PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 # The program with the features of the whole workspace: built once for all parts.
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --locked
 
-# The parts of `make test`, the longest first: two run at a time.
-ALL_PARTS := unit python e2e miri firmware-test lint pages ffi-test fuzz-replay test-socketcan probe determinism deny
+# The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
+# other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
+ALL_PARTS := firmware-test miri lint unit python e2e pages ffi-test fuzz-replay probe determinism test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python firmware-test ffi-test
