@@ -80,7 +80,7 @@ def test_the_schema_is_one_and_the_documents_lines_follow_it():
 def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK, *FILES]} | {"scan"}
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
-    others = {"demo", "watch", "completions", "man"}
+    others = {"demo", "watch", "spec", "completions", "man"}
     assert subcommands(run, "share") == set(SHARE)
     assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "conformance"} | others
 

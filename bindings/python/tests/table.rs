@@ -218,11 +218,7 @@ fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
 
 /// Whether a request has the fields of a reply.
 fn same(reply: &[Field], request: &[Field]) -> bool {
-    reply.len() == request.len()
-        && reply
-            .iter()
-            .zip(request)
-            .all(|(one, other)| one.name == other.name && one.scale == other.scale)
+    reply.len() == request.len() && reply.iter().zip(request).all(|(one, other)| one.is_same(other))
 }
 
 fn documentation(out: &mut String, row: &CommandInfo) -> std::fmt::Result {

@@ -128,14 +128,14 @@ fn parse_motor(text: &str) -> Result<u8, String> {
     }
 }
 
-/// Reads the motors that `--id` means: `3`, `1,3`, `1-4`.
+/// Reads the motors that `--id` means: `3`, `1,3`, `1-4`, or `1..4`, which is the same.
 fn parse_ids(text: &str) -> Result<MotorSet, String> {
     let wrong =
         || format!("`{text}` is not an ID from 1 to 32, nor a list or a range such as 1,3 or 1-4");
     let id = |word: &str| word.trim().parse().ok().and_then(MotorId::new).ok_or_else(wrong);
     let mut ids = MotorSet::EMPTY;
     for word in text.split(',') {
-        let (first, last) = match word.split_once('-') {
+        let (first, last) = match word.split_once('-').or_else(|| word.split_once("..")) {
             Some((first, last)) => (id(first)?, id(last)?),
             None => (id(word)?, id(word)?),
         };
@@ -158,6 +158,7 @@ mod tests {
         assert_eq!(numbers("3"), Ok(vec![3]));
         assert_eq!(numbers("1,3"), Ok(vec![1, 3]));
         assert_eq!(numbers("7,1-4"), Ok(vec![1, 2, 3, 4, 7]));
+        assert_eq!(numbers("1..4"), Ok(vec![1, 2, 3, 4]));
         assert_eq!(numbers("32"), Ok(vec![32]));
         for wrong in ["", "0", "33", "4-1", "1-", "a", "1,,2", "-1", "1-40"] {
             assert!(parse_ids(wrong).is_err(), "{wrong}");

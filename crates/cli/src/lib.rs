@@ -26,6 +26,7 @@ mod settings;
 mod share;
 mod sim;
 mod span;
+mod spec;
 mod st;
 mod terminal;
 mod trace;
@@ -71,6 +72,8 @@ enum Command {
     Watch(watch::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
+    /// Write the tables of the protocols for other programs: DBC
+    Spec(spec::Args),
     /// Print completions for a shell
     Completions {
         /// The shell
@@ -124,6 +127,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Rmd(args) => rmd::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Conformance(args) => conformance::run(args),
+        Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             let mut command = command();

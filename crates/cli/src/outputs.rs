@@ -7,6 +7,8 @@ use std::os::fd::AsFd;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
+use motorlink_link::printable;
+
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 
@@ -76,6 +78,15 @@ pub fn resolve(
     Ok(found)
 }
 
+/// Where the only output of a command goes, given with `option`.
+///
+/// # Errors
+/// The folder does not exist.
+pub fn one(option: &str, path: &Path) -> Result<Output, Failure> {
+    let found = resolve(&[(option, Some(path))], &[])?;
+    Ok(found.into_iter().flatten().next().expect("an output was given"))
+}
+
 /// Two names with the same identity are one file.
 #[derive(Debug, PartialEq, Eq)]
 enum Identity {
@@ -134,9 +145,19 @@ impl Place {
 }
 
 impl Output {
-    /// Whether a regular file would be replaced.
-    pub fn exists(&self) -> bool {
-        matches!(self, Output::File(place) if place.real.exists())
+    /// Checks that no regular file would be replaced. `option` allows to replace it.
+    ///
+    /// # Errors
+    /// The file exists.
+    pub fn check_free(&self, option: &str) -> Result<(), Failure> {
+        match self {
+            Output::File(place) if place.real.exists() => {
+                let name = printable(&place.named.display().to_string());
+                Err(Failure::usage(format!("`{name}` exists; nothing was written"))
+                    .trying(format!("add {option} to replace it")))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes a content. A regular file is replaced when the content is complete, and is not changed

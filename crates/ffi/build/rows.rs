@@ -39,26 +39,16 @@ pub fn replies() -> Vec<Reply> {
             None => {
                 let mut fields: Vec<&Field> = row.reply.iter().collect();
                 fields.sort_by_key(|field| Reverse(field.len));
-                replies.push(Reply { noun: object(row.stem), fields, rows: vec![row] });
+                replies.push(Reply { noun: row.noun().to_owned(), fields, rows: vec![row] });
             }
         }
     }
     replies
 }
 
-/// The stem without its verb and the kind of memory.
-fn object(stem: &str) -> String {
-    let verbs = ["read_", "write_", "set_"];
-    let noun = verbs.iter().find_map(|verb| stem.strip_prefix(verb)).unwrap_or(stem);
-    noun.trim_end_matches("_ram").trim_end_matches("_rom").to_owned()
-}
-
 /// Whether two payloads have the same values at the same places.
 fn is_same(one: &[Field], other: &[Field]) -> bool {
-    let places = |fields: &[Field]| -> Vec<_> {
-        fields.iter().map(|field| (field.name, field.offset)).collect()
-    };
-    places(one) == places(other)
+    one.len() == other.len() && one.iter().zip(other).all(|(one, other)| one.is_same(other))
 }
 
 /// The reply that has the values of a request.

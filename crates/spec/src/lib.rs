@@ -1,1 +1,11 @@
-//! The tables of the protocols for other people's tools: DBC, Wireshark, JSON, Markdown.
+//! The tables of the protocols for other people's tools.
+//!
+//! | for | use |
+//! |---|---|
+//! | cantools, SavvyCAN and other programs that read DBC files | [`dbc`] |
+//!
+//! Everything comes from the tables of `motorlink-proto`.
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+pub mod dbc;

@@ -115,6 +115,8 @@ const EXAMPLES: &[(&str, &str)] = &[
     ),
     ("conformance scenarios", "conformance scenarios st"),
     ("conformance clauses", "conformance clauses rmd"),
+    ("spec dbc", "spec dbc --id 1-4 -o motors.dbc"),
+    ("spec dbc", "spec dbc --id 1-4 --direction request -o commands.dbc"),
     ("completions", "completions bash > motorlink.bash"),
     ("man", "man ./manual"),
 ];

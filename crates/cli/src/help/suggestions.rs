@@ -4,12 +4,13 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 33] = [
+const HARMLESS: [&str; 35] = [
     "acceleration",
     "angle",
     "clear-errors",
     "completions",
     "conformance",
+    "dbc",
     "demo",
     "diff",
     "dump",
@@ -33,6 +34,7 @@ const HARMLESS: [&str; 33] = [
     "segment",
     "share",
     "sim",
+    "spec",
     "st",
     "status",
     "stop",

@@ -87,18 +87,15 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
 
     /// `dump`: writes the settings as text.
     fn dump(self, args: &DumpArgs) -> Result<(), Failure> {
-        let output = outputs::resolve(&[("FILE", Some(&args.file))], &[])?;
-        let file = output.into_iter().flatten().next().filter(|file| *file != Output::Stdout);
-        if !args.overwrite && file.as_ref().is_some_and(Output::exists) {
-            let name = shown(&args.file);
-            return Err(Failure::usage(format!("`{name}` exists; nothing was written"))
-                .trying("add --overwrite to replace it"));
+        let file = outputs::one("FILE", &args.file)?;
+        if !args.overwrite {
+            file.check_free("--overwrite")?;
         }
         let dump = settings::dump(&self.motor).map_err(Into::into)?;
         let rows: Vec<Row> = dump.values().map(|(setting, digits)| row(setting, digits)).collect();
-        let Some(file) = file else {
+        if file == Output::Stdout {
             return self.output.result(dump.text().trim_end(), self.line.values(&rows));
-        };
+        }
         file.write(|out| out.write_all(dump.text().as_bytes()))?;
         let name = shown(&args.file);
         let text = format!("{} settings of {} are in {name}", rows.len(), self.name());

@@ -64,6 +64,15 @@ pub enum Version {
     V1_62,
 }
 
+impl Version {
+    /// The version as the document writes it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Version::V1_62 => "V1.62",
+        }
+    }
+}
+
 /// One row of the command table.
 #[derive(Debug, Clone, Copy)]
 pub struct CommandInfo {
@@ -106,6 +115,14 @@ impl CommandInfo {
             reply_name: "",
             reply: C::Reply::FIELDS,
         }
+    }
+
+    /// The stem without its verb and the kind of memory: what the command reads or writes.
+    pub fn noun(&self) -> &'static str {
+        let verbs = ["read_", "write_", "set_"];
+        let noun = verbs.iter().find_map(|verb| self.stem.strip_prefix(verb));
+        let noun = noun.unwrap_or(self.stem);
+        noun.strip_suffix("_ram").or_else(|| noun.strip_suffix("_rom")).unwrap_or(noun)
     }
 }
 

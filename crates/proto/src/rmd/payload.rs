@@ -90,6 +90,13 @@ impl Field {
         self.len == 2 && self.scale.suffix.is_empty()
     }
 
+    /// Whether the other field is the same value at the same place.
+    pub fn is_same(&self, other: &Field) -> bool {
+        (self.name, self.offset, self.len, self.signed)
+            == (other.name, other.offset, other.len, other.signed)
+            && self.scale == other.scale
+    }
+
     /// The value in its physical unit, or the number without unit.
     pub fn value(&self, data: &[u8; 8]) -> f64 {
         self.scale.value(self.raw(data))

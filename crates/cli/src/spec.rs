@@ -1,0 +1,104 @@
+//! `motorlink spec`: the tables of the protocols for other programs.
+
+use std::path::PathBuf;
+
+use clap::{Subcommand, ValueEnum};
+use motorlink::rmd::{MotorId, MotorSet};
+use motorlink_spec::dbc::{Direction, dbc};
+
+use crate::failure::Failure;
+use crate::hint;
+use crate::output::note;
+use crate::outputs;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Write a DBC file of RMD motors, for cantools, SavvyCAN and other CAN programs
+    ///
+    /// A request and its reply have the same CAN identifier, and a DBC file can describe an identifier
+    /// only once. So requests and replies are two files: see --direction.
+    Dbc {
+        /// The motors' IDs, 1 to 32 (default 1); several as 1,3 or 1-4
+        #[arg(short, long, value_name = "ID", value_parser = hint::ids(),
+              hide_possible_values = true, conflicts_with = "all")]
+        id: Vec<MotorSet>,
+        /// All 32 motors
+        #[arg(long)]
+        all: bool,
+        /// Whose frames the file describes: request for those of the host, reply for those of motors
+        /// (default)
+        #[arg(long, value_name = "DIRECTION")]
+        direction: Option<Sender>,
+        #[command(flatten)]
+        file: File,
+    },
+}
+
+/// Where a description is written to.
+#[derive(clap::Args)]
+struct File {
+    /// The file to write; `-` is stdout
+    #[arg(short, long, value_name = "FILE", default_value = "-",
+          value_hint = clap::ValueHint::FilePath)]
+    output: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+/// [`Direction`] on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+enum Sender {
+    Request,
+    Reply,
+}
+
+impl From<Sender> for Direction {
+    fn from(sender: Sender) -> Self {
+        match sender {
+            Sender::Request => Direction::Request,
+            Sender::Reply => Direction::Reply,
+        }
+    }
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    match args.command {
+        Command::Dbc { id, all, direction, file } => {
+            let motors = if all { MotorSet::ALL } else { ids(&id) };
+            let sender = direction.unwrap_or(Sender::Reply);
+            file.write(&dbc(motors, sender.into()))?;
+            if direction.is_none() {
+                note(
+                    "the file describes replies; requests have the same identifiers: write a second \
+                     file with --direction request",
+                );
+            }
+            Ok(())
+        }
+    }
+}
+
+/// The motors that are meant.
+fn ids(given: &[MotorSet]) -> MotorSet {
+    match given {
+        [] => MotorId::new(1).into_iter().collect(),
+        _ => given.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more)),
+    }
+}
+
+impl File {
+    fn write(&self, text: &str) -> Result<(), Failure> {
+        let output = outputs::one("--output", &self.output)?;
+        if !self.force {
+            output.check_free("--force")?;
+        }
+        output.write(|out| out.write_all(text.as_bytes()))
+    }
+}
