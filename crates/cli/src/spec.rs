@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Subcommand, ValueEnum};
-use motorlink::rmd::{MotorId, MotorSet};
-use motorlink_spec::dbc::{Direction, dbc};
+use motorlink::rmd::{Direction, MotorId, MotorSet};
+use motorlink_spec::dbc::dbc;
+use motorlink_spec::json::json;
 
 use crate::failure::Failure;
 use crate::hint;
@@ -38,6 +39,11 @@ enum Command {
         #[command(flatten)]
         file: File,
     },
+    /// Write the tables of both protocols as JSON, for other generators
+    ///
+    /// Registers, codes, errors, commands with the positions, units and ranges of their values.
+    /// docs/spec.schema.json describes the format.
+    Json(File),
 }
 
 /// Where a description is written to.
@@ -62,8 +68,8 @@ enum Sender {
 impl From<Sender> for Direction {
     fn from(sender: Sender) -> Self {
         match sender {
-            Sender::Request => Direction::Request,
-            Sender::Reply => Direction::Reply,
+            Sender::Request => Direction::HostToDrive,
+            Sender::Reply => Direction::DriveToHost,
         }
     }
 }
@@ -82,6 +88,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             }
             Ok(())
         }
+        Command::Json(file) => file.write(&format!("{:#}\n", json())),
     }
 }
 

@@ -3,9 +3,12 @@
 //! | for | use |
 //! |---|---|
 //! | cantools, SavvyCAN and other programs that read DBC files | [`dbc`] |
+//! | your own generator | [`json`] |
 //!
 //! Everything comes from the tables of `motorlink-proto`.
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
 pub mod dbc;
+pub mod json;
+mod rmd;

@@ -117,6 +117,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("conformance clauses", "conformance clauses rmd"),
     ("spec dbc", "spec dbc --id 1-4 -o motors.dbc"),
     ("spec dbc", "spec dbc --id 1-4 --direction request -o commands.dbc"),
+    ("spec json", "spec json -o tables.json"),
     ("completions", "completions bash > motorlink.bash"),
     ("man", "man ./manual"),
 ];

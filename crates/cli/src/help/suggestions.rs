@@ -4,7 +4,7 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 35] = [
+const HARMLESS: [&str; 36] = [
     "acceleration",
     "angle",
     "clear-errors",
@@ -21,6 +21,7 @@ const HARMLESS: [&str; 35] = [
     "help",
     "host",
     "info",
+    "json",
     "man",
     "off",
     "pid",

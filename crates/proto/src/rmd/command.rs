@@ -132,6 +132,11 @@ impl Code {
         COMMANDS.iter().find(|row| row.code == self)
     }
 
+    /// Whether a reply with this code answers a request of this command (docs/SPEC-NOTES.md R1).
+    pub fn is_answered_by(self, reply: Code) -> bool {
+        self == reply || (self == Code::ClearErrors && reply == Code::ReadStatus)
+    }
+
     /// Whether the command ends the motion: Off or Stop.
     pub const fn ends_motion(self) -> bool {
         matches!(self, Code::Off | Code::Stop)

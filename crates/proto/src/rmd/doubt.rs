@@ -155,6 +155,5 @@ impl Doubt {
 
 /// Whether a reply with the code `reply` answers a request with the code `request`.
 pub(super) fn answers(request: u8, reply: u8) -> bool {
-    let (request, reply) = (Code::from(request), Code::from(reply));
-    request == reply || (request == Code::ClearErrors && reply == Code::ReadStatus)
+    Code::from(request).is_answered_by(Code::from(reply))
 }

@@ -146,6 +146,19 @@ named_numbers! {
     }
 }
 
+impl Command {
+    /// Whether drives of `profile` know the command.
+    pub const fn is_in(self, profile: Profile) -> bool {
+        match self {
+            Command::Reset | Command::Ping | Command::ScStart | Command::ScStop => {
+                matches!(profile, Profile::Mcsdk54)
+            }
+            Command::Unknown(_) => false,
+            _ => true,
+        }
+    }
+}
+
 impl ErrorCode {
     /// Whether the drive did not understand the frame. This is a failure of the line.
     pub const fn is_damage(self) -> bool {

@@ -4,6 +4,10 @@
 pub const MAX_PAYLOAD: usize = 128;
 /// Bytes of a frame without its payload: header, length, checksum.
 pub const OVERHEAD: usize = 3;
+/// Bits of the frame code in a header; the bits above are the motor.
+pub const CODE_BITS: u32 = 5;
+/// The bits of the frame code.
+const CODE_MASK: u8 = (1 << CODE_BITS) - 1;
 /// Maximum size of a frame.
 pub const MAX_FRAME: usize = MAX_PAYLOAD + OVERHEAD;
 
@@ -57,17 +61,17 @@ pub enum Bad {
 impl<'a> Frame<'a> {
     /// The header of a command: 5 bits of frame code, 3 bits of motor.
     pub const fn header(code: u8, motor: u8) -> u8 {
-        code & 0x1F | motor << 5
+        code & CODE_MASK | motor << CODE_BITS
     }
 
     /// The frame code of a command frame, 5 bits.
     pub const fn code(&self) -> u8 {
-        self.header & 0x1F
+        self.header & CODE_MASK
     }
 
     /// The motor number of a command frame, 0 to 7.
     pub const fn motor(&self) -> u8 {
-        self.header >> 5
+        self.header >> CODE_BITS
     }
 
     /// Parses the bytes received since the last frame.

@@ -98,7 +98,7 @@ pub use code::{
 pub use confirm::{Confirmation, LastExchange};
 pub use drive::{MotorControl, MotorNumber};
 pub use failure::{ExchangeError, Failure};
-pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
+pub use frame::{Bad, CODE_BITS, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
 pub use full_scale::{FullScale, InvalidFullScale};
 pub use limits::{LimitError, Limits};
 pub use master::{

@@ -11,8 +11,11 @@ mod text;
 
 use std::fmt::{self, Display};
 
-use motorlink_proto::rmd::{COMMANDS, MotorId, MotorSet, Payload, SetTorque4, TORQUE4_ID, Version};
+use motorlink_proto::rmd::{
+    COMMANDS, Direction, MotorId, MotorSet, Payload, SetTorque4, TORQUE4_ID, Version,
+};
 
+use crate::rmd::{name, opposite, plural};
 use signals::{Multiplexed, Signal, of_commands, of_field};
 use text::{ascii, quoted};
 
@@ -27,53 +30,20 @@ const NO_NODE: &str = "Vector__XXX";
 /// The message to motors 1 to 4.
 const TORQUE4: &str = "SetTorque4";
 
-/// Who sends the frames of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// Frames from the host to motors.
-    Request,
-    /// Frames from motors to the host.
-    Reply,
-}
-
-impl Direction {
-    /// The direction as a word.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Direction::Request => "request",
-            Direction::Reply => "reply",
-        }
-    }
-
-    fn plural(self) -> &'static str {
-        match self {
-            Direction::Request => "requests",
-            Direction::Reply => "replies",
-        }
-    }
-
-    fn other(self) -> Self {
-        match self {
-            Direction::Request => Direction::Reply,
-            Direction::Reply => Direction::Request,
-        }
-    }
-}
-
 /// The DBC file of one direction: a message for each motor, and in requests the message to motors 1
 /// to 4 if one of them is in `motors`.
 ///
 /// ```
-/// use motorlink_proto::rmd::{MotorId, MotorSet};
-/// use motorlink_spec::dbc::{Direction, dbc};
+/// use motorlink_proto::rmd::{Direction, MotorId, MotorSet};
+/// use motorlink_spec::dbc::dbc;
 ///
 /// let motor = MotorSet::from(MotorId::new(1).unwrap());
-/// let text = dbc(motor, Direction::Reply);
+/// let text = dbc(motor, Direction::DriveToHost);
 /// assert!(text.contains("BO_ 321 Motor1_Reply: 8 Motor1"));
 /// ```
 pub fn dbc(motors: MotorSet, direction: Direction) -> String {
     let mut messages: Vec<Message> = motors.map(|motor| of_motor(motor, direction)).collect();
-    if direction == Direction::Request && !motors.intersection(MotorSet::TORQUE4).is_empty() {
+    if direction == Direction::HostToDrive && !motors.intersection(MotorSet::TORQUE4).is_empty() {
         messages.push(torque4(motors));
     }
     let file = File { motors, direction, messages };
@@ -103,10 +73,10 @@ fn node(motor: MotorId) -> String {
 fn of_motor(motor: MotorId, direction: Direction) -> Message {
     let motor_node = node(motor);
     let (sender, receiver, name, of) = match direction {
-        Direction::Request => (HOST.to_owned(), motor_node, "Request", "to"),
-        Direction::Reply => (motor_node, HOST.to_owned(), "Reply", "of"),
+        Direction::HostToDrive => (HOST.to_owned(), motor_node, "Request", "to"),
+        Direction::DriveToHost => (motor_node, HOST.to_owned(), "Reply", "of"),
     };
-    let (frames, others) = (direction.plural(), direction.other().plural());
+    let (frames, others) = (plural(direction), plural(opposite(direction)));
     let comment = format!(
         "RMD {VERSION}: {frames} {of} motor {motor}. The {others} have the same identifier; this \
          message does not describe them"
@@ -167,14 +137,14 @@ fn torque4(motors: MotorSet) -> Message {
 
 impl Display for File {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let frames = self.direction.plural();
+        let frames = plural(self.direction);
         writeln!(f, "VERSION \"motorlink RMD {VERSION} {frames}\"\n\nNS_ :\n\nBS_:\n")?;
         write!(f, "BU_: {HOST}")?;
         self.motors.into_iter().try_for_each(|motor| write!(f, " {}", node(motor)))?;
         writeln!(f)?;
         self.messages.iter().try_for_each(|message| message.definition(f))?;
         writeln!(f)?;
-        let name = self.direction.other().name();
+        let name = name(opposite(self.direction));
         writeln!(
             f,
             "CM_ {};",
@@ -249,7 +219,7 @@ mod tests {
 
     #[test]
     fn a_file_is_ascii_and_has_each_line_once() {
-        for direction in [Direction::Request, Direction::Reply] {
+        for direction in [Direction::HostToDrive, Direction::DriveToHost] {
             let text = dbc(MotorSet::ALL, direction);
             assert!(text.is_ascii());
             let mut lines: Vec<&str> =
@@ -263,7 +233,7 @@ mod tests {
 
     #[test]
     fn names_fit_tools_that_take_32_letters() {
-        for direction in [Direction::Request, Direction::Reply] {
+        for direction in [Direction::HostToDrive, Direction::DriveToHost] {
             for message in MotorSet::ALL.map(|motor| of_motor(motor, direction)) {
                 let names = message.signals().map(|signal| &signal.name).chain([&message.name]);
                 names.for_each(|name| assert!(name.len() <= 32, "{name}"));
@@ -277,10 +247,10 @@ mod tests {
             let motors = ids.iter().filter_map(|id| MotorId::new(*id)).collect();
             dbc(motors, direction).contains("BO_ 640 SetTorque4: 8 Host")
         };
-        assert!(with(&[4, 9], Direction::Request));
-        assert!(!with(&[4, 9], Direction::Reply));
-        assert!(!with(&[5], Direction::Request));
-        let four = dbc(MotorId::new(2).into_iter().collect(), Direction::Request);
+        assert!(with(&[4, 9], Direction::HostToDrive));
+        assert!(!with(&[4, 9], Direction::DriveToHost));
+        assert!(!with(&[5], Direction::HostToDrive));
+        let four = dbc(MotorId::new(2).into_iter().collect(), Direction::HostToDrive);
         assert!(four.contains(" SG_ iq_1 : 0|16@1- (0.016,0) [-32|32] \"A\" Vector__XXX"));
         assert!(four.contains(" SG_ iq_2 : 16|16@1- (0.016,0) [-32|32] \"A\" Motor2"));
     }

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use motorlink_proto::rmd::{COMMANDS, CommandInfo, Field, Meaning};
+use motorlink_proto::rmd::{COMMANDS, CommandInfo, Direction, Field, Meaning};
 
-use super::Direction;
+use crate::rmd::fields;
 
 /// A signal of a message.
 pub struct Signal {
@@ -59,13 +59,6 @@ pub fn of_commands(direction: Direction) -> Vec<Multiplexed> {
     values.iter().flat_map(|value| value.signals(&values, direction)).collect()
 }
 
-fn fields(row: &CommandInfo, direction: Direction) -> &'static [Field] {
-    match direction {
-        Direction::Request => row.request,
-        Direction::Reply => row.reply,
-    }
-}
-
 /// A value, and the commands that have it.
 struct Value {
     field: &'static Field,
@@ -96,8 +89,8 @@ impl Value {
         let codes: Vec<_> =
             self.rows.iter().map(|row| format!("{:#04X}", row.code.number())).collect();
         let from = match direction {
-            Direction::Request => "Request",
-            Direction::Reply => "Reply to",
+            Direction::HostToDrive => "Request",
+            Direction::DriveToHost => "Reply to",
         };
         let doc = self.field.doc.trim_end_matches('.');
         format!("{doc}. {from} {} (3, {})", codes.join(", "), self.rows[0].paragraph)

@@ -41,6 +41,21 @@ features! {
     PositionControl "position control";
 }
 
+#[cfg(feature = "std")]
+impl Feature {
+    /// The feature on the command line and in files: `ObserverPll` is `observer-pll`.
+    pub fn word(self) -> std::string::String {
+        let mut word = std::string::String::new();
+        for letter in std::format!("{self:?}").chars() {
+            if letter.is_uppercase() && !word.is_empty() {
+                word.push('-');
+            }
+            word.extend(letter.to_lowercase());
+        }
+        word
+    }
+}
+
 /// A set of [`Feature`]s; [`Feature::Core`] is in every set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Features(u16);
@@ -62,5 +77,22 @@ impl Features {
     /// Whether the drive has the feature with this discriminant.
     pub(super) const fn has_number(self, number: u8) -> bool {
         self.0.wrapping_shr(number as u32) & 1 != 0
+    }
+}
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use std::string::String;
+    use std::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn every_feature_has_a_word_of_its_own() {
+        let mut words: Vec<String> = Feature::ALL.iter().map(|feature| feature.word()).collect();
+        assert!(words.iter().any(|word| word == "observer-pll"));
+        words.sort();
+        words.dedup();
+        assert_eq!(words.len(), Feature::ALL.len());
     }
 }
