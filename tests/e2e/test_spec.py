@@ -2,6 +2,7 @@
 
 import json
 import random
+import re
 import subprocess
 from pathlib import Path
 
@@ -306,7 +307,7 @@ def test_words_that_make_no_file(run, tmp_path):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("what", ["dbc", "json"])
+@pytest.mark.parametrize("what", ["dbc", "json", "markdown"])
 def test_a_file_is_replaced_only_on_demand(run, tmp_path, what):
     path = tmp_path / "file"
     path.write_text("mine")
@@ -376,3 +377,20 @@ def test_the_tables_have_the_registers_of_the_program(tables, run):
         assert ("spec" in row["profiles"]) == (row["origin"] == "document")
         if row["access"] in ("R", "RW") and "spec" in row["profiles"]:
             assert row["profiles"]["spec"]["read_bytes"] == int(other["type"][1:]) // 8
+
+
+def test_the_page_has_every_row_of_the_tables(tables, run):
+    page = run("spec", "markdown").ended(0).out
+    st, rmd = tables["st"], tables["rmd"]
+    tabled = [*st["frame_codes"], *st["errors"], *st["commands"], *st["states"], *st["control_modes"]]
+    tabled += [*st["faults"], *st["registers"]]
+    for row in tabled:
+        line = rf"^\| (0x[0-9A-F]+|\d+) \| `{row['name']}` \|.*{re.escape(row['description'])} \|$"
+        assert re.search(line, page, re.M), row
+    for row in rmd["commands"]:
+        assert f"| 0x{row['code']:02X} | `{row['name']}` | {row['title']} | {row['description']} |" in page
+        fields = [(row["name"], field) for field in row["request"]]
+        fields += [(row["reply_name"], field) for field in row["reply"] if not row["echo"]]
+        for name, field in fields:
+            line = f"| `{name}` | `{field['name']}` | DATA[{field['byte']}]"
+            assert line in page and f"| {field['description']} |" in page

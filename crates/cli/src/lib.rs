@@ -72,7 +72,7 @@ enum Command {
     Watch(watch::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
-    /// Write the tables of the protocols for other programs: DBC, JSON
+    /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
     Spec(spec::Args),
     /// Print completions for a shell
     Completions {

@@ -6,6 +6,7 @@ use clap::{Subcommand, ValueEnum};
 use motorlink::rmd::{Direction, MotorId, MotorSet};
 use motorlink_spec::dbc::dbc;
 use motorlink_spec::json::json;
+use motorlink_spec::markdown::markdown;
 
 use crate::failure::Failure;
 use crate::hint;
@@ -44,6 +45,8 @@ enum Command {
     /// Registers, codes, errors, commands with the positions, units and ranges of their values.
     /// docs/spec.schema.json describes the format.
     Json(File),
+    /// Write the tables of both protocols as Markdown, for people
+    Markdown(File),
 }
 
 /// Where a description is written to.
@@ -89,6 +92,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             Ok(())
         }
         Command::Json(file) => file.write(&format!("{:#}\n", json())),
+        Command::Markdown(file) => file.write(&markdown()),
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | cantools, SavvyCAN and other programs that read DBC files | [`dbc`] |
 //! | your own generator | [`json`] |
+//! | people | [`markdown`] |
 //!
 //! Everything comes from the tables of `motorlink-proto`.
 #![forbid(unsafe_code)]
@@ -11,4 +12,5 @@
 
 pub mod dbc;
 pub mod json;
+pub mod markdown;
 mod rmd;

@@ -4,7 +4,7 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 36] = [
+const HARMLESS: [&str; 37] = [
     "acceleration",
     "angle",
     "clear-errors",
@@ -23,6 +23,7 @@ const HARMLESS: [&str; 36] = [
     "info",
     "json",
     "man",
+    "markdown",
     "off",
     "pid",
     "ports",

@@ -28,7 +28,7 @@ pub fn tables() -> Value {
         "revup_phases": REVUP_PHASES,
         "segments": SEGMENTS,
         "segment_registers": SEGMENT_REGISTERS,
-        "frame_codes": frame_codes(),
+        "frame_codes": FrameCode::ALL.iter().map(frame_code).collect::<Vec<_>>(),
         "errors": ErrorCode::ALL.iter().map(|code| named(code.number(), code.name(), code.doc()))
             .collect::<Vec<_>>(),
         "commands": Command::ALL.iter().map(command).collect::<Vec<_>>(),
@@ -55,25 +55,10 @@ fn profiles(is_in: impl Fn(Profile) -> bool) -> Value {
     Profile::ALL.into_iter().filter(|&profile| is_in(profile)).map(Profile::name).collect()
 }
 
-/// A number with different meanings in the profiles is two rows.
-fn frame_codes() -> Value {
-    let mut codes: Vec<FrameCode> = Vec::new();
-    for number in 0..1 << CODE_BITS {
-        for code in Profile::ALL.into_iter().filter_map(|it| FrameCode::from_number(number, it)) {
-            if !codes.contains(&code) {
-                codes.push(code);
-            }
-        }
-    }
-    let row = |code: &FrameCode| {
-        json!({
-            "number": code.number(),
-            "name": code.name(),
-            "description": code.doc(),
-            "profiles": profiles(|it| FrameCode::from_number(code.number(), it) == Some(*code)),
-        })
-    };
-    codes.iter().map(row).collect()
+fn frame_code(code: &FrameCode) -> Value {
+    let mut row = named(code.number(), Some(code.name()), code.doc());
+    row["profiles"] = profiles(|it| FrameCode::from_number(code.number(), it) == Some(*code));
+    row
 }
 
 fn command(command: &Command) -> Value {
