@@ -188,7 +188,7 @@ fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
     let (arguments, values) = match (object, row.request) {
         (_, []) => (String::new(), String::new()),
         (Some(read), _) => {
-            let noun = read.stem.strip_prefix("read_").unwrap_or(read.stem);
+            let noun = read.noun();
             (
                 format!(", {noun}: {}", read.reply_name),
                 format!("**fields({noun}, {}, \"{noun}\")", read.reply_name),

@@ -289,11 +289,9 @@ static ROWS: LazyLock<Vec<(String, Code, &'static Field)>> = LazyLock::new(|| {
 fn name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
     let mut fields = reads.iter().flat_map(|read| read.reply);
     let name = field.name_with_unit().to_string();
-    match row.stem.strip_prefix("read_") {
-        Some(noun) if fields.any(|it| it.name == field.name && it.scale != field.scale) => {
-            name.replacen(field.name, noun, 1)
-        }
-        _ => name,
+    match fields.any(|it| it.name == field.name && it.scale != field.scale) {
+        true => name.replacen(field.name, row.noun(), 1),
+        false => name,
     }
 }
 

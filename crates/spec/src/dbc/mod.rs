@@ -138,7 +138,10 @@ fn torque4(motors: MotorSet) -> Message {
 impl Display for File {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let frames = plural(self.direction);
-        writeln!(f, "VERSION \"motorlink RMD {VERSION} {frames}\"\n\nNS_ :\n\nBS_:\n")?;
+        writeln!(
+            f,
+            "VERSION \"motorlink RMD {VERSION} {frames}\"\n\nNS_ :\n\tCM_\n\tVAL_\n\tSG_MUL_VAL_\n\nBS_:\n"
+        )?;
         write!(f, "BU_: {HOST}")?;
         self.motors.into_iter().try_for_each(|motor| write!(f, " {}", node(motor)))?;
         writeln!(f)?;
@@ -193,10 +196,11 @@ impl Message {
         })
     }
 
-    /// Which codes a signal belongs to, if there are several.
+    /// The codes that each signal belongs to. Some programs read all of them here, if one signal has
+    /// several.
     fn ranges(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let several = self.signals.iter().filter(|(signal, _)| signal.codes.len() > 1);
-        for (Multiplexed { signal, codes }, _) in several {
+        let multiplexed = self.signals.iter().filter(|(signal, _)| !signal.codes.is_empty());
+        for (Multiplexed { signal, codes }, _) in multiplexed {
             let mut ranges: Vec<(u8, u8)> = Vec::new();
             for &code in codes {
                 match ranges.last_mut() {
