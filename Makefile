@@ -29,7 +29,7 @@ PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # The program with the features of the whole workspace: built once for all parts.
-PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --example rmd_frames --locked
+PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --example rmd_frames --example wireshark_frames --locked
 
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.

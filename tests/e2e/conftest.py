@@ -1,6 +1,7 @@
 """The program under test, and simulated drives that it serves. `make e2e` does all of it:
 
-$ cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames
+$ cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames \
+    --example wireshark_frames
 $ pip install -r tests/e2e/requirements.txt
 $ MOTORLINK_BIN=target/debug/motorlink pytest tests/e2e
 """

@@ -7,6 +7,7 @@ use motorlink::rmd::{Direction, MotorId, MotorSet};
 use motorlink_spec::dbc::dbc;
 use motorlink_spec::json::json;
 use motorlink_spec::markdown::markdown;
+use motorlink_spec::wireshark::wireshark;
 
 use crate::failure::Failure;
 use crate::hint;
@@ -47,6 +48,11 @@ enum Command {
     Json(File),
     /// Write the tables of both protocols as Markdown, for people
     Markdown(File),
+    /// Write a dissector for Wireshark and tshark, in Lua, for both protocols
+    ///
+    /// It reads captures of CAN buses (SocketCAN) and of serial lines (pcapng, RTAC serial). Copy the
+    /// file to Wireshark's folder "Personal Lua Plugins", or: wireshark -X lua_script:motorlink.lua
+    Wireshark(File),
 }
 
 /// Where a description is written to.
@@ -93,6 +99,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
         }
         Command::Json(file) => file.write(&format!("{:#}\n", json())),
         Command::Markdown(file) => file.write(&markdown()),
+        Command::Wireshark(file) => file.write(&wireshark()),
     }
 }
 

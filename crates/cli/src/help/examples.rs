@@ -119,6 +119,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("spec dbc", "spec dbc --id 1-4 --direction request -o commands.dbc"),
     ("spec json", "spec json -o tables.json"),
     ("spec markdown", "spec markdown -o tables.md"),
+    ("spec wireshark", "spec wireshark -o motorlink.lua"),
     ("completions", "completions bash > motorlink.bash"),
     ("man", "man ./manual"),
 ];

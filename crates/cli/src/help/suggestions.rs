@@ -4,7 +4,7 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 37] = [
+const HARMLESS: [&str; 38] = [
     "acceleration",
     "angle",
     "clear-errors",
@@ -41,6 +41,7 @@ const HARMLESS: [&str; 37] = [
     "status",
     "stop",
     "stop-ramp",
+    "wireshark",
     "clauses",
 ];
 

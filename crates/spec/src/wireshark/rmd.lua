@@ -1,0 +1,381 @@
+-- RMD motors on a CAN bus.
+
+local table_of = TABLES.rmd
+local rmd = Proto("motorlink.rmd", "RMD motor control protocol")
+local claim = Proto("motorlink.can", "RMD motors by CAN identifier")
+local can_remote = Field.new("can.flags.rtr")
+local can_fd = Field.new("canfd.flags.esi")
+
+rmd.prefs.claim = claim_preference(
+    "off: only by Decode As. recognised: frames whose identifier and first byte are those of " ..
+    "a command. all: every frame with an identifier of the protocol.")
+rmd.prefs.direction = direction_preference()
+rmd.prefs.patience_ms = Pref.uint("Longest wait for a reply, ms", table_of.patience_ms,
+    "Without direction: a frame is the reply to a request that is not older than this.")
+
+local own = {
+    motor = ProtoField.uint8("motorlink.rmd.motor", "Motor", base.DEC),
+    type = ProtoField.uint8("motorlink.rmd.type", "Type", base.DEC, TYPES),
+    source = ProtoField.string("motorlink.rmd.type.source", "Type from", base.ASCII,
+        "The capture, or the order of the frames"),
+    code = ProtoField.uint8("motorlink.rmd.code", "Code", base.HEX,
+        names_of(table_of.commands)),
+    dialect = ProtoField.string("motorlink.rmd.dialect", "Dialect"),
+}
+local links = link_fields("motorlink.rmd.")
+local values = {}
+local expert = {
+    code = ProtoExpert.new("motorlink.rmd.unknown_code", "not a command of the protocol",
+        expert.group.UNDECODED, expert.severity.WARN),
+    size = ProtoExpert.new("motorlink.rmd.wrong_size", "not a standard data frame of 8 bytes",
+        expert.group.PROTOCOL, expert.severity.WARN),
+    dialect = ProtoExpert.new("motorlink.rmd.other_dialect", "a reply of a similar protocol",
+        expert.group.PROTOCOL, expert.severity.NOTE),
+    active = ProtoExpert.new("motorlink.rmd.error_active", "a protection is active",
+        expert.group.RESPONSE_CODE, expert.severity.WARN),
+    rom = ProtoExpert.new("motorlink.rmd.rom_write", "writes the ROM, which wears",
+        expert.group.REQUEST_CODE, expert.severity.NOTE),
+    alone = ProtoExpert.new("motorlink.rmd.no_reply", "no reply in this capture",
+        expert.group.SEQUENCE, expert.severity.NOTE),
+}
+
+local function declare(field)
+    local abbreviation = "motorlink.rmd." .. field.key
+    if values[abbreviation] then
+        return
+    end
+    local digits = abbreviation .. ".digits"
+    if field.words then
+        values[abbreviation] =
+            ProtoField.uint8(abbreviation, field.key, base.DEC, field.words, nil, field.doc)
+    elseif field.bits then
+        values[abbreviation] =
+            ProtoField.uint8(abbreviation, field.key, base.HEX, nil, nil, field.doc)
+        for _, bit in ipairs(field.bits) do
+            local key = abbreviation .. "." .. bit.name:lower()
+            values[key] = ProtoField.bool(key, bit.doc, 8, nil, bit.mask)
+        end
+    elseif field.symbol == "" then
+        values[abbreviation] =
+            ProtoField.int64(abbreviation, field.key, base.DEC, nil, nil, field.doc)
+    else
+        -- Commands and replies have the same quantity in different digits.
+        values[abbreviation] = ProtoField.double(abbreviation, field.key, nil, field.doc)
+        values[digits] = ProtoField.int64(digits, "digits")
+    end
+end
+
+local function declare_all(fields)
+    for _, field in ipairs(fields) do
+        declare(field)
+    end
+end
+for _, command in pairs(table_of.commands) do
+    declare_all(command.request)
+    declare_all(command.reply)
+end
+declare_all(table_of.torque4)
+
+rmd.fields = fields_of(own, links, values)
+rmd.experts = expert
+
+-- State of a capture: how each packet was understood, and the open requests.
+local packets, open, seen, identifiers
+
+local function forget()
+    packets, open, seen, identifiers = {}, {}, {}, {}
+end
+forget()
+rmd.init = forget
+
+local function value_of(field, digits)
+    local parts = math.floor(1 / field.digit + 0.5)
+    if parts > 1 and 1 / parts == field.digit then
+        return digits / parts
+    end
+    return digits * field.digit
+end
+
+local function bits_shown(field, number)
+    local words, named_bits = {}, 0
+    for _, bit in ipairs(field.bits) do
+        if math.floor(number / bit.mask) % 2 == 1 then
+            words[#words + 1] = bit.doc
+            named_bits = named_bits + bit.mask
+        end
+    end
+    local text = #words > 0 and table.concat(words, ", ") or "no error"
+    if number ~= named_bits then
+        text = text .. string.format(" (bits 0x%02x mean nothing)", number - named_bits)
+    end
+    return text, #words > 0
+end
+
+-- Adds the fields to the tree. Returns their text.
+local function add_fields(tree, fields, tvb)
+    local shown = {}
+    for _, field in ipairs(fields) do
+        local range = tvb(field.offset, field.len)
+        local key = "motorlink.rmd." .. field.key
+        local text, item
+        if field.words then
+            local number = range:uint()
+            text = field.words[number] or string.format("0x%02x", number)
+            item = tree:add(values[key], range, number)
+        elseif field.bits then
+            local active
+            text, active = bits_shown(field, range:uint())
+            item = tree:add(values[key], range, range:uint())
+            for _, bit in ipairs(field.bits) do
+                item:add(values[key .. "." .. bit.name:lower()], range)
+            end
+            if active then
+                item:add_proto_expert_info(expert.active, text)
+            end
+        else
+            local digits = field.signed and range:le_int64() or range:le_uint64()
+            local number = digits:tonumber()
+            if field.symbol == "" then
+                text = string.format("%d", number)
+                item = tree:add(values[key], range, Int64.new(number))
+            else
+                text = string.format("%." .. field.decimals .. "f %s", number * field.digit,
+                    field.symbol)
+                item = tree:add(values[key], range, value_of(field, number))
+                local whole = field.signed and digits or Int64.new(number)
+                item:add(values[key .. ".digits"], range, whole):set_generated()
+            end
+        end
+        item:set_text(field.name .. ": " .. text)
+        shown[#shown + 1] = field.name .. " " .. text
+    end
+    return #shown > 0 and ": " .. table.concat(shown, ", ") or ""
+end
+
+-- Whether a byte is set where the request has no value. Hosts send 0 there.
+local function is_beyond_request(command, tvb)
+    local used = {}
+    for _, field in ipairs(command.request) do
+        for at = field.offset, field.offset + field.len - 1 do
+            used[at] = true
+        end
+    end
+    for at = 1, 7 do
+        if not used[at] and tvb(at, 1):uint() ~= 0 then
+            return true
+        end
+    end
+    return false
+end
+
+-- The open request that a frame with this code answers.
+local function asked(key, code)
+    local waiting = open[key]
+    if not waiting then
+        return nil
+    end
+    for _, answered in ipairs(table_of.answers[code] or { code }) do
+        if waiting[answered] then
+            return waiting[answered], answered
+        end
+    end
+end
+
+-- A frame is a request or the reply to the request that is open. Request and reply have the same
+-- identifier and code, so only the capture or the order tells which one it is.
+local function understand(pinfo, tvb, motor, code)
+    local known = packets[pinfo.number]
+    if known then
+        return known
+    end
+    local told = direction_of(was_sent(pinfo), rmd.prefs.direction)
+    local key = line_of(pinfo) .. "/" .. motor
+    local request, answered = asked(key, code)
+    local frame = { number = pinfo.number, time = pinfo.rel_ts, told = told ~= nil }
+    frame.direction = told
+    if not told then
+        local command = table_of.commands[code]
+        local is_late = request
+            and (frame.time - request.time) * 1000 > rmd.prefs.patience_ms
+        if command and not command.echo and is_beyond_request(command, tvb) then
+            frame.direction = REPLY
+        else
+            frame.direction = request and not is_late and REPLY or REQUEST
+        end
+    end
+    if frame.direction == REPLY then
+        if request then
+            frame.to = request
+            request.by[motor] = frame
+            open[key][answered] = nil
+        end
+    else
+        frame.by = {}
+        open[key] = open[key] or {}
+        open[key][code] = frame
+    end
+    packets[pinfo.number] = frame
+    return frame
+end
+
+local function ask_four(pinfo)
+    local frame = packets[pinfo.number]
+    if frame then
+        return frame
+    end
+    frame = { number = pinfo.number, time = pinfo.rel_ts, direction = REQUEST, by = {} }
+    frame.told = direction_of(was_sent(pinfo), rmd.prefs.direction) ~= nil
+    for motor = 1, #table_of.torque4 do
+        local key = line_of(pinfo) .. "/" .. motor
+        open[key] = open[key] or {}
+        open[key][table_of.torque4_code] = frame
+    end
+    packets[pinfo.number] = frame
+    return frame
+end
+
+local function add_direction(tree, tvb, frame)
+    tree:add(own.type, frame.direction):set_generated()
+    tree:add(own.source, frame.told and "capture" or "order"):set_generated()
+end
+
+local function add_replies(tree, pinfo, frame)
+    local replies = 0
+    for motor = 1, table_of.motors do
+        if frame.by and frame.by[motor] then
+            add_links(tree, links, frame.time, nil, frame.by[motor])
+            replies = replies + 1
+        end
+    end
+    if frame.to then
+        add_links(tree, links, frame.time, frame.to, nil)
+    end
+    -- Whether a reply follows is known once all packets were read.
+    if frame.direction == REQUEST and pinfo.visited and replies == 0 then
+        tree:add_proto_expert_info(expert.alone)
+    end
+end
+
+local function add_torques(tvb, pinfo, root)
+    local tree = root:add(rmd, tvb())
+    local frame = ask_four(pinfo)
+    add_direction(tree, tvb, frame)
+    local text = "motors 1 to 4: Multiple motor torque closed loop control"
+        .. add_fields(tree, table_of.torque4, tvb)
+    add_replies(tree, pinfo, frame)
+    return tree, text
+end
+
+local function add_exchange(tvb, pinfo, root, motor)
+    local tree = root:add(rmd, tvb())
+    local code = tvb(0, 1):uint()
+    local command = table_of.commands[code]
+    local frame = understand(pinfo, tvb, motor, code)
+    tree:add(own.motor, motor):set_generated()
+    add_direction(tree, tvb, frame)
+    local arrow = frame.direction == REQUEST and ">" or "<"
+    local text = string.format("motor %d %s 0x%02X", motor, arrow, code)
+    local item = tree:add(own.code, tvb(0, 1))
+    if command then
+        local fields = frame.direction == REQUEST and command.request or command.reply
+        text = text .. " " .. command.name .. add_fields(tree, fields, tvb)
+        if command.rom and frame.direction == REQUEST then
+            item:add_proto_expert_info(expert.rom)
+        end
+    else
+        text = text .. " not a command of " .. table_of.version .. ":" .. hex(tvb():raw())
+        item:add_proto_expert_info(expert.code)
+    end
+    add_replies(tree, pinfo, frame)
+    return tree, text
+end
+
+-- The motor of an identifier, and the dialect if it is a reply of a similar protocol.
+local function motor_of(id)
+    for _, range in ipairs(table_of.identifiers) do
+        if id > range.base and id <= range.base + table_of.motors then
+            return id - range.base, range.dialect
+        end
+    end
+end
+
+local function is_ours(id)
+    local motor, dialect = motor_of(id)
+    return id == table_of.torque4_id or motor ~= nil and not dialect
+end
+
+-- Whether the packet has a data frame of 8 bytes.
+local function is_whole(tvb)
+    local remote = can_remote()
+    local is_remote = remote ~= nil and remote.value ~= false and remote.value ~= 0
+    return not is_remote and not can_fd() and tvb:len() == 8 and tvb:reported_len() == 8
+end
+
+local function dissect(tvb, pinfo, root)
+    local id = identifiers[pinfo.number]
+    if not id or tvb:len() == 0 then
+        return 0
+    end
+    local motor, dialect = motor_of(id)
+    local tree, text
+    if dialect then
+        tree = root:add(rmd, tvb())
+        tree:add(own.dialect, dialect):set_generated()
+        tree:add(own.motor, motor):set_generated()
+        tree:add_proto_expert_info(expert.dialect)
+        text = string.format("reply of a %s motor, ID %d:%s", dialect, motor, hex(tvb():raw()))
+    elseif not is_whole(tvb) then
+        tree = root:add(rmd, tvb())
+        tree:add_proto_expert_info(expert.size)
+        text = string.format("0x%03x: not a standard data frame of 8 bytes", id)
+    elseif id == table_of.torque4_id then
+        tree, text = add_torques(tvb, pinfo, root)
+    else
+        tree, text = add_exchange(tvb, pinfo, root, motor)
+    end
+    pinfo.cols.protocol = "RMD"
+    pinfo.cols.info = text
+    tree:append_text(", " .. text)
+    return tvb:len()
+end
+
+-- Frames of other protocols may have the same identifiers. The frame for four motors has no code:
+-- it is recognised behind a frame of one of them.
+local function is_recognised(tvb, pinfo, id)
+    if not is_whole(tvb) then
+        return false
+    end
+    local line = line_of(pinfo)
+    if id == table_of.torque4_id then
+        return seen[line] ~= nil and seen[line] <= pinfo.number
+    end
+    if not table_of.commands[tvb(0, 1):uint()] then
+        return false
+    end
+    if motor_of(id) <= #table_of.torque4 then
+        seen[line] = math.min(seen[line] or pinfo.number, pinfo.number)
+    end
+    return true
+end
+
+-- Only the table of identifiers tells the identifier while Wireshark builds no tree, as when it reads
+-- a capture for the first time. What is not claimed here goes on to other dissectors.
+function claim.dissector(tvb, pinfo, root)
+    local id, preference = pinfo.match_uint, rmd.prefs.claim
+    identifiers[pinfo.number] = id
+    if preference == OFF or not is_ours(id) then
+        return 0
+    end
+    if preference == RECOGNISED and not is_recognised(tvb, pinfo, id) then
+        return 0
+    end
+    return Dissector.get("motorlink.rmd"):call(tvb, pinfo, root)
+end
+
+rmd.dissector = dissect
+DissectorTable.get("can.subdissector"):add_for_decode_as(rmd)
+for _, range in ipairs(table_of.identifiers) do
+    DissectorTable.get("can.id"):add(
+        string.format("%d-%d", range.base + 1, range.base + table_of.motors), claim)
+end
+DissectorTable.get("can.id"):add(table_of.torque4_id, claim)

@@ -1,0 +1,411 @@
+"""The dissector that `motorlink spec wireshark` writes, in tshark, against what `motorlink-proto` reads
+in the same frames (crates/spec/examples/wireshark_frames.rs).
+"""
+
+import json
+import math
+import random
+import shutil
+import subprocess
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+from pcapng import COOKED, EXTENDED, REMOTE, RTAC_SERIAL, SOCKETCAN, USER0, Capture
+
+pytestmark = pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
+
+PROFILES = ("spec", "mcsdk-5.4")
+ALL_RMD, ALL_ST = ["motorlink.rmd.claim:all"], ["motorlink.st.claim:all"]
+USER0_IS_ST = 'uat:user_dlts:"User 0 (DLT=147)","motorlink.st","0","","0",""'
+
+
+@pytest.fixture(scope="session")
+def dissector(run, tmp_path_factory):
+    path = tmp_path_factory.mktemp("wireshark") / "motorlink.lua"
+    done = run("spec", "wireshark", "-o", path)
+    assert done.code == 0, done.err
+    return path
+
+
+@pytest.fixture(scope="session")
+def tshark(dissector, tmp_path_factory):
+    """Runs tshark on a capture. No run may report an error of Lua."""
+    home = tmp_path_factory.mktemp("home")
+
+    def tshark(capture, *arguments, preferences=()):
+        path = capture.write(home / f"{random.getrandbits(64):x}.pcapng")
+        command = ["tshark", "-n", "-r", path, "-X", f"lua_script:{dissector}", *arguments]
+        for preference in preferences:
+            command += ["-o", preference]
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=300, env={"HOME": str(home), "PATH": "/usr/bin:/bin"}
+        )
+        assert done.returncode == 0 and "lua" not in done.stderr.lower(), done.stderr
+        assert "Lua Error" not in done.stdout and "_ws.lua.error" not in done.stdout
+        path.unlink()
+        return done.stdout
+
+    return tshark
+
+
+@pytest.fixture(scope="session")
+def packets(tshark):
+    """The fields of each packet, by name: `{name: [value, ..]}`."""
+
+    def packets(capture, *arguments, preferences=()):
+        out = tshark(capture, "-T", "json", *arguments, preferences=preferences)
+        found = json.loads(out, object_pairs_hook=lambda pairs: pairs)
+        assert len(found) == capture.count
+        return [flat(dict(dict(packet)["_source"])["layers"]) for packet in found]
+
+    return packets
+
+
+def flat(pairs, fields=None):
+    fields = defaultdict(list) if fields is None else fields
+    for name, value in pairs:
+        if isinstance(value, list):
+            flat(value, fields)
+        elif name.startswith(("motorlink.", "can.")):
+            fields[name].append(value)
+    return fields
+
+
+@pytest.fixture(scope="session")
+def sets(motorlink):
+    """The frames of the example, by set."""
+    frames = Path(motorlink).parent / "examples/wireshark_frames"
+    done = subprocess.run([frames], capture_output=True, text=True, check=True, timeout=60)
+    sets = defaultdict(list)
+    for line in done.stdout.splitlines():
+        frame = json.loads(line)
+        frame["data"] = bytes.fromhex(frame["data"])
+        sets[frame["set"]].append(frame)
+    return sets
+
+
+def same(name, got, expected):
+    if isinstance(expected, str):
+        return got == expected or got.replace(":", "") == expected
+    number = float(got) if not got.startswith("0x") else int(got, 0)
+    if isinstance(expected, float) and name.startswith("motorlink.st"):
+        # tshark prints a float of 32 bits with 6 digits.
+        number, expected = float32(number), float32(expected)
+    elif isinstance(expected, int) and not got.startswith("0x"):
+        number = int(got)
+    return math.isclose(number, expected, rel_tol=1e-14)
+
+
+def float32(number):
+    """The number with 6 digits."""
+    return float(f"{number:.6g}")
+
+
+def values(fields):
+    """The fields of the dissector without what the other tests look at."""
+    apart = ("type.source", "response_to", "response_time", "response_in", "whole_in", "checksum.calculated")
+    return {name: got for name, got in fields.items() if name.startswith("motorlink.") and not name.endswith(apart)}
+
+
+def check(frame, fields, number):
+    """The fields of a packet are those of the frame, and no others."""
+    got = values(fields)
+    layer = "motorlink.rmd" if "id" in frame else "motorlink.st"
+    expected = {name: value if isinstance(value, list) else [value] for name, value in frame["fields"].items()}
+    for note in frame["notes"]:
+        expected[f"{layer}.{note}"] = None
+    assert got.keys() == expected.keys(), (number, frame, fields)
+    for name, value in expected.items():
+        if value is None:
+            continue
+        assert len(got[name]) == len(value), (number, name, got[name], frame)
+        for one, other in zip(got[name], value):
+            assert same(name, one, other), (number, name, one, other, frame)
+    link = fields[f"{layer}.response_to"], fields[f"{layer}.response_time"]
+    if frame.get("answers"):
+        assert link[0] == [str(number - 1)] and [float(time) for time in link[1]] == [0.001], (number, link)
+    else:
+        assert link == ([], [])
+
+
+def on_can(frames, told=True):
+    capture = Capture(SOCKETCAN)
+    for frame in frames:
+        capture.can(frame["id"], frame["data"], frame["sent"] if told else None)
+    return capture
+
+
+def on_line(frames):
+    capture = Capture(RTAC_SERIAL)
+    for frame in frames:
+        capture.serial(frame["data"], frame["sent"])
+    return capture
+
+
+def test_every_frame_of_rmd_has_the_values_that_the_core_reads(packets, sets):
+    frames = sets["rmd"] + sets["rmd told"]
+    codes = {frame["data"][0] for frame in frames}
+    assert len(codes) == 256 and len(frames) > 1000
+    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames), preferences=ALL_RMD)), 1):
+        check(frame, fields, number)
+        assert fields["motorlink.rmd.type.source"] == ["capture"]
+
+
+def test_the_info_column_is_the_text_of_the_core(tshark, sets):
+    frames = sets["rmd"] + sets["rmd told"]
+    out = tshark(on_can(frames), "-T", "fields", "-e", "_ws.col.Info", preferences=ALL_RMD)
+    assert out.splitlines() == [frame["info"] for frame in frames]
+
+
+def test_without_direction_a_reply_is_the_frame_behind_its_request(packets, sets):
+    frames = sets["rmd"]
+    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames, told=False))), 1):
+        check(frame, fields, number)
+        assert fields["motorlink.rmd.type.source"] == ["order"]
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_frame_of_st_has_the_values_that_the_core_reads(packets, tshark, sets, profile):
+    frames = sets[f"st {profile}"]
+    assert len(frames) > 5000
+    preferences = [f"motorlink.st.profile:{profile}"]
+    for number, (frame, fields) in enumerate(zip(frames, packets(on_line(frames), preferences=preferences)), 1):
+        check(frame, fields, number)
+        assert fields["motorlink.st.type.source"] == ["capture"]
+    out = tshark(on_line(frames), "-T", "fields", "-e", "_ws.col.Info", preferences=preferences)
+    for frame, info in zip(frames, out.splitlines()):
+        assert frame["info"] is None or info == frame["info"], frame
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_beginning_of_a_frame_is_shown_as_one(packets, sets, profile):
+    frames = sets[f"st {profile} prefixes"]
+    assert len(frames) > 15
+    # Nothing follows on the line of a frame.
+    capture = Capture(*[RTAC_SERIAL] * len(frames))
+    for interface, frame in enumerate(frames):
+        capture.serial(frame["data"], frame["sent"], interface=interface)
+    for number, (frame, fields) in enumerate(zip(frames, packets(capture, preferences=ALL_ST)), 1):
+        check(frame, fields, number)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_frame_that_the_other_end_or_a_silence_cuts_is_truncated(packets, sets, profile):
+    for cut in ("other end", "silence"):
+        frames, capture = sets[f"st {profile} prefixes"], Capture(RTAC_SERIAL)
+        for frame in frames:
+            capture.serial(frame["data"], frame["sent"], after_ms=1001 if cut == "silence" else 1)
+            if cut == "other end":
+                capture.serial(NACK if frame["sent"] else GET_SPEED, not frame["sent"])
+        step = 2 if cut == "other end" else 1
+        got = packets(capture, "-2", preferences=ALL_ST)[::step]
+        for number, (frame, fields) in enumerate(zip(frames, got), 1):
+            is_last = cut == "silence" and number == len(frames)
+            check(frame if is_last else {**frame, "notes": ["truncated"]}, fields, number)
+
+
+GET_SPEED = bytes.fromhex("02011e21")
+SPEED_1500 = bytes.fromhex("f004dc050000d6")
+NACK = bytes.fromhex("ff010a0b")
+def test_frames_are_found_however_packets_divide_them(packets, sets):
+    """One packet for each byte, and packets of many frames, in place of a packet for each frame."""
+    frames = [frame for frame in sets["st spec"] if len(frame["data"]) < 12][:400]
+    exchanges = Capture(RTAC_SERIAL)
+    for frame in frames:
+        for at in range(len(frame["data"])):
+            exchanges.serial(frame["data"][at : at + 1], frame["sent"], after_ms=0.01)
+    got = packets(exchanges, preferences=ALL_ST)
+    number = 0
+    for frame in frames:
+        number += len(frame["data"])
+        fields = values(got[number - 1])
+        assert fields["motorlink.st.checksum.status"] == ["1"], frame
+        for name, value in frame["fields"].items():
+            assert len(fields[name]) == len(value if isinstance(value, list) else [value]), (name, frame)
+    sent = [frame["data"] for frame in frames if frame["sent"]]
+    together = Capture(RTAC_SERIAL)
+    together.serial(b"".join(sent), True)
+    [fields] = packets(together)
+    assert len(fields["motorlink.st.checksum.status"]) == len(sent)
+    assert [int(code, 0) for code in fields["motorlink.st.header"]] == [data[0] for data in sent]
+
+
+def test_a_frame_in_several_packets_is_whole_in_the_last(packets):
+    capture = Capture(RTAC_SERIAL)
+    capture.serial(GET_SPEED, True)
+    for part in (SPEED_1500[:1], SPEED_1500[1:3], SPEED_1500[3:] + NACK[:2], NACK[2:]):
+        capture.serial(part, False)
+    request, first, second, third, last = packets(capture, "-2")
+    assert request["motorlink.st.response_in"] == ["4"]
+    for part in (first, second):
+        assert part["motorlink.st.whole_in"] == ["4"] and not part["motorlink.st.incomplete"]
+    assert third["motorlink.st.reg.speed_meas"] == ["1500"] and third["motorlink.st.value"] == ["1500"]
+    assert third["motorlink.st.response_to"] == ["1"] and third["motorlink.st.whole_in"] == ["5"]
+    assert last["motorlink.st.error"] == ["0x0a"] and last["motorlink.st.unasked"] == [""]
+
+
+def test_damage_is_shown_where_it_is(packets, tshark):
+    capture = Capture(RTAC_SERIAL)
+    capture.serial(GET_SPEED, True)
+    capture.serial(b"\x55\x03" + SPEED_1500, False)
+    capture.serial(GET_SPEED[:-1] + b"\x00", True)
+    capture.serial(b"\x02\xff\xff" + GET_SPEED, True)
+    capture.serial(SPEED_1500[:4] + b"\x06" + SPEED_1500[5:], False)
+    capture.serial(b"\x10" + SPEED_1500[:3] + SPEED_1500, False)
+    capture.serial(b"\x00\x00\x00", True)
+    noise, bad_request, bad_length, bad_reply, twice, zeros = packets(capture, "-2")[1:]
+    assert noise["motorlink.st.stray"] == ["55:03"] and noise["motorlink.st.value"] == ["1500"]
+    assert noise["motorlink.st.response_to"] == ["1"]
+    assert bad_request["motorlink.st.bad_checksum"] == [""] and bad_request["motorlink.st.checksum.status"] == ["0"]
+    assert bad_request["motorlink.st.checksum.calculated"] == ["0x21"]
+    assert not bad_request["motorlink.st.response_in"] and not bad_request["motorlink.st.register"]
+    assert bad_length["motorlink.st.stray"] == ["02:ff:ff"] and bad_length["motorlink.st.register"] == ["0x1e"]
+    assert bad_reply["motorlink.st.bad_checksum"] == [""] and not bad_reply["motorlink.st.value"]
+    assert twice["motorlink.st.stray"] == ["10:f0:04:dc"]
+    assert twice["motorlink.st.value"] == ["1500"] and twice["motorlink.st.response_to"] == ["4"]
+    assert zeros["motorlink.st.unknown_code"] == [""] and zeros["motorlink.st.checksum.status"] == ["1"]
+    info = tshark(capture, "-T", "fields", "-e", "_ws.col.Info").splitlines()
+    assert info[1] == "< 2 bytes that are no frame | < ACK 1500 rpm"
+    assert info[2] == "> bad checksum 0x00 instead of 0x21"
+
+
+def test_requests_and_replies_are_linked(packets):
+    can = Capture(SOCKETCAN)
+    for motor in (1, 2):
+        can.can(0x140 + motor, bytes.fromhex("9c00000000000000"), True)
+    for motor in (2, 1):
+        can.can(0x140 + motor, bytes.fromhex("9c19000000000010"), False)
+    can.can(0x280, bytes(8), True)
+    for motor in (1, 2, 3, 4):
+        can.can(0x140 + motor, bytes.fromhex("a119000000000010"), False)
+    can.can(0x141, bytes.fromhex("a200000010270000"), True)
+    got = packets(can, "-2")
+    assert [fields["motorlink.rmd.response_in"] for fields in got[:2]] == [["4"], ["3"]]
+    assert [fields["motorlink.rmd.response_to"] for fields in got[2:4]] == [["2"], ["1"]]
+    assert [float(fields["motorlink.rmd.response_time"][0]) for fields in got[2:4]] == [0.001, 0.003]
+    assert got[4]["motorlink.rmd.response_in"] == ["6", "7", "8", "9"]
+    assert all(fields["motorlink.rmd.response_to"] == ["5"] for fields in got[5:9])
+    assert got[9]["motorlink.rmd.no_reply"] == [""] and not got[0]["motorlink.rmd.no_reply"]
+
+
+def test_without_direction_a_lost_reply_spoils_few_frames(packets):
+    """A request that is not answered in time is over. A reply has bytes where a request has none."""
+    ask, answer = bytes.fromhex("9c00000000000000"), bytes.fromhex("9c19000000000010")
+    for patience, expected in ((50, "112121212"), (0, "112121212")):
+        can = Capture(SOCKETCAN)
+        can.can(0x141, ask)
+        for data in (ask, answer) * 4:
+            can.can(0x141, data, after_ms=100 if data == ask else 1)
+        got = packets(can, preferences=[f"motorlink.rmd.patience_ms:{patience}"] if patience else [])
+        assert "".join(fields["motorlink.rmd.type"][0] for fields in got) == expected
+    fast = Capture(SOCKETCAN)
+    for data in (ask, ask, answer, ask, answer):
+        fast.can(0x141, data)
+    assert [fields["motorlink.rmd.type"][0] for fields in packets(fast)] == ["1", "2", "2", "1", "2"]
+
+
+def test_the_direction_can_be_turned_or_ignored(packets):
+    can = Capture(SOCKETCAN)
+    serial = Capture(USER0)
+    for sent in (True, False):
+        can.can(0x141, bytes.fromhex("9c00000000000000"), sent)
+        serial.packet(GET_SPEED if sent else SPEED_1500, sent)
+    cooked = Capture(COOKED)
+    for sent in (True, False):
+        cooked.cooked_can(0x141, bytes.fromhex("9c00000000000000"), sent)
+    for preference, expected in (("host", "12"), ("drive", "21"), ("untold", "12")):
+        for capture in (can, cooked):
+            got = packets(capture, preferences=[f"motorlink.rmd.direction:{preference}"])
+            assert "".join(fields["motorlink.rmd.type"][0] for fields in got) == expected
+    for preference, sources in (("host", ["capture"] * 2), ("untold", ["header"] * 2)):
+        got = packets(serial, preferences=[USER0_IS_ST, f"motorlink.st.direction:{preference}"])
+        assert [fields["motorlink.st.type.source"][0] for fields in got] == sources
+        assert [fields["motorlink.st.type"] for fields in got] == [["1"], ["2"]]
+        assert got[1]["motorlink.st.value"] == ["1500"]
+
+
+def test_frames_of_others_are_left_to_others(packets):
+    foreign = Capture(SOCKETCAN)
+    foreign.can(0x141, bytes(8))  # No command has the code 0.
+    foreign.can(0x280, bytes(8))  # No RMD motor was seen.
+    foreign.can(0x141, bytes.fromhex("9c00000000000000")[:4])
+    foreign.can(0x141 | EXTENDED, bytes.fromhex("9c00000000000000"))
+    foreign.can(0x141 | REMOTE, b"")
+    foreign.can(0x181, bytes.fromhex("9c00000000000000"))
+    foreign.can(0x141, bytes.fromhex("9c") + bytes(11), fd=True)
+    foreign.can(0x140, bytes.fromhex("9c00000000000000"))
+    foreign.can(0x161, bytes.fromhex("9c00000000000000"))
+    for preferences in ([], ["motorlink.rmd.claim:off"]):
+        assert not any(values(fields) for fields in packets(foreign, preferences=preferences))
+    own = Capture(SOCKETCAN)
+    own.can(0x141, bytes.fromhex("9c00000000000000"))
+    own.can(0x280, bytes(8))
+    own.can(0x241, bytes.fromhex("9c00000000000000"))
+    own.can(0x141, b"\x9c")
+    assert [bool(values(fields)) for fields in packets(own)] == [True, True, False, False]
+    assert not any(values(fields) for fields in packets(own, preferences=["motorlink.rmd.claim:off"]))
+    by_hand = ["-d", "can.subdissector,motorlink.rmd"]
+    got = packets(own, *by_hand, preferences=["motorlink.rmd.claim:off"])
+    assert got[0]["motorlink.rmd.code"] == ["0x9c"] and got[1]["motorlink.rmd.iq_1_amps"] == ["0"]
+    assert got[2]["motorlink.rmd.dialect"] == ["V3/V4"] and got[3]["motorlink.rmd.wrong_size"] == [""]
+    serial = Capture(RTAC_SERIAL, RTAC_SERIAL)
+    serial.serial(bytes.fromhex("0103000000010a84"), True)  # Modbus
+    serial.serial(SPEED_1500, False, interface=1)
+    got = packets(serial)
+    assert not values(got[0]) and got[1]["motorlink.st.header"] == ["0xf0"]
+    assert not any(values(fields) for fields in packets(serial, preferences=["motorlink.st.claim:off"]))
+    got = packets(serial, "-d", "rtacser.data,motorlink.st", preferences=["motorlink.st.claim:off"])
+    assert all(values(fields) for fields in got)
+
+
+@pytest.mark.parametrize("passes", [(), ("-2",)])
+def test_random_bytes_raise_no_error_of_lua(packets, passes):
+    numbers = random.Random(16)
+    can, serial = Capture(SOCKETCAN), Capture(RTAC_SERIAL, USER0)
+    codes = bytes.fromhex("303132333490911992949a9b9c9d808188a1a2a3a4a5a6")
+    headers = bytes.fromhex("f0ffe0010203060708090a0b0c0d0e12")
+    for _ in range(1500):
+        identifier = numbers.choice([0x141, 0x160, 0x280, 0x181, 0x241, numbers.getrandbits(11)])
+        identifier |= numbers.choice([0, 0, 0, 0, REMOTE, EXTENDED])
+        data = numbers.randbytes(numbers.choice([8, 8, 8, numbers.randint(0, 8)]))
+        if data and numbers.random() < 0.7:
+            data = bytes([numbers.choice(codes)]) + data[1:]
+        sent = numbers.choice([True, False, None])
+        can.can(identifier, data, sent)
+        data = bytearray(numbers.randbytes(numbers.randint(0, 40)))
+        if len(data) > 3 and numbers.random() < 0.7:
+            data[0], data[1] = numbers.choice(headers), len(data) - 3
+            if numbers.random() < 0.8:
+                total = sum(data[:-1])
+                data[-1] = ((total >> 8) + total) & 0xFF
+        if numbers.random() < 0.5:
+            serial.serial(bytes(data), bool(sent), after_ms=numbers.choice([1, 1, 1, 2000]))
+        else:
+            serial.packet(bytes(data), sent, interface=1)
+    packets(can, *passes, preferences=ALL_RMD)
+    packets(can, *passes, "-d", "can.subdissector,motorlink.rmd", preferences=["motorlink.rmd.claim:off"])
+    for profile in PROFILES:
+        found = packets(serial, *passes, preferences=[*ALL_ST, USER0_IS_ST, f"motorlink.st.profile:{profile}"])
+        assert sum("motorlink.st.message" in fields for fields in found) > 200
+
+
+def test_no_byte_of_a_line_is_left_out(tshark):
+    """Frames, parts of frames and stray bytes are together the bytes of each packet."""
+    numbers = random.Random(7)
+    serial = Capture(RTAC_SERIAL)
+    sizes = []
+    for _ in range(1500):
+        data = numbers.choice([GET_SPEED, SPEED_1500, NACK, numbers.randbytes(4)])
+        data = data[: numbers.randint(1, 8)] + numbers.choice([b"", GET_SPEED, SPEED_1500])
+        sizes.append(len(data))
+        serial.serial(data, numbers.random() < 0.5)
+    for passes in ((), ("-2",)):
+        out = tshark(serial, "-T", "jsonraw", "-J", "motorlink.st", *passes, preferences=ALL_ST)
+        found = json.loads(out, object_pairs_hook=lambda pairs: pairs)
+        for number, (packet, size) in enumerate(zip(found, sizes), 1):
+            layers = dict(dict(packet)["_source"])["layers"]
+            shown = [value for name, value in layers if name == "motorlink.st_raw"]
+            # A frame that ends in this packet has the bytes of the packets before, too.
+            places = [(place[1], place[2]) for place in shown]
+            assert sum(place[1] for place in places) == size, (number, places)
