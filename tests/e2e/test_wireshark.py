@@ -143,26 +143,55 @@ def on_line(frames):
     return capture
 
 
+AS_HOST = [*ALL_RMD, "motorlink.rmd.direction:host"]
+ASK, STATUS = bytes.fromhex("9a00000000000000"), bytes.fromhex("9a1900f000000000")
+
+
 def test_every_frame_of_rmd_has_the_values_that_the_core_reads(packets, sets):
     frames = sets["rmd"] + sets["rmd told"]
     codes = {frame["data"][0] for frame in frames}
     assert len(codes) == 256 and len(frames) > 1000
-    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames), preferences=ALL_RMD)), 1):
+    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames), preferences=AS_HOST)), 1):
         check(frame, fields, number)
-        assert fields["motorlink.rmd.type.source"] == ["capture"]
+        assert fields["motorlink.rmd.type.source"] == (["frame"] if frame["id"] == 0x280 else ["capture"])
 
 
 def test_the_info_column_is_the_text_of_the_core(tshark, sets):
     frames = sets["rmd"] + sets["rmd told"]
-    out = tshark(on_can(frames), "-T", "fields", "-e", "_ws.col.Info", preferences=ALL_RMD)
+    out = tshark(on_can(frames), "-T", "fields", "-e", "_ws.col.Info", preferences=AS_HOST)
     assert out.splitlines() == [frame["info"] for frame in frames]
+
+
+def test_the_capture_of_a_host_and_of_a_motor_tell_the_direction(packets, sets):
+    frames = sets["rmd"]
+    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames))), 1):
+        check(frame, fields, number)
+    turned = [{**frame, "sent": not frame["sent"]} for frame in frames]
+    motors = sorted({frame["id"] for frame in frames})
+    shown = packets(after_a_certain_reply(turned, motors, sent=False))[2 * len(motors) :]
+    for number, (frame, fields) in enumerate(zip(frames, shown), 1 + 2 * len(motors)):
+        check(frame, fields, number)
+
+
+def after_a_certain_reply(frames, motors, sent=None):
+    """The frames behind a request of each motor and its reply, which no request looks like."""
+    capture = Capture(SOCKETCAN)
+    for motor in motors:
+        capture.can(motor, ASK, sent)
+        capture.can(motor, STATUS, None if sent is None else not sent)
+    for frame in frames:
+        capture.can(frame["id"], frame["data"], None if sent is None else frame["sent"])
+    return capture
 
 
 def test_without_direction_a_reply_is_the_frame_behind_its_request(packets, sets):
     frames = sets["rmd"]
-    for number, (frame, fields) in enumerate(zip(frames, packets(on_can(frames, told=False))), 1):
+    motors = sorted({frame["id"] for frame in frames})
+    got = packets(after_a_certain_reply(frames, motors))
+    assert [fields["motorlink.rmd.type"][0] for fields in got[: 2 * len(motors)]] == ["0", "2"] * len(motors)
+    for number, (frame, fields) in enumerate(zip(frames, got[2 * len(motors) :]), 1 + 2 * len(motors)):
         check(frame, fields, number)
-        assert fields["motorlink.rmd.type.source"] == ["order"]
+        assert fields["motorlink.rmd.type.source"][0] in ("order", "frame")
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -289,20 +318,45 @@ def test_requests_and_replies_are_linked(packets):
     assert got[9]["motorlink.rmd.no_reply"] == [""] and not got[0]["motorlink.rmd.no_reply"]
 
 
-def test_without_direction_a_lost_reply_spoils_few_frames(packets):
-    """A request that is not answered in time is over. A reply has bytes where a request has none."""
-    ask, answer = bytes.fromhex("9c00000000000000"), bytes.fromhex("9c19000000000010")
-    for patience, expected in ((50, "112121212"), (0, "112121212")):
-        can = Capture(SOCKETCAN)
-        can.can(0x141, ask)
-        for data in (ask, answer) * 4:
-            can.can(0x141, data, after_ms=100 if data == ask else 1)
-        got = packets(can, preferences=[f"motorlink.rmd.patience_ms:{patience}"] if patience else [])
-        assert "".join(fields["motorlink.rmd.type"][0] for fields in got) == expected
-    fast = Capture(SOCKETCAN)
-    for data in (ask, ask, answer, ask, answer):
-        fast.can(0x141, data)
-    assert [fields["motorlink.rmd.type"][0] for fields in packets(fast)] == ["1", "2", "2", "1", "2"]
+def types(packets, frames, preferences=()):
+    """Frames of motor 1: `>` sent, `<` received, `-` without direction, each with its time in ms."""
+    can, now = Capture(SOCKETCAN), 0
+    for ms, direction, data in frames:
+        can.can(0x141, data, {">": True, "<": False, "-": None}[direction], after_ms=ms - now)
+        now = ms
+    return "".join("?><"[int(fields["motorlink.rmd.type"][0])] for fields in packets(can, preferences=preferences))
+
+
+def test_what_cannot_be_known_is_not_known(packets, tshark):
+    """The same cases as those of `motorlink decode`."""
+    off, angle, clear = (bytes.fromhex(code + "00" * 7) for code in ("80", "92", "9b"))
+    certain = [(0, "-", ASK), (1, "-", STATUS), (10, "-", ASK), (11, "-", STATUS)]
+    behind = [(20, "-", off), (21, "-", off), (30, "-", off)]
+    cases = {
+        "?<><><>": certain + behind,
+        "???": [(0, "-", angle), (1, "-", angle), (10, "-", angle)],
+        "?><>>": [(0, "-", off), (51, "-", off), (52, "-", off), (200, "-", off), (300, "-", off)],
+        "><><": [(0, ">", clear), (1, "<", ASK), (2, ">", clear), (3, "<", clear)],
+        "><><?<": [(0, ">", off), (1, "<", off), (2, ">", angle), (3, "<", angle), (10, "<", angle), (11, "<", STATUS)],
+        # A machine that only listens receives requests, too.
+        "?<><": [(0, "<", ASK), (1, "<", STATUS), (10, "<", ASK), (11, "<", STATUS)],
+        "?<>< ": [(0, "<", ASK), (1, ">", STATUS), (10, "<", off), (11, ">", off)],
+    }
+    for expected, frames in cases.items():
+        assert types(packets, frames) == expected.strip(), frames
+    patient = [(0, "-", ASK), (1, "-", STATUS), (10, "-", ASK), (80, "-", ASK)]
+    assert types(packets, patient) == "?<>>"
+    assert types(packets, patient, ["motorlink.rmd.patience_ms:100"]) == "?<><"
+    can = Capture(SOCKETCAN)
+    can.can(0x141, bytes.fromhex("a200000010270000"))
+    can.can(0x141, bytes.fromhex("9400000000000000"))
+    can.can(0x141, off)
+    assert tshark(can, "-T", "fields", "-e", "_ws.col.Info").splitlines() == [
+        "motor 1 ? 0xA2 Speed closed-loop command: request speed 100.00 °/s, or reply "
+        "temperature 0 °C, iq 0.000 A, speed 10000 °/s, encoder 0",
+        "motor 1 ? 0x94 Read single circle angle command: request, or reply angle 0.00 °",
+        "motor 1 ? 0x80 Motor off command",
+    ]
 
 
 def test_the_direction_can_be_turned_or_ignored(packets):
@@ -314,7 +368,7 @@ def test_the_direction_can_be_turned_or_ignored(packets):
     cooked = Capture(COOKED)
     for sent in (True, False):
         cooked.cooked_can(0x141, bytes.fromhex("9c00000000000000"), sent)
-    for preference, expected in (("host", "12"), ("drive", "21"), ("untold", "12")):
+    for preference, expected in (("auto", "12"), ("host", "12"), ("drive", "21"), ("untold", "00")):
         for capture in (can, cooked):
             got = packets(capture, preferences=[f"motorlink.rmd.direction:{preference}"])
             assert "".join(fields["motorlink.rmd.type"][0] for fields in got) == expected

@@ -1,9 +1,9 @@
 -- What both protocols use. The tables above are generated, the code is not.
 
-local REQUEST, REPLY = 1, 2
-local TYPES = { [REQUEST] = "request", [REPLY] = "reply" }
+local UNKNOWN, REQUEST, REPLY = 0, 1, 2
+local TYPES = { [UNKNOWN] = "request or reply", [REQUEST] = "request", [REPLY] = "reply" }
 local OFF, RECOGNISED, ALL = 1, 2, 3
-local AT_HOST, AT_DRIVE, UNTOLD = 1, 2, 3
+local AT_HOST, AT_DRIVE, UNTOLD, AUTO = 1, 2, 3, 4
 
 local frame_interface = Field.new("frame.interface_id")
 
@@ -25,19 +25,23 @@ local function claim_preference(what)
     }, false)
 end
 
-local function direction_preference()
-    return Pref.enum("Direction", AT_HOST,
-        "Captured at the host: sent frames are requests. Captured at the drive: received frames " ..
-        "are. Untold: the direction of the capture is ignored.", {
+local function direction_preference(default)
+    local words = {
         { 1, "host", AT_HOST },
         { 2, "drive", AT_DRIVE },
         { 3, "untold", UNTOLD },
-    }, false)
+    }
+    if default == AUTO then
+        words[4] = { 4, "auto", AUTO }
+    end
+    return Pref.enum("Direction", default,
+        "host: sent frames are requests. drive: received frames are. untold: the direction of the " ..
+        "capture is ignored. auto: replies show who captured.", words, false)
 end
 
--- Whether a frame was sent by the machine that captured it; nil if the capture does not tell.
+-- `sent` is nil if the capture does not tell.
 local function direction_of(sent, preference)
-    if sent == nil or preference == UNTOLD then
+    if sent == nil or preference == UNTOLD or preference == AUTO then
         return nil
     end
     if preference == AT_DRIVE then
@@ -46,6 +50,7 @@ local function direction_of(sent, preference)
     return sent and REQUEST or REPLY
 end
 
+-- Whether the machine that captured the frame sent it.
 local function was_sent(pinfo)
     if pinfo.p2p_dir == P2P_DIR_SENT then
         return true

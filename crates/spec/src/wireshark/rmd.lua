@@ -9,7 +9,7 @@ local can_fd = Field.new("canfd.flags.esi")
 rmd.prefs.claim = claim_preference(
     "off: only by Decode As. recognised: frames whose identifier and first byte are those of " ..
     "a command. all: every frame with an identifier of the protocol.")
-rmd.prefs.direction = direction_preference()
+rmd.prefs.direction = direction_preference(AUTO)
 rmd.prefs.patience_ms = Pref.uint("Longest wait for a reply, ms", table_of.patience_ms,
     "Without direction: a frame is the reply to a request that is not older than this.")
 
@@ -17,7 +17,7 @@ local own = {
     motor = ProtoField.uint8("motorlink.rmd.motor", "Motor", base.DEC),
     type = ProtoField.uint8("motorlink.rmd.type", "Type", base.DEC, TYPES),
     source = ProtoField.string("motorlink.rmd.type.source", "Type from", base.ASCII,
-        "The capture, or the order of the frames"),
+        "The capture, the order of the frames, or the frame itself"),
     code = ProtoField.uint8("motorlink.rmd.code", "Code", base.HEX,
         names_of(table_of.commands)),
     dialect = ProtoField.string("motorlink.rmd.dialect", "Dialect"),
@@ -79,11 +79,11 @@ declare_all(table_of.torque4)
 rmd.fields = fields_of(own, links, values)
 rmd.experts = expert
 
--- State of a capture: how each packet was understood, and the open requests.
-local packets, open, seen, identifiers
+-- What was found in a capture: its frames, and the exchanges on each bus.
+local packets, buses, seen, identifiers
 
 local function forget()
-    packets, open, seen, identifiers = {}, {}, {}, {}
+    packets, buses, seen, identifiers = {}, {}, {}, {}
 end
 forget()
 rmd.init = forget
@@ -96,19 +96,46 @@ local function value_of(field, digits)
     return digits * field.digit
 end
 
+local function is_active(field, number)
+    for _, bit in ipairs(field.bits) do
+        if math.floor(number / bit.mask) % 2 == 1 then
+            return true
+        end
+    end
+    return false
+end
+
 local function bits_shown(field, number)
-    local words, named_bits = {}, 0
+    local words, unnamed = {}, number
     for _, bit in ipairs(field.bits) do
         if math.floor(number / bit.mask) % 2 == 1 then
             words[#words + 1] = bit.doc
-            named_bits = named_bits + bit.mask
+            unnamed = unnamed - bit.mask
         end
     end
     local text = #words > 0 and table.concat(words, ", ") or "no error"
-    if number ~= named_bits then
-        text = text .. string.format(" (bits 0x%02x mean nothing)", number - named_bits)
+    if unnamed ~= 0 then
+        text = text .. string.format(" (bits 0x%02x mean nothing)", unnamed)
     end
-    return text, #words > 0
+    return text
+end
+
+-- The text of a value, its number, and its digits.
+local function read(field, range)
+    if field.words then
+        local number = range:uint()
+        return field.words[number] or string.format("0x%02x", number), number
+    elseif field.bits then
+        return bits_shown(field, range:uint()), range:uint()
+    end
+    local digits = field.signed and range:le_int64() or range:le_uint64()
+    local number = digits:tonumber()
+    if field.symbol == "" then
+        return string.format("%d", number), Int64.new(number)
+    end
+    local places = "%." .. field.decimals .. "f %s"
+    return string.format(places, number * field.digit, field.symbol), value_of(field, number),
+        field.signed and digits or Int64.new(number)
 end
 
 -- Adds the fields to the tree. Returns their text.
@@ -117,43 +144,33 @@ local function add_fields(tree, fields, tvb)
     for _, field in ipairs(fields) do
         local range = tvb(field.offset, field.len)
         local key = "motorlink.rmd." .. field.key
-        local text, item
-        if field.words then
-            local number = range:uint()
-            text = field.words[number] or string.format("0x%02x", number)
-            item = tree:add(values[key], range, number)
-        elseif field.bits then
-            local active
-            text, active = bits_shown(field, range:uint())
-            item = tree:add(values[key], range, range:uint())
-            for _, bit in ipairs(field.bits) do
-                item:add(values[key .. "." .. bit.name:lower()], range)
-            end
-            if active then
-                item:add_proto_expert_info(expert.active, text)
-            end
-        else
-            local digits = field.signed and range:le_int64() or range:le_uint64()
-            local number = digits:tonumber()
-            if field.symbol == "" then
-                text = string.format("%d", number)
-                item = tree:add(values[key], range, Int64.new(number))
-            else
-                text = string.format("%." .. field.decimals .. "f %s", number * field.digit,
-                    field.symbol)
-                item = tree:add(values[key], range, value_of(field, number))
-                local whole = field.signed and digits or Int64.new(number)
-                item:add(values[key .. ".digits"], range, whole):set_generated()
-            end
-        end
+        local text, value, digits = read(field, range)
+        local item = tree:add(values[key], range, value)
         item:set_text(field.name .. ": " .. text)
-        shown[#shown + 1] = field.name .. " " .. text
+        if digits then
+            item:add(values[key .. ".digits"], range, digits):set_generated()
+        end
+        for _, bit in ipairs(field.bits or {}) do
+            item:add(values[key .. "." .. bit.name:lower()], range)
+        end
+        if field.bits and is_active(field, value) then
+            item:add_proto_expert_info(expert.active, text)
+        end
+        shown[#shown + 1] = " " .. field.name .. " " .. text
     end
-    return #shown > 0 and ": " .. table.concat(shown, ", ") or ""
+    return table.concat(shown, ",")
 end
 
--- Whether a byte is set where the request has no value. Hosts send 0 there.
-local function is_beyond_request(command, tvb)
+local function describe(fields, tvb)
+    local shown = {}
+    for index, field in ipairs(fields) do
+        shown[index] = " " .. field.name .. " " .. read(field, tvb(field.offset, field.len))
+    end
+    return table.concat(shown, ",")
+end
+
+-- Whether the bytes that the request does not use are 0, as hosts send them.
+local function may_be_request(command, tvb)
     local used = {}
     for _, field in ipairs(command.request) do
         for at = field.offset, field.offset + field.len - 1 do
@@ -162,81 +179,124 @@ local function is_beyond_request(command, tvb)
     end
     for at = 1, 7 do
         if not used[at] and tvb(at, 1):uint() ~= 0 then
+            return false
+        end
+    end
+    return true
+end
+
+local function is_late(earlier, now)
+    return (now - earlier) * 1000 > rmd.prefs.patience_ms
+end
+
+-- Whether a frame with this code may be the reply to the open request.
+local function is_answer(motor, code, now)
+    local open = motor.open
+    if not open or is_late(open.time, now) then
+        return false
+    end
+    for _, asked in ipairs(table_of.answers[code] or { code }) do
+        if motor.asked == asked then
             return true
         end
     end
     return false
 end
 
--- The open request that a frame with this code answers.
-local function asked(key, code)
-    local waiting = open[key]
-    if not waiting then
-        return nil
+-- Request and reply have the same identifier and code. What a frame is comes from the user, from the
+-- frame itself, from the direction of the capture once it is known who captured, or from the order of
+-- frames. `motorlink decode` has the same rules. Returns the type and its source.
+local function type_of(line, motor, frame, command, tvb, sent)
+    local told = direction_of(sent, rmd.prefs.direction)
+    if told then
+        return told, "capture"
     end
-    for _, answered in ipairs(table_of.answers[code] or { code }) do
-        if waiting[answered] then
-            return waiting[answered], answered
+    if rmd.prefs.direction ~= AUTO then
+        sent = nil
+    end
+    if command and not may_be_request(command, tvb) then
+        if sent then
+            line.sender = AT_DRIVE
         end
+        return REPLY, "frame"
     end
+    if sent and line.sender == nil and not frame.answers then
+        line.sender = AT_HOST
+    end
+    if sent ~= nil and line.sender then
+        local type = direction_of(sent, line.sender)
+        if type == REQUEST or frame.answers then
+            return type, "capture"
+        end
+        -- A reply to a request that is not in the capture, or a request of another host.
+        return UNKNOWN, "nothing"
+    end
+    if frame.answers then
+        return REPLY, "order"
+    end
+    -- No reply comes so late behind the frame before.
+    if motor.is_synced or motor.last and is_late(motor.last, frame.time) then
+        return REQUEST, "order"
+    end
+    return UNKNOWN, "nothing"
 end
 
--- A frame is a request or the reply to the request that is open. Request and reply have the same
--- identifier and code, so only the capture or the order tells which one it is.
-local function understand(pinfo, tvb, motor, code)
+local function bus_of(pinfo)
+    local id = line_of(pinfo)
+    buses[id] = buses[id] or { motors = {} }
+    return buses[id]
+end
+
+local function motor_at(bus, id)
+    bus.motors[id] = bus.motors[id] or {}
+    return bus.motors[id]
+end
+
+local function understand(pinfo, tvb, id, code)
     local known = packets[pinfo.number]
     if known then
         return known
     end
-    local told = direction_of(was_sent(pinfo), rmd.prefs.direction)
-    local key = line_of(pinfo) .. "/" .. motor
-    local request, answered = asked(key, code)
-    local frame = { number = pinfo.number, time = pinfo.rel_ts, told = told ~= nil }
-    frame.direction = told
-    if not told then
-        local command = table_of.commands[code]
-        local is_late = request
-            and (frame.time - request.time) * 1000 > rmd.prefs.patience_ms
-        if command and not command.echo and is_beyond_request(command, tvb) then
-            frame.direction = REPLY
-        else
-            frame.direction = request and not is_late and REPLY or REQUEST
+    local bus = bus_of(pinfo)
+    local motor = motor_at(bus, id)
+    local frame = { number = pinfo.number, time = pinfo.rel_ts, by = {} }
+    frame.answers = is_answer(motor, code, frame.time)
+    frame.type, frame.source =
+        type_of(bus, motor, frame, table_of.commands[code], tvb, was_sent(pinfo))
+    motor.last = frame.time
+    if frame.type == REPLY then
+        if frame.answers then
+            frame.to = motor.open
+            motor.open.by[id] = frame
         end
+        motor.open = nil
+    elseif frame.type == REQUEST then
+        motor.open, motor.asked = frame, code
     end
-    if frame.direction == REPLY then
-        if request then
-            frame.to = request
-            request.by[motor] = frame
-            open[key][answered] = nil
-        end
-    else
-        frame.by = {}
-        open[key] = open[key] or {}
-        open[key][code] = frame
-    end
+    motor.is_synced = motor.is_synced or frame.type ~= UNKNOWN
     packets[pinfo.number] = frame
     return frame
 end
 
 local function ask_four(pinfo)
-    local frame = packets[pinfo.number]
-    if frame then
-        return frame
+    local known = packets[pinfo.number]
+    if known then
+        return known
     end
-    frame = { number = pinfo.number, time = pinfo.rel_ts, direction = REQUEST, by = {} }
-    frame.told = direction_of(was_sent(pinfo), rmd.prefs.direction) ~= nil
-    for motor = 1, #table_of.torque4 do
-        local key = line_of(pinfo) .. "/" .. motor
-        open[key] = open[key] or {}
-        open[key][table_of.torque4_code] = frame
+    local frame = { number = pinfo.number, time = pinfo.rel_ts, by = {} }
+    frame.type, frame.source = REQUEST, "frame"
+    for id = 1, #table_of.torque4 do
+        local motor = motor_at(bus_of(pinfo), id)
+        motor.open, motor.asked = frame, table_of.torque4_code
+        motor.is_synced, motor.last = true, frame.time
     end
     packets[pinfo.number] = frame
     return frame
 end
 
-local function add_direction(tree, tvb, frame)
-    tree:add(own.type, frame.direction):set_generated()
-    tree:add(own.source, frame.told and "capture" or "order"):set_generated()
+local function add_type(tree, frame)
+    tree:add(own.type, frame.type):set_generated()
+    tree:add(own.source, frame.source):set_generated()
 end
 
 local function add_replies(tree, pinfo, frame)
@@ -251,7 +311,7 @@ local function add_replies(tree, pinfo, frame)
         add_links(tree, links, frame.time, frame.to, nil)
     end
     -- Whether a reply follows is known once all packets were read.
-    if frame.direction == REQUEST and pinfo.visited and replies == 0 then
+    if frame.type == REQUEST and pinfo.visited and replies == 0 then
         tree:add_proto_expert_info(expert.alone)
     end
 end
@@ -259,12 +319,25 @@ end
 local function add_torques(tvb, pinfo, root)
     local tree = root:add(rmd, tvb())
     local frame = ask_four(pinfo)
-    add_direction(tree, tvb, frame)
-    local text = "motors 1 to 4: Multiple motor torque closed loop control"
+    add_type(tree, frame)
+    local text = "motors 1 to 4: Multiple motor torque closed loop control:"
         .. add_fields(tree, table_of.torque4, tvb)
     add_replies(tree, pinfo, frame)
     return tree, text
 end
+
+-- The values of a command. None are certain while the type is not, unless request and reply have the
+-- same values.
+local function add_values(tree, command, type, tvb)
+    if type == UNKNOWN and not command.echo then
+        return ": request" .. describe(command.request, tvb)
+            .. ", or reply" .. describe(command.reply, tvb)
+    end
+    local shown = add_fields(tree, type == REPLY and command.reply or command.request, tvb)
+    return shown == "" and "" or ":" .. shown
+end
+
+local ARROWS = { [UNKNOWN] = "?", [REQUEST] = ">", [REPLY] = "<" }
 
 local function add_exchange(tvb, pinfo, root, motor)
     local tree = root:add(rmd, tvb())
@@ -272,14 +345,12 @@ local function add_exchange(tvb, pinfo, root, motor)
     local command = table_of.commands[code]
     local frame = understand(pinfo, tvb, motor, code)
     tree:add(own.motor, motor):set_generated()
-    add_direction(tree, tvb, frame)
-    local arrow = frame.direction == REQUEST and ">" or "<"
-    local text = string.format("motor %d %s 0x%02X", motor, arrow, code)
+    add_type(tree, frame)
+    local text = string.format("motor %d %s 0x%02X", motor, ARROWS[frame.type], code)
     local item = tree:add(own.code, tvb(0, 1))
     if command then
-        local fields = frame.direction == REQUEST and command.request or command.reply
-        text = text .. " " .. command.name .. add_fields(tree, fields, tvb)
-        if command.rom and frame.direction == REQUEST then
+        text = text .. " " .. command.name .. add_values(tree, command, frame.type, tvb)
+        if command.rom and frame.type == REQUEST then
             item:add_proto_expert_info(expert.rom)
         end
     else

@@ -14,7 +14,7 @@ st.prefs.claim = claim_preference(
     "RTAC serial captures. off: only by Decode As. recognised: lines from a packet on that " ..
     "begins with a frame of the protocol. all: every line.")
 st.prefs.profile = Pref.enum("Profile", 1, "What the drive follows", profiles, false)
-st.prefs.direction = direction_preference()
+st.prefs.direction = direction_preference(AT_HOST)
 st.prefs.silence_ms = Pref.uint("Silence that ends a frame, ms", table_of.silence_ms,
     "A frame is over when no byte of it follows in this time")
 
