@@ -223,6 +223,18 @@ fn shipped_firmware_differs_from_table_3_in_sizes_and_access() {
 }
 
 #[test]
+fn a_drive_with_every_feature_knows_the_commands_of_its_profile() {
+    for profile in Profile::ALL {
+        let mut bench = SlaveFixture::new(profile, 1, Memory::with(all_features()));
+        for number in 0..=u8::MAX {
+            let command = Command::from(number);
+            let known = bench.ask(0, Request::ExecuteCommand(command)).is_ok();
+            assert_eq!(known, command.is_in(profile), "{command:?}");
+        }
+    }
+}
+
+#[test]
 fn a_longer_value_is_cut_and_a_shorter_one_keeps_the_rest() {
     let mut bench = spec();
     let kp = RegisterId::SPEED_KP;

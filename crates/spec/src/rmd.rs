@@ -1,4 +1,4 @@
-//! Directions of RMD frames, in words.
+//! Names of the directions of RMD frames.
 
 use motorlink_proto::rmd::{CommandInfo, Direction, Field};
 

@@ -324,14 +324,15 @@ fn execute(
     features: Features,
     drive: &mut impl MotorControl,
 ) -> Result<(), Nack> {
+    let firmware = profile == Profile::Mcsdk54;
     let (possible, command) = match command {
-        _ if !command.is_in(profile) => (false, command),
         Command::PfcEnable | Command::PfcDisable | Command::PfcFaultAck => {
             (features.has(Feature::Pfc), command)
         }
-        Command::ScStart => (features.has(Feature::Profiler), command),
-        Command::ScStop => (true, Command::StopMotor),
-        Command::Reset | Command::Ping => return Ok(()),
+        Command::ScStart => (firmware && features.has(Feature::Profiler), command),
+        Command::ScStop => (firmware, Command::StopMotor),
+        Command::Reset | Command::Ping if firmware => return Ok(()),
+        Command::Reset | Command::Ping | Command::Unknown(_) => (false, command),
         _ => (true, command),
     };
     if !possible {
