@@ -116,7 +116,7 @@ def message_of(databases, kind, motor=1):
 
 def test_both_files_have_every_command_by_its_name(databases, tables):
     expected = {row["code"]: row["name"] for row in tables["rmd"]["commands"]}
-    assert len(expected) == 23
+    assert set(expected) == {int(vector["command"], 16) for vector in VECTORS if vector["command"] != "torque4"}
     for kind in ("request", "reply"):
         for motor in IDS:
             message = message_of(databases, kind, motor)
@@ -358,7 +358,7 @@ def test_another_generator_can_build_every_request(tables, frames):
             }
             lines.append({"kind": "request", "code": row["code"], "digits": digits})
             made.append(built(tables, row["name"], 7, values))
-    assert len({line["code"] for line in lines}) == 23 and len(lines) > 250
+    assert len({line["code"] for line in lines}) == len(tables["rmd"]["commands"]) and len(lines) > 250
     for encoded, (identifier, data) in zip(frames(lines), made):
         assert (identifier, data.hex()) == (0x147, encoded["data"])
 
