@@ -3,6 +3,7 @@
 import json
 import random
 import re
+import struct
 import subprocess
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from jsonschema import Draft202012Validator
 
 ROOT = Path(__file__).parents[2]
 VECTORS = json.loads((ROOT / "vectors/rmd.json").read_text())
+ST_VECTORS = json.loads((ROOT / "vectors/st.json").read_text())
 IDS = (1, 2, 3, 4, 32)
 #: Values that two commands have at different places, or in different units.
 RENAMED = {
@@ -361,6 +363,60 @@ def test_another_generator_can_build_every_request(tables, frames):
     assert len({line["code"] for line in lines}) == len(tables["rmd"]["commands"]) and len(lines) > 250
     for encoded, (identifier, data) in zip(frames(lines), made):
         assert (identifier, data.hex()) == (0x147, encoded["data"])
+
+
+FORMATS = {"i8": "b", "u8": "B", "i16": "h", "u16": "H", "i32": "i", "u32": "I", "f32": "f"}
+
+
+def numbers(payload, fields):
+    """The numbers of an ST payload. `fields` has their names without units."""
+    data = bytearray(sum(value["bytes"] for value in payload["values"]))
+    for value in payload["values"]:
+        wanted = fields[value["name"].split("_")[0]]
+        struct.pack_into("<" + FORMATS[value["type"]], data, value["byte"], wanted)
+    return bytes(data)
+
+
+def st_frame(tables, vector):
+    """The command of a vector, from the tables alone."""
+    st, fields = tables["st"], vector["fields"]
+    profiles = st["profiles"] if vector["profile"] == "both" else [vector["profile"]]
+    (row,) = (
+        row for row in st["frame_codes"] if row["name"] == vector["code"] and set(profiles) <= set(row["profiles"])
+    )
+    data = numbers(row["request"], fields)
+    rest = {
+        "register": lambda: bytes([fields["register"]]),
+        "register-and-value": lambda: bytes([fields["register"]]) + bytes.fromhex(fields["value"]),
+        "command": lambda: bytes([fields["command"]]),
+        "values-and-registers": lambda: bytes.fromhex(fields["registers"]),
+        "bytes": lambda: bytes.fromhex(fields["steps"]),
+        "values": bytes,
+    }
+    data += rest[row["request"]["content"]]()
+    header = row["number"] | vector["motor"] << st["frame"]["code_bits"]
+    frame = bytes([header, len(data)]) + data
+    total = sum(frame)
+    return frame + bytes([(total >> 8) + total & 0xFF])
+
+
+def test_another_generator_can_build_every_frame_of_st(tables):
+    for vector in ST_VECTORS:
+        assert st_frame(tables, vector).hex() == vector["request"], vector
+    assert {row["name"] for row in tables["st"]["frame_codes"]} == {vector["code"] for vector in ST_VECTORS}
+
+
+def test_the_payloads_of_replies_have_the_numbers_of_the_vectors(tables):
+    rows = {row["name"]: row for row in tables["st"]["frame_codes"]}
+    seen = set()
+    for vector in ST_VECTORS:
+        reply = rows[vector["code"]]["reply"]
+        data = bytes.fromhex(vector.get("reply", ""))
+        if data[:1] != bytes([tables["st"]["reply_headers"]["acknowledge"]]) or reply["content"] != "values":
+            continue
+        assert numbers(reply, vector["answer"]) == data[2:-1], vector
+        seen.add(vector["code"])
+    assert {"GET_REVUP_DATA", "SET_RAMP", "SET_REG"} <= seen
 
 
 def test_the_tables_have_the_registers_of_the_program(tables, run):

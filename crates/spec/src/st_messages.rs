@@ -42,6 +42,22 @@ pub enum Content {
     Bytes,
 }
 
+impl Content {
+    /// The numbers at the beginning of the payload, each with its first byte.
+    pub fn values(self) -> impl Iterator<Item = (usize, &'static Value)> {
+        let values = match self {
+            Content::Values(values) | Content::Registers(values) => values,
+            _ => &[],
+        };
+        let mut next = 0;
+        values.iter().map(move |value| {
+            let first = next;
+            next += usize::from(value.ty.size());
+            (first, value)
+        })
+    }
+}
+
 const fn value(name: &'static str, label: &'static str, ty: Type, unit: Unit) -> Value {
     Value { name, label, ty, unit }
 }

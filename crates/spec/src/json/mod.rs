@@ -1,5 +1,6 @@
 //! The tables as JSON, for other generators. docs/spec.schema.json describes it.
 
+mod payload;
 mod range;
 mod rmd;
 mod st;

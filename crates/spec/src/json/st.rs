@@ -8,7 +8,9 @@ use motorlink_proto::st::{
 };
 use serde_json::{Map, Value, json};
 
+use super::payload::payload;
 use super::range::range;
+use crate::st_messages::contents;
 
 pub fn tables() -> Value {
     json!({
@@ -58,6 +60,9 @@ fn profiles(is_in: impl Fn(Profile) -> bool) -> Value {
 fn frame_code(code: &FrameCode) -> Value {
     let mut row = named(code.number(), Some(code.name()), code.doc());
     row["profiles"] = profiles(|it| FrameCode::from_number(code.number(), it) == Some(*code));
+    let (request, reply) = contents(*code);
+    row["request"] = payload(request);
+    row["reply"] = payload(reply);
     row
 }
 

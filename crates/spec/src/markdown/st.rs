@@ -7,6 +7,7 @@ use motorlink_proto::st::{
 };
 
 use super::page::{Page, code, mark};
+use crate::st_messages::{Content, contents};
 
 pub fn tables(page: &mut Page) {
     page.heading(2, "ST's Motor Control Protocol");
@@ -22,6 +23,18 @@ pub fn tables(page: &mut Page) {
         FrameCode::ALL.iter().map(|it| {
             let is_in = |profile| FrameCode::from_number(it.number(), profile) == Some(*it);
             [hex(it.number()), code(it.name()), profiles(is_in), it.doc().to_owned()]
+        }),
+    );
+    page.heading(3, "Numbers in payloads");
+    page.text(
+        "Payloads of registers, commands, data segments and versions are not in this table. A reply is \
+         the payload of the acknowledge.",
+    );
+    page.table(
+        ["frame code", "payload of the", "value", "first byte", "type", "unit"],
+        FrameCode::ALL.iter().flat_map(|&code| {
+            let (request, reply) = contents(code);
+            numbers(code, "request", request).chain(numbers(code, "reply", reply))
         }),
     );
     page.heading(3, "Registers");
@@ -71,6 +84,17 @@ pub fn tables(page: &mut Page) {
             [mask.trailing_zeros().to_string(), code(name), (*doc).into()]
         }),
     );
+}
+
+fn numbers(
+    of: FrameCode,
+    payload: &'static str,
+    content: Content,
+) -> impl Iterator<Item = [String; 6]> {
+    content.values().map(move |(byte, value)| {
+        let (ty, unit) = (value.ty.name().to_owned(), value.unit.symbol().to_owned());
+        [code(of.name()), payload.to_owned(), code(value.name), byte.to_string(), ty, unit]
+    })
 }
 
 const HEAD: [&str; 3] = ["number", "name", "meaning"];
