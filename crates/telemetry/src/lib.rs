@@ -39,6 +39,7 @@
 
 pub mod acquisition;
 pub mod event;
+pub mod label;
 pub mod line;
 pub mod plan;
 pub mod rows;

@@ -7,6 +7,7 @@ use motorlink::rmd::{MotorId, MotorSet, ReadStatus, Stop};
 use motorlink::st::{Command, Error, ErrorCode, MotorNumber, RegisterId, Request as StRequest};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::CommandError;
+use motorlink_telemetry::label::{distinct, last_part};
 use motorlink_telemetry::line::{Line, LineError, Request, RmdLine, StLine};
 use motorlink_telemetry::runner::{Remote, Runner};
 use motorlink_telemetry::signal::Motor;
@@ -145,20 +146,9 @@ pub fn stop_of(motor: Motor) -> Request {
 
 /// A short name for each port: the last part of its name. If two are equal, a number is added.
 pub fn labels(names: &[String]) -> Vec<String> {
-    let mut labels: Vec<String> = Vec::new();
-    for name in names {
-        let body = name.split('?').next().unwrap_or(name).trim_end_matches(['/', ':']);
-        let end = body.rsplit(['/', ':']).next().unwrap_or(body);
-        let short = |end: &str, most: usize| end.chars().take(most).collect::<String>();
-        let mut label = short(end, LABEL);
-        let mut number = 2;
-        while labels.contains(&label) {
-            label = format!("{}~{number}", short(end, LABEL - 2));
-            number += 1;
-        }
-        labels.push(label);
-    }
-    labels
+    let short = |end: &str, most: usize| end.chars().take(most).collect::<String>();
+    let labels = names.iter().map(|name| short(last_part(name), LABEL));
+    distinct(labels, |label, number| format!("{}~{number}", short(label, LABEL - 2)))
 }
 
 /// The longest short name, in characters.

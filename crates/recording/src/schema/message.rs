@@ -1,0 +1,463 @@
+//! The messages whose types are the same in every recording.
+
+use super::cdr::{Decoder, Encoder, Malformed};
+
+/// A message with a type of its own.
+pub trait Message: Sized {
+    /// The name of the type: package, `msg`, name.
+    const TYPE: &'static str;
+    /// The fields in the language of `.msg` files, with the types that they use.
+    fn definition() -> String;
+    /// Writes the fields.
+    fn write(&self, out: &mut Encoder);
+    /// Reads the fields.
+    ///
+    /// # Errors
+    /// The bytes are not such a message.
+    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed>;
+
+    /// The message as CDR.
+    fn encode(&self) -> Vec<u8> {
+        let mut out = Encoder::default();
+        self.write(&mut out);
+        out.into_bytes()
+    }
+
+    /// The message that this CDR is.
+    ///
+    /// # Errors
+    /// It is no message of this type.
+    fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
+        Self::read(&mut Decoder::new(bytes)?)
+    }
+}
+
+const NANOS: u64 = 1_000_000_000;
+
+/// `builtin_interfaces/msg/Time`: ns since 1970.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Time(pub u64);
+
+impl Time {
+    /// The fields in the language of `.msg` files.
+    pub(super) const DEPENDENCY: (&'static str, &'static str) =
+        ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+
+    pub(super) fn write(self, out: &mut Encoder) {
+        out.i32(i32::try_from(self.0 / NANOS).unwrap_or(i32::MAX));
+        out.u32((self.0 % NANOS) as u32);
+    }
+
+    pub(super) fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        let seconds = u64::try_from(from.i32()?).unwrap_or(0);
+        Ok(Time(seconds * NANOS + u64::from(from.u32()?)))
+    }
+}
+
+/// `std_msgs/msg/Header`, without a frame of reference: motors have none.
+const HEADER: (&str, &str) =
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
+
+fn write_header(stamp: Time, out: &mut Encoder) {
+    stamp.write(out);
+    out.text("");
+}
+
+fn read_header(from: &mut Decoder<'_>) -> Result<Time, Malformed> {
+    let stamp = Time::read(from)?;
+    from.text()?;
+    Ok(stamp)
+}
+
+/// A definition with those of the types that it uses, each behind a line of 80 `=`.
+pub(super) fn with_dependencies(fields: &str, dependencies: &[(&str, &str)]) -> String {
+    let rule = "=".repeat(80);
+    let used = dependencies.iter().map(|(name, text)| format!("{rule}\nMSG: {name}\n{text}"));
+    std::iter::once(fields.to_owned()).chain(used).collect()
+}
+
+/// `sensor_msgs/msg/JointState`: where motors are and how they move.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointState {
+    /// When the values were read.
+    pub stamp: Time,
+    /// The motors.
+    pub name: Vec<String>,
+    /// rad. Empty if it is not recorded.
+    pub position: Vec<f64>,
+    /// rad/s. Empty if it is not recorded.
+    pub velocity: Vec<f64>,
+    /// A of the current that makes torque. Empty if it is not recorded.
+    pub effort: Vec<f64>,
+}
+
+impl Message for JointState {
+    const TYPE: &'static str = "sensor_msgs/msg/JointState";
+
+    fn definition() -> String {
+        let fields = "std_msgs/Header header\nstring[] name\nfloat64[] position\n\
+                      float64[] velocity\nfloat64[] effort\n";
+        with_dependencies(fields, &[HEADER, Time::DEPENDENCY])
+    }
+
+    fn write(&self, out: &mut Encoder) {
+        write_header(self.stamp, out);
+        out.sequence(&self.name, |out, name| out.text(name));
+        for values in [&self.position, &self.velocity, &self.effort] {
+            out.sequence(values, |out, value| out.f64(*value));
+        }
+    }
+
+    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        Ok(JointState {
+            stamp: read_header(from)?,
+            name: from.sequence(Decoder::text)?,
+            position: from.sequence(Decoder::f64)?,
+            velocity: from.sequence(Decoder::f64)?,
+            effort: from.sequence(Decoder::f64)?,
+        })
+    }
+}
+
+/// `diagnostic_msgs/msg/DiagnosticArray`: the condition of motors in words.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct DiagnosticArray {
+    /// When this was so.
+    pub stamp: Time,
+    /// One for each motor.
+    pub status: Vec<DiagnosticStatus>,
+}
+
+/// `diagnostic_msgs/msg/DiagnosticStatus`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DiagnosticStatus {
+    /// How good it is.
+    pub level: Level,
+    /// Label and motor: `st0/motor1`.
+    pub name: String,
+    /// State and faults in words.
+    pub message: String,
+    /// The port.
+    pub hardware_id: String,
+    /// More, by name.
+    pub values: Vec<(String, String)>,
+}
+
+/// The level of a [`DiagnosticStatus`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Level {
+    /// Nothing is wrong.
+    Ok = 0,
+    /// Something needs attention.
+    Warn = 1,
+    /// The motor has a fault.
+    Error = 2,
+    /// The motor does not answer.
+    Stale = 3,
+}
+
+impl From<u8> for Level {
+    fn from(level: u8) -> Self {
+        match level {
+            0 => Level::Ok,
+            1 => Level::Warn,
+            3 => Level::Stale,
+            _ => Level::Error,
+        }
+    }
+}
+
+impl Message for DiagnosticArray {
+    const TYPE: &'static str = "diagnostic_msgs/msg/DiagnosticArray";
+
+    fn definition() -> String {
+        let fields = "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n";
+        let status = format!(
+            "byte OK={}\nbyte WARN={}\nbyte ERROR={}\nbyte STALE={}\nbyte level\nstring name\n\
+             string message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values\n",
+            Level::Ok as u8,
+            Level::Warn as u8,
+            Level::Error as u8,
+            Level::Stale as u8
+        );
+        let value = ("diagnostic_msgs/KeyValue", "string key\nstring value\n");
+        let status = ("diagnostic_msgs/DiagnosticStatus", status.as_str());
+        with_dependencies(fields, &[HEADER, Time::DEPENDENCY, status, value])
+    }
+
+    fn write(&self, out: &mut Encoder) {
+        write_header(self.stamp, out);
+        out.sequence(&self.status, |out, status| {
+            out.u8(status.level as u8);
+            out.text(&status.name);
+            out.text(&status.message);
+            out.text(&status.hardware_id);
+            out.sequence(&status.values, |out, (key, value)| {
+                out.text(key);
+                out.text(value);
+            });
+        });
+    }
+
+    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        let stamp = read_header(from)?;
+        let status = from.sequence(|from| {
+            Ok(DiagnosticStatus {
+                level: from.u8()?.into(),
+                name: from.text()?,
+                message: from.text()?,
+                hardware_id: from.text()?,
+                values: from.sequence(|from| Ok((from.text()?, from.text()?)))?,
+            })
+        })?;
+        Ok(DiagnosticArray { stamp, status })
+    }
+}
+
+/// `motorlink/msg/Frame`: one frame on the wire, or bytes that are none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// When it was sent, or its last byte came.
+    pub stamp: Time,
+    /// From the program's point of view.
+    pub direction: Direction,
+    /// The CAN identifier, with the flags [`Frame::EXTENDED`] and [`Frame::REMOTE`]; 0 on a serial line.
+    pub id: u32,
+    /// What it is.
+    pub result: FrameResult,
+    /// The bytes on a serial line, the data of a CAN frame.
+    pub data: Vec<u8>,
+}
+
+/// The direction of a [`Frame`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Direction {
+    /// From the program to the motors.
+    Sent = 0,
+    /// From the motors to the program.
+    Received = 1,
+}
+
+/// What a [`Frame`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FrameResult {
+    /// A frame of the protocol.
+    Frame = 0,
+    /// A frame of the protocol in which the drive refuses a request.
+    Nack = 1,
+    /// Bytes that are no frame.
+    Damaged = 2,
+    /// A CAN frame that is not of this protocol.
+    Foreign = 3,
+}
+
+impl Frame {
+    /// Of [`id`](Self::id): the identifier has 29 bits.
+    pub const EXTENDED: u32 = 1 << 31;
+    /// Of [`id`](Self::id): a remote transmission request.
+    pub const REMOTE: u32 = 1 << 30;
+}
+
+impl Message for Frame {
+    const TYPE: &'static str = "motorlink/msg/Frame";
+
+    fn definition() -> String {
+        let fields = format!(
+            "# One frame on the wire, or bytes that are none.\n\
+             builtin_interfaces/Time stamp # when it was sent, or its last byte came\n\
+             # from the point of view of the program that recorded\n\
+             uint8 SENT={}\nuint8 RECEIVED={}\nuint8 direction\n\
+             # the CAN identifier; these flags are added; 0 on a serial line\n\
+             uint32 EXTENDED={}\nuint32 REMOTE={}\nuint32 id\n\
+             # a frame of the protocol; one in which the drive refuses a request; bytes that are no\n\
+             # frame; a CAN frame that is not of the protocol\n\
+             uint8 FRAME={}\nuint8 NACK={}\nuint8 DAMAGED={}\nuint8 FOREIGN={}\nuint8 result\n\
+             uint8[] data # the bytes on a serial line, the data of a CAN frame\n",
+            Direction::Sent as u8,
+            Direction::Received as u8,
+            Frame::EXTENDED,
+            Frame::REMOTE,
+            FrameResult::Frame as u8,
+            FrameResult::Nack as u8,
+            FrameResult::Damaged as u8,
+            FrameResult::Foreign as u8,
+        );
+        with_dependencies(&fields, &[Time::DEPENDENCY])
+    }
+
+    fn write(&self, out: &mut Encoder) {
+        self.stamp.write(out);
+        out.u8(self.direction as u8);
+        out.u32(self.id);
+        out.u8(self.result as u8);
+        out.bytes(&self.data);
+    }
+
+    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        Ok(Frame {
+            stamp: Time::read(from)?,
+            direction: match from.u8()? {
+                0 => Direction::Sent,
+                _ => Direction::Received,
+            },
+            id: from.u32()?,
+            result: match from.u8()? {
+                0 => FrameResult::Frame,
+                1 => FrameResult::Nack,
+                3 => FrameResult::Foreign,
+                _ => FrameResult::Damaged,
+            },
+            data: from.bytes()?,
+        })
+    }
+}
+
+/// `rcl_interfaces/msg/Log`: something that happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Log {
+    /// When it happened.
+    pub stamp: Time,
+    /// How bad it is.
+    pub severity: Severity,
+    /// Whom it concerns: `st0/motor1`, or the label of a port.
+    pub name: String,
+    /// The sentence.
+    pub message: String,
+    /// Who commanded it; may be empty.
+    pub by: String,
+    /// The kind, one word for programs: `stopped`.
+    pub kind: String,
+}
+
+/// The severity of a [`Log`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Severity {
+    /// For looking for causes.
+    Debug = 10,
+    /// In the course of things.
+    Info = 20,
+    /// Values are missing, or something was refused.
+    Warn = 30,
+    /// A motor may not do what was commanded.
+    Error = 40,
+    /// Nothing goes on.
+    Fatal = 50,
+}
+
+impl From<u8> for Severity {
+    fn from(level: u8) -> Self {
+        match level {
+            0..=10 => Severity::Debug,
+            11..=20 => Severity::Info,
+            21..=30 => Severity::Warn,
+            31..=40 => Severity::Error,
+            _ => Severity::Fatal,
+        }
+    }
+}
+
+impl Message for Log {
+    const TYPE: &'static str = "rcl_interfaces/msg/Log";
+
+    fn definition() -> String {
+        let fields = format!(
+            "byte DEBUG={}\nbyte INFO={}\nbyte WARN={}\nbyte ERROR={}\nbyte FATAL={}\n\
+             builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\n\
+             string function\nuint32 line\n",
+            Severity::Debug as u8,
+            Severity::Info as u8,
+            Severity::Warn as u8,
+            Severity::Error as u8,
+            Severity::Fatal as u8
+        );
+        with_dependencies(&fields, &[Time::DEPENDENCY])
+    }
+
+    fn write(&self, out: &mut Encoder) {
+        self.stamp.write(out);
+        out.u8(self.severity as u8);
+        out.text(&self.name);
+        out.text(&self.message);
+        out.text(&self.by);
+        out.text(&self.kind);
+        out.u32(0);
+    }
+
+    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        let log = Log {
+            stamp: Time::read(from)?,
+            severity: from.u8()?.into(),
+            name: from.text()?,
+            message: from.text()?,
+            by: from.text()?,
+            kind: from.text()?,
+        };
+        from.u32()?;
+        Ok(log)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn returns<M: Message + PartialEq + std::fmt::Debug>(message: M) {
+        let bytes = message.encode();
+        assert_eq!(M::decode(&bytes).as_ref(), Ok(&message));
+        for end in 0..bytes.len() {
+            assert!(M::decode(&bytes[..end]).is_err(), "{end} of {} bytes", bytes.len());
+        }
+    }
+
+    #[test]
+    fn every_message_is_decoded_to_what_was_encoded_and_no_part_of_it_is() {
+        let stamp = Time(1_764_000_000_123_456_789);
+        returns(JointState {
+            stamp,
+            name: vec!["st0_motor1".to_owned(), "can0_motor12".to_owned()],
+            position: vec![1.5, -2.0],
+            velocity: vec![],
+            effort: vec![f64::MIN_POSITIVE, 1e9],
+        });
+        let status = DiagnosticStatus {
+            level: Level::Stale,
+            name: "st0/motor1".to_owned(),
+            message: "FAULT_OVER: over voltage".to_owned(),
+            hardware_id: "/dev/ttyACM0".to_owned(),
+            values: vec![("state".to_owned(), "FAULT_OVER".to_owned())],
+        };
+        returns(DiagnosticArray { stamp, status: vec![status] });
+        returns(Frame {
+            stamp,
+            direction: Direction::Received,
+            id: Frame::EXTENDED | 0x141,
+            result: FrameResult::Foreign,
+            data: vec![0x9A, 0, 1],
+        });
+        returns(Log {
+            stamp,
+            severity: Severity::Warn,
+            name: "st0".to_owned(),
+            message: "the port is open again".to_owned(),
+            by: "web".to_owned(),
+            kind: "back".to_owned(),
+        });
+    }
+
+    #[test]
+    fn a_definition_has_the_types_that_it_uses_behind_lines_of_80_characters() {
+        let text = JointState::definition();
+        let rule = "=".repeat(80);
+        let parts: Vec<&str> = text.split(&format!("{rule}\n")).collect();
+        assert_eq!(parts.len(), 3);
+        assert_eq!(
+            parts[1],
+            "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+        );
+        assert_eq!(parts[2], "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n");
+    }
+}

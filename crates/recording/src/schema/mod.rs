@@ -1,0 +1,67 @@
+//! What a recording contains: message types, their encoding, topics and names.
+//!
+//! The types are those of ROS 2 where it has one. [`SignalsType`] is made for each motor.
+
+mod cdr;
+mod message;
+pub mod name;
+mod signals;
+
+pub use cdr::Malformed;
+pub use message::{
+    DiagnosticArray, DiagnosticStatus, Direction, Frame, FrameResult, JointState, Level, Log,
+    Message, Severity, Time,
+};
+pub use signals::{PACKAGE, SignalField, SignalsRow, SignalsType};
+
+/// The profile of the file: robotics tools know how to read the messages.
+pub const PROFILE: &str = "ros2";
+/// The encoding of type definitions.
+pub const SCHEMA_ENCODING: &str = "ros2msg";
+/// The encoding of messages.
+pub const MESSAGE_ENCODING: &str = "cdr";
+/// The media type of settings.
+pub const SETTINGS_TYPE: &str = "application/toml";
+
+/// Keys of the metadata of a recording, which is named [`recording::NAME`](self::recording::NAME).
+pub mod recording {
+    /// The name of the metadata record.
+    pub const NAME: &str = "motorlink";
+    /// The version of the program that recorded.
+    pub const VERSION: &str = "version";
+    /// The version of what this page describes.
+    pub const FORMAT: &str = "format";
+    /// The value of [`FORMAT`].
+    pub const FORMAT_1: &str = "1";
+    /// When it began, in the form of RFC 3339.
+    pub const BEGAN: &str = "began";
+    /// The command that recorded.
+    pub const COMMAND: &str = "command";
+    /// Counted from 0: which file of a recording in several files this is.
+    pub const PART: &str = "part";
+}
+
+/// Keys of the metadata of a motor, which is named [`drive::NAME`](self::drive::NAME). Channels of
+/// frames have some of them, too.
+pub mod drive {
+    /// The name of the metadata record.
+    pub const NAME: &str = "drive";
+    /// The label of the port in topics.
+    pub const LABEL: &str = "label";
+    /// The name of the port.
+    pub const PORT: &str = "port";
+    /// [`ST`] or [`RMD`].
+    pub const PROTOCOL: &str = "protocol";
+    /// The protocol of serial drives.
+    pub const ST: &str = "st";
+    /// The protocol of motors on a CAN bus.
+    pub const RMD: &str = "rmd";
+    /// The profile of an ST drive.
+    pub const PROFILE: &str = "profile";
+    /// The number or ID of the motor.
+    pub const MOTOR: &str = "motor";
+    /// What is known of the drive; one line of [`IDENTITY`] and a number each.
+    pub const IDENTITY: &str = "identity";
+    /// The name of the attachment with the settings.
+    pub const SETTINGS: &str = "settings";
+}
