@@ -7,6 +7,8 @@
 //! | receive values and events | [`subscription::Subscription`] |
 //! | make rows of values of the same instant | [`rows::Rows`] |
 //! | see which exchanges read signals | [`plan`] |
+//! | find the motors of a line | [`search`] |
+//! | say the state and the faults of a motor | [`overview`] |
 //! | exchange messages with other programs that use the same lines | [`share`] |
 //! | schedule exchanges of your own, sans I/O | [`schedule::Schedule`] |
 //!
@@ -41,11 +43,13 @@ pub mod acquisition;
 pub mod event;
 pub mod label;
 pub mod line;
+pub mod overview;
 pub mod plan;
 pub mod rows;
 pub mod runner;
 pub mod sample;
 pub mod schedule;
+pub mod search;
 pub mod share;
 pub mod signal;
 pub mod subscription;

@@ -12,9 +12,10 @@ use motorlink::st::Profile;
 use motorlink::{rmd, st};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{Line, RmdLine, StLine, Stopped};
-use motorlink_telemetry::share::hub::{Held, Speaks};
+use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{Answer, Ask, Event, Protocol};
 use motorlink_telemetry::share::server::{Server, ServerError};
+use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use serde_json::json;
 

@@ -6,13 +6,14 @@ use std::time::{Duration, Instant, SystemTime};
 
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::event::What;
+use motorlink_telemetry::overview;
 use motorlink_telemetry::schedule::CommandId;
+use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::Record;
 
-use super::ports::Protocol;
 use super::row::{Row, Stop, remember};
-use super::values::{self, Units};
+use super::values::Units;
 use crate::span::utc;
 
 /// Events that are kept.
@@ -164,7 +165,7 @@ impl Model {
             return ("stopping ...".to_owned(), false);
         }
         let is_bad = self.faults(row).is_some();
-        let state = values::state(&row.main, |source| row.value(source));
+        let state = overview::state(&row.main, |source| row.value(source));
         (state.unwrap_or_else(|| "-".to_owned()), is_bad)
     }
 
@@ -180,7 +181,7 @@ impl Model {
 
     /// The text of the faults; `None`: no fault.
     pub fn faults(&self, row: &Row) -> Option<String> {
-        values::faults(row.motor, row.value(row.main.faults)?)
+        overview::faults(row.motor, row.value(row.main.faults)?)
     }
 
     /// Handles a record of a port.

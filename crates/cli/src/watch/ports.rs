@@ -3,25 +3,18 @@
 use std::sync::Arc;
 
 use motorlink::port::PortName;
-use motorlink::rmd::{MotorId, MotorSet, ReadStatus, Stop};
-use motorlink::st::{Command, Error, ErrorCode, MotorNumber, RegisterId, Request as StRequest};
+use motorlink::rmd::{MotorSet, Stop};
+use motorlink::st::{Command, MotorNumber, Request as StRequest};
 use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::event::CommandError;
 use motorlink_telemetry::label::{distinct, last_part};
-use motorlink_telemetry::line::{Line, LineError, Request, RmdLine, StLine};
-use motorlink_telemetry::runner::{Remote, Runner};
+use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
+use motorlink_telemetry::runner::Runner;
+use motorlink_telemetry::search::motors;
+use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::Motor;
 
 use super::args::Args;
-use super::settings::TIME_TO_LIVE;
 use crate::failure::Failure;
-
-/// The protocol of the motors of a port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Protocol {
-    St,
-    Rmd,
-}
 
 /// A port, its engine and its motors.
 pub struct Opened {
@@ -79,58 +72,6 @@ impl Opened {
             false => given,
         };
         Ok(Opened { runner, name: name.to_owned(), protocol, motors })
-    }
-}
-
-/// Searches for motors. Returns those that reply.
-///
-/// # Errors
-/// No motor replies.
-pub fn motors(
-    remote: &Remote,
-    by: &Arc<str>,
-    protocol: Protocol,
-) -> Result<Vec<Motor>, CommandError> {
-    match protocol {
-        Protocol::St => st_motors(remote, by),
-        Protocol::Rmd => rmd_motors(remote, by),
-    }
-}
-
-/// The motors that the drive has.
-fn st_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError> {
-    let mut found = Vec::new();
-    for number in (1..=u8::MAX).map_while(MotorNumber::new) {
-        let read = Request::st(number.number(), StRequest::GetRegister(RegisterId::STATUS));
-        match remote.command(by, read, TIME_TO_LIVE) {
-            Ok(_) => found.push(Motor::St(number)),
-            Err(CommandError::Line(LineError::St(Error::Refused { code, .. }))) => {
-                if code != ErrorCode::BadMotorSelected {
-                    found.push(Motor::St(number));
-                }
-            }
-            // The drive no longer replies: do not wait for the other numbers.
-            Err(error) if found.is_empty() => return Err(error),
-            Err(_) => break,
-        }
-    }
-    Ok(found)
-}
-
-fn rmd_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError> {
-    // On a busy machine one reply may be late.
-    let ask_once = |id: MotorId| remote.command(by, Request::rmd(id, &ReadStatus), TIME_TO_LIVE);
-    let ask = |id: MotorId| ask_once(id).or_else(|_| ask_once(id));
-    let answers: Vec<_> = std::thread::scope(|scope| {
-        let asked: Vec<_> = MotorSet::ALL.map(|id| (id, scope.spawn(move || ask(id)))).collect();
-        let joined = asked.into_iter().map(|(id, asked)| (id, asked.join()));
-        joined.filter_map(|(id, answer)| Some((id, answer.ok()?))).collect()
-    });
-    let answer = answers.iter().filter(|(_, answer)| answer.is_ok());
-    let found: Vec<Motor> = answer.map(|(id, _)| Motor::Rmd(*id)).collect();
-    match answers.into_iter().find_map(|(_, answer)| answer.err()) {
-        Some(error) if found.is_empty() => Err(error),
-        _ => Ok(found),
     }
 }
 

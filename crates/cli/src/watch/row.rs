@@ -5,10 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motorlink_telemetry::acquisition::Rate;
+use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::sample::{Sample, Values};
 use motorlink_telemetry::signal::{Motor, Signal, Source};
-
-use super::values::Main;
 
 /// Values of a sparkline.
 pub const HISTORY: usize = 200;
@@ -33,7 +32,7 @@ pub struct Row {
     pub port: usize,
     pub motor: Motor,
     pub name: String,
-    pub main: Main,
+    pub main: Overview,
     pub stop: Stop,
     /// Why a stop was not confirmed. `None` again after a confirmed one.
     pub unconfirmed: Option<String>,
@@ -66,7 +65,7 @@ impl Row {
             port,
             motor,
             name,
-            main: Main::of(motor),
+            main: Overview::of(motor),
             stop: Stop::None,
             unconfirmed: None,
             is_gone: false,

@@ -12,6 +12,7 @@ use motorlink_telemetry::event::{Event, What};
 use motorlink_telemetry::line::LineError;
 use motorlink_telemetry::plan::{Poll, Read};
 use motorlink_telemetry::sample::{Sample, Values};
+use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::{Motor, Signal, Source};
 use motorlink_telemetry::subscription::Record;
 use ratatui::Terminal;
@@ -21,7 +22,6 @@ use ratatui::style::{Color, Modifier};
 
 use super::keys::{Ask, Field, Place, View};
 use super::model::{Model, Port};
-use super::ports::Protocol;
 use super::row::{Row, Stop};
 use super::settings::Item;
 use super::values::Units;

@@ -9,15 +9,18 @@ use motorlink::time::Micros;
 use motorlink_telemetry::acquisition::{ConsumerId, Rate};
 use motorlink_telemetry::event::CommandError;
 use motorlink_telemetry::line::LineError;
+use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::Remote;
+use motorlink_telemetry::search::motors;
+use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::{Full, Subscription};
 
 use super::model::Latch;
-use super::ports::{Protocol, motors, stop_of};
+use super::ports::stop_of;
 use super::settings::{Access, Item};
-use super::values::{Main, details};
+use super::values::details;
 
 /// Capacity of the queue of results.
 const RESULTS: usize = 1024;
@@ -200,7 +203,7 @@ pub fn subscribe(
     let (fast, slow) = (Micros::from(period), Micros::from(period.max(SLOW)));
     let mut wants = Wants::new();
     for &motor in motors {
-        let main = Main::of(motor);
+        let main = Overview::of(motor);
         let of = |source| motorlink_telemetry::signal::Signal { motor, source };
         wants.extend(main.fast().map(|source| (of(source), fast)));
         wants.extend(main.slow().map(|source| (of(source), slow)));

@@ -3,6 +3,7 @@
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`port`] is a line of a share as a port.
+//! [`words`] has the events of an engine in words.
 
 pub mod data;
 pub mod frame;
@@ -10,6 +11,7 @@ pub mod hub;
 pub mod message;
 pub mod port;
 pub mod server;
+pub mod words;
 
 /// The version of the messages.
 pub const VERSION: u32 = 1;

@@ -12,8 +12,9 @@ use motorlink::st::{EventClient, Options};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
-use motorlink_telemetry::share::hub::{Held, Speaks};
+use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::server::Server;
+use motorlink_telemetry::share::words::Speaks;
 use motorlink_testbench::{Bench, Serving};
 
 use crate::drives::{path, served};

@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use super::feed::Feed;
 use super::line::{self, Held, Motion};
-use super::place::{SessionId, Speaks};
+use super::place::SessionId;
 use super::session::Session;
 use super::{Hub, Sent, Work, reason};
 use crate::acquisition::Acquisition;
@@ -23,6 +23,7 @@ use crate::share::message::{
     self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
     MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
 };
+use crate::share::words::Speaks;
 use crate::signal::{Motor, Signal, Source};
 use crate::subscription::Full;
 

@@ -11,14 +11,14 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
-use super::place::{SessionId, Speaks, seconds, wall_now};
-use super::words::Words;
+use super::place::{SessionId, number, seconds, wall_now};
 use crate::acquisition::Acquisition;
 use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
 use crate::share::message::{Event, Happening, Line, Protocol};
+use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
 
@@ -155,27 +155,37 @@ impl Held {
                 What::Confirmed(motor, _) => drop(self.heard.insert(*motor)),
                 _ => {}
             }
-            let told = self.words.of(&self.name, self.speaks, &event.what);
+            let told = self.words.of(self.speaks, &event.what);
             let told = told.filter(|told| !self.is_of_no_motor(told));
-            events.extend(told.map(|told| Event {
-                wall: self.wall(event.time),
-                line: Some(self.name.clone()),
-                t: Some(seconds(event.time)),
-                ..told
-            }));
+            events.extend(told.map(|told| self.message(event.time, told)));
         }
         let has_ended = events.is_empty() && self.events.is_closed();
         (!has_ended).then_some(events)
     }
 
+    fn message(&self, time: Instant, told: Told) -> Event {
+        let motor = told.motor.map(number);
+        let place = match motor {
+            Some(motor) => format!("{}, motor {motor}", self.name),
+            None => self.name.clone(),
+        };
+        Event {
+            wall: self.wall(time),
+            line: Some(self.name.clone()),
+            t: Some(seconds(time)),
+            since: told.since.map(seconds),
+            motor,
+            by: told.by.map(|by| by.to_string()),
+            event: told.event,
+            message: format!("{place}: {}", told.message),
+        }
+    }
+
     /// Whether it is the stop of an ID that never answered, and that no program turned: there may be no
     /// motor. Only the program that asked for the stop gets the failure.
-    fn is_of_no_motor(&self, told: &Event) -> bool {
+    fn is_of_no_motor(&self, told: &Told) -> bool {
         let is_of_stop = matches!(told.event, Happening::Stopping | Happening::StopFailed);
-        let Some(id) = told.motor.and_then(MotorId::new).filter(|_| is_of_stop) else {
-            return false;
-        };
-        let motor = Motor::Rmd(id);
+        let Some(motor) = told.motor.filter(|_| is_of_stop) else { return false };
         let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
         let is_turned = is_starting || self.owners.contains_key(&motor);
         self.speaks == Speaks::Rmd && !self.heard.contains(&motor) && !is_turned

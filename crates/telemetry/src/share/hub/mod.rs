@@ -7,7 +7,6 @@ mod feed;
 mod line;
 mod place;
 mod session;
-mod words;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -16,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use super::frame::Frame;
 use super::message::{self, Event, Happening, MotorName, Reason, SignalName, SignalRate};
+use super::words;
 use crate::acquisition::Rate;
 use crate::event::CommandError;
 use crate::line::{LineError, Reply, Stopped};
@@ -26,7 +26,7 @@ use place::{number, wall_now};
 use session::{Part, Session};
 
 pub use line::Held;
-pub use place::{SessionId, Speaks};
+pub use place::SessionId;
 
 /// The engine of a line has ended: its thread is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

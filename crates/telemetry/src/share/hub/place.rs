@@ -2,7 +2,6 @@
 
 use std::time::SystemTime;
 
-use motorlink_proto::st::Profile;
 use motorlink_proto::time::Instant;
 
 use crate::signal::Motor;
@@ -10,15 +9,6 @@ use crate::signal::Motor;
 /// A program at the share. No program has the default.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub(super) u64);
-
-/// What the drives of a line speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Speaks {
-    /// ST's protocol, in this profile.
-    St(Profile),
-    /// The RMD protocol.
-    Rmd,
-}
 
 /// The number of a motor on its line.
 pub(super) fn number(motor: Motor) -> u8 {

@@ -1,4 +1,4 @@
-//! The events of an engine for programs and people.
+//! The events of an engine in words, for programs and people.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -6,19 +6,43 @@ use std::sync::Arc;
 use motorlink::st::Transcript;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Direction, describe};
-use motorlink_proto::st::{Frame, MAX_FRAME};
+use motorlink_proto::st::{Frame, MAX_FRAME, Profile};
+use motorlink_proto::time::Instant;
 
-use super::place::{Speaks, number, seconds};
+use super::message::Happening;
 use crate::event::What;
 use crate::line::Request;
 use crate::schedule::CommandId;
-use crate::share::message::{Event, Happening};
 use crate::signal::Motor;
+
+/// What the drives of a line speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speaks {
+    /// ST's protocol, in this profile.
+    St(Profile),
+    /// The RMD protocol.
+    Rmd,
+}
+
+/// An event in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Told {
+    /// What happened.
+    pub event: Happening,
+    /// The motor; `None` for the line.
+    pub motor: Option<Motor>,
+    /// Who commanded it.
+    pub by: Option<Arc<str>>,
+    /// Of a doubt: since when.
+    pub since: Option<Instant>,
+    /// What happened, without the motor and the line.
+    pub message: String,
+}
 
 /// The stops whose end is not known yet.
 #[derive(Debug, Default)]
-pub(super) struct Words {
-    stops: HashMap<CommandId, (Option<Motor>, String)>,
+pub struct Words {
+    stops: HashMap<CommandId, (Option<Motor>, Arc<str>)>,
 }
 
 impl Words {
@@ -36,17 +60,10 @@ impl Words {
         }
     }
 
-    /// The event, without its times. Reads and confirmations are none.
-    pub(super) fn of(&mut self, line: &str, speaks: Speaks, what: &What) -> Option<Event> {
-        let event = |event, motor: Option<Motor>, by: Option<&str>, message: String| {
-            let motor = motor.map(number);
-            let by = by.map(str::to_owned);
-            let place = match motor {
-                Some(motor) => format!("{line}, motor {motor}"),
-                None => line.to_owned(),
-            };
-            let message = format!("{place}: {message}");
-            Some(Event { wall: 0.0, line: None, t: None, since: None, motor, by, event, message })
+    /// The event in words. Reads and confirmations are none.
+    pub fn of(&mut self, speaks: Speaks, what: &What) -> Option<Told> {
+        let event = |event, motor: Option<Motor>, by: Option<&Arc<str>>, message: String| {
+            Some(Told { event, motor, by: by.cloned(), since: None, message })
         };
         match what {
             What::Lost(why) => {
@@ -68,7 +85,7 @@ impl Words {
             What::Doubtful(motor, since) => {
                 let message = "values may be those of other signals".to_owned();
                 let told = event(Happening::Doubtful, Some(*motor), None, message)?;
-                Some(Event { since: Some(seconds(*since)), ..told })
+                Some(Told { since: Some(*since), ..told })
             }
             What::Commanded(_, by, request) if !request.is_read() => {
                 let message = format!("{by} sends {}", described(speaks, request));
@@ -76,7 +93,7 @@ impl Words {
             }
             What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => None,
             What::Stopping(id, by, request) => {
-                self.stops.insert(*id, (request.motor(), by.to_string()));
+                self.stops.insert(*id, (request.motor(), Arc::clone(by)));
                 let message = stops(by);
                 event(Happening::Stopping, request.motor(), Some(by), message)
             }
