@@ -1,0 +1,52 @@
+//! Why a recording ends early or does not begin.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file of a recording cannot be written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WriteError {
+    /// It is not overwritten unasked.
+    #[error("{} exists already", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It cannot be made.
+    #[error("cannot write {}: {why}", .path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        why: String,
+    },
+    /// It cannot be written any more.
+    #[error(
+        "cannot write {} any more: {why}; it has {messages} messages, {bytes} bytes, and stays readable",
+        .path.display()
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        why: String,
+        /// Messages that the file has.
+        messages: u64,
+        /// Bytes that the file has.
+        bytes: u64,
+    },
+    /// Somebody removed it.
+    #[error("{} was removed while it was written: {bytes} bytes are lost", .path.display())]
+    Removed {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that it had.
+        bytes: u64,
+    },
+}
+
+impl WriteError {
+    pub(crate) fn create(path: &Path, error: io::Error) -> Self {
+        WriteError::Create { path: path.to_owned(), why: error.to_string() }
+    }
+}

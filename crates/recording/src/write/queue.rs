@@ -1,0 +1,119 @@
+//! What waits for the disk, in bounded memory. Nobody who adds to it waits.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// What takes memory.
+pub trait Weighed {
+    /// The bytes that it takes, about.
+    fn bytes(&self) -> usize;
+}
+
+/// Items for another thread, up to a number of bytes. Clones share them.
+#[derive(Debug)]
+pub struct Queue<T>(Arc<Shared<T>>);
+
+#[derive(Debug)]
+struct Shared<T> {
+    held: Mutex<Held<T>>,
+    came: Condvar,
+    most_bytes: usize,
+}
+
+#[derive(Debug)]
+struct Held<T> {
+    items: VecDeque<T>,
+    bytes: usize,
+    lost: u64,
+    is_closed: bool,
+}
+
+/// What was in the queue.
+#[derive(Debug)]
+pub struct Taken<T> {
+    /// The items.
+    pub items: VecDeque<T>,
+    /// Nothing more comes.
+    pub is_last: bool,
+}
+
+impl<T> Clone for Queue<T> {
+    fn clone(&self) -> Self {
+        Queue(Arc::clone(&self.0))
+    }
+}
+
+impl<T: Weighed> Queue<T> {
+    /// An empty queue for this number of bytes.
+    pub fn new(most_bytes: usize) -> Self {
+        let held = Held { items: VecDeque::new(), bytes: 0, lost: 0, is_closed: false };
+        let (held, came) = (Mutex::new(held), Condvar::new());
+        Queue(Arc::new(Shared { held, came, most_bytes }))
+    }
+
+    /// Adds an item; `false`: the queue is full or closed, and drops and counts it.
+    pub fn push(&self, item: T) -> bool {
+        let mut held = self.lock();
+        let bytes = held.bytes + item.bytes();
+        if bytes > self.0.most_bytes || held.is_closed {
+            held.lost += 1;
+            return false;
+        }
+        held.bytes = bytes;
+        held.items.push_back(item);
+        true
+    }
+
+    /// Items that were dropped in all.
+    pub fn lost(&self) -> u64 {
+        self.lock().lost
+    }
+
+    /// Nothing more comes.
+    pub fn close(&self) {
+        self.lock().is_closed = true;
+        self.0.came.notify_all();
+    }
+
+    /// What is there.
+    pub fn take(&self) -> Taken<T> {
+        let mut held = self.lock();
+        held.bytes = 0;
+        Taken { items: std::mem::take(&mut held.items), is_last: held.is_closed }
+    }
+
+    /// Waits for this time, or until nothing more comes.
+    pub fn wait(&self, time: Duration) {
+        let waited = self.0.came.wait_timeout_while(self.lock(), time, |held| !held.is_closed);
+        drop(waited);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Held<T>> {
+        self.0.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Weighed for &str {
+        fn bytes(&self) -> usize {
+            self.len()
+        }
+    }
+
+    #[test]
+    fn a_full_queue_drops_what_comes_and_counts_it() {
+        let queue = Queue::new(5);
+        let taken = ["ab", "cd", "ef", "g", "hi"].map(|item| queue.push(item));
+        assert_eq!((taken, queue.lost()), ([true, true, false, true, false], 2));
+        assert_eq!(queue.take().items, ["ab", "cd", "g"]);
+        assert!(queue.push("again"));
+        queue.close();
+        assert!(!queue.push("late"));
+        let taken = queue.take();
+        assert_eq!((taken.items.len(), taken.is_last), (1, true));
+    }
+}

@@ -1,0 +1,252 @@
+//! The files of a recording: one, or one after the other.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::file::McapFile;
+use super::queue::Weighed;
+use super::{Attached, Pairs, Topic};
+use crate::error::WriteError;
+use crate::schema::recording::{NAME, PART};
+
+/// Where a recording goes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Output {
+    /// The file; with [`rotate`](Self::rotate) its name before the number.
+    pub path: PathBuf,
+    /// Files that exist are overwritten.
+    pub force: bool,
+    /// When another file begins.
+    pub rotate: Option<Rotate>,
+    /// The bytes after which the recording ends.
+    pub max_size: Option<u64>,
+    /// How often to wait until the disk has everything.
+    pub sync_every: Option<Duration>,
+}
+
+/// When another file begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rotate {
+    /// After this number of bytes.
+    Bytes(u64),
+    /// After this time, by the times of the messages.
+    Time(Duration),
+}
+
+/// Something for the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Entry {
+    /// A topic. Topics are numbered in this order, from 0.
+    Topic(Topic),
+    /// A metadata record.
+    Metadata(String, Pairs),
+    /// A file in the file.
+    Attached(Attached),
+    /// A message.
+    Message {
+        /// The number of its topic.
+        topic: usize,
+        /// ns since 1970.
+        time: u64,
+        /// The message as CDR.
+        data: Vec<u8>,
+    },
+}
+
+impl Weighed for Entry {
+    fn bytes(&self) -> usize {
+        let content = match self {
+            Entry::Message { data, .. } | Entry::Attached(Attached { data, .. }) => data.len(),
+            Entry::Topic(topic) => topic.definition.len(),
+            Entry::Metadata(..) => 0,
+        };
+        size_of::<Entry>() + content
+    }
+}
+
+/// How much was written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Written {
+    /// The files, in the order of time.
+    pub files: Vec<PathBuf>,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// Messages of all files.
+    pub messages: u64,
+}
+
+/// The files of a recording.
+pub struct Series {
+    output: Output,
+    current: McapFile,
+    /// The files before the current one.
+    before: Written,
+    /// What each file begins with.
+    preamble: Vec<Entry>,
+    /// The number of each topic in the current file, and of its next message.
+    topics: Vec<(u16, u32)>,
+    /// The time of the first message of the current file.
+    began: Option<u64>,
+}
+
+impl Series {
+    /// Makes the first file.
+    ///
+    /// # Errors
+    /// It exists, or cannot be written.
+    pub fn create(output: Output) -> Result<Self, WriteError> {
+        let current = McapFile::create(&output.name(0), output.force)?;
+        let (before, preamble, topics) = (Written::default(), Vec::new(), Vec::new());
+        Ok(Series { output, current, before, preamble, topics, began: None })
+    }
+
+    /// Takes the next entry.
+    ///
+    /// # Errors
+    /// The file cannot be written any more.
+    pub fn take(&mut self, entry: Entry) -> Result<(), WriteError> {
+        if let Entry::Message { time, .. } = &entry
+            && self.is_full(*time)
+        {
+            self.rotate()?;
+        }
+        self.write(&entry)?;
+        if !matches!(entry, Entry::Message { .. }) {
+            self.preamble.push(entry);
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, entry: &Entry) -> Result<(), WriteError> {
+        match entry {
+            Entry::Topic(topic) => self.topics.push((self.current.topic(topic)?, 0)),
+            Entry::Metadata(name, pairs) if name == NAME => {
+                let mut pairs = pairs.clone();
+                pairs.insert(PART.to_owned(), self.part().to_string());
+                self.current.metadata(name, &pairs)?;
+            }
+            Entry::Metadata(name, pairs) => self.current.metadata(name, pairs)?,
+            Entry::Attached(attached) => self.current.attach(attached)?,
+            Entry::Message { topic, time, data } => {
+                self.began.get_or_insert(*time);
+                let (channel, sequence) = &mut self.topics[*topic];
+                self.current.message(*channel, *sequence, *time, data)?;
+                *sequence = sequence.wrapping_add(1);
+            }
+        }
+        Ok(())
+    }
+
+    fn part(&self) -> usize {
+        self.before.files.len()
+    }
+
+    fn is_full(&self, time: u64) -> bool {
+        match (self.output.rotate, self.began) {
+            (Some(Rotate::Bytes(most)), Some(_)) => self.current.size() >= most,
+            (Some(Rotate::Time(most)), Some(began)) => {
+                u128::from(time.saturating_sub(began)) >= most.as_nanos()
+            }
+            _ => false,
+        }
+    }
+
+    fn rotate(&mut self) -> Result<(), WriteError> {
+        let name = self.output.name(self.part() + 1);
+        let next = McapFile::create(&name, self.output.force)?;
+        let ended = std::mem::replace(&mut self.current, next);
+        end(ended, &mut self.before)?;
+        (self.topics, self.began) = (Vec::new(), None);
+        for entry in std::mem::take(&mut self.preamble) {
+            self.write(&entry)?;
+            self.preamble.push(entry);
+        }
+        Ok(())
+    }
+
+    /// Writes everything into the file: the end of the program loses nothing of it.
+    ///
+    /// # Errors
+    /// The file cannot be written any more.
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        self.current.flush()
+    }
+
+    /// Waits until the disk has everything: the end of the machine loses nothing of it.
+    ///
+    /// # Errors
+    /// The file cannot be written any more.
+    pub fn sync(&mut self) -> Result<(), WriteError> {
+        self.current.sync()
+    }
+
+    /// How often to wait for the disk.
+    pub(super) fn sync_every(&self) -> Option<Duration> {
+        self.output.sync_every
+    }
+
+    /// Whether the recording has the bytes that it may have.
+    pub fn is_complete(&self) -> bool {
+        self.output.max_size.is_some_and(|most| self.written().bytes >= most)
+    }
+
+    /// What was written up to now.
+    pub fn written(&self) -> Written {
+        let mut written = self.before.clone();
+        written.files.push(self.current.path().to_owned());
+        written.bytes += self.current.size();
+        written.messages += self.current.messages();
+        written
+    }
+
+    /// Ends the last file.
+    ///
+    /// # Errors
+    /// It cannot be written any more.
+    pub fn finish(mut self) -> Result<Written, WriteError> {
+        end(self.current, &mut self.before)?;
+        Ok(self.before)
+    }
+}
+
+fn end(mut file: McapFile, before: &mut Written) -> Result<(), WriteError> {
+    file.flush()?;
+    before.files.push(file.path().to_owned());
+    before.messages += file.messages();
+    before.bytes += file.finish()?;
+    Ok(())
+}
+
+impl Output {
+    /// The name of a file: `run.mcap`, or `run_000.mcap` if there are several.
+    fn name(&self, part: usize) -> PathBuf {
+        if self.rotate.is_none() {
+            return self.path.clone();
+        }
+        let extension = self.path.extension().unwrap_or("mcap".as_ref());
+        let mut name = self.path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("_{part:03}"));
+        name.push(".");
+        name.push(extension);
+        self.path.with_file_name(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn files_of_a_rotated_recording_are_numbered() {
+        let name = |path: &str, part| {
+            let output =
+                Output { path: path.into(), rotate: Some(Rotate::Bytes(1)), ..Output::default() };
+            output.name(part).display().to_string()
+        };
+        assert_eq!(name("a/run.mcap", 0), "a/run_000.mcap");
+        assert_eq!(name("run.1", 12), "run_012.1");
+        assert_eq!(name("run", 1000), "run_1000.mcap");
+        assert_eq!(Output { path: "run".into(), ..Output::default() }.name(0), Path::new("run"));
+    }
+}
