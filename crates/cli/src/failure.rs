@@ -114,6 +114,11 @@ impl Failure {
         }
     }
 
+    /// After a file could not be written any more.
+    pub fn unwritten(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Output, message).into()
+    }
+
     /// Two failures of one command. Both are reported; the exit code is that of the first, except that
     /// an interruption is never hidden.
     pub fn and(self, other: Self) -> Self {

@@ -19,6 +19,7 @@ mod outputs;
 mod palette;
 mod pasteable;
 mod ports;
+mod record;
 mod recording;
 mod repeat;
 mod rmd;
@@ -70,6 +71,8 @@ enum Command {
     /// Watch motors in the terminal: values, registers, stop
     #[command(after_help = help::watch_ports())]
     Watch(watch::Args),
+    /// Record motors into an MCAP file: signals, frames, events, settings
+    Record(record::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
@@ -126,6 +129,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),
         Command::Watch(args) => watch::run(args),
+        Command::Record(args) => record::run(&args),
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

@@ -52,6 +52,15 @@ pub fn parse_distance(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a rate in Hz as its period.
+pub fn parse_rate(text: &str) -> Result<Duration, String> {
+    let hertz: f64 = text.parse().map_err(|_| "give a number of Hz, such as 10".to_owned())?;
+    match (0.1..=1000.0).contains(&hertz) {
+        true => Ok(Duration::from_secs_f64(1.0 / hertz)),
+        false => Err("it must be 0.1 to 1000 Hz".to_owned()),
+    }
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let (number, scale) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {

@@ -2,9 +2,10 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A file of a recording cannot be written.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum WriteError {
     /// It is not overwritten unasked.
     #[error("{} exists already", .path.display())]
@@ -13,12 +14,12 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// It cannot be made.
-    #[error("cannot write {}: {why}", .path.display())]
+    #[error("cannot write {}: {error}", .path.display())]
     Create {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        why: String,
+        error: Arc<io::Error>,
     },
     /// It cannot be written any more.
     #[error(
@@ -47,6 +48,6 @@ pub enum WriteError {
 
 impl WriteError {
     pub(crate) fn create(path: &Path, error: io::Error) -> Self {
-        WriteError::Create { path: path.to_owned(), why: error.to_string() }
+        WriteError::Create { path: path.to_owned(), error: error.into() }
     }
 }

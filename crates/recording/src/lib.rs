@@ -3,10 +3,12 @@
 //! | to | use |
 //! |---|---|
 //! | know what a file contains, encode and decode its messages | [`schema`] |
+//! | record drives in threads | [`record::Recorder`] |
 //! | write files, in a thread or not | [`write`] |
 #![forbid(unsafe_code)]
 
 mod error;
+pub mod record;
 pub mod schema;
 pub mod write;
 

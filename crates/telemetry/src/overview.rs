@@ -96,3 +96,11 @@ pub fn faults(motor: Motor, sample: Sample) -> Option<String> {
         }
     }
 }
+
+/// Whether the cause of a fault is present. RMD motors report present faults only.
+pub fn is_present(motor: Motor, faults: Option<Sample>) -> bool {
+    faults.is_some_and(|sample| match motor {
+        Motor::Rmd(_) => !Errors(sample.digits as u8).is_empty(),
+        Motor::St(_) => Flags(sample.digits as u32).present() != 0,
+    })
+}

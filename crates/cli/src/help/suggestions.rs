@@ -4,7 +4,7 @@ use clap::Error;
 use clap::error::{ContextKind, ContextValue};
 
 /// Subcommands that are suggested for mistyped ones. They read, end motion, or need no drive.
-const HARMLESS: [&str; 38] = [
+const HARMLESS: &[&str] = &[
     "acceleration",
     "angle",
     "clear-errors",
@@ -28,6 +28,7 @@ const HARMLESS: [&str; 38] = [
     "pid",
     "ports",
     "presets",
+    "record",
     "registers",
     "revup-data",
     "rmd",

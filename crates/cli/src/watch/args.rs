@@ -6,7 +6,7 @@ use motorlink::rmd::{GearRatio, MotorSet};
 use motorlink::st::{FullScale, Profile};
 
 use crate::hint;
-use crate::span::span_up_to;
+use crate::span::{parse_rate, span_up_to};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -37,13 +37,4 @@ pub struct Args {
     /// Show angles, speeds and accelerations of RMD motors at the output shaft of this gear
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = hint::gear_ratio())]
     pub gear_ratio: Option<GearRatio>,
-}
-
-/// Reads a rate as its period.
-fn parse_rate(text: &str) -> Result<Duration, String> {
-    let hertz: f64 = text.parse().map_err(|_| "give a number of Hz, such as 10".to_owned())?;
-    match (0.1..=1000.0).contains(&hertz) {
-        true => Ok(Duration::from_secs_f64(1.0 / hertz)),
-        false => Err("it must be 0.1 to 1000 Hz".to_owned()),
-    }
 }

@@ -74,6 +74,11 @@ impl Dump {
         values.map(|(setting, digits)| (setting, *digits))
     }
 
+    /// What is known of the drive, in lines such as `firmware: ...`.
+    pub fn identity(&self) -> &[String] {
+        &self.identity
+    }
+
     /// The names of the settings that the motor refused to read.
     pub fn absent(&self) -> &[String] {
         &self.absent

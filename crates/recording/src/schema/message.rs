@@ -43,6 +43,23 @@ impl Time {
     pub(super) const DEPENDENCY: (&'static str, &'static str) =
         ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
 
+    /// The time of the day in the form of RFC 3339, to the millisecond: `2026-11-23T14:05:09.250Z`.
+    pub fn text(self) -> String {
+        let (seconds, millis) = (self.0 / NANOS, self.0 % NANOS / 1_000_000);
+        let (days, of_day) = (seconds / 86_400, seconds % 86_400);
+        // Days of eras of 400 years, which begin on March 1st.
+        let days = days + 719_468;
+        let (era, of_era) = (days / 146_097, days % 146_097);
+        let year_of_era = (of_era - of_era / 1_460 + of_era / 36_524 - of_era / 146_096) / 365;
+        let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+        let from_march = (5 * of_year + 2) / 153;
+        let day = of_year - (153 * from_march + 2) / 5 + 1;
+        let month = if from_march < 10 { from_march + 3 } else { from_march - 9 };
+        let year = year_of_era + era * 400 + u64::from(month <= 2);
+        let (hour, minute, second) = (of_day / 3_600, of_day / 60 % 60, of_day % 60);
+        format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{millis:03}Z")
+    }
+
     pub(super) fn write(self, out: &mut Encoder) {
         out.i32(i32::try_from(self.0 / NANOS).unwrap_or(i32::MAX));
         out.u32((self.0 % NANOS) as u32);
@@ -446,6 +463,15 @@ mod tests {
             by: "web".to_owned(),
             kind: "back".to_owned(),
         });
+    }
+
+    #[test]
+    fn a_time_is_written_as_in_rfc_3339() {
+        let text = |seconds: u64| Time(seconds * NANOS + 250_999_999).text();
+        assert_eq!(text(0), "1970-01-01T00:00:00.250Z");
+        assert_eq!(text(951_782_399), "2000-02-28T23:59:59.250Z");
+        assert_eq!(text(951_782_400), "2000-02-29T00:00:00.250Z");
+        assert_eq!(text(1_795_442_709), "2026-11-23T14:05:09.250Z");
     }
 
     #[test]

@@ -65,6 +65,11 @@ impl<T: Weighed> Queue<T> {
         true
     }
 
+    /// Whether at least half of the memory is free.
+    pub fn has_room(&self) -> bool {
+        self.lock().bytes <= self.0.most_bytes / 2
+    }
+
     /// Items that were dropped in all.
     pub fn lost(&self) -> u64 {
         self.lock().lost

@@ -387,6 +387,14 @@ pub enum Happening {
     Later,
 }
 
+impl Happening {
+    /// One word for programs, as in the messages, with `_`: `stop_failed`.
+    pub fn slug(self) -> String {
+        let word = serde_json::to_value(self).ok();
+        word.and_then(|word| Some(word.as_str()?.replace('-', "_"))).unwrap_or_default()
+    }
+}
+
 /// Why a request was not carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -1,0 +1,221 @@
+//! `motorlink record`: what drives say and do goes into an MCAP file. It moves no motor.
+
+mod args;
+
+use std::io::IsTerminal;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use motorlink::st::MotorNumber;
+use motorlink_link::printable;
+use motorlink_recording::WriteError;
+use motorlink_recording::record::{Config, Line, Port, Progress, RecordError, Recorder};
+use motorlink_recording::write::Output;
+use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::signal::Motor;
+use serde_json::{Value, json};
+
+use crate::connection::missing_port;
+use crate::failure::Failure;
+use crate::output::{self, note};
+use crate::{interrupt, pasteable};
+pub use args::Args;
+
+/// How often the progress is shown.
+const SHOWN: Duration = Duration::from_secs(1);
+/// How often the recording is looked at.
+const LOOKED: Duration = Duration::from_millis(100);
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    // Nobody who does not read the output stops the recording.
+    output::never_wait(if args.json { output::missed } else { output::missed_text });
+    interrupt::take_over();
+    let config = config(args)?;
+    let recorder = Recorder::start(&config).map_err(refused)?;
+    begun(&recorder, args)?;
+    let bar = bar(args);
+    let (began, mut shown) = (Instant::now(), Instant::now());
+    let is_over = |progress: &Progress| {
+        progress.is_over || args.duration.is_some_and(|duration| began.elapsed() >= duration)
+    };
+    let mut progress = recorder.progress();
+    while !is_over(&progress) && interrupt::wait(LOOKED) {
+        progress = recorder.progress();
+        if shown.elapsed() >= SHOWN {
+            shown = Instant::now();
+            show(&progress, &bar, args)?;
+        }
+    }
+    let ended = recorder.end();
+    bar.finish_and_clear();
+    let ended = ended.map_err(|error| broken(&error))?;
+    over(&ended, args)
+}
+
+fn config(args: &Args) -> Result<Config, Failure> {
+    if args.port.iter().all(String::is_empty) {
+        return Err(missing_port());
+    }
+    if args.output == Path::new("-") {
+        return Err(Failure::usage("a recording cannot go to stdout: give the name of a file"));
+    }
+    let numbers = args.motor.iter().copied().filter_map(MotorNumber::new);
+    let motors: Vec<MotorNumber> = numbers.collect();
+    let ids = args
+        .id
+        .iter()
+        .fold(Default::default(), |ids: motorlink::rmd::MotorSet, more| ids.union(*more));
+    let port = |text: &String| -> Result<Port, Failure> {
+        let (name, motors) = (text.parse()?, motors.clone());
+        Ok(Port { name, profile: args.profile, timeout: args.timeout, motors, ids })
+    };
+    let words: Vec<String> =
+        std::env::args().map(|word| pasteable::quoted(&word).to_string()).collect();
+    Ok(Config {
+        ports: args.port.iter().map(port).collect::<Result<_, _>>()?,
+        signals: args.signals.clone(),
+        period: args.rate.into(),
+        settings: !args.no_settings,
+        output: Output {
+            path: args.output.clone(),
+            force: args.force,
+            rotate: args.rotate,
+            max_size: args.max_size,
+            sync_every: args.fsync,
+        },
+        by: Arc::from(format!("motorlink record {}", std::process::id())),
+        command: words.join(" "),
+    })
+}
+
+fn refused(error: RecordError) -> Failure {
+    match error {
+        RecordError::NoPort => missing_port(),
+        RecordError::File(WriteError::Exists { path }) => {
+            let shown = printable(&path.display().to_string()).to_string();
+            Failure::usage(format!("{shown} exists already"))
+                .trying("give another name, or --force to overwrite it")
+        }
+        RecordError::File(WriteError::Create { path, error }) => Failure::file(&path, &error),
+        RecordError::File(error) => broken(&error),
+        RecordError::Line(error) => (&error).into(),
+        RecordError::NoMotor { protocol, .. } => {
+            let option = match protocol {
+                Protocol::St => "--motor 1",
+                Protocol::Rmd => "--id 1",
+            };
+            Failure::link(error.to_string())
+                .trying(format!("to record a motor that is off now, name it: {option}"))
+        }
+        RecordError::Signal(error) => Failure::usage(error.to_string()),
+        RecordError::Ended(error) => error.into(),
+        RecordError::Thread(error) => Failure::link(error.to_string()),
+    }
+}
+
+fn broken(error: &WriteError) -> Failure {
+    Failure::unwritten(error.to_string()).trying(
+        "`motorlink recover` makes a whole file of what is there; make room, or choose another disk",
+    )
+}
+
+fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
+    let file = args.output.display().to_string();
+    if args.json {
+        let lines: Vec<Value> = recorder.lines().iter().map(line_object).collect();
+        return output::print_line(&json!({"event": "recording", "file": file, "lines": lines}));
+    }
+    let lines = recorder.lines().iter().map(|line| {
+        let motors: Vec<String> = line.motors.iter().map(|it| number(*it).to_string()).collect();
+        let noun = if motors.len() == 1 { "motor" } else { "motors" };
+        format!("{} ({}), {noun} {}", line.label, line.port, motors.join(", "))
+    });
+    let lines: Vec<String> = lines.collect();
+    note(format!("recording {} to {file}; Ctrl-C ends it", lines.join("; ")));
+    Ok(())
+}
+
+fn line_object(line: &Line) -> Value {
+    let motors: Vec<u8> = line.motors.iter().map(|motor| number(*motor)).collect();
+    json!({"label": line.label, "port": line.port, "motors": motors})
+}
+
+fn number(motor: Motor) -> u8 {
+    match motor {
+        Motor::St(number) => number.number(),
+        Motor::Rmd(id) => id.number(),
+    }
+}
+
+/// A line on stderr, if that is a terminal.
+fn bar(args: &Args) -> ProgressBar {
+    let is_shown = !args.json && std::io::stderr().is_terminal();
+    let bar = if is_shown { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
+    bar.set_style(
+        ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
+    );
+    bar
+}
+
+fn show(progress: &Progress, bar: &ProgressBar, args: &Args) -> Result<(), Failure> {
+    if args.json {
+        return output::print_line(&object("progress", progress));
+    }
+    bar.set_message(words(progress));
+    Ok(())
+}
+
+fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
+    if args.json {
+        return output::print_line(&object("recorded", progress));
+    }
+    let files = progress.written.files.iter().map(|path| path.display().to_string());
+    let files: Vec<String> = files.collect();
+    output::print_line(&format!("recorded {}: {}", files.join(", "), words(progress)))
+}
+
+fn words(progress: &Progress) -> String {
+    let Progress { elapsed, written, counts, rates, .. } = progress;
+    let rates = rates.map(|(asked, got)| format!(", {got:.1} of {asked:.1} Hz"));
+    let lost = match (counts.lost, counts.unconfirmed) {
+        (0, 0) => "nothing lost".to_owned(),
+        (lost, 0) => format!("{lost} LOST"),
+        (lost, unconfirmed) => format!("{lost} LOST, {unconfirmed} rows not confirmed"),
+    };
+    format!(
+        "{:.0} s, {}, {} values, {} frames{}, {lost}",
+        elapsed.as_secs_f64(),
+        size(written.bytes),
+        counts.values,
+        counts.frames,
+        rates.unwrap_or_default(),
+    )
+}
+
+fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    match bytes {
+        ..1e6 => format!("{:.1} kB", bytes / 1e3),
+        1e6..1e9 => format!("{:.1} MB", bytes / 1e6),
+        _ => format!("{:.2} GB", bytes / 1e9),
+    }
+}
+
+fn object(event: &str, progress: &Progress) -> Value {
+    let Progress { elapsed, written, counts, rates, .. } = progress;
+    let files = written.files.iter().map(|path| path.display().to_string());
+    json!({
+        "event": event,
+        "seconds": (elapsed.as_secs_f64() * 1e3).round() / 1e3,
+        "files": files.collect::<Vec<_>>(),
+        "bytes": written.bytes,
+        "values": counts.values,
+        "frames": counts.frames,
+        "unconfirmed": counts.unconfirmed,
+        "lost": counts.lost,
+        "asked_hz": rates.map(|(asked, _)| asked),
+        "achieved_hz": rates.map(|(_, achieved)| achieved),
+    })
+}

@@ -1,0 +1,272 @@
+//! Frames on the wire: what a tap sees, and serial bytes split into frames.
+
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use motorlink::can::CanFrame;
+use motorlink::port::{Direction as Way, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink_proto::rmd::IDENTIFIERS;
+use motorlink_proto::st::{
+    Bad, Frame as StFrame, HEADER_ACK, HEADER_ATR, HEADER_NACK, OVERHEAD, Parse,
+};
+
+use super::wall::{Anchor, wall_now};
+use crate::schema::{Direction, Frame, FrameResult, Time};
+use crate::write::{Queue, Weighed};
+
+/// The memory for what a tap has seen and nobody has taken.
+const MEMORY: usize = 8 << 20;
+
+/// What a tap has seen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seen {
+    time: Time,
+    direction: Direction,
+    what: Wire,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Wire {
+    Bytes(Box<[u8]>),
+    Can(CanFrame),
+}
+
+impl Weighed for Seen {
+    fn bytes(&self) -> usize {
+        let content = match &self.what {
+            Wire::Bytes(bytes) => bytes.len(),
+            Wire::Can(_) => 0,
+        };
+        size_of::<Seen>() + content
+    }
+}
+
+/// Taps for each opening of a port. Clones put what they see into the same queue.
+#[derive(Debug, Clone)]
+pub struct Taps {
+    seen: Queue<Seen>,
+    /// Of a port with a time of its own.
+    anchor: Arc<OnceLock<Anchor>>,
+}
+
+impl Default for Taps {
+    fn default() -> Self {
+        Taps { seen: Queue::new(MEMORY), anchor: Arc::default() }
+    }
+}
+
+impl Taps {
+    /// With the time of the day at a moment of the port's own clock.
+    pub fn anchored(anchor: Anchor) -> Self {
+        Taps { anchor: Arc::new(OnceLock::from(anchor)), ..Taps::default() }
+    }
+
+    /// Around a serial line.
+    pub fn around_line(&self, link: Box<dyn EventBytes>) -> Box<dyn EventBytes> {
+        let (seen, began) = (self.seen.clone(), self.now(link.clock()));
+        Box::new(TapBytes::new(link, move |way, at, bytes: &[u8]| {
+            seen.push(Seen::new(began, way, at, Wire::Bytes(bytes.into())));
+        }))
+    }
+
+    /// Around a CAN bus.
+    pub fn around_bus(&self, link: Box<dyn EventCan>) -> Box<dyn EventCan> {
+        let (seen, began) = (self.seen.clone(), self.now(link.clock()));
+        Box::new(TapCan::new(link, move |way, at, frame: &CanFrame| {
+            seen.push(Seen::new(began, way, at, Wire::Can(*frame)));
+        }))
+    }
+
+    fn now(&self, clock: Option<motorlink::Clock>) -> Time {
+        match clock.filter(motorlink::Clock::is_virtual) {
+            Some(clock) => self.anchor.get_or_init(|| Anchor::now(&clock)).wall(clock.now()),
+            None => wall_now(),
+        }
+    }
+
+    /// What was seen since the last time.
+    pub(super) fn take(&self) -> impl Iterator<Item = Seen> {
+        self.seen.take().items.into_iter()
+    }
+
+    /// How much was lost because nobody took it.
+    pub(super) fn lost(&self) -> u64 {
+        self.seen.lost()
+    }
+}
+
+impl Seen {
+    fn new(began: Time, way: Way, at: Duration, what: Wire) -> Self {
+        let direction = match way {
+            Way::Sent => Direction::Sent,
+            Way::Received => Direction::Received,
+        };
+        let since = u64::try_from(at.as_nanos()).unwrap_or(u64::MAX);
+        Seen { time: Time(began.0.saturating_add(since)), direction, what }
+    }
+}
+
+/// Makes frames of what a tap has seen.
+#[derive(Debug, Default)]
+pub struct Splitter {
+    /// Bytes that may be the beginning of a frame, and when the last of them came.
+    received: Partial,
+    sent: Partial,
+}
+
+#[derive(Debug, Default)]
+struct Partial {
+    bytes: Vec<u8>,
+    time: Time,
+}
+
+impl Splitter {
+    /// Takes the next thing that was seen. `put` receives the frames.
+    pub fn take(&mut self, seen: Seen, put: &mut dyn FnMut(Frame)) {
+        let Seen { time, direction, what } = seen;
+        match what {
+            Wire::Can(frame) => put(of_can(time, direction, &frame)),
+            Wire::Bytes(bytes) if direction == Direction::Sent => {
+                // The reply to the last request is over, or incomplete for good.
+                self.received.end(Direction::Received, put);
+                self.sent.take(time, &bytes, direction, put);
+                // A request is written at once.
+                self.sent.end(Direction::Sent, put);
+            }
+            Wire::Bytes(bytes) => self.received.take(time, &bytes, direction, put),
+        }
+    }
+
+    /// Nothing more comes.
+    pub fn end(&mut self, put: &mut dyn FnMut(Frame)) {
+        self.received.end(Direction::Received, put);
+    }
+}
+
+impl Partial {
+    fn take(&mut self, time: Time, bytes: &[u8], way: Direction, put: &mut dyn FnMut(Frame)) {
+        self.time = time;
+        self.bytes.extend(bytes);
+        let mut damaged = 0;
+        loop {
+            let rest = &self.bytes[damaged..];
+            let begins = way == Direction::Sent
+                || rest
+                    .first()
+                    .is_none_or(|byte| [HEADER_ACK, HEADER_NACK, HEADER_ATR].contains(byte));
+            if !begins {
+                damaged += 1;
+                continue;
+            }
+            match StFrame::parse(rest) {
+                Parse::More => break,
+                // What follows the header may be a frame.
+                Parse::Bad(Bad::Length(_)) => damaged += 1,
+                Parse::Bad(Bad::Checksum { .. }) => damaged += usize::from(rest[1]) + OVERHEAD,
+                Parse::Frame(frame, size) => {
+                    let result = match way == Direction::Received && frame.header == HEADER_NACK {
+                        true => FrameResult::Nack,
+                        false => FrameResult::Frame,
+                    };
+                    self.put(damaged, FrameResult::Damaged, way, put);
+                    self.put(size, result, way, put);
+                    damaged = 0;
+                }
+            }
+        }
+        self.put(damaged, FrameResult::Damaged, way, put);
+    }
+
+    fn end(&mut self, way: Direction, put: &mut dyn FnMut(Frame)) {
+        self.put(self.bytes.len(), FrameResult::Damaged, way, put);
+    }
+
+    fn put(
+        &mut self,
+        size: usize,
+        result: FrameResult,
+        direction: Direction,
+        put: &mut dyn FnMut(Frame),
+    ) {
+        if size > 0 {
+            let data = self.bytes.drain(..size).collect();
+            put(Frame { stamp: self.time, direction, id: 0, result, data });
+        }
+    }
+}
+
+fn of_can(stamp: Time, direction: Direction, frame: &CanFrame) -> Frame {
+    let is_ours = frame.eight_bytes().is_some_and(|(id, _)| (IDENTIFIERS.is_used)(id));
+    let result = if is_ours { FrameResult::Frame } else { FrameResult::Foreign };
+    let flag = |is_set, flag| if is_set { flag } else { 0 };
+    let id = frame.id()
+        | flag(frame.is_extended(), Frame::EXTENDED)
+        | flag(frame.is_remote(), Frame::REMOTE);
+    Frame { stamp, direction, id, result, data: frame.data().to_vec() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REQUEST: [u8; 4] = [0x22, 1, 2, 0x25];
+    const REPLY: [u8; 4] = [0xF0, 1, 6, 0xF7];
+    const NACK: [u8; 4] = [0xFF, 1, 3, 0x04];
+
+    fn split(seen: &[(Way, &[u8])]) -> Vec<(Direction, FrameResult, Vec<u8>)> {
+        let (mut splitter, mut frames) = (Splitter::default(), Vec::new());
+        let mut put = |frame: Frame| frames.push((frame.direction, frame.result, frame.data));
+        for (way, bytes) in seen {
+            let what = Wire::Bytes((*bytes).into());
+            splitter.take(Seen::new(Time(0), *way, Duration::ZERO, what), &mut put);
+        }
+        splitter.end(&mut put);
+        frames
+    }
+
+    fn results(bytes: &[&[u8]]) -> Vec<(FrameResult, usize)> {
+        let seen: Vec<_> = bytes.iter().map(|bytes| (Way::Received, *bytes)).collect();
+        split(&seen).into_iter().map(|(_, result, data)| (result, data.len())).collect()
+    }
+
+    #[test]
+    fn a_request_and_its_reply_are_a_frame_each() {
+        let seen =
+            [(Way::Sent, &REQUEST[..]), (Way::Received, &REPLY[..2]), (Way::Received, &REPLY[2..])];
+        let expected = [
+            (Direction::Sent, FrameResult::Frame, REQUEST.to_vec()),
+            (Direction::Received, FrameResult::Frame, REPLY.to_vec()),
+        ];
+        assert_eq!(split(&seen), expected);
+    }
+
+    #[test]
+    fn bytes_that_are_no_frame_are_kept_between_those_that_are() {
+        use FrameResult::{Damaged, Frame, Nack};
+        assert_eq!(results(&[&[&[1, 2, 3], &REPLY[..]].concat()]), [(Damaged, 3), (Frame, 4)]);
+        assert_eq!(results(&[&NACK, &[7]]), [(Nack, 4), (Damaged, 1)]);
+        let mut wrong = REPLY;
+        wrong[3] ^= 1;
+        assert_eq!(results(&[&[wrong, NACK].concat()]), [(Damaged, 4), (Nack, 4)]);
+        assert_eq!(results(&[&[0xF0, 200], &REPLY]), [(Damaged, 2), (Frame, 4)]);
+    }
+
+    #[test]
+    fn a_reply_without_its_end_is_kept_when_the_next_request_is_sent() {
+        let seen = [(Way::Received, &REPLY[..3]), (Way::Sent, &REQUEST[..])];
+        let results: Vec<_> =
+            split(&seen).into_iter().map(|(way, result, _)| (way, result)).collect();
+        let expected =
+            [(Direction::Received, FrameResult::Damaged), (Direction::Sent, FrameResult::Frame)];
+        assert_eq!(results, expected);
+    }
+
+    #[test]
+    fn frames_of_others_on_a_bus_are_foreign() {
+        let result = |frame| of_can(Time(0), Direction::Received, &frame);
+        assert_eq!(result(CanFrame::new(0x141, [0x9C; 8])).result, FrameResult::Frame);
+        assert_eq!(result(CanFrame::new(0x701, [5; 8])).result, FrameResult::Foreign);
+        let extended = result(CanFrame::data_frame(0x1_0141, true, &[1]));
+        assert_eq!((extended.id, extended.result), (0x8001_0141, FrameResult::Foreign));
+    }
+}

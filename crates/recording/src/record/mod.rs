@@ -1,0 +1,17 @@
+//! Records drives: [`Recorder`] in threads, [`track`] without one.
+
+pub mod choice;
+mod condition;
+pub mod frames;
+mod joint;
+mod open;
+mod recorder;
+mod settings;
+mod topics;
+pub mod track;
+pub mod wall;
+
+pub use open::Port;
+pub use recorder::{Config, Progress, RecordError, Recorder};
+pub use topics::Topics;
+pub use track::Line;

@@ -1,0 +1,376 @@
+//! Records lines in threads: an engine each, one that makes messages, one that writes them.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use motorlink_proto::st::Profile;
+use motorlink_proto::time::Micros;
+use motorlink_telemetry::acquisition::Rate;
+use motorlink_telemetry::event::CommandError;
+use motorlink_telemetry::line::LineError;
+use motorlink_telemetry::runner::{Ended, Runner};
+use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::signal::{Motor, UnknownSignal};
+
+use super::choice;
+use super::open::{Opened, Port, open};
+use super::settings;
+use super::topics::Topics;
+use super::track::{Counts, Line, Track, entry, lost_records};
+use super::wall::wall_now;
+use crate::error::WriteError;
+use crate::schema::{self, Log, Severity, Time, drive, name, recording};
+use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
+
+/// How often messages are made of what came.
+const TURN: Duration = Duration::from_millis(20);
+/// How often the rates of the engines are asked for.
+const RATES: Duration = Duration::from_secs(1);
+/// How long the end waits until the last values are confirmed.
+const CONFIRMATION: Duration = Duration::from_millis(500);
+
+/// Whom losses of the recorder itself concern, in events.
+const RECORDER: &str = "recorder";
+
+/// What is recorded.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// The ports.
+    pub ports: Vec<Port>,
+    /// The names of the signals. Empty: a set that fits most uses.
+    pub signals: Vec<String>,
+    /// How often they are read.
+    pub period: Micros,
+    /// Whether the settings of the motors are read before.
+    pub settings: bool,
+    /// Where it goes.
+    pub output: Output,
+    /// The name of the program among those that use the motors.
+    pub by: Arc<str>,
+    /// The command line, for the metadata.
+    pub command: String,
+}
+
+/// Why nothing is recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// There is no port.
+    #[error("there is no port to record")]
+    NoPort,
+    /// The file.
+    #[error(transparent)]
+    File(#[from] WriteError),
+    /// A port.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// A port without a motor that answers.
+    #[error("no motor answers at {port}: {why}")]
+    NoMotor {
+        /// The port.
+        port: String,
+        /// What its drives speak.
+        protocol: Protocol,
+        /// The last error.
+        why: Box<CommandError>,
+    },
+    /// No motor has a signal.
+    #[error(transparent)]
+    Signal(#[from] UnknownSignal),
+    /// An engine has ended.
+    #[error(transparent)]
+    Ended(#[from] Ended),
+    /// The system gives no thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}
+
+/// How far a recording is.
+#[derive(Debug, Clone, Default)]
+pub struct Progress {
+    /// How long it has recorded.
+    pub elapsed: Duration,
+    /// What is in the files.
+    pub written: Written,
+    /// Values, frames, losses.
+    pub counts: Counts,
+    /// The rate of the signals, Hz: asked, and the least that is reached.
+    pub rates: Option<(f64, f64)>,
+    /// Nothing more is recorded: the file cannot be written, or has the size that it may have.
+    pub is_over: bool,
+}
+
+/// A recording that goes on. It ends when this is dropped.
+#[derive(Debug)]
+pub struct Recorder {
+    shared: Arc<Shared>,
+    lines: Vec<Line>,
+    thread: Option<JoinHandle<Result<Written, WriteError>>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    progress: Mutex<Progress>,
+    ends: AtomicBool,
+}
+
+/// An engine and what is made of its records.
+struct Recorded {
+    track: Track,
+    runner: Runner,
+    rates: Arc<Mutex<Vec<Rate>>>,
+}
+
+impl Recorder {
+    /// Makes the file, opens the ports, reads the settings, and begins.
+    ///
+    /// # Errors
+    /// See [`RecordError`]. No file is left then.
+    pub fn start(config: &Config) -> Result<Self, RecordError> {
+        if config.ports.is_empty() {
+            return Err(RecordError::NoPort);
+        }
+        let series = Series::create(config.output.clone())?;
+        let opened = open(&config.ports, &config.by)?;
+        let motors: Vec<Motor> = opened.iter().flat_map(|it| it.line.motors.clone()).collect();
+        choice::check(&motors, &config.signals)?;
+        let mut entries = vec![about(config)];
+        let mut events = Vec::new();
+        for it in &opened {
+            for motor in &it.line.motors {
+                drive(config, it, *motor, &mut entries, &mut events);
+            }
+        }
+        let (mut topics, mut recorded) = (Topics::default(), Vec::new());
+        for Opened { runner, line, anchor, taps } in opened {
+            let groups = choice::choose(&line.motors, &config.signals, config.period);
+            let track = Track::new(line, groups, anchor, taps, &mut topics);
+            for (subscription, wants) in track.subscriptions() {
+                let (theirs, wants) = (subscription.clone(), wants.clone());
+                runner.remote().with(|engine| engine.subscribe(theirs, wants))?;
+            }
+            recorded.push(Recorded { track, runner, rates: Arc::default() });
+        }
+        let lines = recorded.iter().map(|it| it.track.line().clone()).collect();
+        let writer = Writer::start(series).map_err(RecordError::Thread)?;
+        for entry in entries.into_iter().chain(topics.take()).chain(events) {
+            writer.queue().push(entry);
+        }
+        let shared = Arc::new(Shared::default());
+        let theirs = Arc::clone(&shared);
+        let thread = std::thread::Builder::new().name("motorlink-record".to_owned());
+        let thread = thread.spawn(move || run(recorded, writer, &theirs));
+        let thread = Some(thread.map_err(RecordError::Thread)?);
+        Ok(Recorder { shared, lines, thread })
+    }
+
+    /// The lines that are recorded.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// How far it is.
+    pub fn progress(&self) -> Progress {
+        self.shared.progress().clone()
+    }
+
+    /// Ends the recording and the file. Motors are not affected.
+    ///
+    /// # Errors
+    /// The file cannot be written any more.
+    pub fn end(mut self) -> Result<Progress, WriteError> {
+        let written = self.close().unwrap_or_else(|| Ok(self.progress().written))?;
+        Ok(Progress { written, ..self.progress() })
+    }
+
+    fn close(&mut self) -> Option<Result<Written, WriteError>> {
+        self.shared.ends.store(true, Ordering::SeqCst);
+        let thread = self.thread.take()?;
+        thread.thread().unpark();
+        thread.join().ok()
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+impl Shared {
+    fn progress(&self) -> MutexGuard<'_, Progress> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn run(
+    mut recorded: Vec<Recorded>,
+    writer: Writer,
+    shared: &Shared,
+) -> Result<Written, WriteError> {
+    let began = Instant::now();
+    let mut asked = None;
+    let mut losses = Losses::default();
+    while !shared.ends.load(Ordering::SeqCst) && !shared.progress().is_over {
+        std::thread::park_timeout(TURN);
+        if asked.is_none_or(|asked: Instant| asked.elapsed() >= RATES) {
+            asked = Some(Instant::now());
+            recorded.iter_mut().for_each(Recorded::ask_rates);
+        }
+        turn(&mut recorded, &writer, &mut losses);
+        tell(&recorded, &writer, &losses, began, shared);
+    }
+    await_confirmation(&mut recorded, &writer, &mut losses);
+    for Recorded { mut track, runner, .. } in recorded {
+        // It moves no motor, so there is none to be stopped.
+        runner.end();
+        track.end(wall_now(), &mut |entry| {
+            writer.queue().push(entry);
+        });
+    }
+    writer.end()
+}
+
+fn turn(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
+    let now = wall_now();
+    for Recorded { track, .. } in recorded {
+        track.take(now, &mut |entry| {
+            writer.queue().push(entry);
+        });
+    }
+    losses.tell(now, writer.queue());
+}
+
+fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant, shared: &Shared) {
+    let of_writer = writer.progress();
+    let mut progress = shared.progress();
+    progress.elapsed = began.elapsed();
+    progress.written = of_writer.written;
+    progress.is_over = of_writer.is_complete || of_writer.failed.is_some();
+    let counts = recorded.iter().map(|it| it.track.counts());
+    progress.counts = counts.fold(Counts::default(), Counts::plus);
+    progress.counts.lost += losses.known;
+    let rates = recorded.iter().filter_map(|it| it.track.rates());
+    progress.rates = rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)));
+}
+
+/// Messages that did not fit into the queue of the writer.
+#[derive(Default)]
+struct Losses {
+    known: u64,
+    told: u64,
+}
+
+impl Losses {
+    /// Says how many were lost, as soon as there is room to say it.
+    fn tell(&mut self, now: Time, queue: &Queue<Entry>) {
+        self.known = queue.lost();
+        let new = self.known - self.told;
+        let said = || entry(Topics::EVENTS, now, &lost_records(now, RECORDER, new));
+        if new > 0 && queue.has_room() && queue.push(said()) {
+            self.told = self.known;
+        }
+    }
+}
+
+fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
+    let began = Instant::now();
+    let ends: Vec<_> = recorded
+        .iter()
+        .map(|it| it.runner.remote().with(|engine| engine.clock().now()).ok())
+        .collect();
+    let is_pending = |recorded: &[Recorded]| {
+        let mut pairs = recorded.iter().zip(&ends);
+        pairs.any(|(it, end)| end.is_some_and(|end| it.track.is_pending_before(end)))
+    };
+    while is_pending(recorded) && began.elapsed() < CONFIRMATION {
+        std::thread::park_timeout(TURN);
+        turn(recorded, writer, losses);
+    }
+}
+
+impl Recorded {
+    /// Takes the rates that came, and asks for the next ones without waiting for them.
+    fn ask_rates(&mut self) {
+        self.track.take_rates(&lock(&self.rates));
+        let rates = Arc::clone(&self.rates);
+        // An engine that has ended has no rates.
+        let _ = self.runner.remote().post(move |engine| {
+            *lock(&rates) = engine.rates().collect();
+        });
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What is known of the recording.
+fn about(config: &Config) -> Entry {
+    let pairs = [
+        (recording::VERSION, env!("CARGO_PKG_VERSION").to_owned()),
+        (recording::FORMAT, recording::FORMAT_1.to_owned()),
+        (recording::BEGAN, wall_now().text()),
+        (recording::COMMAND, config.command.clone()),
+    ];
+    let pairs = pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    Entry::Metadata(recording::NAME.to_owned(), pairs)
+}
+
+/// What is known of a motor: identity and settings.
+fn drive(
+    config: &Config,
+    opened: &Opened,
+    motor: Motor,
+    entries: &mut Vec<Entry>,
+    events: &mut Vec<Entry>,
+) {
+    let Opened { runner, line, .. } = opened;
+    let mut pairs: Pairs = line.pairs();
+    let number = match motor {
+        Motor::St(number) => number.number(),
+        Motor::Rmd(id) => id.number(),
+    };
+    pairs.insert(drive::MOTOR.to_owned(), number.to_string());
+    let profile = match line.speaks {
+        Speaks::St(profile) => profile,
+        Speaks::Rmd => Profile::default(),
+    };
+    let mut said = |message: String| {
+        let stamp = wall_now();
+        let log = Log {
+            stamp,
+            severity: Severity::Warn,
+            name: name::path(&line.label, motor),
+            message,
+            by: String::new(),
+            kind: "refused".to_owned(),
+        };
+        events.push(entry(Topics::EVENTS, stamp, &log));
+    };
+    if config.settings {
+        match settings::read(runner.remote(), &config.by, motor, profile) {
+            Ok(dump) => {
+                for (number, line) in dump.identity().iter().enumerate() {
+                    pairs.insert(format!("{}{number}", drive::IDENTITY), line.clone());
+                }
+                if !dump.absent().is_empty() {
+                    said(format!("no settings of {}: it refuses them", dump.absent().join(", ")));
+                }
+                let attachment = name::settings_attachment(&line.label, motor);
+                pairs.insert(drive::SETTINGS.to_owned(), attachment.clone());
+                entries.push(Entry::Attached(Attached {
+                    name: attachment,
+                    media_type: schema::SETTINGS_TYPE.to_owned(),
+                    time: wall_now().0,
+                    data: dump.text().into_bytes(),
+                }));
+            }
+            Err(why) => said(format!("its settings are not recorded: {why}")),
+        }
+    }
+    entries.push(Entry::Metadata(drive::NAME.to_owned(), pairs));
+}
