@@ -81,8 +81,8 @@ impl Condition {
             () => Level::Ok,
         };
         let silence = (level == Level::Stale).then(|| "does not answer".to_owned());
-        let parts: Vec<String> = [silence, state, faults].into_iter().flatten().collect();
-        (level, parts.join(": "))
+        let parts = [silence, state, faults, too_slow].into_iter().flatten();
+        (level, parts.collect::<Vec<_>>().join(": "))
     }
 
     /// Whether it is another than when it was said last.

@@ -29,7 +29,7 @@ use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Writte
 /// How often messages are made of what came.
 const TURN: Duration = Duration::from_millis(20);
 /// How often the rates of the engines are asked for.
-const RATES: Duration = Duration::from_secs(1);
+const RATES: Duration = Duration::from_millis(1_100);
 /// How long the end waits until the last values are confirmed.
 const CONFIRMATION: Duration = Duration::from_millis(500);
 
@@ -121,7 +121,8 @@ struct Shared {
 struct Recorded {
     track: Track,
     runner: Runner,
-    rates: Arc<Mutex<Vec<Rate>>>,
+    /// Rates that the engine has given and nobody has taken.
+    rates: Arc<Mutex<Option<Vec<Rate>>>>,
 }
 
 impl Recorder {
@@ -212,13 +213,14 @@ fn run(
     shared: &Shared,
 ) -> Result<Written, WriteError> {
     let began = Instant::now();
-    let mut asked = None;
+    let mut asked = began;
     let mut losses = Losses::default();
     while !shared.ends.load(Ordering::SeqCst) && !shared.progress().is_over {
         std::thread::park_timeout(TURN);
-        if asked.is_none_or(|asked: Instant| asked.elapsed() >= RATES) {
-            asked = Some(Instant::now());
-            recorded.iter_mut().for_each(Recorded::ask_rates);
+        // The engine counts the values of the last second.
+        if asked.elapsed() >= RATES {
+            asked = Instant::now();
+            recorded.iter().for_each(Recorded::ask_rates);
         }
         turn(&mut recorded, &writer, &mut losses);
         tell(&recorded, &writer, &losses, began, shared);
@@ -236,7 +238,10 @@ fn run(
 
 fn turn(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
     let now = wall_now();
-    for Recorded { track, .. } in recorded {
+    for Recorded { track, rates, .. } in recorded {
+        if let Some(rates) = lock(rates).take() {
+            track.take_rates(&rates);
+        }
         track.take(now, &mut |entry| {
             writer.queue().push(entry);
         });
@@ -293,13 +298,12 @@ fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut L
 }
 
 impl Recorded {
-    /// Takes the rates that came, and asks for the next ones without waiting for them.
-    fn ask_rates(&mut self) {
-        self.track.take_rates(&lock(&self.rates));
+    /// Asks for the rates without waiting for them.
+    fn ask_rates(&self) {
         let rates = Arc::clone(&self.rates);
         // An engine that has ended has no rates.
         let _ = self.runner.remote().post(move |engine| {
-            *lock(&rates) = engine.rates().collect();
+            *lock(&rates) = Some(engine.rates().collect());
         });
     }
 }

@@ -1,0 +1,308 @@
+"""`motorlink record`: its files in the readers of other people, and its ends: killed, full disk, no folder."""
+
+import json
+import math
+import os
+import resource
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+
+import numpy
+import pytest
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+from peers import Plug
+from program import PATIENT, environment, eventually
+
+QUICK = ("--rate", "50", *PATIENT)
+
+
+class File:
+    """A whole recording, as the packages `mcap` and `mcap-ros2-support` read it."""
+
+    def __init__(self, path):
+        with open(path, "rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            self.header = reader.get_header()
+            self.messages = [
+                (channel.topic, message.log_time, decoded)
+                for _, channel, message, decoded in reader.iter_decoded_messages()
+            ]
+            self.metadata = [(it.name, it.metadata) for it in reader.iter_metadata()]
+            self.attachments = {it.name: it.data.decode() for it in reader.iter_attachments()}
+
+    def of(self, topic):
+        """The messages of a topic."""
+        return [message for it, _, message in self.messages if it == topic]
+
+    def events(self):
+        """The kinds of all events."""
+        return [log.function for log in self.of("/events")]
+
+
+def kept(path):
+    """The times of the messages in a file that may end anywhere, by the stream reader of `mcap`."""
+    times = []
+    with open(path, "rb") as file:
+        try:
+            for record in StreamReader(file, skip_magic=False).records:
+                if isinstance(record, Message):
+                    times.append(record.log_time)
+        except (McapError, EOFError, ValueError):
+            pass  # the end of what was written
+    return times
+
+
+@pytest.fixture
+def record(start):
+    """Starts a recording, and waits until it has begun: `record("run.mcap", ...)`."""
+
+    def record(path, *words, until=0, **options):
+        running = start("record", "-o", path, "--json", *QUICK, *words, **options)
+        running.until(lambda: len(running.out) > until, "the recording begins")
+        return running
+
+    return record
+
+
+def recorded(running):
+    """Ends a recording with Ctrl-C. Gives its last line."""
+    running.interrupt()
+    assert running.wait() == 0, running.err
+    return json.loads(running.out[-1])
+
+
+def test_the_readers_of_others_show_what_the_drives_do(run, sim, record, tmp_path):
+    drives, path = sim(), tmp_path / "run.mcap"
+    bus = ("rmd", "-p", f"slcan:{drives.can}", "--id", "1", *PATIENT)
+    run(*bus, "position", "90", "--wait").ended(0)
+    recording = record(path, "-p", drives.st, "-p", f"slcan:{drives.can}", "--id", "1,2", until=3)
+    told = recorded(recording)
+    assert told["event"] == "recorded" and told["lost"] == 0 and told["bytes"] == path.stat().st_size
+    file = File(path)
+    assert file.header.profile == "ros2"
+    truth = drives.motor(1, f"slcan-pty:{drives.can}")
+    joints = [it for it in file.of("/joint_states") if it.name == ["can0_motor1"]]
+    assert len(joints) >= 20
+    for joint in joints:
+        # A digit of the angle is 0.01°.
+        assert joint.position[0] == pytest.approx(math.radians(truth["angle_degrees"]), abs=2e-4)
+        assert joint.velocity[0] == pytest.approx(math.radians(truth["speed_dps"]), abs=0.02)
+    assert len(file.of("/st0/motor1/signals")) >= 20
+    assert {it.bus_voltage for it in file.of("/st0/motor1/signals_2_hz")} == {325.0}
+    status = [status for array in file.of("/diagnostics") for status in array.status]
+    assert {it.name for it in status} >= {"st0/motor1", "can0/motor1", "can0/motor2"}
+    # A busy machine reads too slowly, which is a warning.
+    assert status[-1].level in (0, 1) and status[-1].message.startswith("at rest")
+    frames = file.of("/can0/frames")
+    assert {frame.direction for frame in frames} == {0, 1} and {frame.result for frame in frames} == {0}
+    assert 0x141 in {frame.id for frame in frames}
+    # NACKs: settings that the drive does not have.
+    assert {frame.result for frame in file.of("/st0/frames")} == {0, 1}
+    drive = [values for name, values in file.metadata if name == "drive"]
+    assert ("can0", "2") in [(it["label"], it["motor"]) for it in drive]
+    assert "motor = 1" in file.attachments["st0_motor1.toml"]
+
+
+def test_rosbags_reads_the_same_joint_states(sim, record, tmp_path):
+    typesys = pytest.importorskip("rosbags.typesys")
+    drives, path = sim(), tmp_path / "run.mcap"
+    recorded(record(path, "-p", f"slcan:{drives.can}", "--id", "1", until=2))
+    types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    with open(path, "rb") as file:
+        messages = list(make_reader(file).iter_messages(topics=["/joint_states"]))
+    ours = File(path).of("/joint_states")
+    assert len(messages) == len(ours) > 10
+    for (schema, _, message), expected in zip(messages, ours):
+        joint = types.deserialize_cdr(message.data, schema.name)
+        assert joint.name == expected.name
+        assert numpy.array_equal(joint.position, expected.position)
+        assert joint.header.stamp.nanosec == expected.header.stamp.nanosec
+
+
+def test_rosbags_knows_every_generated_type(drives, record, tmp_path):
+    typesys = pytest.importorskip("rosbags.typesys")
+    path = tmp_path / "run.mcap"
+    recorded(record(path, "-p", drives.st, "-p", f"slcan:{drives.can}", until=2))
+    types = typesys.get_typestore(typesys.Stores.EMPTY)
+    with open(path, "rb") as file:
+        messages = list(make_reader(file).iter_messages())
+    for schema in {schema.name: schema for schema, _, _ in messages}.values():
+        types.register(typesys.get_types_from_msg(schema.data.decode(), schema.name))
+    for schema, _, message in messages:
+        types.deserialize_cdr(message.data, schema.name)
+
+
+def test_a_kill_loses_the_last_second_at_most(drives, record, tmp_path):
+    for number, after in enumerate((0.31, 0.77, 1.13)):
+        path = tmp_path / f"run{number}.mcap"
+        running = record(path, "-p", drives.st, "-p", f"slcan:{drives.can}", until=1)
+        # A moment after a flush that no rhythm of the recorder decides.
+        time.sleep(after)
+        killed = time.time_ns()
+        running.kill()
+        lost = killed - max(kept(path))
+        assert lost < 1.0e9, f"{lost / 1e9:.3f} s are lost"
+
+
+def test_an_existing_file_is_kept(run, drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    path.write_text("old")
+    outcome = run("record", "-p", drives.st, "-o", path, *QUICK).ended(2)
+    assert "exists already" in outcome.err and "--force" in outcome.err
+    # Not even --force destroys it before the port is open.
+    run("record", "-p", f"{tmp_path}/nothing", "-o", path, "--force", *QUICK).ended(3)
+    assert path.read_text() == "old"
+    run("record", "-p", drives.st, "-o", path, "--force", "--duration", "500ms", *QUICK).ended(0)
+    assert File(path).of("/st0/motor1/signals")
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_port_is_opened(run, tmp_path):
+    folder = tmp_path / "none"
+    outcome = run("record", "-p", f"{tmp_path}/nothing", "-o", folder / "run.mcap").ended(3)
+    assert f"cannot write `{folder}/run.mcap`" in outcome.err and "mkdir -p" in outcome.err
+    outcome = run("record", "-p", f"{tmp_path}/nothing", "-o", "/proc/run.mcap").ended(3)
+    assert "cannot write `/proc/run.mcap`" in outcome.err
+    outcome = run("record", "-p", "sim:", "-o", "-").ended(2)
+    assert "stdout" in outcome.err
+
+
+def test_nothing_is_left_where_no_motor_answers(run, sim, tmp_path):
+    drives, path = sim(), tmp_path / "run.mcap"
+    outcome = run("record", "-p", drives.st, "-o", path, "SPED_MEAS", *QUICK).ended(2)
+    assert "did you mean `SPEED_MEAS`" in outcome.err
+    assert not path.exists()
+
+
+def limited(size):
+    """A file may have this size; more is an error, as on a full disk."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    return limit
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_motors(motorlink, run, sim, tmp_path):
+    drives, path = sim(), tmp_path / "run.mcap"
+    turning = ("rmd", "-p", f"slcan:{drives.can}", "--id", "1", *PATIENT)
+    run(*turning, "speed", "360").ended(0)
+    words = ["record", "-p", f"slcan:{drives.can}", "--id", "1", "-o", path, "--duration", "30s", *QUICK]
+    done = subprocess.run(
+        [motorlink, *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=environment(),
+        preexec_fn=limited(60_000),
+    )
+    assert done.returncode == 3, done.stderr
+    assert f"cannot write {path} any more: File too large" in done.stderr, done.stderr
+    assert "messages" in done.stderr and "stays readable" in done.stderr
+    # It has a footer, so that readers of others open it without a repair.
+    assert File(path).of("/can0/motor1/signals")
+    assert drives.motor(1, f"slcan-pty:{drives.can}")["speed_dps"] == pytest.approx(360, abs=20)
+    run(*turning, "stop").ended(0)
+
+
+def test_a_folder_that_is_removed_is_said_at_once(drives, record, tmp_path):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    running = record(folder / "run.mcap", "-p", drives.st, until=1)
+    os.remove(folder / "run.mcap")
+    folder.rmdir()
+    assert running.wait() == 3
+    assert any("was removed while it was written" in line for line in running.err), running.err
+
+
+@contextmanager
+def closed_output(motorlink, *words):
+    """The program with an output that nobody reads any more."""
+    process = subprocess.Popen(
+        [motorlink, *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+    process.stdout.readline()
+    process.stdout.close()
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_a_closed_output_does_not_stop_the_recording(motorlink, drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    words = ("record", "-p", drives.st, "-o", path, "--json", "--duration", "3s", *QUICK)
+    with closed_output(motorlink, *words) as process:
+        assert process.wait(30) == 0
+    times = [time for topic, time, _ in File(path).messages if topic == "/st0/motor1/signals"]
+    assert max(times) - min(times) > 2e9
+
+
+def test_a_recording_goes_on_when_its_port_is_back(drives, record, tmp_path):
+    path = tmp_path / "run.mcap"
+    cable = Plug(drives.st_address)
+    running = record(path, "-p", cable.port, "--motor", "1", until=1)
+    cable.unplug()
+    running.more_lines(2)
+    cable.plug_in()
+    values = json.loads(running.out[-1])["values"]
+    eventually(
+        lambda: json.loads(running.out[-1])["values"] > values + 50, "values come again", 30
+    )
+    recorded(running)
+    cable.unplug()
+    file = File(path)
+    events = file.events()
+    assert "lost" in events and "back" in events[events.index("lost") :]
+    (label,) = {values["label"] for name, values in file.metadata if name == "drive"}
+    back = next(log.stamp for log in file.of("/events") if log.function == "back")
+    rows = file.of(f"/{label}/motor1/signals")
+    assert any((row.stamp.sec, row.stamp.nanosec) > (back.sec, back.nanosec) for row in rows)
+    levels = [status.level for array in file.of("/diagnostics") for status in array.status]
+    assert 3 in levels and levels[-1] in (0, 1)
+
+
+def test_files_are_rotated_and_end_by_size(run, drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    words = ("--rotate", "30kB", "--max-size", "100kB", "--fsync", "1s", "--json", *QUICK)
+    told = run("record", "-p", drives.st, "-o", path, *words, within=60).ended(0).lines[-1]
+    assert told["files"] == sorted(map(str, tmp_path.glob("run_*.mcap"))) and len(told["files"]) > 1
+    assert sum(os.path.getsize(file) for file in told["files"]) == told["bytes"] >= 100_000
+    parts = [dict(File(file).metadata)["motorlink"]["part"] for file in told["files"]]
+    assert parts == [str(number) for number in range(len(parts))]
+    assert all(File(file).of("/st0/motor1/signals") for file in told["files"][:-1])
+
+
+def test_chosen_signals_are_recorded_at_the_rate(run, drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    words = ("SPEED_MEAS", "speed_dps", "--duration", "2s", "--no-settings", *PATIENT, "--rate", "20")
+    ports = ("-p", drives.st, "-p", f"slcan:{drives.can}", "--id", "1")
+    run("record", *ports, "-o", path, *words).ended(0)
+    file = File(path)
+    assert not file.attachments
+    rows = file.of("/st0/motor1/signals")
+    assert 30 <= len(rows) <= 45 and rows[0].speed_meas == 0
+    assert {topic for topic, _, _ in file.messages if "signals" in topic} == {
+        "/st0/motor1/signals",
+        "/st0/motor2/signals",
+        "/can0/motor1/signals",
+    }
+
+
+def test_a_share_is_recorded_beside_another_program(run, start, sim, record, tmp_path):
+    drives, place = sim(), tmp_path / "share"
+    start("share", "-p", drives.st, "--at", f"unix:{place}", "--json").line(0)
+    path = tmp_path / "run.mcap"
+    running = record(path, "-p", f"share:{place}/st0", "--motor", "1", until=2)
+    told = recorded(running)
+    assert told["values"] > 0 and told["achieved_hz"] is not None
+    assert File(path).of("/st0/motor1/signals")
