@@ -20,7 +20,7 @@ use super::choice;
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
-use super::track::{Counts, Line, Track, entry, lost_records};
+use super::track::{Counts, Line, Track, lost_records};
 use super::wall::wall_now;
 use crate::error::WriteError;
 use crate::schema::{self, Log, Severity, Time, drive, name, recording};
@@ -274,7 +274,7 @@ impl Losses {
     fn tell(&mut self, now: Time, queue: &Queue<Entry>) {
         self.known = queue.lost();
         let new = self.known - self.told;
-        let said = || entry(Topics::EVENTS, now, &lost_records(now, RECORDER, new));
+        let said = || Entry::message(Topics::EVENTS, now, &lost_records(now, RECORDER, new));
         if new > 0 && queue.has_room() && queue.push(said()) {
             self.told = self.known;
         }
@@ -353,7 +353,7 @@ fn drive(
             by: String::new(),
             kind: "refused".to_owned(),
         };
-        events.push(entry(Topics::EVENTS, stamp, &log));
+        events.push(Entry::message(Topics::EVENTS, stamp, &log));
     };
     if config.settings {
         match settings::read(runner.remote(), &config.by, motor, profile) {

@@ -18,9 +18,7 @@ use super::frames::{Splitter, Taps};
 use super::joint::Joint;
 use super::topics::Topics;
 use super::wall::Anchor;
-use crate::schema::{
-    DiagnosticArray, Log, Message, Severity, SignalsRow, SignalsType, Time, drive, name,
-};
+use crate::schema::{DiagnosticArray, Log, Severity, SignalsRow, SignalsType, Time, drive, name};
 use crate::write::{Entry, Pairs};
 
 /// Records of a subscription that wait: a reply or an event each, of about 300 bytes. 16 motors that are
@@ -189,7 +187,7 @@ impl Track {
         let (topic, count) = (self.frames, &mut self.counts.frames);
         self.splitter.end(&mut |frame| {
             *count += 1;
-            put(entry(topic, frame.stamp, &frame));
+            put(Entry::message(topic, frame.stamp, &frame));
         });
     }
 
@@ -250,7 +248,7 @@ impl Track {
         }
         if let Some(told) = self.words.of(self.line.speaks, &event.what) {
             let time = self.anchor.wall(event.time);
-            put(entry(Topics::EVENTS, time, &self.line.log(time, told)));
+            put(Entry::message(Topics::EVENTS, time, &self.line.log(time, told)));
         }
     }
 
@@ -267,7 +265,7 @@ impl Track {
         for seen in self.taps.take() {
             self.splitter.take(seen, &mut |frame| {
                 *count += 1;
-                put(entry(topic, frame.stamp, &frame));
+                put(Entry::message(topic, frame.stamp, &frame));
             });
         }
     }
@@ -280,7 +278,7 @@ impl Track {
             self.known_lost = lost;
             self.counts.lost += new;
             let log = lost_records(now, &self.line.label, new);
-            put(entry(Topics::EVENTS, now, &log));
+            put(Entry::message(Topics::EVENTS, now, &log));
         }
     }
 
@@ -293,7 +291,7 @@ impl Track {
             self.said_at = now;
         }
         if !status.is_empty() {
-            put(entry(Topics::DIAGNOSTICS, now, &DiagnosticArray { stamp: now, status }));
+            put(Entry::message(Topics::DIAGNOSTICS, now, &DiagnosticArray { stamp: now, status }));
         }
     }
 }
@@ -324,7 +322,7 @@ impl MotorRows {
         // The time of a row is in the middle.
         let span_s = row.time.since(row.requested).0 as f64 * 2e-6;
         if let Some((joint, name)) = &self.joint {
-            put(entry(Topics::JOINT_STATES, stamp, &joint.state(name, stamp, &values)));
+            put(Entry::message(Topics::JOINT_STATES, stamp, &joint.state(name, stamp, &values)));
         }
         let count = values.iter().filter(|value| !value.is_nan()).count() as u64;
         let data = self.ty.encode(&SignalsRow { stamp, span_s, values });
@@ -381,10 +379,6 @@ pub(super) fn lost_records(stamp: Time, name: &str, count: u64) -> Log {
         by: String::new(),
         kind: "lost_records".to_owned(),
     }
-}
-
-pub(super) fn entry(topic: usize, time: Time, message: &impl Message) -> Entry {
-    Entry::Message { topic, time: time.0, data: message.encode() }
 }
 
 /// The motor that an event concerns; `None`: all motors of the line.

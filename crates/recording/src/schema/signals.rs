@@ -54,6 +54,11 @@ impl SignalsType {
         SignalsType { name: format!("{PACKAGE}{}", camel_case(topic)), fields, constants }
     }
 
+    /// The type of any values. `topic` is that of its messages.
+    pub fn of_fields(topic: &str, fields: Vec<SignalField>) -> Self {
+        SignalsType { name: format!("{PACKAGE}{}", camel_case(topic)), fields, constants: vec![] }
+    }
+
     /// The type that a recording has under this name; `None` if it is none of ours.
     pub fn parse(name: &str, definition: &str) -> Option<Self> {
         let own = definition.split("\n====").next()?;

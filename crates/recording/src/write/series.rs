@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::entry::Entry;
 use super::file::McapFile;
-use super::queue::Weighed;
-use super::{Attached, Pairs, Topic};
 use crate::error::WriteError;
 use crate::schema::recording::{NAME, PART};
 
@@ -33,37 +32,6 @@ pub enum Rotate {
     Time(Duration),
 }
 
-/// Something for the file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Entry {
-    /// A topic. Topics are numbered in this order, from 0.
-    Topic(Topic),
-    /// A metadata record.
-    Metadata(String, Pairs),
-    /// A file in the file.
-    Attached(Attached),
-    /// A message.
-    Message {
-        /// The number of its topic.
-        topic: usize,
-        /// ns since 1970.
-        time: u64,
-        /// The message as CDR.
-        data: Vec<u8>,
-    },
-}
-
-impl Weighed for Entry {
-    fn bytes(&self) -> usize {
-        let content = match self {
-            Entry::Message { data, .. } | Entry::Attached(Attached { data, .. }) => data.len(),
-            Entry::Topic(topic) => topic.definition.len(),
-            Entry::Metadata(..) => 0,
-        };
-        size_of::<Entry>() + content
-    }
-}
-
 /// How much was written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Written {
@@ -83,8 +51,6 @@ pub struct Series {
     before: Written,
     /// What each file begins with.
     preamble: Vec<Entry>,
-    /// The number of each topic in the current file, and of its next message.
-    topics: Vec<(u16, u32)>,
     /// The time of the first message of the current file.
     began: Option<u64>,
 }
@@ -96,8 +62,8 @@ impl Series {
     /// It exists, or cannot be written.
     pub fn create(output: Output) -> Result<Self, WriteError> {
         let current = McapFile::create(&output.name(0), output.force)?;
-        let (before, preamble, topics) = (Written::default(), Vec::new(), Vec::new());
-        Ok(Series { output, current, before, preamble, topics, began: None })
+        let (before, preamble) = (Written::default(), Vec::new());
+        Ok(Series { output, current, before, preamble, began: None })
     }
 
     /// Takes the next entry.
@@ -119,22 +85,17 @@ impl Series {
 
     fn write(&mut self, entry: &Entry) -> Result<(), WriteError> {
         match entry {
-            Entry::Topic(topic) => self.topics.push((self.current.topic(topic)?, 0)),
             Entry::Metadata(name, pairs) if name == NAME => {
                 let mut pairs = pairs.clone();
                 pairs.insert(PART.to_owned(), self.part().to_string());
-                self.current.metadata(name, &pairs)?;
+                self.current.put(&Entry::Metadata(name.clone(), pairs))
             }
-            Entry::Metadata(name, pairs) => self.current.metadata(name, pairs)?,
-            Entry::Attached(attached) => self.current.attach(attached)?,
-            Entry::Message { topic, time, data } => {
+            Entry::Message { time, .. } => {
                 self.began.get_or_insert(*time);
-                let (channel, sequence) = &mut self.topics[*topic];
-                self.current.message(*channel, *sequence, *time, data)?;
-                *sequence = sequence.wrapping_add(1);
+                self.current.put(entry)
             }
+            entry => self.current.put(entry),
         }
-        Ok(())
     }
 
     fn part(&self) -> usize {
@@ -156,7 +117,7 @@ impl Series {
         let next = McapFile::create(&name, self.output.force)?;
         let ended = std::mem::replace(&mut self.current, next);
         end(ended, &mut self.before)?;
-        (self.topics, self.began) = (Vec::new(), None);
+        self.began = None;
         for entry in std::mem::take(&mut self.preamble) {
             self.write(&entry)?;
             self.preamble.push(entry);

@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::entry::Entry;
 use super::queue::{Queue, Taken};
-use super::series::{Entry, Series, Written};
+use super::series::{Series, Written};
 use crate::error::WriteError;
 
 /// How often everything is written into the file. A killed program loses this time, and the values that
