@@ -16,6 +16,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("demo", "demo"),
     ("sim", "sim --st pty:./st0 --rmd slcan-pty:./can0"),
     ("sim run", "sim run scenarios/position-moves.toml --csv run.csv"),
+    ("sim run", "sim run scenarios/position-moves.toml --mcap run.mcap"),
     ("sim presets", "sim presets"),
     ("guard", "guard st -p ./st0 --serve pty:./drive"),
     ("guard st", "guard st -p ./st0 --serve pty:./drive"),

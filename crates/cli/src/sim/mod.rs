@@ -1,5 +1,6 @@
 //! `motorlink sim`: serves simulated drives and executes commands from stdin, or plays a scenario.
 
+mod mcap;
 mod plot;
 mod presets;
 mod run;

@@ -8,7 +8,7 @@ use motorlink_link::printable;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
-use super::plot;
+use super::{mcap, plot};
 use crate::failure::Failure;
 use crate::json;
 use crate::output::{note, print_line};
@@ -27,6 +27,10 @@ pub struct Args {
     /// Write all signals into this file, a row for each sample; `-` is stdout
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Write signals, joint states and events into this MCAP file, as `motorlink record` does; `-` is
+    /// stdout
+    #[arg(long, value_name = "FILE.mcap")]
+    mcap: Option<PathBuf>,
     /// Print one line of JSON instead of text
     #[arg(long)]
     json: bool,
@@ -49,9 +53,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let inputs: Vec<&Path> =
         std::iter::once(&args.scenario).chain(&scenario.files).map(|path| &**path).collect();
-    let outputs = [("--csv", args.csv.as_deref()), ("--plot", args.plot.as_deref())];
+    let outputs = [
+        ("--csv", args.csv.as_deref()),
+        ("--plot", args.plot.as_deref()),
+        ("--mcap", args.mcap.as_deref()),
+    ];
     let outputs = outputs::resolve(&outputs, &inputs)?;
-    let [csv, plot] = &outputs[..] else { unreachable!("each output was resolved") };
+    let [csv, plot, mcap] = &outputs[..] else { unreachable!("each output was resolved") };
     let stdout_is_taken = outputs.contains(&Some(Output::Stdout));
     if stdout_is_taken && args.json {
         return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
@@ -84,8 +92,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         true => Ok(()),
         false => Err(Failure::refused(not_as_expected(&run))),
     };
+    let mcap = mcap.as_ref().map_or(Ok(()), |out| {
+        let bytes =
+            mcap::bytes(&scenario, &run).map_err(|error| Failure::link(error.to_string()))?;
+        out.write(|file| file.write_all(&bytes))
+    });
     // The result of the run comes first: its exit code counts.
-    let failures = [judged, report, csv, plot].into_iter().filter_map(Result::err);
+    let failures = [judged, report, csv, plot, mcap].into_iter().filter_map(Result::err);
     failures.reduce(Failure::and).map_or(Ok(()), Err)
 }
 

@@ -12,6 +12,7 @@ pub use message::{
     DiagnosticArray, DiagnosticStatus, Direction, Frame, FrameResult, JointState, Level, Log,
     Message, Severity, Time,
 };
+pub use name::snake_case;
 pub use signals::{PACKAGE, SignalField, SignalsRow, SignalsType};
 
 /// The profile of the file: robotics tools know how to read the messages.
@@ -37,6 +38,8 @@ pub mod recording {
     pub const BEGAN: &str = "began";
     /// The command that recorded.
     pub const COMMAND: &str = "command";
+    /// The title of the scenario, if the drives were simulated on virtual time.
+    pub const SCENARIO: &str = "scenario";
     /// Counted from 0: which file of a recording in several files this is.
     pub const PART: &str = "part";
 }

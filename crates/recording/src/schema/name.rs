@@ -10,6 +10,9 @@ pub const DIAGNOSTICS: &str = "/diagnostics";
 /// The topic of [`Log`](super::Log).
 pub const EVENTS: &str = "/events";
 
+/// The last part of the topics of signals.
+pub const SIGNALS: &str = "signals";
+
 /// A short name for each port, for topics: the last part of its name, in lower case. If two are equal, a
 /// number is added.
 pub fn labels(ports: &[String]) -> Vec<String> {
@@ -32,7 +35,7 @@ pub fn motor(motor: Motor) -> String {
 /// The topic of a motor's signals. Those that are read at a lower rate have a topic of their own.
 pub fn signals_topic(label: &str, of: Motor, slower_hz: Option<f64>) -> String {
     let rate = slower_hz.map(|hz| format!("_{}_hz", snake_case(&hz.to_string())));
-    format!("/{label}/{}/signals{}", motor(of), rate.unwrap_or_default())
+    format!("/{}/{SIGNALS}{}", path(label, of), rate.unwrap_or_default())
 }
 
 /// The topic of the frames of a port.
@@ -56,7 +59,7 @@ pub fn settings_attachment(label: &str, of: Motor) -> String {
 }
 
 /// Lower case letters and digits, with single `_` between.
-pub(super) fn snake_case(text: &str) -> String {
+pub fn snake_case(text: &str) -> String {
     let lower = text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { ' ' });
     let lower = lower.collect::<String>().to_ascii_lowercase();
     lower.split_whitespace().collect::<Vec<_>>().join("_")
