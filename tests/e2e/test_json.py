@@ -82,7 +82,7 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "spec", "completions", "man"}
     assert subcommands(run, "share") == set(SHARE)
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "conformance"} | others
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "conformance"} | others
 
 
 @pytest.mark.parametrize("command", ST)
@@ -283,6 +283,16 @@ def test_a_share_tells_what_happens(sim, start, checked, tmp_path):
     share.interrupt()
     share.wait()
     assert len(check("\n".join(share.out))) > 4
+
+
+def test_a_recording_tells_how_far_it_is(checked, tmp_path):
+    words = ("-o", tmp_path / "run.mcap", "--duration", "2500ms", "--timeout", "1s")
+    out, err = checked("record", "-p", "sim:", *words)
+    assert [line["event"] for line in out] == ["recording", "progress", "progress", "recorded"] and not err
+    assert out[0]["lines"][0] == {"label": "sim", "port": "sim:", "motors": [1, 2]}
+    assert out[-1]["lost"] == 0 and out[-1]["values"] > 0
+    _, (failed,) = checked("record", "-p", "sim:", *words, code=2)
+    assert failed["error"]["kind"] == "usage"
 
 
 def test_a_guard_tells_what_it_proved(sim, checked):
