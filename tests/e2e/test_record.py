@@ -8,6 +8,7 @@ import signal
 import subprocess
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy
 import pytest
@@ -19,6 +20,7 @@ from mcap_ros2.decoder import DecoderFactory
 from peers import Plug
 from program import PATIENT, environment, eventually
 
+SCENARIO = Path(__file__).parents[2] / "scenarios/position-moves.toml"
 QUICK = ("--rate", "50", *PATIENT)
 
 
@@ -90,9 +92,9 @@ def test_the_readers_of_others_show_what_the_drives_do(run, sim, record, tmp_pat
     joints = [it for it in file.of("/joint_states") if it.name == ["can0_motor1"]]
     assert len(joints) >= 20
     for joint in joints:
-        # A digit of the angle is 0.01°.
-        assert joint.position[0] == pytest.approx(math.radians(truth["angle_degrees"]), abs=2e-4)
-        assert joint.velocity[0] == pytest.approx(math.radians(truth["speed_dps"]), abs=0.02)
+        # A digit of the angle is 0.01°, and the motor settles after its arrival.
+        assert joint.position[0] == pytest.approx(math.radians(truth["angle_degrees"]), abs=2e-3)
+        assert joint.velocity[0] == pytest.approx(math.radians(truth["speed_dps"]), abs=0.05)
     assert len(file.of("/st0/motor1/signals")) >= 20
     assert {it.bus_voltage for it in file.of("/st0/motor1/signals_2_hz")} == {325.0}
     status = [status for array in file.of("/diagnostics") for status in array.status]
@@ -306,3 +308,17 @@ def test_a_share_is_recorded_beside_another_program(run, start, sim, record, tmp
     told = recorded(running)
     assert told["values"] > 0 and told["achieved_hz"] is not None
     assert File(path).of("/st0/motor1/signals")
+
+
+def test_a_scenario_is_recorded_and_has_the_same_bytes_each_time(run, tmp_path):
+    first, second, table = (tmp_path / name for name in ("first.mcap", "second.mcap", "run.csv"))
+    run("sim", "run", SCENARIO, "--mcap", first, "--csv", table, within=120).ended(0)
+    run("sim", "run", SCENARIO, "--mcap", second, within=120).ended(0)
+    assert first.read_bytes() == second.read_bytes()
+    file = File(first)
+    lines = table.read_text().splitlines()
+    rows, names = file.of("/rmd/motor1/signals"), lines[0].split(",")
+    assert len(rows) == len(lines) - 1 == len(file.of("/joint_states"))
+    column = names.index("rmd1.speed_dps")
+    assert [row.speed_dps for row in rows] == [float(line.split(",")[column]) for line in lines[1:]]
+    assert "commanded" in file.events()

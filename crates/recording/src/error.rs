@@ -4,6 +4,45 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use motorlink_telemetry::event::CommandError;
+use motorlink_telemetry::line::LineError;
+use motorlink_telemetry::runner::Ended;
+use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::signal::UnknownSignal;
+
+/// Why nothing is recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// There is no port.
+    #[error("there is no port to record")]
+    NoPort,
+    /// The file.
+    #[error(transparent)]
+    File(#[from] WriteError),
+    /// A port.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// A port without a motor that answers.
+    #[error("no motor answers at {port}: {why}")]
+    NoMotor {
+        /// The port.
+        port: String,
+        /// What its drives speak.
+        protocol: Protocol,
+        /// The last error.
+        why: Box<CommandError>,
+    },
+    /// No motor has a signal.
+    #[error(transparent)]
+    Signal(#[from] UnknownSignal),
+    /// An engine has ended.
+    #[error(transparent)]
+    Ended(#[from] Ended),
+    /// The system gives no thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+}
+
 /// A file of a recording cannot be written.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum WriteError {

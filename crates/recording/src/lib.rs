@@ -12,4 +12,4 @@ pub mod record;
 pub mod schema;
 pub mod write;
 
-pub use error::WriteError;
+pub use error::{RecordError, WriteError};

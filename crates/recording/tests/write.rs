@@ -10,7 +10,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use motorlink_recording::WriteError;
 use motorlink_recording::schema::recording::{NAME, PART};
 use motorlink_recording::schema::{Log, Message, Severity, Time};
-use motorlink_recording::write::{Entry, Output, Rotate, Series, Topic};
+use motorlink_recording::write::{Entry, Output, Rotate, Series, Topic, Writer};
 
 /// A folder for one test.
 struct Folder(PathBuf);
@@ -192,4 +192,17 @@ fn a_file_that_is_removed_is_noticed() {
     fs::remove_file(folder.0.join("run.mcap")).unwrap();
     series.take(message(1)).unwrap();
     assert!(matches!(series.flush(), Err(WriteError::Removed { .. })));
+}
+
+#[test]
+fn a_file_is_whole_even_if_the_next_one_cannot_be_made() {
+    let folder = Folder::new("next");
+    fs::write(folder.0.join("run_001.mcap"), "old").unwrap();
+    let rotate = Some(Rotate::Time(Duration::from_nanos(40)));
+    let series = begin(Output { rotate, ..folder.output("run.mcap") });
+    let writer = Writer::start(series).unwrap();
+    (0..100).for_each(|number| assert!(writer.queue().push(message(number))));
+    assert!(matches!(writer.end(), Err(WriteError::Exists { .. })));
+    assert_eq!(whole(&folder.0.join("run_000.mcap")), (0..40).collect::<Vec<u64>>());
+    assert_eq!(fs::read(folder.0.join("run_001.mcap")).unwrap(), b"old");
 }

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::st::MotorNumber;
 use motorlink_link::printable;
-use motorlink_recording::WriteError;
-use motorlink_recording::record::{Config, Line, Port, Progress, RecordError, Recorder};
+use motorlink_recording::record::{Config, Line, Port, Progress, Recorder};
 use motorlink_recording::write::Output;
+use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
@@ -40,9 +40,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let is_over = |progress: &Progress| {
         progress.is_over || args.duration.is_some_and(|duration| began.elapsed() >= duration)
     };
-    let mut progress = recorder.progress();
+    let (mut progress, mut told) = (recorder.progress(), 0);
     while !is_over(&progress) && interrupt::wait(LOOKED) {
         progress = recorder.progress();
+        if progress.counts.lost > told {
+            told = progress.counts.lost;
+            note(format!("{told} messages are LOST: this machine or the disk is too slow"));
+        }
         if shown.elapsed() >= SHOWN {
             shown = Instant::now();
             show(&progress, &bar, args)?;

@@ -12,6 +12,6 @@ pub mod track;
 pub mod wall;
 
 pub use open::Port;
-pub use recorder::{Config, Progress, RecordError, Recorder};
+pub use recorder::{Config, Progress, Recorder};
 pub use topics::Topics;
 pub use track::Line;

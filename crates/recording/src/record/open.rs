@@ -16,9 +16,9 @@ use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::frames::Taps;
-use super::recorder::RecordError;
 use super::track::Line;
 use super::wall::Anchor;
+use crate::error::RecordError;
 use crate::schema::name;
 
 /// A port to record.

@@ -1,6 +1,5 @@
 //! Records lines in threads: an engine each, one that makes messages, one that writes them.
 
-use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -9,12 +8,9 @@ use std::time::{Duration, Instant};
 use motorlink_proto::st::Profile;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::acquisition::Rate;
-use motorlink_telemetry::event::CommandError;
-use motorlink_telemetry::line::LineError;
-use motorlink_telemetry::runner::{Ended, Runner};
-use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::share::words::Speaks;
-use motorlink_telemetry::signal::{Motor, UnknownSignal};
+use motorlink_telemetry::signal::Motor;
 
 use super::choice;
 use super::open::{Opened, Port, open};
@@ -22,7 +18,7 @@ use super::settings;
 use super::topics::Topics;
 use super::track::{Counts, Line, Track, lost_records};
 use super::wall::wall_now;
-use crate::error::WriteError;
+use crate::error::{RecordError, WriteError};
 use crate::schema::{self, Log, Severity, Time, drive, name, recording};
 use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
 
@@ -53,39 +49,6 @@ pub struct Config {
     pub by: Arc<str>,
     /// The command line, for the metadata.
     pub command: String,
-}
-
-/// Why nothing is recorded.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// There is no port.
-    #[error("there is no port to record")]
-    NoPort,
-    /// The file.
-    #[error(transparent)]
-    File(#[from] WriteError),
-    /// A port.
-    #[error(transparent)]
-    Line(#[from] LineError),
-    /// A port without a motor that answers.
-    #[error("no motor answers at {port}: {why}")]
-    NoMotor {
-        /// The port.
-        port: String,
-        /// What its drives speak.
-        protocol: Protocol,
-        /// The last error.
-        why: Box<CommandError>,
-    },
-    /// No motor has a signal.
-    #[error(transparent)]
-    Signal(#[from] UnknownSignal),
-    /// An engine has ended.
-    #[error(transparent)]
-    Ended(#[from] Ended),
-    /// The system gives no thread.
-    #[error("cannot start a thread: {0}")]
-    Thread(io::Error),
 }
 
 /// How far a recording is.
@@ -377,4 +340,33 @@ fn drive(
         }
     }
     entries.push(Entry::Metadata(drive::NAME.to_owned(), pairs));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schema::Message;
+
+    #[test]
+    fn losses_are_written_once_there_is_room_again() {
+        let queue = Queue::new(1_000);
+        let mut losses = Losses::default();
+        let message = || Entry::Message { topic: 0, time: 0, data: vec![0; 300] };
+        let taken = (0..10).filter(|_| queue.push(message())).count();
+        losses.tell(Time(7), &queue);
+        let items = queue.take().items;
+        assert_eq!((losses.known, losses.told), (10 - taken as u64, 0));
+        assert_eq!(items.len(), taken);
+        losses.tell(Time(8), &queue);
+        losses.tell(Time(9), &queue);
+        let [Entry::Message { time: 8, data, .. }] = &Vec::from(queue.take().items)[..] else {
+            panic!("one event");
+        };
+        let log = Log::decode(data).unwrap();
+        assert_eq!(
+            (&*log.kind, &*log.name, log.severity),
+            ("lost_records", RECORDER, Severity::Error)
+        );
+        assert!(log.message.starts_with(&format!("{} messages are lost here", 10 - taken)));
+    }
 }

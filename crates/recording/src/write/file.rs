@@ -29,6 +29,8 @@ pub(super) struct McapFile {
     messages: u64,
     /// Messages since the last flush.
     unwritten: u64,
+    /// A write has failed. The file has its end already.
+    is_broken: bool,
 }
 
 impl McapFile {
@@ -48,8 +50,8 @@ impl McapFile {
         })?;
         let mcap = Mcap::new(None).map_err(|error| WriteError::create(path, error))?;
         let path = path.to_owned();
-        let (written, messages, unwritten) = (0, 0, 0);
-        Ok(McapFile { path, file, is_new, mcap, written, messages, unwritten })
+        let (written, messages, unwritten, is_broken) = (0, 0, 0, false);
+        Ok(McapFile { path, file, is_new, mcap, written, messages, unwritten, is_broken })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -73,6 +75,11 @@ impl McapFile {
         Ok(())
     }
 
+    /// Whether a write has failed.
+    pub(super) fn is_broken(&self) -> bool {
+        self.is_broken
+    }
+
     /// Writes all of it into the file.
     pub(super) fn flush(&mut self) -> Result<(), WriteError> {
         self.mcap.end_chunk().map_err(|error| self.failed(&error))?;
@@ -88,6 +95,9 @@ impl McapFile {
 
     /// Ends the file with its summary, and gives its size.
     pub(super) fn finish(mut self) -> Result<u64, WriteError> {
+        if self.is_broken {
+            return Ok(self.written);
+        }
         self.flush()?;
         self.mcap.finish().map_err(|error| self.failed(&error))?;
         self.commit()?;
@@ -107,6 +117,7 @@ impl McapFile {
             self.file.set_len(0).map_err(|error| self.failed(&error))?;
         }
         if let Err(error) = self.file.write_all(&bytes) {
+            self.is_broken = true;
             self.cut();
             self.end_short();
             return Err(self.failed(&error));

@@ -160,7 +160,7 @@ impl Series {
         written
     }
 
-    /// Ends the last file.
+    /// Ends the last file. One that could not be written has its end already.
     ///
     /// # Errors
     /// It cannot be written any more.
@@ -171,7 +171,9 @@ impl Series {
 }
 
 fn end(mut file: McapFile, before: &mut Written) -> Result<(), WriteError> {
-    file.flush()?;
+    if !file.is_broken() {
+        file.flush()?;
+    }
     before.files.push(file.path().to_owned());
     before.messages += file.messages();
     before.bytes += file.finish()?;

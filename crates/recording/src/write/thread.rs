@@ -97,6 +97,9 @@ fn write(
         if let Err(error) = written {
             told.failed = Some(error.clone());
             queue.close();
+            drop(told);
+            // If it was the next file that could not be made, this one is whole. The first error counts.
+            let _ = series.finish();
             return Err(error);
         }
         drop(told);
