@@ -225,7 +225,7 @@ def test_a_folder_that_is_removed_is_said_at_once(drives, record, tmp_path):
 
 @contextmanager
 def closed_output(motorlink, *words):
-    """The program with an output that nobody reads any more."""
+    """The program with a closed output."""
     process = subprocess.Popen(
         [motorlink, *map(str, words)],
         stdout=subprocess.PIPE,
@@ -320,5 +320,7 @@ def test_a_scenario_is_recorded_and_has_the_same_bytes_each_time(run, tmp_path):
     rows, names = file.of("/rmd/motor1/signals"), lines[0].split(",")
     assert len(rows) == len(lines) - 1 == len(file.of("/joint_states"))
     column = names.index("rmd1.speed_dps")
-    assert [row.speed_dps for row in rows] == [float(line.split(",")[column]) for line in lines[1:]]
+    # The table has the digits of a float of 32 bits.
+    speeds = [numpy.float32(line.split(",")[column]) for line in lines[1:]]
+    assert [numpy.float32(row.speed_dps) for row in rows] == speeds
     assert "commanded" in file.events()

@@ -13,8 +13,8 @@ use motorlink_telemetry::signal::UnknownSignal;
 /// Why nothing is recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// There is no port.
-    #[error("there is no port to record")]
+    /// No port was given.
+    #[error("no port to record was given")]
     NoPort,
     /// The file.
     #[error(transparent)]

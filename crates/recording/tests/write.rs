@@ -61,7 +61,7 @@ fn begin(output: Output) -> Series {
     series
 }
 
-/// The numbers of the messages of a file, however it ends.
+/// The numbers of the messages of a file that may end anywhere.
 fn messages(bytes: &[u8]) -> Vec<u64> {
     let options = LinearReaderOptions::default().with_skip_end_magic(true);
     let mut reader = LinearReader::new_with_options(options);

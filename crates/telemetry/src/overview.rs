@@ -1,4 +1,4 @@
-//! The signals that say most about a motor, and its state and faults in words.
+//! The most important signals of a motor, and texts of its state and faults.
 
 use motorlink_proto::rmd::Errors;
 use motorlink_proto::st::{Flags, RegisterId, Status};

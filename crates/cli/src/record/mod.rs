@@ -29,7 +29,7 @@ const SHOWN: Duration = Duration::from_secs(1);
 const LOOKED: Duration = Duration::from_millis(100);
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    // Nobody who does not read the output stops the recording.
+    // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::take_over();
     let config = config(args)?;

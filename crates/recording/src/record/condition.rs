@@ -1,4 +1,4 @@
-//! The condition of a motor in words, for diagnostics.
+//! The condition of a motor, for diagnostics.
 
 use motorlink_telemetry::overview::{self, Overview};
 use motorlink_telemetry::sample::Sample;

@@ -14,7 +14,7 @@ use super::wall::{Anchor, wall_now};
 use crate::schema::{Direction, Frame, FrameResult, Time};
 use crate::write::{Queue, Weighed};
 
-/// The memory for what a tap has seen and nobody has taken.
+/// The memory for what a tap has seen, until it is taken.
 const MEMORY: usize = 8 << 20;
 
 /// What a tap has seen.
@@ -89,7 +89,7 @@ impl Taps {
         self.seen.take().items.into_iter()
     }
 
-    /// How much was lost because nobody took it.
+    /// How much was lost, because it was taken too late.
     pub(super) fn lost(&self) -> u64 {
         self.seen.lost()
     }

@@ -66,7 +66,7 @@ pub struct Progress {
     pub is_over: bool,
 }
 
-/// A recording that goes on. It ends when this is dropped.
+/// A recording in progress. It ends when this is dropped.
 #[derive(Debug)]
 pub struct Recorder {
     shared: Arc<Shared>,
@@ -84,7 +84,7 @@ struct Shared {
 struct Recorded {
     track: Track,
     runner: Runner,
-    /// Rates that the engine has given and nobody has taken.
+    /// Rates of the engine, until they are taken.
     rates: Arc<Mutex<Option<Vec<Rate>>>>,
 }
 

@@ -36,7 +36,7 @@ impl Anchor {
     }
 }
 
-/// The time of the day. It is read once: when somebody sets the clock of the machine, it goes on.
+/// The time of the day. The clock of the machine is read once, so the time never jumps.
 pub fn wall_now() -> Time {
     static ANCHOR: OnceLock<(Clock, u64)> = OnceLock::new();
     let (clock, began) = ANCHOR.get_or_init(|| {

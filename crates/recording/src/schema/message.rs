@@ -26,7 +26,7 @@ pub trait Message: Sized {
     /// The message that this CDR is.
     ///
     /// # Errors
-    /// It is no message of this type.
+    /// It is a message of another type.
     fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
         Self::read(&mut Decoder::new(bytes)?)
     }
@@ -136,7 +136,7 @@ impl Message for JointState {
     }
 }
 
-/// `diagnostic_msgs/msg/DiagnosticArray`: the condition of motors in words.
+/// `diagnostic_msgs/msg/DiagnosticArray`: the condition of motors.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DiagnosticArray {
     /// When this was so.
@@ -152,7 +152,7 @@ pub struct DiagnosticStatus {
     pub level: Level,
     /// Label and motor: `st0/motor1`.
     pub name: String,
-    /// State and faults in words.
+    /// State and faults.
     pub message: String,
     /// The port.
     pub hardware_id: String,
@@ -361,7 +361,7 @@ pub enum Severity {
     Warn = 30,
     /// A motor may not do what was commanded.
     Error = 40,
-    /// Nothing goes on.
+    /// The program cannot continue.
     Fatal = 50,
 }
 

@@ -110,7 +110,7 @@ impl SignalsType {
     /// The row that this CDR is.
     ///
     /// # Errors
-    /// It is no message of this type.
+    /// It is a message of another type.
     pub fn decode(&self, bytes: &[u8]) -> Result<SignalsRow, Malformed> {
         let mut from = Decoder::new(bytes)?;
         Ok(SignalsRow {

@@ -1,4 +1,4 @@
-//! What waits for the disk, in bounded memory. Nobody who adds to it waits.
+//! What waits for the disk, in bounded memory. Adding to it never waits.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -75,7 +75,7 @@ impl Drop for Writer {
     fn drop(&mut self) {
         self.queue.close();
         if let Some(thread) = self.thread.take() {
-            // Nobody is there to be told.
+            // A drop has no result.
             let _ = thread.join();
         }
     }

@@ -3,7 +3,7 @@
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`port`] is a line of a share as a port.
-//! [`words`] has the events of an engine in words.
+//! [`words`] makes sentences of the events of an engine.
 
 pub mod data;
 pub mod frame;

@@ -1,4 +1,4 @@
-//! The events of an engine in words, for programs and people.
+//! Makes sentences of the events of an engine.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ pub enum Speaks {
     Rmd,
 }
 
-/// An event in words.
+/// An event with its sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Told {
     /// What happened.
@@ -60,7 +60,7 @@ impl Words {
         }
     }
 
-    /// The event in words. Reads and confirmations are none.
+    /// The event with its sentence. Reads and confirmations are none.
     pub fn of(&mut self, speaks: Speaks, what: &What) -> Option<Told> {
         let event = |event, motor: Option<Motor>, by: Option<&Arc<str>>, message: String| {
             Some(Told { event, motor, by: by.cloned(), since: None, message })
