@@ -43,7 +43,7 @@ def examples(text):
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     # The program itself, and commands without subcommands.
     pages = helps(run, command) if command else [
-        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",), ("watch",))
+        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",), ("watch",), ("record",))
     ]
     lines = {line: None for _, text in pages for line in examples(text)}
     assert len(lines) >= 2
@@ -59,7 +59,7 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
             if asks_a_share(command[1]):
                 shell.run(*next(commands("motorlink share -p ./st0 -p slcan:./can0 --at unix:./share &")))
             shell.run(*command)
-        for made in ("run.csv", "run.svg", "motorlink.bash"):
+        for made in ("run.csv", "run.svg", "run.mcap", "motorlink.bash"):
             (tmp_path / made).unlink(missing_ok=True)
 
 
