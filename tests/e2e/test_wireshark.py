@@ -4,6 +4,7 @@ in the same frames (crates/spec/examples/wireshark_frames.rs).
 
 import json
 import math
+import os
 import random
 import shutil
 import subprocess
@@ -38,9 +39,8 @@ def tshark(dissector, tmp_path_factory):
         command = ["tshark", "-n", "-r", path, "-X", f"lua_script:{dissector}", *arguments]
         for preference in preferences:
             command += ["-o", preference]
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=300, env={"HOME": str(home), "PATH": "/usr/bin:/bin"}
-        )
+        own = {"HOME": str(home), "XDG_CONFIG_HOME": str(home), "XDG_DATA_HOME": str(home)}
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, **own})
         assert done.returncode == 0 and "lua" not in done.stderr.lower(), done.stderr
         assert "Lua Error" not in done.stdout and "_ws.lua.error" not in done.stdout
         path.unlink()
@@ -76,6 +76,8 @@ def flat(pairs, fields=None):
 def sets(motorlink):
     """The frames of the example, by set."""
     frames = Path(motorlink).parent / "examples/wireshark_frames"
+    if not frames.exists():
+        pytest.fail(f"{frames} is not built: `cargo build -p motorlink-spec --example wireshark_frames`")
     done = subprocess.run([frames], capture_output=True, text=True, check=True, timeout=60)
     sets = defaultdict(list)
     for line in done.stdout.splitlines():
@@ -283,7 +285,8 @@ def test_damage_is_shown_where_it_is(packets, tshark):
     capture.serial(SPEED_1500[:4] + b"\x06" + SPEED_1500[5:], False)
     capture.serial(b"\x10" + SPEED_1500[:3] + SPEED_1500, False)
     capture.serial(b"\x00\x00\x00", True)
-    noise, bad_request, bad_length, bad_reply, twice, zeros = packets(capture, "-2")[1:]
+    capture.serial(b"\x02\x04" + GET_SPEED + GET_SPEED, True)
+    noise, bad_request, bad_length, bad_reply, twice, zeros, swallowed = packets(capture, "-2")[1:]
     assert noise["motorlink.st.stray"] == ["55:03"] and noise["motorlink.st.value"] == ["1500"]
     assert noise["motorlink.st.response_to"] == ["1"]
     assert bad_request["motorlink.st.bad_checksum"] == [""] and bad_request["motorlink.st.checksum.status"] == ["0"]
@@ -294,6 +297,8 @@ def test_damage_is_shown_where_it_is(packets, tshark):
     assert twice["motorlink.st.stray"] == ["10:f0:04:dc"]
     assert twice["motorlink.st.value"] == ["1500"] and twice["motorlink.st.response_to"] == ["4"]
     assert zeros["motorlink.st.unknown_code"] == [""] and zeros["motorlink.st.checksum.status"] == ["1"]
+    # A wrong length does not swallow the frames behind it.
+    assert swallowed["motorlink.st.stray"] == ["02:04"] and swallowed["motorlink.st.register"] == ["0x1e"] * 2
     info = tshark(capture, "-T", "fields", "-e", "_ws.col.Info").splitlines()
     assert info[1] == "< 2 bytes that are no frame | < ACK 1500 rpm"
     assert info[2] == "> bad checksum 0x00 instead of 0x21"

@@ -27,6 +27,11 @@ const CODE: &[&[&str]] = &[
 ];
 
 /// The dissector, as a Lua script for Wireshark 4.0 or newer.
+///
+/// ```
+/// let script = motorlink_spec::wireshark::wireshark();
+/// assert!(script.contains("name = \"SPEED_MEAS\""));
+/// ```
 pub fn wireshark() -> String {
     let mut script = String::from(concat!(
         "-- Wireshark dissectors for ST's Motor Control Protocol and RMD motors on CAN, of Motorlink ",

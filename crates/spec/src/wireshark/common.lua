@@ -50,12 +50,14 @@ local function direction_of(sent, preference)
     return sent and REQUEST or REPLY
 end
 
--- Whether the machine that captured the frame sent it.
+-- Whether the machine that captured the frame sent it. Wireshark's numbers are those of its C code; not
+-- every version has names for them in Lua.
+local DIRECTION_SENT, DIRECTION_RECEIVED = 0, 1
 local function was_sent(pinfo)
-    if pinfo.p2p_dir == P2P_DIR_SENT then
+    if pinfo.p2p_dir == DIRECTION_SENT then
         return true
     end
-    if pinfo.p2p_dir == P2P_DIR_RECV then
+    if pinfo.p2p_dir == DIRECTION_RECEIVED then
         return false
     end
     return nil

@@ -277,4 +277,4 @@ end
 
 st.dissector = dissect
 DissectorTable.get("rtacser.data"):add_for_decode_as(st)
-DissectorTable.get("wtap_encap"):add(wtap.RTAC_SERIAL, rtac)
+DissectorTable.get("wtap_encap"):add(wtap_encaps.RTAC_SERIAL, rtac)

@@ -113,7 +113,7 @@ local function add_value(tree, range, id, profile)
     local value, digits = number_of(range, type)
     if not register then
         tree:add(own.digits, range, Int64.new(digits))
-        return tostring(digits)
+        return string.format("%d", digits)
     end
     local scale = register.scales[profile]
     -- Scales are parts of ten: digits / 10 is exact to the last place, digits * 0.1 is not.
