@@ -207,6 +207,9 @@ def test_every_frame_of_st_has_the_values_that_the_core_reads(packets, tshark, s
     out = tshark(on_line(frames), "-T", "fields", "-e", "_ws.col.Info", preferences=preferences)
     for frame, info in zip(frames, out.splitlines()):
         assert frame["info"] is None or info == frame["info"], frame
+        name, version = (frame["fields"].get(f"motorlink.st.{key}") for key in ("name", "version"))
+        if name is not None and version is not None:
+            assert info == f"< ACK {name} {version}", frame
 
 
 @pytest.mark.parametrize("profile", PROFILES)
