@@ -350,6 +350,8 @@ def test_what_cannot_be_known_is_not_known(packets, tshark):
         "?<><": [(0, "<", ASK), (1, "<", STATUS), (10, "<", ASK), (11, "<", STATUS)],
         "?<>< ": [(0, "<", ASK), (1, ">", STATUS), (10, "<", off), (11, ">", off)],
     }
+    # A motor's capture without a certain reply: what it sends answers a request.
+    cases["?><"] = [(0, "<", off), (60, "<", off), (61, ">", off)]
     for expected, frames in cases.items():
         assert types(packets, frames) == expected.strip(), frames
     patient = [(0, "-", ASK), (1, "-", STATUS), (10, "-", ASK), (80, "-", ASK)]
