@@ -1,5 +1,5 @@
 """The dissector that `motorlink spec wireshark` writes, in tshark, against what `motorlink-proto` reads
-in the same frames (crates/spec/examples/wireshark_frames.rs).
+in the same frames (crates/spec/examples/wireshark_frames).
 """
 
 import json
