@@ -1,6 +1,6 @@
 //! ST's protocol: frames, both ends, and the simulated drive of the slave.
 
-use motorlink::st::Transcript;
+use motorlink_capture::st::Transcript;
 use motorlink_proto::st::*;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{StDrive, StMotor, StStation};

@@ -36,6 +36,11 @@ RMD = [
 ]
 #: What a running share is asked for.
 SHARE = ["stop", "latch", "release"]
+#: Captures, in hexadecimal.
+DECODE = {
+    "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 09", "29 01 02 2c"],
+    "rmd": ["141#9A1900F000000009", "141#9A00000000000000", "280#640000009CFFD007", "7FF#00", "00000141#R"],
+}
 #: What reads or writes a file of settings.
 FILES = ["dump", "dump FILE --overwrite", "diff FILE", "restore FILE", "restore FILE --dry-run"]
 SCAN = "`motorlink rmd -p sim: scan` lists the motors that answer"
@@ -82,7 +87,18 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "spec", "completions", "man"}
     assert subcommands(run, "share") == set(SHARE)
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "conformance"} | others
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "conformance", "decode"} | others
+
+
+@pytest.mark.parametrize("protocol", DECODE)
+def test_decode_tells_what_was_captured(checked, run, protocol):
+    assert subcommands(run, "decode") == set(DECODE)
+    for words in DECODE[protocol]:
+        out, err = checked("decode", protocol, *words.split())
+        assert out and not err
+    out, err = checked("decode", protocol, stdin="(1.0) can0 20000004#00\n(1.0) can0 142##100\nhello\n", code=1)
+    assert len(out) == 3 and "damage" in out[2]
+    assert "frame" in err[0]["note"] and err[1]["error"]["kind"] == "damaged"
 
 
 @pytest.mark.parametrize("command", ST)

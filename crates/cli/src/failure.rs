@@ -44,6 +44,8 @@ pub enum Kind {
     Refused,
     /// The motor has other settings than a file.
     Differs,
+    /// A part of a capture is damaged or lost.
+    Damaged,
     /// The command does not make sense.
     Usage,
     /// The connection failed.
@@ -57,7 +59,7 @@ pub enum Kind {
 impl Kind {
     fn exit_code(self) -> u8 {
         match self {
-            Kind::Refused | Kind::Differs => 1,
+            Kind::Refused | Kind::Differs | Kind::Damaged => 1,
             Kind::Usage => 2,
             Kind::Link | Kind::Silent | Kind::Output => 3,
         }
@@ -67,6 +69,7 @@ impl Kind {
         match self {
             Kind::Refused => "refused",
             Kind::Differs => "differs",
+            Kind::Damaged => "damaged",
             Kind::Usage => "usage",
             Kind::Link => "link",
             Kind::Silent => "silent",
@@ -83,6 +86,11 @@ impl Failure {
     /// A difference between a motor and a file.
     pub fn differs(message: impl Into<String>) -> Self {
         Problem::new(Kind::Differs, message).into()
+    }
+
+    /// Damage in a capture.
+    pub fn damaged(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Damaged, message).into()
     }
 
     pub fn usage(message: impl Into<String>) -> Self {

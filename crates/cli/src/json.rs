@@ -313,7 +313,7 @@ fn number(value: f64, decimals: u8) -> Value {
 }
 
 /// The fewest digits that say which `f32` it is.
-fn shortest(value: f32) -> Value {
+pub fn shortest(value: f32) -> Value {
     json!(value.to_string().parse::<f64>().ok())
 }
 

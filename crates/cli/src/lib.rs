@@ -7,6 +7,7 @@ mod arrival;
 mod columns;
 mod conformance;
 mod connection;
+mod decode;
 mod demo;
 mod failure;
 mod guard;
@@ -73,6 +74,8 @@ enum Command {
     Watch(watch::Args),
     /// Record motors into an MCAP file: signals, frames, events, settings
     Record(record::Args),
+    /// Decode captures: candump, asc, pcapng, hexadecimal text
+    Decode(decode::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
@@ -91,7 +94,7 @@ enum Command {
 }
 
 /// Runs a command line, which begins with the program's name. Returns the exit code: 0 done, 1 the
-/// drive refused, 2 usage, 3 the line failed, 130 interrupted. `program` starts this command in a
+/// drive refused or a capture is damaged, 2 usage, 3 the line failed, 130 interrupted. `program` starts this command in a
 /// process of its own.
 ///
 /// It takes the process over as the command does: SIGINT, SIGTERM and SIGHUP are its own from now on,
@@ -130,6 +133,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Rmd(args) => rmd::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(&args),
+        Command::Decode(args) => decode::run(args),
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

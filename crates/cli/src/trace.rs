@@ -5,7 +5,8 @@ use std::time::Duration;
 use motorlink::can::CanFrame;
 use motorlink::port::Direction;
 use motorlink::rmd;
-use motorlink::st::{Profile, Transcript};
+use motorlink::st::Profile;
+use motorlink_capture::st::Transcript;
 
 use crate::output::{hex, print_message};
 

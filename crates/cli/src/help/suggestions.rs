@@ -11,6 +11,7 @@ const HARMLESS: &[&str] = &[
     "completions",
     "conformance",
     "dbc",
+    "decode",
     "demo",
     "diff",
     "dump",

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use motorlink::st::{
     ControlMode, Effect, Error, Flags, Frame, MAX_FRAME, NotStarted, Profile, Ramp, Reading,
-    RegisterId, Status, Transcript,
+    RegisterId, Status,
 };
+use motorlink_capture::st::Transcript;
 
 use super::session::Session;
 use crate::failure::Failure;

@@ -2,7 +2,7 @@
 
 use motorlink::Clock;
 use motorlink::port::ByteLink;
-use motorlink::st::Transcript;
+use motorlink_capture::st::Transcript;
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
     Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber, Parse,

@@ -23,7 +23,6 @@ mod options;
 mod scan;
 mod session;
 mod stop_on_drop;
-mod transcript;
 
 pub use motorlink_proto::st::{
     ARRIVAL_TOLERANCE_RAD, AbortReason, ArrivalSampler, ArrivalWatch, Command, Confirmation,
@@ -46,4 +45,3 @@ pub use options::Options;
 pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan_baud};
 pub use session::Exchanged;
 pub use stop_on_drop::{StopOnDrop, Stopped};
-pub use transcript::Transcript;

@@ -1,7 +1,7 @@
 //! Frames as text, for logs. A frame alone does not show its sender: request and reply have the
 //! same identifier, and for some commands the same bytes.
 
-use super::command::Code;
+use super::command::{Code, CommandInfo};
 use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, TORQUE4_ID};
 use super::payload::{Field, Payload};
@@ -17,63 +17,153 @@ pub enum Direction {
     DriveToHost,
 }
 
+/// Heading of the four torques (chapter 4), which have no code.
+const TORQUE4: &str = "Multiple motor torque closed loop control";
+
 /// A frame that displays itself with names and physical units.
 #[derive(Debug, Clone, Copy)]
 pub struct Described {
     frame: CanFrame,
-    direction: Direction,
+    direction: Option<Direction>,
 }
 
-/// Describes a frame as text.
-pub const fn describe(frame: CanFrame, direction: Direction) -> Described {
-    Described { frame, direction }
+/// What a frame is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Subject {
+    /// A request to this motor, or its reply.
+    Motor(MotorId, Code),
+    /// The torque command to motors 1 to 4.
+    Torque4,
+    /// A reply of a motor with a similar protocol.
+    Dialect(Dialect, MotorId),
+    /// A standard data frame of 8 bytes that is none of this protocol.
+    Foreign,
+    /// Not a standard data frame of 8 bytes.
+    NotData,
+}
+
+/// Describes a frame as text. `None` is a frame whose direction is not known.
+pub fn describe(frame: CanFrame, direction: impl Into<Option<Direction>>) -> Described {
+    Described { frame, direction: direction.into() }
+}
+
+impl Described {
+    /// The frame.
+    pub const fn frame(&self) -> &CanFrame {
+        &self.frame
+    }
+
+    /// The direction; `None` if it is not known.
+    pub const fn direction(&self) -> Option<Direction> {
+        self.direction
+    }
+
+    /// What the frame is about.
+    pub fn subject(&self) -> Subject {
+        let Some((id, data)) = self.frame.eight_bytes() else { return Subject::NotData };
+        if id == TORQUE4_ID {
+            return Subject::Torque4;
+        }
+        if let Some(motor) = MotorId::from_can_id(u32::from(id)) {
+            let [code, ..] = *data;
+            return Subject::Motor(motor, Code::from(code));
+        }
+        match Dialect::from_can_id(u32::from(id)) {
+            Some((dialect, motor)) => Subject::Dialect(dialect, motor),
+            None => Subject::Foreign,
+        }
+    }
+
+    /// The values of the frame. None are known while the direction is not, unless request and reply
+    /// have the same values.
+    pub fn fields(&self) -> &'static [Field] {
+        let row = match self.subject() {
+            Subject::Torque4 => return SetTorque4::FIELDS,
+            Subject::Motor(_, code) => code.info(),
+            _ => None,
+        };
+        let Some(row) = row else { return &[] };
+        match self.direction {
+            Some(Direction::HostToDrive) => row.request,
+            Some(Direction::DriveToHost) => row.reply,
+            None if row.echo => row.request,
+            None => &[],
+        }
+    }
 }
 
 impl fmt::Display for Described {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some((id, data)) = self.frame.eight_bytes() else {
-            return write!(f, "{:#05x}: not a standard data frame of 8 bytes", self.frame.id());
-        };
-        if id == TORQUE4_ID {
-            f.write_str("motors 1 to 4: Multiple motor torque closed loop control")?;
-            return fields(SetTorque4::FIELDS, data, f);
+        let (id, data) = (self.frame.id(), self.frame.padded_data());
+        match self.subject() {
+            Subject::NotData => write!(f, "{id:#05x}: not a standard data frame of 8 bytes"),
+            Subject::Torque4 => {
+                write!(f, "motors 1 to 4: {TORQUE4}")?;
+                fields(SetTorque4::FIELDS, &data, ":", f)
+            }
+            Subject::Motor(motor, code) => self.exchange(motor, code, &data, f),
+            Subject::Dialect(dialect, motor) => {
+                write!(f, "reply of a {dialect} motor, ID {motor}")?;
+                bytes(&data, f)
+            }
+            Subject::Foreign => {
+                write!(f, "{id:#05x}: not a frame of this protocol")?;
+                bytes(&data, f)
+            }
         }
-        if let Some(motor) = MotorId::from_can_id(u32::from(id)) {
-            return self.exchange(motor, data, f);
-        }
-        match Dialect::from_can_id(u32::from(id)) {
-            Some((dialect, motor)) => write!(f, "reply of a {dialect} motor, ID {motor}")?,
-            None => write!(f, "{id:#05x}: not a frame of this protocol")?,
-        }
-        bytes(data, f)
     }
 }
 
 impl Described {
-    fn exchange(&self, motor: MotorId, data: &[u8; 8], f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn exchange(
+        &self,
+        motor: MotorId,
+        code: Code,
+        data: &[u8; 8],
+        f: &mut fmt::Formatter<'_>,
+    ) -> fmt::Result {
         let arrow = match self.direction {
-            Direction::HostToDrive => '>',
-            Direction::DriveToHost => '<',
+            Some(Direction::HostToDrive) => '>',
+            Some(Direction::DriveToHost) => '<',
+            None => '?',
         };
-        let [code, ..] = *data;
-        write!(f, "motor {motor} {arrow} {code:#04X}")?;
-        let Some(row) = Code::from(code).info() else {
+        write!(f, "motor {motor} {arrow} {:#04X}", code.number())?;
+        let Some(row) = code.info() else {
             f.write_str(" not a command of V1.62")?;
             return bytes(data, f);
         };
         write!(f, " {}", row.code)?;
-        match self.direction {
-            Direction::HostToDrive => fields(row.request, data, f),
-            Direction::DriveToHost => fields(row.reply, data, f),
+        if self.direction.is_some() || row.echo {
+            return fields(self.fields(), data, ":", f);
         }
+        f.write_str(": request")?;
+        fields(row.request, data, "", f)?;
+        f.write_str(", or reply")?;
+        fields(row.reply, data, "", f)
     }
 }
 
-fn fields(fields: &[Field], data: &[u8; 8], f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let mut separator = ':';
+impl CommandInfo {
+    /// Whether `data` may be this request: the bytes that it does not use are 0. If not, `data` is a
+    /// reply.
+    pub fn may_be_request(&self, data: &[u8; 8]) -> bool {
+        let used = self.request.iter().fold(0xFF, |used, field| used | field.mask());
+        u64::from_le_bytes(*data) & !used == 0
+    }
+}
+
+/// The values behind `before`, with commas between them.
+fn fields(
+    fields: &[Field],
+    data: &[u8; 8],
+    before: &str,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    let mut separator = before;
     for field in fields {
         write!(f, "{separator} {} {}", field.name, field.shown(data))?;
-        separator = ',';
+        separator = ",";
     }
     Ok(())
 }
@@ -135,6 +225,29 @@ mod tests {
             "motors 1 to 4: Multiple motor torque closed loop control: iq_1 1.600 A, \
              iq_2 -1.600 A, iq_3 0.000 A, iq_4 32.000 A"
         );
+    }
+
+    #[test]
+    fn a_frame_without_a_direction_shows_both_meanings() {
+        let either = |data| describe(CanFrame::new(0x141, data), None).to_string();
+        assert_eq!(
+            either([0xA2, 0, 0, 0, 0x10, 0x27, 0, 0]),
+            "motor 1 ? 0xA2 Speed closed-loop command: request speed 100.00 °/s, or reply \
+             temperature 0 °C, iq 0.000 A, speed 10000 °/s, encoder 0"
+        );
+        assert_eq!(
+            either([0x94, 0, 0, 0, 0, 0, 0, 0]),
+            "motor 1 ? 0x94 Read single circle angle command: request, or reply angle 0.00 °"
+        );
+        assert_eq!(either([0x80, 0, 0, 0, 0, 0, 0, 0]), "motor 1 ? 0x80 Motor off command");
+    }
+
+    #[test]
+    fn a_byte_that_no_request_has_shows_a_reply() {
+        let may_be = |data: [u8; 8]| Code::from(data[0]).info().unwrap().may_be_request(&data);
+        assert!(may_be([0x9A, 0, 0, 0, 0, 0, 0, 0]) && !may_be([0x9A, 25, 0, 0, 0, 0, 0, 0]));
+        assert!(may_be([0xA2, 0, 0, 0, 1, 2, 3, 4]) && !may_be([0xA2, 25, 0, 0, 1, 2, 3, 4]));
+        assert!(may_be([0xA5, 1, 0, 0, 1, 2, 0, 0]) && !may_be([0xA5, 1, 0, 0, 1, 2, 3, 4]));
     }
 
     #[test]

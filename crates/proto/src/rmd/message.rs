@@ -48,6 +48,10 @@ pub struct SetTorque4(
 );
 
 impl SetTorque4 {
+    /// The name from which the names in all languages are derived, as
+    /// [`CommandInfo::stem`](super::CommandInfo::stem).
+    pub const STEM: &str = "set_torque4";
+
     /// The eight bytes of the frame.
     pub fn encode(&self) -> [u8; 8] {
         self.pack().to_le_bytes()

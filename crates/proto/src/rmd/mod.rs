@@ -59,7 +59,7 @@ pub use arrival::{
     NotArrived,
 };
 pub use command::*;
-pub use describe::{Described, Direction, describe};
+pub use describe::{Described, Direction, Subject, describe};
 pub use drive::{Drive, DriveConfig, Ignored, Mode, MotorControl, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
 pub use gear::{GearRatio, InvalidGearRatio};

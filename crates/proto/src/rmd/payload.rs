@@ -70,6 +70,14 @@ impl Field {
         if self.signed { (top as i64).wrapping_shr(down) } else { top.wrapping_shr(down) as i64 }
     }
 
+    /// The bits of this value in the little-endian word of a frame.
+    pub const fn mask(&self) -> u64 {
+        let bits = (self.len as u32).wrapping_mul(8);
+        u64::MAX
+            .wrapping_shr(64u32.wrapping_sub(bits))
+            .wrapping_shl((self.offset as u32).wrapping_mul(8))
+    }
+
     /// The name followed by the unit, for numbers without a unit of their own: `speed_dps`.
     pub fn name_with_unit(&self) -> impl fmt::Display + '_ {
         Named(self)

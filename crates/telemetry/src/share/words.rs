@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use motorlink::st::Transcript;
+use motorlink_capture::st::Transcript;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Direction, describe};
 use motorlink_proto::st::{Frame, MAX_FRAME, Profile};

@@ -1,0 +1,155 @@
+//! Files of Wireshark: CAN as LINKTYPE_CAN_SOCKETCAN, serial lines as LINKTYPE_RTAC_SERIAL.
+
+mod blocks;
+mod packet;
+mod writer;
+
+pub use writer::Writer;
+
+use std::io::{self, Read};
+
+use crate::captured::{Damage, Direction, Stamp, Wire};
+use blocks::{Block, Blocks, BrokenFile};
+
+/// The packets of a file.
+pub(crate) struct Packets<R> {
+    blocks: Blocks<R>,
+    interfaces: Vec<Interface>,
+    /// A frame behind a loss that was reported first.
+    waiting: Option<Packet>,
+    is_at_end: bool,
+}
+
+/// An interface of the file.
+#[derive(Debug, Clone)]
+struct Interface {
+    link_type: u16,
+    name: Option<String>,
+    resolution: Resolution,
+    offset_s: i64,
+}
+
+/// Units of a time.
+#[derive(Debug, Clone, Copy)]
+enum Resolution {
+    /// 10 to the power of this number, a second.
+    Decimal(u8),
+    /// 2 to the power of this number, a second.
+    Binary(u8),
+}
+
+/// A packet that says something.
+#[derive(Debug)]
+pub(crate) struct Packet {
+    pub(crate) number: u64,
+    pub(crate) time: Option<Stamp>,
+    pub(crate) channel: Option<String>,
+    pub(crate) direction: Option<Direction>,
+    pub(crate) wire: Wire,
+}
+
+impl<R: Read> Packets<R> {
+    pub(crate) fn new(input: R) -> Self {
+        let blocks = Blocks::new(input);
+        Packets { blocks, interfaces: Vec::new(), waiting: None, is_at_end: false }
+    }
+
+    pub(crate) fn next(&mut self) -> io::Result<Option<Packet>> {
+        if let Some(packet) = self.waiting.take() {
+            return Ok(Some(packet));
+        }
+        while !self.is_at_end {
+            let block = match self.blocks.next() {
+                Ok(Some(block)) => block,
+                Ok(None) => break,
+                Err(BrokenFile::Io(error)) => return Err(error),
+                Err(BrokenFile::Content(why)) => {
+                    self.is_at_end = true;
+                    let number = self.blocks.packets + 1;
+                    let wire = Wire::Damage(Damage::End(why));
+                    return Ok(Some(Packet {
+                        number,
+                        time: None,
+                        channel: None,
+                        direction: None,
+                        wire,
+                    }));
+                }
+            };
+            match block {
+                Block::Section => self.interfaces.clear(),
+                Block::Interface { link_type, options } => {
+                    self.interfaces.push(Interface::new(link_type, options));
+                }
+                Block::Packet { number, interface, units, data, original, direction, dropped } => {
+                    let Some(interface) = self.interfaces.get(interface as usize) else {
+                        let wire = Wire::Damage(Damage::Packet(
+                            "a packet of an interface that the file does not have",
+                        ));
+                        return Ok(Some(Packet {
+                            number,
+                            time: None,
+                            channel: None,
+                            direction: None,
+                            wire,
+                        }));
+                    };
+                    let time = units.and_then(|units| interface.time(units));
+                    let (wire, seen) = packet::parse(interface.link_type, data, original);
+                    let channel = interface.name.clone();
+                    let direction = direction.or(seen);
+                    let packet = Packet { number, time, channel: channel.clone(), direction, wire };
+                    if dropped == 0 {
+                        return Ok(Some(packet));
+                    }
+                    self.waiting = Some(packet);
+                    let wire = Wire::Damage(Damage::Dropped(dropped));
+                    return Ok(Some(Packet { number, time, channel, direction: None, wire }));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Interface {
+    fn new(link_type: u16, options: blocks::Options<'_>) -> Self {
+        const NAME: u16 = 2;
+        const RESOLUTION: u16 = 9;
+        const OFFSET: u16 = 14;
+        let mut interface =
+            Interface { link_type, name: None, resolution: Resolution::Decimal(6), offset_s: 0 };
+        for (code, value) in options {
+            match (code, value) {
+                (NAME, name) => interface.name = Some(String::from_utf8_lossy(name).into_owned()),
+                (RESOLUTION, [power, ..]) => {
+                    interface.resolution = match power & 0x80 {
+                        0 => Resolution::Decimal(*power),
+                        _ => Resolution::Binary(power & 0x7F),
+                    };
+                }
+                (OFFSET, value) => {
+                    if let Some(bytes) = value.first_chunk() {
+                        interface.offset_s = options.order().i64(*bytes);
+                    }
+                }
+                _ => {}
+            }
+        }
+        interface
+    }
+
+    fn time(&self, units: u64) -> Option<Stamp> {
+        const NS: i128 = 1_000_000_000;
+        let units = i128::from(units);
+        let ns = match self.resolution {
+            Resolution::Decimal(power) => match 10i128.checked_pow(power.into()) {
+                Some(second) => units * NS / second,
+                None => 0,
+            },
+            Resolution::Binary(power) => (units * NS).checked_shr(power.into()).unwrap_or(0),
+        };
+        let ns = i64::try_from(ns + i128::from(self.offset_s) * NS).ok()?;
+        Some(crate::candump::stamp(ns))
+    }
+}

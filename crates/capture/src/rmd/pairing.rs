@@ -1,0 +1,267 @@
+//! Requests and replies of a motor have the same identifier. This module tells them apart.
+//!
+//! A frame is a reply if it has a byte that no request has. Otherwise it is a reply if it follows a
+//! request of the same motor with the same code, at most [`DEFAULT_TIMEOUT`] later. Otherwise it is
+//! a request, if the exchange before it is known to be over. Else its direction is not known.
+
+use motorlink_proto::rmd::{Code, DEFAULT_TIMEOUT, Direction, MotorId, MotorSet};
+
+use crate::captured::{self, Captured, Stamp};
+
+/// The direction of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Way {
+    /// Request or reply; `None` if it cannot be known.
+    pub direction: Option<Direction>,
+    /// From what it is known.
+    pub by: KnownBy,
+}
+
+/// From what the direction of a frame is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KnownBy {
+    /// The frame itself.
+    Frame,
+    /// The capture has it.
+    Log,
+    /// The frames before it.
+    Pairing,
+    /// The caller said it.
+    Caller,
+    /// It is not known.
+    Nothing,
+}
+
+impl KnownBy {
+    /// A word for programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            KnownBy::Frame => "frame",
+            KnownBy::Log => "log",
+            KnownBy::Pairing => "pairing",
+            KnownBy::Caller => "option",
+            KnownBy::Nothing => "nothing",
+        }
+    }
+}
+
+/// The time in which a motor replies.
+const REPLY_WITHIN_NS: i64 = DEFAULT_TIMEOUT.0 as i64 * 1_000;
+
+/// The exchanges on a bus.
+#[derive(Debug, Default)]
+pub(super) struct Bus {
+    motors: [Motor; MotorId::COUNT],
+    sender: Sender,
+}
+
+/// Who is behind frames that the capturing machine sent.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+enum Sender {
+    #[default]
+    Unknown,
+    Host,
+    Drive,
+}
+
+#[derive(Debug, Default, Clone, Copy)]
+struct Motor {
+    /// Whether every frame so far was told apart.
+    is_synced: bool,
+    open: Option<Open>,
+    last: Option<Stamp>,
+}
+
+/// A request without a reply so far.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    code: Code,
+    time: Option<Stamp>,
+}
+
+impl Open {
+    /// Whether a frame with this code and time may be the reply.
+    fn is_answered_by(&self, code: Code, time: Option<Stamp>) -> bool {
+        // The reply to 0x9B may have the code 0x9A (docs/SPEC-NOTES.md R1).
+        let is_same =
+            code == self.code || (self.code, code) == (Code::ClearErrors, Code::ReadStatus);
+        is_same && !is_late(self.time, time)
+    }
+}
+
+fn is_late(then: Option<Stamp>, now: Option<Stamp>) -> bool {
+    let elapsed = then.zip(now).and_then(|(then, now)| now.since(then));
+    elapsed.is_some_and(|ns| ns > REPLY_WITHIN_NS)
+}
+
+impl Bus {
+    /// The direction of a frame of a motor.
+    pub(super) fn exchange(
+        &mut self,
+        entry: &Captured,
+        id: MotorId,
+        code: Code,
+        data: &[u8; 8],
+    ) -> Way {
+        let motor = &mut self.motors[id.index()];
+        let is_reply = code.info().is_some_and(|row| !row.may_be_request(data));
+        let answers = motor.open.is_some_and(|open| open.is_answered_by(code, entry.time));
+        // No reply comes so late after the frame before.
+        let is_first = motor.last.is_some() && is_late(motor.last, entry.time);
+        motor.last = entry.time;
+
+        let (direction, by) = match (entry.direction, self.sender) {
+            (_, _) if is_reply => {
+                if entry.direction == Some(captured::Direction::Sent) {
+                    self.sender = Sender::Drive;
+                }
+                (Some(Direction::DriveToHost), KnownBy::Frame)
+            }
+            (Some(captured::Direction::Sent), Sender::Host) => {
+                (Some(Direction::HostToDrive), KnownBy::Log)
+            }
+            (Some(captured::Direction::Sent), Sender::Unknown) if !answers => {
+                self.sender = Sender::Host;
+                (Some(Direction::HostToDrive), KnownBy::Log)
+            }
+            (Some(captured::Direction::Received), Sender::Drive) => {
+                (Some(Direction::HostToDrive), KnownBy::Log)
+            }
+            (Some(captured::Direction::Received), Sender::Host) if answers => {
+                (Some(Direction::DriveToHost), KnownBy::Log)
+            }
+            (Some(captured::Direction::Sent), Sender::Drive) if answers => {
+                (Some(Direction::DriveToHost), KnownBy::Log)
+            }
+            // A reply to a request that is not in the capture, or a request of another host.
+            (Some(captured::Direction::Received), Sender::Host)
+            | (Some(captured::Direction::Sent), Sender::Drive) => (None, KnownBy::Nothing),
+            _ if answers => (Some(Direction::DriveToHost), KnownBy::Pairing),
+            _ if motor.is_synced || is_first => (Some(Direction::HostToDrive), KnownBy::Pairing),
+            _ => (None, KnownBy::Nothing),
+        };
+        match direction {
+            Some(Direction::HostToDrive) => {
+                motor.is_synced = true;
+                motor.open = Some(Open { code, time: entry.time });
+            }
+            Some(Direction::DriveToHost) => {
+                motor.is_synced = true;
+                motor.open = None;
+            }
+            None => {}
+        }
+        Way { direction, by }
+    }
+
+    /// After 0x280, which opens an exchange with each of its motors.
+    pub(super) fn torque4(&mut self, entry: &Captured) {
+        for id in MotorSet::TORQUE4 {
+            let open = Some(Open { code: Code::SetTorque, time: entry.time });
+            self.motors[id.index()] = Motor { is_synced: true, open, last: entry.time };
+        }
+    }
+
+    /// After a loss of frames.
+    pub(super) fn lose(&mut self) {
+        self.motors = Default::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::captured::Wire;
+    use motorlink_proto::can::CanFrame;
+
+    const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+    const STATUS: [u8; 8] = [0x9A, 25, 0, 240, 0, 0, 0, 0];
+    const OFF: [u8; 8] = [0x80, 0, 0, 0, 0, 0, 0, 0];
+    const ANGLE: [u8; 8] = [0x92, 0, 0, 0, 0, 0, 0, 0];
+
+    /// Passes frames of motor 1: `>` sent, `<` received, `-` not known. Gives what they are.
+    fn told(bus: &mut Bus, frames: &[(i64, char, [u8; 8])]) -> String {
+        let mut out = String::new();
+        for (ms, direction, data) in frames {
+            let direction = match direction {
+                '>' => Some(captured::Direction::Sent),
+                '<' => Some(captured::Direction::Received),
+                _ => None,
+            };
+            let entry = Captured {
+                place: 1,
+                time: Some(Stamp::Relative(ms * 1_000_000)),
+                channel: None,
+                direction,
+                wire: Wire::Can(CanFrame::new(0x141, *data)),
+            };
+            let motor = MotorId::new(1).unwrap();
+            let way = bus.exchange(&entry, motor, Code::from(data[0]), data);
+            out.push(match way.direction {
+                Some(Direction::HostToDrive) => '>',
+                Some(Direction::DriveToHost) => '<',
+                None => '?',
+            });
+        }
+        out
+    }
+
+    #[test]
+    fn without_directions_a_certain_reply_makes_the_rest_certain() {
+        let mut bus = Bus::default();
+        let frames = [(0, '-', READ), (1, '-', STATUS), (10, '-', READ), (11, '-', STATUS)];
+        assert_eq!(told(&mut bus, &frames), "?<><");
+        // From now on also frames whose request and reply are the same.
+        assert_eq!(told(&mut bus, &[(20, '-', OFF), (21, '-', OFF), (30, '-', OFF)]), "><>");
+    }
+
+    #[test]
+    fn what_cannot_be_known_is_not_known() {
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &[(0, '-', ANGLE), (1, '-', ANGLE), (10, '-', ANGLE)]), "???");
+        bus.lose();
+        assert_eq!(told(&mut bus, &[(11, '-', OFF)]), "?");
+    }
+
+    #[test]
+    fn a_frame_after_silence_is_a_request() {
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &[(0, '-', OFF), (51, '-', OFF), (52, '-', OFF)]), "?><");
+        // A motor that does not answer: both are requests.
+        assert_eq!(told(&mut bus, &[(200, '-', OFF), (300, '-', OFF)]), ">>");
+    }
+
+    #[test]
+    fn a_reply_to_clear_errors_may_have_another_code() {
+        let mut bus = Bus::default();
+        let clear = [0x9B, 0, 0, 0, 0, 0, 0, 0];
+        let frames = [(0, '>', clear), (1, '<', READ), (2, '>', clear), (3, '<', clear)];
+        assert_eq!(told(&mut bus, &frames), "><><");
+    }
+
+    #[test]
+    fn the_log_of_a_host_has_the_directions() {
+        let mut bus = Bus::default();
+        assert_eq!(
+            told(&mut bus, &[(0, '>', OFF), (1, '<', OFF), (2, '>', ANGLE), (3, '<', ANGLE)]),
+            "><><"
+        );
+        // Nobody here asked for it: another host's request, or a late reply.
+        assert_eq!(told(&mut bus, &[(10, '<', ANGLE)]), "?");
+        assert_eq!(told(&mut bus, &[(11, '<', STATUS)]), "<");
+    }
+
+    #[test]
+    fn a_listener_receives_requests_too() {
+        let mut bus = Bus::default();
+        let frames = [(0, '<', READ), (1, '<', STATUS), (10, '<', READ), (11, '<', STATUS)];
+        assert_eq!(told(&mut bus, &frames), "?<><");
+    }
+
+    #[test]
+    fn the_log_of_a_drive_has_the_directions_too() {
+        let mut bus = Bus::default();
+        let frames = [(0, '<', READ), (1, '>', STATUS), (10, '<', OFF), (11, '>', OFF)];
+        assert_eq!(told(&mut bus, &frames), "?<><");
+    }
+}

@@ -1,0 +1,126 @@
+//! The bytes of a line of ST's protocol in a capture: their frames, and what those mean.
+
+mod message;
+mod split;
+mod transcript;
+
+use std::sync::Arc;
+
+use motorlink_proto::st::Profile;
+
+use crate::captured::{Captured, Direction, Wire};
+pub use message::{Answer, Message, Value};
+use split::Splitter;
+pub use split::{Broken, Piece};
+pub use transcript::Transcript;
+
+/// A pause after which a frame is not continued. Adapters deliver bytes up to 16 ms late.
+const PAUSE_NS: i64 = 100_000_000;
+/// Lines that are told apart. A damaged capture can have any number of names.
+const MOST_LINES: usize = 64;
+
+/// Decodes the bytes of a capture, which it must get in their order.
+#[derive(Debug)]
+pub struct Decoder {
+    profile: Profile,
+    lines: Vec<Line>,
+}
+
+/// A line, with both of its directions.
+#[derive(Debug)]
+struct Line {
+    channel: Option<Arc<str>>,
+    transcript: Transcript,
+    /// Bytes that were sent, that were received, and whose direction the capture does not have.
+    splitters: [Splitter; 3],
+    last: [Option<Captured>; 3],
+}
+
+/// What a line said.
+#[derive(Debug)]
+pub enum Item<'a> {
+    /// A frame and its meaning.
+    Message(Message<'a>),
+    /// Bytes that are no frame.
+    Broken(Broken),
+}
+
+impl Decoder {
+    /// A decoder at the begin of the capture of a drive of `profile`.
+    pub fn new(profile: Profile) -> Self {
+        Decoder { profile, lines: Vec::new() }
+    }
+
+    /// Passes an entry. `said` gets the entry in which each item ends, its bytes, and the item.
+    pub fn decode(&mut self, entry: &Captured, mut said: impl FnMut(&Captured, &[u8], Item<'_>)) {
+        let Wire::Serial(bytes) = &entry.wire else {
+            self.lines.iter_mut().for_each(|line| line.transcript.lose());
+            return;
+        };
+        let slot = match entry.direction {
+            Some(Direction::Sent) => 0,
+            Some(Direction::Received) => 1,
+            None => 2,
+        };
+        let line = self.line(entry);
+        let last = line.last[slot].as_ref();
+        let pause = last.and_then(|last| entry.time?.since(last.time?));
+        if pause.is_some_and(|ns| ns > PAUSE_NS) {
+            line.end(slot, &mut said);
+        }
+        line.splitters[slot].push(bytes);
+        line.last[slot] = Some(Captured { wire: Wire::Serial(Vec::new()), ..entry.clone() });
+        line.pieces(slot, &mut said);
+    }
+
+    /// Ends the capture: frames that are not complete are broken.
+    pub fn end(&mut self, mut said: impl FnMut(&Captured, &[u8], Item<'_>)) {
+        for line in &mut self.lines {
+            (0..line.splitters.len()).for_each(|slot| line.end(slot, &mut said));
+        }
+    }
+
+    fn line(&mut self, entry: &Captured) -> &mut Line {
+        let channel = &entry.channel;
+        let known = self.lines.iter().position(|line| line.channel == *channel);
+        let index = known.unwrap_or_else(|| {
+            if self.lines.len() == MOST_LINES {
+                self.lines.clear();
+            }
+            self.lines.push(Line {
+                channel: channel.clone(),
+                transcript: Transcript::new(self.profile),
+                splitters: Default::default(),
+                last: Default::default(),
+            });
+            self.lines.len() - 1
+        });
+        &mut self.lines[index]
+    }
+}
+
+impl Line {
+    fn pieces(&mut self, slot: usize, said: &mut impl FnMut(&Captured, &[u8], Item<'_>)) {
+        let Line { transcript, splitters, last, .. } = self;
+        let Some(last) = &last[slot] else { return };
+        splitters[slot].pieces(|bytes, piece| match piece {
+            Piece::Frame(frame) => said(last, bytes, Item::Message(transcript.read(None, &frame))),
+            Piece::Broken(broken) => {
+                transcript.lose();
+                said(last, bytes, Item::Broken(broken));
+            }
+        });
+    }
+
+    fn end(&mut self, slot: usize, said: &mut impl FnMut(&Captured, &[u8], Item<'_>)) {
+        let Line { transcript, splitters, last, .. } = self;
+        let Some(last) = &last[slot] else { return };
+        splitters[slot].end(|bytes, piece| match piece {
+            Piece::Frame(frame) => said(last, bytes, Item::Message(transcript.read(None, &frame))),
+            Piece::Broken(broken) => {
+                transcript.lose();
+                said(last, bytes, Item::Broken(broken));
+            }
+        });
+    }
+}

@@ -1,0 +1,255 @@
+//! `motorlink decode`: the frames of a capture, with their meaning. docs/DECODE.md is the manual.
+
+mod csv;
+mod entry;
+mod input;
+mod object;
+mod out;
+mod text;
+
+use std::io::Read;
+
+use clap::{Subcommand, ValueEnum};
+use motorlink::rmd::{self, MotorId};
+use motorlink::st::Profile;
+use motorlink_capture::{
+    Captured, Damage, Format, Plain, Reader, Wire, rmd as rmd_capture, st as st_capture,
+};
+
+use crate::failure::Failure;
+use crate::hint;
+use crate::output::note;
+use entry::{Entry, Meaning};
+use out::Out;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    protocol: Protocol,
+}
+
+#[derive(Subcommand)]
+enum Protocol {
+    /// Decode a serial line with ST's protocol
+    ///
+    /// Requests and replies have different headers, so their directions are known. A reply has the
+    /// values of the request before it. The format of a file is found by its content. A pipe is decoded
+    /// line by line.
+    St {
+        #[command(flatten)]
+        common: Common,
+        /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
+        #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", value_parser = hint::profile())]
+        profile: Profile,
+    },
+    /// Decode a CAN bus with RMD motors
+    ///
+    /// Request and reply of a motor have the same identifier. docs/DECODE.md says how they are told
+    /// apart. A frame whose direction cannot be known is marked with `?` and shows both meanings. The
+    /// format of a file is found by its content. A pipe is decoded line by line.
+    Rmd {
+        #[command(flatten)]
+        common: Common,
+        /// The motor's ID, 1 to 32, of hexadecimal data bytes without an identifier
+        #[arg(short, long, value_parser = clap::value_parser!(u8).range(1..=32), hide_possible_values = true)]
+        id: Option<u8>,
+        /// Take every frame of a motor as a request, or as a reply
+        #[arg(long, value_enum)]
+        direction: Option<Direction>,
+    },
+}
+
+#[derive(clap::Args)]
+struct Common {
+    /// A file, `-` for stdin (the default), or the frames in hexadecimal
+    #[arg(value_name = "FILE|HEX", value_hint = clap::ValueHint::FilePath)]
+    input: Vec<String>,
+    /// The format of the input, if its content does not show it
+    #[arg(long, value_parser = formats())]
+    format: Option<Format>,
+    /// Print a JSON object per frame: docs/JSON.md
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Print comma-separated values, a row per value
+    #[arg(long)]
+    csv: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Direction {
+    /// From the host to a motor
+    Request,
+    /// From a motor to the host
+    Reply,
+}
+
+fn formats() -> impl clap::builder::TypedValueParser<Value = Format> {
+    use clap::builder::TypedValueParser;
+    let names = Format::ALL.map(Format::name);
+    clap::builder::PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    let (common, plain, decoder) = match args.protocol {
+        Protocol::St { common, profile } => {
+            (common, Plain::Serial, Decoder::St(st_capture::Decoder::new(profile)))
+        }
+        Protocol::Rmd { common, id, direction } => {
+            let id = id.and_then(MotorId::new).map(MotorId::can_id);
+            let decoder = match direction {
+                None => rmd_capture::Decoder::new(),
+                Some(Direction::Request) => rmd_capture::Decoder::of(rmd::Direction::HostToDrive),
+                Some(Direction::Reply) => rmd_capture::Decoder::of(rmd::Direction::DriveToHost),
+            };
+            (common, Plain::Can(id), Decoder::Rmd(Box::new(decoder)))
+        }
+    };
+    let out = match (common.json, common.csv) {
+        (true, _) => Out::new(out::Shape::Json),
+        (_, true) => Out::new(out::Shape::Csv),
+        _ => Out::new(out::Shape::Text),
+    };
+    let input = input::open(&common.input, common.format, plain)?;
+    let (is_file, is_hex, name) = (input.is_file, input.is_hex, input.name.clone());
+    let failed = |error: std::io::Error| Failure::usage(format!("cannot read {name}: {error}"));
+    let reader = Reader::new(input.content, input.format, plain).map_err(&failed)?;
+    let counts = decode(reader, decoder, out, (is_file, is_hex), failed)?;
+    counts.report(!is_hex)
+}
+
+/// Decodes everything. Before it waits for more input, all output is written.
+fn decode<R: Read>(
+    mut reader: Reader<R>,
+    mut decoder: Decoder,
+    mut out: Out,
+    (is_file, is_hex): (bool, bool),
+    failed: impl Fn(std::io::Error) -> Failure,
+) -> Result<Counts, Failure> {
+    let mut counts = Counts::default();
+    out.begin()?;
+    loop {
+        if !is_file && reader.may_wait() {
+            out.flush()?;
+        }
+        let Some(captured) = reader.next().map_err(&failed)? else { break };
+        if let (Wire::Damage(damage @ Damage::Line { .. }), true) = (&captured.wire, is_hex) {
+            return Err(Failure::usage(damage.to_string()));
+        }
+        decoder.decode(&captured, &mut |entry| {
+            counts.add(&entry);
+            out.entry(&entry)
+        })?;
+    }
+    decoder.end(&mut |entry| {
+        counts.add(&entry);
+        out.entry(&entry)
+    })?;
+    out.flush()?;
+    Ok(counts)
+}
+
+enum Decoder {
+    St(st_capture::Decoder),
+    Rmd(Box<rmd_capture::Decoder>),
+}
+
+type Said<'a> = &'a mut dyn FnMut(Entry<'_>) -> Result<(), Failure>;
+
+impl Decoder {
+    fn decode(&mut self, captured: &Captured, said: Said<'_>) -> Result<(), Failure> {
+        match self {
+            Decoder::Rmd(decoder) => {
+                let decoded = decoder.decode(captured);
+                said(Entry::of_rmd(captured, decoded.as_ref()))
+            }
+            Decoder::St(decoder) => {
+                let mut result = Ok(());
+                decoder.decode(captured, |at, bytes, item| {
+                    if result.is_ok() {
+                        result = said(Entry::of_st(at, bytes, &item));
+                    }
+                });
+                result?;
+                match Entry::of_other(captured) {
+                    Some(entry) => said(entry),
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+
+    fn end(&mut self, said: Said<'_>) -> Result<(), Failure> {
+        let mut result = Ok(());
+        if let Decoder::St(decoder) = self {
+            decoder.end(|at, bytes, item| {
+                if result.is_ok() {
+                    result = said(Entry::of_st(at, bytes, &item));
+                }
+            });
+        }
+        result
+    }
+}
+
+/// What was found.
+#[derive(Default)]
+struct Counts {
+    requests: u64,
+    replies: u64,
+    unknown: u64,
+    others: u64,
+    damaged: u64,
+    /// The first entry with damage.
+    first: Option<u64>,
+}
+
+impl Counts {
+    fn add(&mut self, entry: &Entry<'_>) {
+        match &entry.meaning {
+            Meaning::Damage(_) => {
+                self.damaged += 1;
+                self.first.get_or_insert(entry.at.place);
+            }
+            _ if entry.is_other() => self.others += 1,
+            _ => match entry.is_request {
+                Some(true) => self.requests += 1,
+                Some(false) => self.replies += 1,
+                None => self.unknown += 1,
+            },
+        }
+    }
+
+    /// The sum on stderr, and a failure if there was damage.
+    fn report(&self, is_summed_up: bool) -> Result<(), Failure> {
+        let counted = |count: u64, one: &str, many: &str| match count {
+            1 => format!("1 {one}"),
+            count => format!("{count} {many}"),
+        };
+        let all = self.requests + self.replies + self.unknown + self.others;
+        let mut parts = vec![
+            counted(self.requests, "request", "requests"),
+            counted(self.replies, "reply", "replies"),
+        ];
+        for (count, what) in [
+            (self.unknown, "of unknown direction"),
+            (self.others, "of other protocols"),
+            (self.damaged, "damaged or lost"),
+        ] {
+            if count > 0 {
+                parts.push(format!("{count} {what}"));
+            }
+        }
+        if is_summed_up {
+            note(format!("{}: {}", counted(all, "frame", "frames"), parts.join(", ")));
+        }
+        match self.first {
+            None => Ok(()),
+            Some(first) => Err(Failure::damaged(match self.damaged {
+                1 => format!("entry {first} is damaged or lost"),
+                count => {
+                    format!("{count} entries are damaged or lost, the first one is entry {first}")
+                }
+            })),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+"""`motorlink decode`: captures of other programs, pipes, damage, exit codes."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+
+import can
+import pytest
+
+from program import environment, eventually
+
+READ = "141#9A00000000000000"
+STATUS = "141#9A1900F000000009"
+ASK, REPLY = "22 01 1e 41", "f0 04 ce 07 00 00 ca"
+
+
+def log(*frames, direction=""):
+    """A log of `candump -L` with a frame per millisecond."""
+    lines = [f"(1436509053.{n:03}000) can0 {frame}{direction}" for n, frame in enumerate(frames)]
+    return "\n".join(lines) + "\n"
+
+
+def test_a_frame_from_the_command_line_is_decoded(run):
+    out = run("decode", "rmd", STATUS).ended(0).out
+    assert out.startswith(f"<- {STATUS} motor 1 < 0x9A ") and "voltage 24.0 V" in out
+    assert run("decode", "rmd", "--id", 1, *"9a 19 00 f0 00 00 00 09".split()).ended(0).out == out
+    # Alone it may be a reply of zeros, too.
+    either = run("decode", "rmd", READ).ended(0).out
+    assert either.startswith(f"-- {READ} motor 1 ? ") and "request, or reply temperature 0" in either
+    request = run("decode", "rmd", "--direction", "request", READ).ended(0).out
+    assert request.startswith(f"-> {READ} motor 1 > ")
+
+
+def test_st_requests_and_replies_are_told_apart(run):
+    out = run("decode", "st", *ASK.split(), *REPLY.split()).ended(0).out.splitlines()
+    assert [line[:2] for line in out] == ["->", "<-"]
+    assert "GET_REG SPEED_MEAS, motor 1" in out[0] and "ACK 1998 rpm" in out[1]
+    refused = run("decode", "st", "ff 01 0b 0c").ended(0).out
+    assert "NACK BAD_MOTOR_SELECTED: the drive has no motor of this number" in refused
+
+
+def test_the_format_is_found_by_the_content(run, tmp_path):
+    terminal = f" (1436509053.000000)  can0  141   [8]  {' '.join(STATUS[4:][n : n + 2] for n in range(0, 16, 2))}\n"
+    asc = "date Sat Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\n" \
+        "0.5 1  141             Rx   d 8 9A 19 00 F0 00 00 00 09\n"
+    for name, text in (("a", log(STATUS)), ("b", terminal), ("c", asc), ("d", f"{STATUS}\n")):
+        path = tmp_path / name
+        path.write_text(text)
+        for done in (run("decode", "rmd", path), run("decode", "rmd", stdin=text), run("decode", "rmd", "-", stdin=text)):
+            assert "motor 1 < 0x9A" in done.ended(0).out
+            assert "1 frame: 0 requests, 1 reply" in done.err
+    wrong = run("decode", "rmd", "--format", "asc", stdin=log(STATUS)).ended(1)
+    assert "!! entry 1: not a line of an asc file" in wrong.out
+
+
+def test_a_pipe_is_followed_line_by_line(start):
+    for words, line, said in (
+        ("decode rmd", log(STATUS), "motor 1 < 0x9A"),
+        ("decode st --json", f"{ASK}\n", '"message":"GET_REG"'),
+        ("decode rmd --csv", log(STATUS), "voltage,24.0,V,240"),
+    ):
+        process = start(*words.split(), stdin=subprocess.PIPE)
+        for count in (1, 2, 3):
+            process.process.stdin.write(line)
+            process.process.stdin.flush()
+            eventually(lambda: sum(said in line for line in process.out) == count, f"{count} times {said}")
+        process.process.stdin.close()
+        assert process.process.wait(20) == 0
+
+
+def test_damage_is_shown_where_it_is(run):
+    text = log(READ, STATUS) + "hello \x1b[2J\nDROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 3)\n" \
+        + log("20000004#0001000000000000", "7FF#00", "241#9C190000000000FF", "142##1AABB", "142#R")
+    done = run("decode", "rmd", stdin=text).ended(1)
+    lines = done.out.splitlines()
+    assert len(lines) == 9 and "\x1b" not in done.out
+    assert [line for line in lines if "!!" in line] == lines[2:5]
+    assert "the capture lost 3 frames here" in lines[3] and "problem of the controller" in lines[4]
+    assert "V3/V4" in lines[6] and "CAN FD" in lines[7]
+    assert "3 entries are damaged or lost, the first one is entry 3" in done.err
+    # Other protocols on the bus are no damage.
+    run("decode", "rmd", stdin=log("7FF#00", "241#9C190000000000FF")).ended(0)
+    broken = run("decode", "st", *"22 01 1e 42 f0".split(), *ASK.split()).ended(1)
+    assert "!! 22 01 1E 42" in broken.out.replace("  ", "") and "instead of 0x41" in broken.out
+    assert "GET_REG" in broken.out
+
+
+def test_what_makes_no_sense_is_a_usage_error(run):
+    for words, text in (
+        ("decode rmd 9a00", "give --id"),
+        ("decode rmd nothing-there.log", "cannot read `nothing-there.log`"),
+        ("decode rmd 141#xx", "141#xx"),
+        ("decode st 022", "not hexadecimal bytes"),
+    ):
+        assert text in run(*words.split()).ended(2).err
+
+
+def test_a_whole_dialogue_of_a_bus_is_told_apart(run):
+    off = "141#8000000000000000"
+    frames = [READ, STATUS, off, off, "280#640000009CFFD007", "141#A119000800000000", READ, READ]
+    lines = run("decode", "rmd", "--json", stdin=log(*frames)).ended(0).lines
+    ways = [(line.get("direction"), line.get("known_by")) for line in lines]
+    assert ways == [
+        (None, None),
+        ("reply", "frame"),
+        ("request", "pairing"),
+        ("reply", "pairing"),
+        ("request", "frame"),
+        ("reply", "frame"),
+        ("request", "pairing"),
+        ("reply", "pairing"),
+    ]
+    sent = run("decode", "rmd", "--json", stdin=log(READ, direction=" T")).ended(0).json
+    assert (sent["direction"], sent["known_by"]) == ("request", "log")
+
+
+def test_json_and_csv_have_the_same_values(run):
+    text = log(STATUS, "280#640000009CFFD007", "7FF#00")
+    objects = run("decode", "rmd", "--json", stdin=text).ended(0).lines
+    rows = list(csv.DictReader(io.StringIO(run("decode", "rmd", "--csv", stdin=text).ended(0).out)))
+    pairs = [
+        (str(line["entry"]), name, str(value["value"]), str(value["digits"]))
+        for line in objects
+        for name, value in line.get("values", {}).items()
+    ]
+    assert pairs == [
+        (row["entry"], row["field"], row["value"], row["digits"]) for row in rows if row["field"]
+    ]
+    assert rows[-1]["message"] == "other" and objects[-1]["other"] == rows[-1]["text"]
+    assert all(float(row["time [s]"]) == line for row, line in zip(rows[:1], [objects[0]["wall"]]))
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc"])
+def test_files_of_python_can_are_read(run, tmp_path, suffix):
+    path = tmp_path / f"bus{suffix}"
+    messages = [
+        can.Message(1436509053.25, 0x141, False, data=bytes.fromhex("9a00000000000000"), is_rx=False, channel=0),
+        can.Message(1436509053.26, 0x141, False, data=bytes.fromhex("9a1900f000000009"), is_rx=True, channel=0),
+        can.Message(1436509053.27, 0x1ABCDE, True, data=b"\x01", is_rx=True, channel=0),
+        can.Message(1436509053.28, 0x141, False, is_remote_frame=True, dlc=8, is_rx=True, channel=0),
+        can.Message(1436509053.29, is_error_frame=True, is_rx=True, channel=0),
+        can.Message(1436509053.30, 0x300, False, is_fd=True, bitrate_switch=True, data=bytes(12), is_rx=True, channel=0),
+    ]
+    with can.Logger(path) as logger:
+        for message in messages:
+            logger(message)
+    lines = run("decode", "rmd", "--json", path).ended(1).lines
+    assert [line.get("direction") for line in lines[:2]] == ["request", "reply"]
+    assert lines[1]["values"]["voltage"] == {"value": 24.0, "unit": "V", "digits": 240}
+    assert lines[2]["id"] == 0x1ABCDE and lines[2]["extended"] is True
+    assert lines[3]["remote"] is True
+    assert "error frame" in lines[4]["damage"]
+    assert "CAN FD" in lines[5]["other"] and lines[5]["data"] == " ".join(["00"] * 12)
+
+
+def test_a_closed_reader_ends_it_quietly(motorlink, tmp_path):
+    path = tmp_path / "long.log"
+    path.write_text(log(*[STATUS] * 900) * 50)
+    done = subprocess.run(
+        ["bash", "-c", f"{motorlink} decode rmd {path} | head -n 1; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True, text=True, timeout=30, env=environment(),
+    )
+    assert done.returncode == 0 and len(done.stdout.splitlines()) == 1 and not done.stderr
