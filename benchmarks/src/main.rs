@@ -3,6 +3,7 @@
 
 mod can;
 mod codec;
+mod decode;
 mod engine;
 mod exchange;
 mod kernel;
@@ -45,6 +46,8 @@ enum What {
         #[arg(long, default_value_t = ENGINE_SECONDS)]
         seconds: u32,
     },
+    /// A log of a CAN bus, decoded by `motorlink decode` and by cantools
+    Decode,
     /// Instructions of an ST exchange, master and slave together
     Exchange,
     /// Exchanges per second through Python, compared with pyserial
@@ -60,6 +63,9 @@ enum What {
     /// Replies on this number of ptys until the end of standard input
     #[command(hide = true)]
     Respond { count: u32 },
+    /// Decodes a log as `motorlink decode rmd` does
+    #[command(hide = true)]
+    DecodeLog { log: std::path::PathBuf },
     /// Serves the drives of the engine until the end of standard input
     #[command(hide = true)]
     Drives,
@@ -88,11 +94,14 @@ fn main() -> Result<()> {
             &engine,
             &exchange::measure,
             &simulation::measure,
+            &decode::measure,
         ],
         What::Codec => &[&codec::measure],
         What::Line => &[&line::measure],
         What::Can => &[&can::measure],
         What::Engine { .. } => &[&engine],
+        What::Decode => &[&decode::measure],
+        What::DecodeLog { log } => return decode::decode(&log),
         What::Exchange => &[&exchange::measure],
         What::Python => &[&python::measure],
         What::Simulation => &[&simulation::measure],

@@ -3,6 +3,7 @@
 //! them with seeds and earlier findings in `make test`.
 #![deny(unsafe_code)]
 
+mod capture;
 mod ffi;
 mod host;
 mod input;
@@ -26,6 +27,7 @@ pub const TARGETS: &[Target] = &[
     ("rmd_drive", rmd::drive),
     ("ffi", ffi::ffi),
     ("slcan", host::slcan),
+    ("decode", capture::decode),
     ("port_name", host::port_name),
     ("st_value", host::st_value),
     ("settings_file", host::settings_file),

@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use motorlink::slcan;
+use motorlink_capture::{Captured, Direction, Format, Stamp, Wire, Writer};
+use motorlink_proto::Hex;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::TORQUE4_ID;
 use motorlink_proto::st::RegisterId;
@@ -61,6 +63,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
             .chain(rmd().map(|(id, data)| rmd_through_c(id, data)))
             .collect(),
         "slcan" => rmd().map(|(id, data)| adapter(id, data)).collect(),
+        "decode" => captures(),
         "port_name" => PORTS.iter().map(|name| name.as_bytes().to_vec()).collect(),
         "st_value" => values(),
         "settings_file" => settings(),
@@ -68,6 +71,43 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "sim_command" => commands(),
         _ => panic!("there is no target {target}"),
     }
+}
+
+/// The frames of the vectors in each format of captures.
+fn captures() -> Vec<Vec<u8>> {
+    let entry = |wire| Captured {
+        place: 1,
+        time: Some(Stamp::Wall(1_436_509_053_249_713_000)),
+        channel: Some("can0".into()),
+        direction: Some(Direction::Received),
+        wire,
+    };
+    let frames: Vec<Captured> =
+        rmd().map(|(id, data)| entry(Wire::Can(CanFrame::new(id, data)))).collect();
+    let bytes: Vec<Captured> =
+        st().map(|(_, request, reply)| entry(Wire::Serial([request, reply].concat()))).collect();
+    let written = [
+        (Format::Candump, &frames[..2]),
+        (Format::Asc, &frames[..2]),
+        (Format::Pcapng, &frames[..2]),
+        (Format::Pcapng, &bytes[..2]),
+    ];
+    let mut seeds: Vec<Vec<u8>> = written
+        .into_iter()
+        .map(|(format, entries)| {
+            let writer = Writer::new(format, Vec::new()).expect("a vector can be written");
+            let mut writer = writer.expect("the format is written");
+            for entry in entries {
+                writer.write(entry).expect("the format has it");
+            }
+            writer.into_inner().expect("a vector can be written")
+        })
+        .collect();
+    seeds.extend(st().take(4).map(|(_, request, _)| Hex(&request).to_string().into_bytes()));
+    seeds
+        .push(b" (1436509053.249713)  can0  RX B -  141  [08]  9A 00 00 00 00 00 00 00\n".to_vec());
+    seeds.push(b"  can0  20000004   [8]  00 01 00 00 00 00 00 00   ERRORFRAME\n".to_vec());
+    seeds
 }
 
 fn vectors(path: &str) -> Vec<Value> {

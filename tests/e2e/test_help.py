@@ -15,6 +15,9 @@ ROOT = Path(__file__).parents[2]
 SERVO = 'profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n'
 
 
+#: A pcapng file without packets.
+EMPTY_CAPTURE = bytes.fromhex("0a0d0d0a 1c000000 4d3c2b1a 01000000 ffffffff ffffffff 1c000000")
+
 #: What turns a motor, lets it turn, or wears it.
 MOVING = {
     *("start", "start-stop", "ramp", "torque-ramp", "current-reference", "current", "position", "move", "set", "raw"),
@@ -39,7 +42,7 @@ def examples(text):
     return [line.strip() for line in block[1].replace("\\\n", "").splitlines()] if block else []
 
 
-@pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "conformance", "spec", ""])
+@pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", ""])
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     # The program itself, and commands without subcommands.
     pages = helps(run, command) if command else [
@@ -49,6 +52,8 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
     assert len(lines) >= 2
     (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
     (tmp_path / "servo.toml").write_text(SERVO)
+    (tmp_path / "can0.log").write_text("(1436509053.249713) can0 141#9A1900F000000009\n")
+    (tmp_path / "capture.pcapng").write_bytes(EMPTY_CAPTURE)
     path = f"{Path(motorlink).resolve().parent}:{os.environ['PATH']}"
     for line in lines:
         config = "servo.toml" if "mcsdk-5.4" in line else ""

@@ -38,7 +38,7 @@ RMD = [
 SHARE = ["stop", "latch", "release"]
 #: Captures, in hexadecimal.
 DECODE = {
-    "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 09", "29 01 02 2c"],
+    "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 0f", "29 01 02 2c"],
     "rmd": ["141#9A1900F000000009", "141#9A00000000000000", "280#640000009CFFD007", "7FF#00", "00000141#R"],
 }
 #: What reads or writes a file of settings.

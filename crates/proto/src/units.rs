@@ -173,6 +173,26 @@ impl Scale {
         Scale { digit: 1.0, symbol: "digits", decimals: 0, ..self }
     }
 
+    /// Writes digits as a value with all its decimals and its unit.
+    pub(crate) fn show(&self, digits: i64, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let places = usize::from(self.decimals);
+        let parts = (0..places).fold(1u64, |parts, _| parts.saturating_mul(10));
+        // A digit is a unit of the last place: whole numbers are written several times as fast.
+        if self.digit * parts as f64 == 1.0 {
+            let sign = if digits < 0 { "-" } else { "" };
+            let all = digits.unsigned_abs();
+            let (whole, below) = (all.checked_div(parts), all.checked_rem(parts));
+            write!(f, "{sign}{}", whole.unwrap_or(all))?;
+            if places > 0 {
+                write!(f, ".{:0places$}", below.unwrap_or(0))?;
+            }
+        } else {
+            write!(f, "{:.places$}", digits as f64 * self.digit)?;
+        }
+        f.write_str(" ")?;
+        f.write_str(self.symbol)
+    }
+
     /// Converts digits to the physical unit: 239 digits of 0.1 are 23.9, and not
     /// 23.900000000000002.
     pub fn value(&self, digits: i64) -> f64 {
@@ -392,6 +412,30 @@ mod tests {
         }
         let digits = SpeedLimit::wanted_digits(0.9).unwrap_err().to_string();
         assert_eq!(digits, "0.9 digits is outside 1 to 65535 digits");
+    }
+
+    #[test]
+    fn a_shown_value_is_the_rounded_one() {
+        struct Shown(Scale, i64);
+        impl core::fmt::Display for Shown {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                self.0.show(self.1, f)
+            }
+        }
+        fn check<Q: Quantity>(digits: i64) {
+            let Scale { digit, decimals, symbol, .. } = Q::UNIT;
+            let value = digits as f64 * digit;
+            let expected = std::format!("{value:.*} {symbol}", usize::from(decimals));
+            assert_eq!(Shown(Q::UNIT, digits).to_string(), expected);
+        }
+        for digits in [0, 1, -1, 9, -9, 10, 99, -100, 101, 35_999, -32_768, 1 << 50, -(1 << 50)] {
+            check::<WideCentiDegrees>(digits);
+            check::<DeciVolts>(digits);
+            check::<Dps>(digits);
+            check::<IqFeedback>(digits);
+            check::<IqCommand>(digits);
+            check::<PhaseCurrent>(digits);
+        }
     }
 
     #[test]

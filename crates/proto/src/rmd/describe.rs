@@ -134,8 +134,11 @@ impl Described {
             return bytes(data, f);
         };
         write!(f, " {}", row.code)?;
-        if self.direction.is_some() || row.echo {
-            return fields(self.fields(), data, ":", f);
+        match self.direction {
+            Some(Direction::HostToDrive) => return fields(row.request, data, ":", f),
+            Some(Direction::DriveToHost) => return fields(row.reply, data, ":", f),
+            None if row.echo => return fields(row.request, data, ":", f),
+            None => {}
         }
         f.write_str(": request")?;
         fields(row.request, data, "", f)?;
@@ -162,7 +165,11 @@ fn fields(
 ) -> fmt::Result {
     let mut separator = before;
     for field in fields {
-        write!(f, "{separator} {} {}", field.name, field.shown(data))?;
+        f.write_str(separator)?;
+        f.write_str(" ")?;
+        f.write_str(field.name)?;
+        f.write_str(" ")?;
+        fmt::Display::fmt(&field.shown(data), f)?;
         separator = ",";
     }
     Ok(())

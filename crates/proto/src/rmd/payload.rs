@@ -256,9 +256,7 @@ impl<Q: Quantity + Copy> Wire for Q {
     }
 
     fn show(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Scale { digit, symbol, decimals, .. } = Q::UNIT;
-        let value = Quantity::digits(self) as f64 * digit;
-        write!(f, "{value:.*} {symbol}", usize::from(decimals))
+        Q::UNIT.show(Quantity::digits(self), f)
     }
 }
 
