@@ -84,7 +84,7 @@ proptest! {
 
     #[test]
     fn every_frame_can_be_described(frame in any_frame()) {
-        for direction in [Direction::HostToDrive, Direction::DriveToHost] {
+        for direction in [Some(Direction::HostToDrive), Some(Direction::DriveToHost), None] {
             prop_assert!(!describe(frame, direction).to_string().is_empty());
         }
     }

@@ -1,8 +1,9 @@
 //! Requests and replies of a motor have the same identifier. This module tells them apart.
 //!
-//! A frame is a reply if it has a byte that no request has. Otherwise it is a reply if it follows a
-//! request of the same motor with the same code, at most [`DEFAULT_TIMEOUT`] later. Otherwise it is
-//! a request, if the exchange before it is known to be over. Else its direction is not known.
+//! A frame is a reply if it has a byte that no request has. Any other frame is a request, if a reply
+//! is not expected: the exchange before it is known to be over. If a reply is expected, the frame may
+//! also be the request again, because the motor is silent. Only the direction of the capture tells
+//! these apart.
 
 use motorlink_proto::rmd::{Code, DEFAULT_TIMEOUT, Direction, MotorId, MotorSet};
 
@@ -136,7 +137,7 @@ impl Bus {
             // A reply to a request that is not in the capture, or a request of another host.
             (Some(captured::Direction::Received), Sender::Host)
             | (Some(captured::Direction::Sent), Sender::Drive) => (None, KnownBy::Nothing),
-            _ if answers => (Some(Direction::DriveToHost), KnownBy::Pairing),
+            _ if answers => (None, KnownBy::Nothing),
             _ if motor.is_synced || is_first => (Some(Direction::HostToDrive), KnownBy::Pairing),
             _ => (None, KnownBy::Nothing),
         };
@@ -149,7 +150,11 @@ impl Bus {
                 motor.is_synced = true;
                 motor.open = None;
             }
-            None => {}
+            None => {
+                if answers {
+                    motor.open = Some(Open { code, time: entry.time });
+                }
+            }
         }
         Way { direction, by }
     }
@@ -211,8 +216,8 @@ mod tests {
         let mut bus = Bus::default();
         let frames = [(0, '-', READ), (1, '-', STATUS), (10, '-', READ), (11, '-', STATUS)];
         assert_eq!(told(&mut bus, &frames), "?<><");
-        // From now on also frames whose request and reply are the same.
-        assert_eq!(told(&mut bus, &[(20, '-', OFF), (21, '-', OFF), (30, '-', OFF)]), "><>");
+        // The second frame may be a reply, or the request again.
+        assert_eq!(told(&mut bus, &[(20, '-', OFF), (21, '-', OFF), (30, '-', READ)]), ">?>");
     }
 
     #[test]
@@ -226,9 +231,21 @@ mod tests {
     #[test]
     fn a_frame_after_silence_is_a_request() {
         let mut bus = Bus::default();
-        assert_eq!(told(&mut bus, &[(0, '-', OFF), (51, '-', OFF), (52, '-', OFF)]), "?><");
+        assert_eq!(told(&mut bus, &[(0, '-', OFF), (51, '-', OFF), (52, '-', OFF)]), "?>?");
         // A motor that does not answer: both are requests.
         assert_eq!(told(&mut bus, &[(200, '-', OFF), (300, '-', OFF)]), ">>");
+    }
+
+    #[test]
+    fn the_requests_to_a_silent_motor_are_no_replies() {
+        let speed = |rpm| [0xA2, 0, 0, 0, rpm, 0, 0, 0];
+        let mut bus = Bus::default();
+        let alive = [(0, '-', speed(1)), (1, '-', [0xA2, 25, 0, 0, 1, 0, 0, 0])];
+        assert_eq!(told(&mut bus, &alive), "?<");
+        let silent: Vec<_> = (2..9).map(|n| (10 * i64::from(n), '-', speed(n))).collect();
+        assert_eq!(told(&mut bus, &silent), ">??????");
+        let silent: Vec<_> = (2..9).map(|n| (100 * i64::from(n), '-', READ)).collect();
+        assert_eq!(told(&mut bus, &silent), ">>>>>>>");
     }
 
     #[test]
