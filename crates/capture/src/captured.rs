@@ -105,14 +105,14 @@ pub struct FdFrame {
 /// What cannot be decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Damage {
-    /// A line that is no frame.
+    /// A line that is not a frame.
     Line {
         /// Why.
         why: &'static str,
         /// The beginning of the line, without control characters.
         text: String,
     },
-    /// A packet that is no frame.
+    /// A packet that is not a frame.
     Packet(&'static str),
     /// The capture lost frames here: their number.
     Dropped(u64),

@@ -30,7 +30,7 @@ impl<W: Write> Writer<W> {
     /// Writes an entry. A frame without a direction is written as received.
     ///
     /// # Errors
-    /// `out` cannot be written, or the entry is no CAN frame.
+    /// `out` cannot be written, or the entry is not a CAN frame.
     pub fn write(&mut self, entry: &Captured) -> Result<(), WriteError> {
         if let Wire::Serial(_) = entry.wire {
             return Err(Unwritable::Serial.into());

@@ -25,7 +25,7 @@ impl<W: Write> Writer<W> {
     /// Writes an entry.
     ///
     /// # Errors
-    /// `out` cannot be written, or the entry is no CAN frame.
+    /// `out` cannot be written, or the entry is not a CAN frame.
     pub fn write(&mut self, entry: &Captured) -> Result<(), WriteError> {
         let line = &mut self.line;
         line.clear();

@@ -67,7 +67,7 @@ enum Sender {
 
 #[derive(Debug, Default, Clone, Copy)]
 struct Motor {
-    /// Whether every frame so far was told apart.
+    /// Whether the direction of an earlier frame is known.
     is_synced: bool,
     open: Option<Open>,
     last: Option<Stamp>,
@@ -263,7 +263,7 @@ mod tests {
             told(&mut bus, &[(0, '>', OFF), (1, '<', OFF), (2, '>', ANGLE), (3, '<', ANGLE)]),
             "><><"
         );
-        // Nobody here asked for it: another host's request, or a late reply.
+        // This host did not request it: another host's request, or a late reply.
         assert_eq!(told(&mut bus, &[(10, '<', ANGLE)]), "?");
         assert_eq!(told(&mut bus, &[(11, '<', STATUS)]), "<");
     }

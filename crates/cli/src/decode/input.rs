@@ -1,12 +1,13 @@
 //! Where the frames come from: arguments, a file, stdin.
 
 use std::fs::File;
-use std::io::{Cursor, Read, stdin};
+use std::io::{Cursor, IsTerminal, Read, stdin};
 use std::path::Path;
 
 use motorlink_capture::{Format, Plain};
 
 use crate::failure::Failure;
+use crate::output::note;
 use crate::terminal::safe;
 
 pub struct Input {
@@ -43,6 +44,9 @@ pub fn open(words: &[String], format: Option<Format>, plain: Plain) -> Result<In
 }
 
 fn standard(format: Option<Format>) -> Input {
+    if stdin().is_terminal() {
+        note("reads frames from the terminal; Ctrl-D ends the input");
+    }
     let is_file = File::from(rustix::io::dup(stdin()).expect("stdin is open"))
         .metadata()
         .is_ok_and(|found| found.is_file());
