@@ -1,14 +1,13 @@
 //! `motorlink decode` and `cantools decode` on the same log, whose content is known.
 
 use std::env::current_exe;
-use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use motorlink_proto::rmd::{COMMANDS, Field, MotorId};
+use motorlink_proto::rmd::{Direction, MotorId};
 
 use crate::report::{Goal, Section};
 use crate::result::Result;
@@ -64,7 +63,7 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
 - Each line of `motorlink decode` is compared with what the generator of the log wrote. Where
   the log does not show a direction, both meanings are right: the first request of each motor, and
   the reply to 0x80.
-- cantools decodes with a DBC of the replies, in one line per frame."
+- cantools decodes with the DBC file of `motorlink spec dbc`, in one line per frame."
         ),
         columns: vec!["program", "frames/s", "ratio to it"],
         rows,
@@ -134,37 +133,12 @@ fn cantools(folder: &Folder, log: &Path) -> Result<Option<f64>> {
         return Ok(None);
     }
     let dbc = folder.file("rmd.dbc");
-    fs::write(&dbc, replies())?;
+    let motors = (1..=MOTORS).filter_map(MotorId::new).collect();
+    fs::write(&dbc, motorlink_spec::dbc::dbc(motors, Direction::DriveToHost))?;
     let decoded = folder.file("cantools.txt");
     let mut command = Command::new(program);
     command.args(["decode", "--single-line", "--no-strict"]).arg(dbc);
     timed(&mut command, File::open(log)?.into(), &decoded).map(Some)
-}
-
-/// A DBC with the replies of the motors.
-fn replies() -> String {
-    let mut dbc = "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: host motor\n".to_owned();
-    for motor in (1..=MOTORS).filter_map(MotorId::new) {
-        // Writing to a string does not fail.
-        let _ = writeln!(dbc, "\nBO_ {} motor_{motor}: 8 motor", motor.can_id());
-        dbc += " SG_ code M : 0|8@1+ (1,0) [0|0] \"\" host\n";
-        for row in &COMMANDS {
-            let code = row.code.number();
-            for Field { name, offset, len, signed, scale, .. } in row.reply {
-                let sign = if *signed { '-' } else { '+' };
-                let _ = writeln!(
-                    dbc,
-                    " SG_ {}_{name} m{code} : {}|{}@1{sign} ({},0) [0|0] \"{}\" host",
-                    row.stem,
-                    8 * offset,
-                    8 * len,
-                    scale.digit,
-                    scale.symbol
-                );
-            }
-        }
-    }
-    dbc
 }
 
 /// Writes the log, and what its lines mean. Returns the number of frames.

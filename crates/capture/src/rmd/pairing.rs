@@ -83,10 +83,7 @@ struct Open {
 impl Open {
     /// Whether a frame with this code and time may be the reply.
     fn is_answered_by(&self, code: Code, time: Option<Stamp>) -> bool {
-        // The reply to 0x9B may have the code 0x9A (docs/SPEC-NOTES.md R1).
-        let is_same =
-            code == self.code || (self.code, code) == (Code::ClearErrors, Code::ReadStatus);
-        is_same && !is_late(self.time, time)
+        self.code.is_answered_by(code) && !is_late(self.time, time)
     }
 }
 
