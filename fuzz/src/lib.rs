@@ -9,6 +9,7 @@ mod host;
 mod input;
 #[path = "../../crates/proto/tests/model/mod.rs"]
 mod model;
+mod recording;
 mod rmd;
 pub mod seeds;
 mod st;
@@ -31,6 +32,7 @@ pub const TARGETS: &[Target] = &[
     ("port_name", host::port_name),
     ("st_value", host::st_value),
     ("settings_file", host::settings_file),
+    ("recording", recording::recording),
     ("sim_config", host::sim_config),
     ("sim_command", host::sim_command),
 ];

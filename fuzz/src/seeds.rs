@@ -68,6 +68,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "st_value" => values(),
         "settings_file" => settings(),
         "sim_config" => configurations(),
+        "recording" => crate::recording::seeds(),
         "sim_command" => commands(),
         _ => panic!("there is no target {target}"),
     }

@@ -5,9 +5,11 @@
 //! | know what a file contains, encode and decode its messages | [`schema`] |
 //! | record drives in threads | [`record::Recorder`] |
 //! | write files, in a thread or not | [`write`] |
+//! | read a file, whole or broken | [`read`] |
 #![forbid(unsafe_code)]
 
 mod error;
+pub mod read;
 pub mod record;
 pub mod schema;
 pub mod write;

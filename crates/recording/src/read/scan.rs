@@ -1,0 +1,288 @@
+//! Reads a file from its beginning, and continues behind damage.
+
+use std::io::{self, Read, Seek};
+use std::ops::Range;
+
+use mcap::MAGIC;
+use mcap::records::op;
+
+use super::message::{beginning, message_records, whole};
+use super::record::{
+    Attachment, Channel, ChunkHead, Fields, HEAD, Metadata, Schema, Statistics, is_known,
+    is_message_index, split,
+};
+use super::{AttachmentPlace, Damage, Loss, Place, ReadError, Recording, chunk};
+
+/// Loose records are read in groups of about this size.
+const GROUP: u64 = 1 << 20;
+
+/// What a scan has seen so far.
+#[derive(Default)]
+struct Seen {
+    statistics: Statistics,
+    /// Whether the record before was a chunk or the index of one.
+    is_behind_chunk: bool,
+    /// Whether messages are in chunks.
+    has_chunks: bool,
+}
+
+/// What is behind a record.
+enum Next {
+    Record(u64),
+    /// The end of the data; the summary begins.
+    Summary(u64),
+    /// The record is damaged, but the next one is known.
+    Damaged(Damage, u64),
+    /// The record is damaged, and its length may be wrong.
+    Lost(Damage),
+}
+
+impl<R: Read + Seek> Recording<R> {
+    /// Finds all places with messages, and all damage.
+    pub(super) fn scan(&mut self) -> Result<(), ReadError> {
+        let end = self.source.end;
+        let mut seen = Seen::default();
+        let mut at = 0;
+        if self.source.bytes(0, MAGIC.len() as u64)? == MAGIC {
+            at = MAGIC.len() as u64;
+        } else {
+            let Some(chunk) = self.find_chunk(0)? else { return Err(ReadError::NotMcap) };
+            self.lose(0..chunk, &seen, Damage::NoRecord);
+            at = at.max(chunk);
+        }
+        let mut is_finished = false;
+        while at < end {
+            match self.step(at, &mut seen)? {
+                Next::Record(next) => at = next,
+                Next::Summary(next) => {
+                    let is_right = self.has_right_end(next)?;
+                    let more = if is_right { None } else { self.find_chunk(next)? };
+                    if let Some(chunk) = more {
+                        // Another recording was appended, or this is no end.
+                        self.lose(at..chunk, &seen, Damage::NoRecord);
+                        at = chunk;
+                        continue;
+                    }
+                    if !is_right {
+                        self.lose(next..end, &seen, Damage::Index);
+                    }
+                    is_finished = true;
+                    break;
+                }
+                Next::Damaged(damage, next) => {
+                    self.lose(at..next, &seen, damage);
+                    seen.is_behind_chunk = true;
+                    at = next;
+                }
+                Next::Lost(damage) => {
+                    let next = self.find_chunk(at + 1)?;
+                    let until = match next {
+                        Some(next) => next,
+                        None => self.summary_start()?.filter(|start| *start > at).unwrap_or(end),
+                    };
+                    self.lose_or_cut(at..until, &mut seen, damage, next.is_some())?;
+                    at = next.unwrap_or(end);
+                }
+            }
+        }
+        match self.read_descriptions()? {
+            Some(counted) if counted.messages > seen.statistics.messages => {
+                let missing = counted.messages - seen.statistics.messages;
+                self.lose(end..end, &seen, Damage::Fewer { missing });
+            }
+            Some(_) => {}
+            None if is_finished || self.losses.last().is_some_and(|loss| loss.bytes.end == end) => {
+            }
+            None => self.lose(end..end, &seen, Damage::Unfinished),
+        }
+        self.statistics = seen.statistics;
+        Ok(())
+    }
+
+    fn lose(&mut self, bytes: Range<u64>, seen: &Seen, damage: Damage) {
+        self.add_loss(Loss { bytes, after: seen.statistics.last(), damage });
+    }
+
+    /// Reads the record at a place.
+    fn step(&mut self, at: u64, seen: &mut Seen) -> io::Result<Next> {
+        let end = self.source.end;
+        let head = self.source.bytes(at, HEAD as u64)?;
+        let mut fields = Fields(head);
+        let (Some(&[opcode]), Some(length)) = (fields.take(1), fields.u64()) else {
+            return Ok(Next::Lost(Damage::Cut));
+        };
+        let body = at + HEAD as u64;
+        let is_behind_chunk = seen.is_behind_chunk;
+        seen.is_behind_chunk =
+            opcode == op::CHUNK || (opcode == op::MESSAGE_INDEX && is_behind_chunk);
+        let Some(next) = body.checked_add(length).filter(|next| *next <= end) else {
+            return Ok(Next::Lost(if is_known(opcode) { Damage::Cut } else { Damage::NoRecord }));
+        };
+        if opcode == op::CHUNK {
+            seen.has_chunks = true;
+            return self.step_chunk(at..next, seen);
+        }
+        if length > chunk::LARGEST {
+            return self.damaged(Damage::TooLarge, next);
+        }
+        let bytes = self.source.bytes(body, length)?;
+        let is_right = match opcode {
+            op::HEADER => {
+                let bytes = bytes.to_vec();
+                self.take_header(&bytes)
+            }
+            op::SCHEMA => Schema::parse(bytes).map(|schema| self.add_schema(schema)).is_some(),
+            op::CHANNEL => Channel::parse(bytes).map(|channel| self.add_channel(channel)).is_some(),
+            op::MESSAGE => self.step_message(at..next, seen)?,
+            op::MESSAGE_INDEX => is_behind_chunk && is_message_index(bytes),
+            op::ATTACHMENT => match Attachment::parse(bytes) {
+                Some(attachment) => {
+                    let name = attachment.name;
+                    self.attachments.push(AttachmentPlace { name, at: at..next });
+                    true
+                }
+                None => return self.damaged(Damage::Checksum, next),
+            },
+            op::METADATA => match Metadata::parse(bytes) {
+                Some(metadata) => {
+                    self.metadata.push(metadata);
+                    true
+                }
+                None => false,
+            },
+            op::DATA_END => match Fields(bytes).u32() {
+                Some(sum) => {
+                    let is_right =
+                        sum == 0 || !self.losses.is_empty() || sum == self.source.sum_before(at)?;
+                    if !is_right {
+                        self.lose(at..at, seen, Damage::Checksum);
+                    }
+                    return Ok(Next::Summary(next));
+                }
+                None => false,
+            },
+            // Programs may add records of their own.
+            0x80.. => true,
+            _ => false,
+        };
+        Ok(if is_right { Next::Record(next) } else { Next::Lost(Damage::NoRecord) })
+    }
+
+    fn step_message(&mut self, at: Range<u64>, seen: &mut Seen) -> io::Result<bool> {
+        let record = self.source.bytes(at.start, at.end - at.start)?;
+        let Some((head, _)) = message_records(record).next() else { return Ok(false) };
+        // A damaged opcode makes any record a message. No checksum would tell.
+        if seen.has_chunks || !self.channels.contains_key(&head.channel) {
+            return Ok(false);
+        }
+        seen.statistics.count(&head);
+        match self.places.last_mut() {
+            Some(Place::Loose(group)) if group.end == at.start && at.end - group.start <= GROUP => {
+                group.end = at.end;
+            }
+            _ => self.places.push(Place::Loose(at)),
+        }
+        Ok(true)
+    }
+
+    fn step_chunk(&mut self, at: Range<u64>, seen: &mut Seen) -> io::Result<Next> {
+        let length = at.end - at.start;
+        if length > chunk::LARGEST {
+            return self.damaged(Damage::TooLarge, at.end);
+        }
+        let records = whole(self.source.bytes(at.start, length)?);
+        match records {
+            Ok(records) => {
+                self.take_records(&records, seen);
+                self.places.push(Place::Chunk(at.clone()));
+                Ok(Next::Record(at.end))
+            }
+            Err(damage) => self.damaged(damage, at.end),
+        }
+    }
+
+    /// A damaged record that ends before `next`, if a record begins there.
+    fn damaged(&mut self, damage: Damage, next: u64) -> io::Result<Next> {
+        let head = self.source.bytes(next, HEAD as u64)?;
+        let mut fields = Fields(head);
+        let is_record = match (fields.take(1), fields.u64()) {
+            (Some(&[opcode]), Some(length)) => {
+                let behind = (next + HEAD as u64).checked_add(length);
+                is_known(opcode) && behind.is_some_and(|behind| behind <= self.source.end)
+            }
+            _ => next == self.source.end,
+        };
+        Ok(if is_record { Next::Damaged(damage, next) } else { Next::Lost(damage) })
+    }
+
+    /// Schemas and channels of a chunk; counts its messages.
+    fn take_records(&mut self, records: &[u8], seen: &mut Seen) {
+        let mut rest = records;
+        while let Some((opcode, body, behind)) = split(rest) {
+            match opcode {
+                op::SCHEMA => Schema::parse(body).into_iter().for_each(|it| self.add_schema(it)),
+                op::CHANNEL => Channel::parse(body).into_iter().for_each(|it| self.add_channel(it)),
+                _ => {}
+            }
+            rest = behind;
+        }
+        for (head, _) in message_records(records) {
+            seen.statistics.count(&head);
+        }
+    }
+
+    /// Bytes that are damaged. If no chunk is behind them, the file was cut, and messages at the
+    /// beginning of a chunk are right: nothing was changed, only the end is missing.
+    fn lose_or_cut(
+        &mut self,
+        bytes: Range<u64>,
+        seen: &mut Seen,
+        damage: Damage,
+        has_chunk_behind: bool,
+    ) -> io::Result<()> {
+        let mut lost = bytes.clone();
+        let is_end = !has_chunk_behind && bytes.end == self.source.end;
+        if damage == Damage::Cut && !is_end {
+            self.lose(lost, seen, Damage::NoRecord);
+            return Ok(());
+        }
+        if damage == Damage::Cut {
+            let at = bytes.start..bytes.end.min(bytes.start + chunk::LARGEST);
+            let record = self.source.bytes(at.start, at.end - at.start)?;
+            let (head, records) = beginning(record);
+            if let Some(head) = head {
+                self.take_records(&records, seen);
+                self.places.push(Place::Cut(at));
+                if head.compression.is_empty() {
+                    lost.start += HEAD as u64 + head.length + records.len() as u64;
+                }
+            }
+        }
+        self.lose(lost, seen, damage);
+        Ok(())
+    }
+
+    /// The next chunk at or behind a place whose head agrees with itself.
+    fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
+        const BLOCK: u64 = 1 << 16;
+        const HEAD_LENGTH: usize = HEAD + ChunkHead::LONGEST;
+        let mut at = from;
+        while at < self.source.end {
+            let end = self.source.end;
+            let block = self.source.bytes(at, BLOCK + HEAD_LENGTH as u64)?;
+            let starts = block.iter().take(BLOCK as usize).enumerate();
+            for (n, _) in starts.filter(|(_, byte)| **byte == op::CHUNK) {
+                let mut fields = Fields(&block[n + 1..]);
+                let length = fields.u64().unwrap_or(u64::MAX);
+                let head = ChunkHead::parse(&fields.0[..fields.0.len().min(ChunkHead::LONGEST)]);
+                let place = at + n as u64;
+                let fits = (place + HEAD as u64).checked_add(length).is_some_and(|to| to <= end);
+                if fits && head.is_some_and(|head| head.fills(length)) {
+                    return Ok(Some(place));
+                }
+            }
+            at += BLOCK;
+        }
+        Ok(None)
+    }
+}
