@@ -5,9 +5,11 @@
 //! [`Loss`]es. Messages of a chunk with a wrong checksum are never given: any value could be wrong.
 
 mod chunk;
+mod content;
 mod index;
 mod message;
 mod record;
+mod repair;
 mod scan;
 mod source;
 
@@ -19,6 +21,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use content::{Content, Table, Tables, Types};
 pub use message::{Message, Messages};
 pub use record::{Attachment, Channel, Metadata, Schema};
 use record::{HEAD, Statistics};
@@ -78,7 +81,7 @@ pub enum Damage {
     Checksum,
     /// It is no record of the format.
     NoRecord,
-    /// The index at the end is missing or wrong. All messages were read.
+    /// An index is missing or wrong. This costs no message.
     Index,
     /// A chunk is larger than this program reads.
     TooLarge,
@@ -100,7 +103,7 @@ impl fmt::Display for Damage {
             Damage::Unfinished => write!(f, "the file was not finished by its writer"),
             Damage::Checksum => write!(f, "a checksum differs"),
             Damage::NoRecord => write!(f, "these bytes are no record"),
-            Damage::Index => write!(f, "the index at the end is missing or wrong"),
+            Damage::Index => write!(f, "an index is missing or wrong"),
             Damage::TooLarge => write!(f, "a chunk is larger than {} MiB", chunk::LARGEST >> 20),
             Damage::Compression(name) => {
                 write!(f, "a chunk has the unknown compression `{}`", name.escape_default())
@@ -255,6 +258,21 @@ impl<R: Read + Seek> Recording<R> {
     /// messages are read, or by [`checked`](Self::checked).
     pub fn losses(&self) -> &[Loss] {
         &self.losses
+    }
+
+    /// Number of messages, by the index or as they were counted.
+    pub fn message_count(&self) -> u64 {
+        self.statistics.messages
+    }
+
+    /// Number of messages of a channel.
+    pub fn count(&self, channel: &Channel) -> u64 {
+        self.statistics.counts.get(&channel.id).copied().unwrap_or(0)
+    }
+
+    /// Times of the first and of the last message, ns since 1970. `None` without messages.
+    pub fn times(&self) -> Option<[u64; 2]> {
+        (self.statistics.messages > 0).then_some(self.statistics.times)
     }
 
     /// All messages in the order of the file. Damage is left out, and is in

@@ -248,12 +248,17 @@ impl Statistics {
     }
 }
 
-/// Whether a message index is as the format demands.
-pub fn is_message_index(body: &[u8]) -> bool {
-    const ENTRY: usize = 8 + 8;
+/// Entries of a message index: channel, log time, offset in the chunk. `None` if it is not as the
+/// format demands.
+pub fn message_index(body: &[u8]) -> Option<Vec<(u16, u64, u64)>> {
     let mut fields = Fields(body);
-    let entries = fields.u16().and_then(|_channel| fields.bytes());
-    entries.is_some_and(|entries| entries.len() % ENTRY == 0) && fields.0.is_empty()
+    let channel = fields.u16()?;
+    let mut entries = Fields(fields.bytes()?);
+    let mut read = Vec::new();
+    while !entries.0.is_empty() {
+        read.push((channel, entries.u64()?, entries.u64()?));
+    }
+    fields.0.is_empty().then_some(read)
 }
 
 /// A record at the beginning of `bytes`, and the bytes behind it. `None` if it does not end there.

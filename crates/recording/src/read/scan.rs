@@ -1,5 +1,6 @@
 //! Reads a file from its beginning, and continues behind damage.
 
+use std::collections::HashSet;
 use std::io::{self, Read, Seek};
 use std::ops::Range;
 
@@ -8,8 +9,8 @@ use mcap::records::op;
 
 use super::message::{beginning, message_records, whole};
 use super::record::{
-    Attachment, Channel, ChunkHead, Fields, HEAD, Metadata, Schema, Statistics, is_known,
-    is_message_index, split,
+    Attachment, Channel, ChunkHead, Fields, HEAD, MessageHead, Metadata, Schema, Statistics,
+    is_known, message_index, split,
 };
 use super::{AttachmentPlace, Damage, Loss, Place, ReadError, Recording, chunk};
 
@@ -22,6 +23,8 @@ struct Seen {
     statistics: Statistics,
     /// Whether the record before was a chunk or the index of one.
     is_behind_chunk: bool,
+    /// The messages of the last chunk: channel, log time, offset. `None` if it is damaged.
+    in_chunk: Option<HashSet<(u16, u64, u64)>>,
     /// Whether messages are in chunks.
     has_chunks: bool,
 }
@@ -134,7 +137,15 @@ impl<R: Read + Seek> Recording<R> {
             op::SCHEMA => Schema::parse(bytes).map(|schema| self.add_schema(schema)).is_some(),
             op::CHANNEL => Channel::parse(bytes).map(|channel| self.add_channel(channel)).is_some(),
             op::MESSAGE => self.step_message(at..next, seen)?,
-            op::MESSAGE_INDEX => is_behind_chunk && is_message_index(bytes),
+            op::MESSAGE_INDEX => match message_index(bytes).filter(|_| is_behind_chunk) {
+                Some(entries) => match &seen.in_chunk {
+                    Some(known) if !entries.iter().all(|entry| known.contains(entry)) => {
+                        return self.damaged(Damage::Index, next);
+                    }
+                    _ => true,
+                },
+                None => false,
+            },
             op::ATTACHMENT => match Attachment::parse(bytes) {
                 Some(attachment) => {
                     let name = attachment.name;
@@ -187,6 +198,7 @@ impl<R: Read + Seek> Recording<R> {
 
     fn step_chunk(&mut self, at: Range<u64>, seen: &mut Seen) -> io::Result<Next> {
         let length = at.end - at.start;
+        seen.in_chunk = None;
         if length > chunk::LARGEST {
             return self.damaged(Damage::TooLarge, at.end);
         }
@@ -194,6 +206,11 @@ impl<R: Read + Seek> Recording<R> {
         match records {
             Ok(records) => {
                 self.take_records(&records, seen);
+                let messages = message_records(&records).map(|(head, data)| {
+                    let start = data.start - MessageHead::SIZE - HEAD;
+                    (head.channel, head.log_time, start as u64)
+                });
+                seen.in_chunk = Some(messages.collect());
                 self.places.push(Place::Chunk(at.clone()));
                 Ok(Next::Record(at.end))
             }

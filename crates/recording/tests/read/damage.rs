@@ -55,10 +55,13 @@ fn no_flipped_bit_is_a_wrong_message_or_a_hidden_loss() {
         for bit in 0..file.len() * 8 {
             let mut file = file.clone();
             file[bit / 8] ^= 1 << (bit % 8);
-            for recording in
-                [Recording::new(Cursor::new(&file)), Recording::checked(Cursor::new(&file))]
-            {
-                let (got, losses) = match recording {
+            // Without an index both read from the beginning.
+            let readers: &[fn(_) -> _] = match n {
+                0 | 1 => &[Recording::new, Recording::checked],
+                _ => &[Recording::new],
+            };
+            for reader in readers {
+                let (got, losses) = match reader(Cursor::new(&file)) {
                     Ok(recording) => crate::files::all(recording),
                     Err(_) => continue,
                 };

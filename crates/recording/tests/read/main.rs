@@ -2,4 +2,6 @@
 
 mod damage;
 mod files;
+mod repair;
+mod tables;
 mod whole;
