@@ -54,6 +54,8 @@ pub enum Kind {
     Silent,
     /// The output cannot be written.
     Output,
+    /// A recording is not whole.
+    Lost,
 }
 
 impl Kind {
@@ -62,6 +64,7 @@ impl Kind {
             Kind::Refused | Kind::Differs | Kind::Damaged => 1,
             Kind::Usage => 2,
             Kind::Link | Kind::Silent | Kind::Output => 3,
+            Kind::Lost => 4,
         }
     }
 
@@ -74,6 +77,7 @@ impl Kind {
             Kind::Link => "link",
             Kind::Silent => "silent",
             Kind::Output => "output",
+            Kind::Lost => "lost",
         }
     }
 }
@@ -95,6 +99,11 @@ impl Failure {
 
     pub fn usage(message: impl Into<String>) -> Self {
         Problem::new(Kind::Usage, message).into()
+    }
+
+    /// A recording is not whole.
+    pub fn lost(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Lost, message).into()
     }
 
     pub fn link(message: impl Into<String>) -> Self {

@@ -22,6 +22,7 @@ mod pasteable;
 mod ports;
 mod record;
 mod recording;
+mod recordings;
 mod repeat;
 mod rmd;
 mod settings;
@@ -76,6 +77,12 @@ enum Command {
     Record(record::Args),
     /// Decode captures: candump, asc, pcapng, hexadecimal text
     Decode(decode::Args),
+    /// Show what a recording contains: drives, signals, events, losses
+    Info(recordings::info::Args),
+    /// Check a recording, and write what can be read of a broken one into a new file
+    Recover(recordings::recover::Args),
+    /// Write a recording in another format
+    Convert(recordings::convert::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
@@ -94,8 +101,8 @@ enum Command {
 }
 
 /// Runs a command line, which begins with the program's name. Returns the exit code: 0 done, 1 the
-/// drive refused or a capture is damaged, 2 usage, 3 the line failed, 130 interrupted. `program` starts this command in a
-/// process of its own.
+/// drive refused or a capture is damaged, 2 usage, 3 the line failed, 4 a recording is not whole, 130
+/// interrupted. `program` starts this command in a process of its own.
 ///
 /// It takes the process over as the command does: SIGINT, SIGTERM and SIGHUP are its own from now on,
 /// and end the process where nothing has to be tidied up.
@@ -134,6 +141,9 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(&args),
         Command::Decode(args) => decode::run(args),
+        Command::Info(args) => recordings::info::run(&args),
+        Command::Recover(args) => recordings::recover::run(&args),
+        Command::Convert(args) => recordings::convert::run(&args),
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

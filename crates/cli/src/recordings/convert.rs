@@ -1,0 +1,161 @@
+//! `motorlink convert`: a recording in another format.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use motorlink_link::printable;
+use motorlink_recording::read::{Table, Tables};
+use motorlink_recording::schema::Log;
+use serde_json::json;
+
+use super::Input;
+use super::pick::Pick;
+use crate::failure::Failure;
+use crate::output::Printer;
+use crate::outputs::Output;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: Input,
+    /// The new file; its ending is the format: `.csv`. `-` is stdout, in CSV
+    #[arg(value_name = "OUT.csv", value_hint = clap::ValueHint::FilePath)]
+    output: PathBuf,
+    #[command(flatten)]
+    pick: Pick,
+    /// Give times in s since 1970 instead of s since the first sample
+    #[arg(long)]
+    unix: bool,
+    /// Replace the new file if it exists
+    #[arg(long)]
+    force: bool,
+    /// Print one line of JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let ending = |path: &Path| path.extension()?.to_str().map(str::to_ascii_lowercase);
+    let is_csv = ending(&args.output).as_deref() == Some("csv");
+    if !is_csv && args.output.as_os_str() != "-" && !is_stream(&args.output) {
+        let name = printable(&args.output.display().to_string());
+        return Err(Failure::usage(format!("`{name}` does not say the format"))
+            .trying("give a name that ends in .csv"));
+    }
+    let output = args.input.output("OUT.csv", &args.output, args.force)?;
+    if output == Output::Stdout && args.json {
+        return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
+    }
+    let tables = args.input.tables(&args.pick)?;
+    let csv = Csv::new(&tables, args.unix);
+    let mut rows = 0;
+    output.write(|out| {
+        rows = csv.write(out)?;
+        Ok(())
+    })?;
+    if output == Output::Stdout {
+        return Ok(());
+    }
+    let file = printable(&args.output.display().to_string());
+    let columns = csv.columns();
+    let text = format!("{rows} rows of {columns} signals are in {file}");
+    let object = json!({ "ok": true, "recording": args.input.name(), "file": file, "rows": rows });
+    Printer { json: args.json }.result(text, object)
+}
+
+/// Whether it is a device or a FIFO, whose names have no ending.
+fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// One table with all signals: a row for each instant of each topic, and for each event.
+struct Csv<'a> {
+    tables: &'a [Table],
+    events: &'a [Log],
+    /// Time 0, ns since 1970.
+    zero: u64,
+    is_unix: bool,
+    has_motors: bool,
+}
+
+impl<'a> Csv<'a> {
+    fn new(read: &'a Tables, is_unix: bool) -> Self {
+        let firsts = read.tables.iter().filter_map(|table| table.times.first());
+        let zero = firsts.min().copied();
+        let zero = zero.or(read.events.first().map(|event| event.stamp.0)).unwrap_or(0);
+        let mut motors: Vec<&str> = read.tables.iter().map(Table::motor).collect();
+        motors.dedup();
+        let has_motors = motors.len() > 1;
+        Csv { tables: &read.tables, events: &read.events, zero, is_unix, has_motors }
+    }
+
+    fn columns(&self) -> usize {
+        self.tables.iter().map(|table| table.fields.len()).sum()
+    }
+
+    /// Writes the rows in the order of time. Returns their number, without events.
+    fn write(&self, out: &mut dyn Write) -> io::Result<u64> {
+        write!(out, "{}", if self.is_unix { "unix [s]" } else { "t [s]" })?;
+        for table in self.tables {
+            for field in &table.fields {
+                let motor =
+                    if self.has_motors { format!("{}/", table.motor()) } else { String::new() };
+                let unit = match field.unit.is_empty() {
+                    true => String::new(),
+                    false => format!(" [{}]", field.unit),
+                };
+                write!(out, ",{}", quoted(&format!("{motor}{}{unit}", field.signal)))?;
+            }
+        }
+        writeln!(out, ",event")?;
+        let columns = self.columns();
+        let mut places = vec![0; self.tables.len()];
+        let mut events = self.events.iter().peekable();
+        let mut rows = 0;
+        loop {
+            let next = |(n, table): (usize, &Table)| Some((*table.times.get(places[n])?, n));
+            let row = self.tables.iter().enumerate().filter_map(next).min();
+            let is_event = |event: &&Log| row.is_none_or(|(time, _)| event.stamp.0 <= time);
+            if let Some(event) = events.next_if(is_event) {
+                self.write_time(out, event.stamp.0)?;
+                let text = format!("{} {}", event.kind, event.name);
+                writeln!(out, "{},{}", ",".repeat(columns), quoted(&text))?;
+                continue;
+            }
+            let Some((time, n)) = row else { return Ok(rows) };
+            self.write_time(out, time)?;
+            let before: usize = self.tables[..n].iter().map(|table| table.fields.len()).sum();
+            let table = &self.tables[n];
+            write!(out, "{}", ",".repeat(before))?;
+            for column in &table.columns {
+                match column[places[n]] {
+                    value if value.is_nan() => write!(out, ",")?,
+                    value => write!(out, ",{value}")?,
+                }
+            }
+            writeln!(out, "{},", ",".repeat(columns - before - table.columns.len()))?;
+            places[n] += 1;
+            rows += 1;
+        }
+    }
+
+    fn write_time(&self, out: &mut dyn Write, time: u64) -> io::Result<()> {
+        const NANOS: u64 = 1_000_000_000;
+        if self.is_unix {
+            return write!(out, "{}.{:09}", time / NANOS, time % NANOS);
+        }
+        // An event may be before the first sample.
+        let sign = if time < self.zero { "-" } else { "" };
+        let micros = time.abs_diff(self.zero) / 1000;
+        write!(out, "{sign}{}.{:06}", micros / 1_000_000, micros % 1_000_000)
+    }
+}
+
+/// A text as a cell. Control characters are escaped.
+fn quoted(text: &str) -> String {
+    let text = printable(text);
+    match text.contains([',', '"']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text,
+    }
+}

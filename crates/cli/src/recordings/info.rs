@@ -1,0 +1,277 @@
+//! `motorlink info`: what a recording contains.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+
+use motorlink_link::printable;
+use motorlink_recording::read::{Content, Metadata, Recording};
+use motorlink_recording::schema::{self, Log, SETTINGS_TYPE, SignalField, Time, drive};
+use serde_json::{Map, Value, json};
+
+use super::{Input, lost};
+use crate::failure::Failure;
+use crate::json;
+use crate::output::Printer;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: Input,
+    /// Print the settings that this motor had at the start, for example of `st0/motor1`
+    #[arg(long, value_name = "MOTOR", conflicts_with = "events")]
+    settings: Option<String>,
+    /// Print all events
+    #[arg(long)]
+    events: bool,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let printer = Printer { json: args.json };
+    let mut recording = args.input.open()?;
+    if let Some(motor) = &args.settings {
+        return settings(args, &mut recording, motor, printer);
+    }
+    let contents = Contents::read(&args.input, &mut recording)?;
+    if args.events {
+        args.input.note_losses(recording.losses());
+        for event in &contents.events {
+            printer.result(event_line(event), event_object(event))?;
+        }
+        return Ok(());
+    }
+    let lines = contents.lines(&args.input, &recording);
+    printer.result(lines.join("\n"), contents.object(&args.input, &recording))
+}
+
+/// Prints the settings of a motor.
+fn settings(
+    args: &Args,
+    recording: &mut Recording<File>,
+    motor: &str,
+    printer: Printer,
+) -> Result<(), Failure> {
+    let wanted = motor.trim_matches('/').replace('/', "_");
+    let names: Vec<String> = recording.attachments().map(str::to_owned).collect();
+    let is_wanted = |name: &&String| {
+        **name == motor || name.strip_suffix(".toml").is_some_and(|name| name == wanted)
+    };
+    let found = names.iter().find(is_wanted);
+    let file = args.input.name();
+    let Some(name) = found else {
+        let known: Vec<String> = names
+            .iter()
+            .filter_map(|name| name.strip_suffix(".toml"))
+            .map(|name| format!("`{}`", printable(&name.replacen('_', "/", 1))))
+            .collect();
+        let failure = Failure::usage(format!("{file} has no settings of `{motor}`"));
+        return Err(match known.is_empty() {
+            true => failure,
+            false => failure.trying(format!("it has those of {}", known.join(", "))),
+        });
+    };
+    let read = recording.attachment(name).map_err(|error| args.input.failed(&error))?;
+    let text = read.filter(|read| read.media_type == SETTINGS_TYPE);
+    let text = text.and_then(|read| String::from_utf8(read.data).ok());
+    let Some(text) = text else {
+        return Err(Failure::usage(format!("the settings of `{motor}` in {file} are damaged")));
+    };
+    let object = json!({ "recording": file, "settings": text });
+    printer.result(text.trim_end(), object)
+}
+
+/// What was read of a recording.
+struct Contents {
+    topics: Vec<Topic>,
+    /// Kinds of events with their numbers, in the order of their first appearance.
+    kinds: Vec<(String, u64)>,
+    events: Vec<Log>,
+}
+
+struct Topic {
+    name: String,
+    ty: String,
+    fields: Vec<SignalField>,
+    messages: u64,
+    times: Option<[u64; 2]>,
+}
+
+impl Topic {
+    /// Messages per second.
+    fn rate(&self) -> Option<f64> {
+        let [first, last] = self.times?;
+        let seconds = (last - first) as f64 / 1e9;
+        (self.messages > 2 && seconds > 0.0).then(|| (self.messages - 1) as f64 / seconds)
+    }
+}
+
+impl Contents {
+    fn read(input: &Input, recording: &mut Recording<File>) -> Result<Self, Failure> {
+        let types = recording.types();
+        let mut topics: BTreeMap<u16, Topic> = BTreeMap::new();
+        for channel in recording.channels() {
+            let fields = types.signals(channel.id).map(|ty| ty.fields().to_vec());
+            let ty = recording.schema(channel).map_or(String::new(), |schema| schema.name.clone());
+            let name = channel.topic.clone();
+            let fields = fields.unwrap_or_default();
+            topics.insert(channel.id, Topic { name, ty, fields, messages: 0, times: None });
+        }
+        let mut events = Vec::new();
+        for message in recording.messages() {
+            let message = message.map_err(|error| input.failed(&error))?;
+            let at = message.log_time;
+            if let Some(topic) = topics.get_mut(&message.channel.id) {
+                topic.messages += 1;
+                let [first, last] = topic.times.unwrap_or([at; 2]);
+                topic.times = Some([first.min(at), last.max(at)]);
+            }
+            if message.channel.topic == schema::name::EVENTS
+                && let Ok(Content::Event(event)) = types.content(&message)
+            {
+                events.push(event);
+            }
+        }
+        let mut kinds: Vec<(String, u64)> = Vec::new();
+        for event in &events {
+            match kinds.iter_mut().find(|(kind, _)| *kind == event.kind) {
+                Some((_, count)) => *count += 1,
+                None => kinds.push((event.kind.clone(), 1)),
+            }
+        }
+        let mut topics: Vec<Topic> = topics.into_values().collect();
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(Contents { topics, kinds, events })
+    }
+
+    fn times(&self) -> Option<[u64; 2]> {
+        let times = self.topics.iter().filter_map(|topic| topic.times);
+        times.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+    }
+
+    fn messages(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.messages).sum()
+    }
+
+    fn lines(&self, input: &Input, recording: &Recording<File>) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut row = |name: &str, text: String| {
+            lines.push(format!("{name:<9}  {}", printable(&text)).trim_end().to_owned());
+        };
+        row("recording", format!("{}, {} bytes", input.name(), recording.size()));
+        if let Some([first, last]) = self.times() {
+            let seconds = (last - first) as f64 / 1e9;
+            row(
+                "time",
+                format!("{seconds:.3} s, from {} to {}", Time(first).text(), Time(last).text()),
+            );
+        }
+        let about = recording.metadata().iter().find(|it| it.name == schema::recording::NAME);
+        let fact = |name: &str| about.and_then(|about| about.values.get(name));
+        if let Some(version) = fact(schema::recording::VERSION) {
+            row("program", format!("motorlink {version}"));
+        } else {
+            row("program", recording.library().to_owned());
+        }
+        if let Some(command) = fact(schema::recording::COMMAND) {
+            row("command", command.clone());
+        }
+        for (n, drive) in drives(recording).enumerate() {
+            row(if n == 0 { "drives" } else { "" }, drive_line(drive));
+        }
+        let width = self.topics.iter().map(|topic| topic.name.len()).max().unwrap_or(0);
+        for (n, topic) in self.topics.iter().enumerate() {
+            let rate = topic.rate().map_or(String::new(), |rate| format!(", {rate:.1} Hz"));
+            let text = format!("{:<width$}  {} messages{rate}", topic.name, topic.messages);
+            row(if n == 0 { "topics" } else { "" }, text);
+            for field in &topic.fields {
+                let unit = if field.unit.is_empty() { "" } else { &*format!(" [{}]", field.unit) };
+                row("", format!("{:<width$}  {}{unit}", "", field.signal));
+            }
+        }
+        let kinds: Vec<String> =
+            self.kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        row("events", if kinds.is_empty() { "none".to_owned() } else { kinds.join(", ") });
+        let attached: Vec<&str> = recording.attachments().collect();
+        if !attached.is_empty() {
+            row("attached", attached.join(", "));
+        }
+        row("lost", lost(recording.losses()).unwrap_or_else(|| "nothing".to_owned()));
+        lines
+    }
+
+    fn object(&self, input: &Input, recording: &Recording<File>) -> Value {
+        let mut object = Map::new();
+        let mut add = |name: &str, value: Value| object.insert(name.to_owned(), value);
+        add("recording", input.name().into());
+        add("bytes", recording.size().into());
+        add("messages", self.messages().into());
+        if let Some([first, last]) = self.times() {
+            add("first", Time(first).text().into());
+            add("last", Time(last).text().into());
+            add("duration", json::quantity((last - first) as f64 / 1e9, 3, "s"));
+        }
+        let about = recording.metadata().iter().find(|it| it.name == schema::recording::NAME);
+        add("about", about.map_or(json!({}), |about| json!(about.values)));
+        add("drives", drives(recording).map(|drive| json!(drive.values)).collect());
+        let topics = self.topics.iter().map(|topic| {
+            let mut object = json!({
+                "topic": topic.name,
+                "type": topic.ty,
+                "messages": topic.messages,
+            });
+            if let Some(rate) = topic.rate() {
+                object["rate"] = json::quantity(rate, 1, "Hz");
+            }
+            if !topic.fields.is_empty() {
+                let signal = |field: &SignalField| match field.unit.is_empty() {
+                    true => json!({ "name": field.signal }),
+                    false => json!({ "name": field.signal, "unit": field.unit }),
+                };
+                object["signals"] = topic.fields.iter().map(signal).collect();
+            }
+            object
+        });
+        add("topics", topics.collect());
+        let kinds: Map<String, Value> =
+            self.kinds.iter().map(|(kind, count)| (kind.clone(), (*count).into())).collect();
+        add("events", kinds.into());
+        add("attachments", recording.attachments().collect());
+        if let Some(why) = lost(recording.losses()) {
+            add("lost", json!({ "bytes": recording.lost_bytes(), "why": why }));
+        }
+        object.into()
+    }
+}
+
+fn drives(recording: &Recording<File>) -> impl Iterator<Item = &Metadata> {
+    recording.metadata().iter().filter(|metadata| metadata.name == drive::NAME)
+}
+
+/// `st0/motor1 on /dev/ttyACM0, st, spec: identity`.
+fn drive_line(drive: &Metadata) -> String {
+    let fact = |name: &str| drive.values.get(name).map_or("", String::as_str);
+    let (label, motor, port) = (fact(drive::LABEL), fact(drive::MOTOR), fact(drive::PORT));
+    let kind = [fact(drive::PROTOCOL), fact(drive::PROFILE)];
+    let kind: Vec<&str> = kind.into_iter().filter(|text| !text.is_empty()).collect();
+    let identity = drive.values.iter().filter(|(name, _)| name.starts_with(drive::IDENTITY));
+    let identity: Vec<&str> = identity.map(|(_, text)| &**text).collect();
+    let colon = if identity.is_empty() { "" } else { ": " };
+    format!("{label}/motor{motor} at {port}, {}{colon}{}", kind.join(" "), identity.join(", "))
+}
+
+fn event_line(event: &Log) -> String {
+    let by = if event.by.is_empty() { String::new() } else { format!(" ({})", event.by) };
+    printable(&format!("{}  {:<10}  {}{by}", event.stamp.text(), event.name, event.message))
+}
+
+fn event_object(event: &Log) -> Value {
+    json!({
+        "time": event.stamp.text(),
+        "event": event.kind,
+        "of": event.name,
+        "by": event.by,
+        "message": event.message,
+    })
+}
