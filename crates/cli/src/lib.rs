@@ -19,6 +19,7 @@ mod output;
 mod outputs;
 mod palette;
 mod pasteable;
+mod plot;
 mod ports;
 mod record;
 mod recording;
@@ -83,6 +84,8 @@ enum Command {
     Recover(recordings::recover::Args),
     /// Write a recording in another format
     Convert(recordings::convert::Args),
+    /// Draw signals of a recording
+    Plot(recordings::plot::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
@@ -144,6 +147,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Info(args) => recordings::info::run(&args),
         Command::Recover(args) => recordings::recover::run(&args),
         Command::Convert(args) => recordings::convert::run(&args),
+        Command::Plot(args) => recordings::plot::run(&args),
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

@@ -80,9 +80,7 @@ struct Csv<'a> {
 
 impl<'a> Csv<'a> {
     fn new(read: &'a Tables, is_unix: bool) -> Self {
-        let firsts = read.tables.iter().filter_map(|table| table.times.first());
-        let zero = firsts.min().copied();
-        let zero = zero.or(read.events.first().map(|event| event.stamp.0)).unwrap_or(0);
+        let zero = read.first.or(read.events.first().map(|event| event.stamp.0)).unwrap_or(0);
         let mut motors: Vec<&str> = read.tables.iter().map(Table::motor).collect();
         motors.dedup();
         let has_motors = motors.len() > 1;

@@ -2,7 +2,9 @@
 
 pub mod convert;
 pub mod info;
+mod look;
 mod pick;
+pub mod plot;
 pub mod recover;
 
 use std::fs::File;
@@ -80,7 +82,9 @@ impl Input {
 
 /// What was lost, and after which time.
 fn lost(losses: &[Loss]) -> Option<String> {
-    let first = losses.first()?;
+    // An index costs no message, so other damage is more important.
+    let is_index = |loss: &&Loss| loss.damage == Damage::Index;
+    let first = losses.iter().find(|loss| !is_index(loss)).or(losses.first())?;
     let bytes: u64 = losses.iter().map(|loss| loss.bytes.end - loss.bytes.start).sum();
     let messages = losses.iter().find_map(|loss| match loss.damage {
         Damage::Fewer { missing } => Some(format!("{missing} messages and ")),

@@ -7,12 +7,12 @@ use std::path::PathBuf;
 use motorlink_link::printable;
 use motorlink_recording::read::{Damage, Recording};
 use motorlink_recording::schema::Time;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
 use super::{Input, lost};
 use crate::failure::Failure;
 use crate::json;
-use crate::output::{Printer, in_words};
+use crate::output::Printer;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -62,12 +62,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             _ => None,
         });
         let mut lost = json!({ "bytes": recording.lost_bytes(), "why": why });
-        lost["messages"] = missing.map_or(Value::Null, Value::from);
+        if let Some(missing) = missing {
+            lost["messages"] = missing.into();
+        }
         object.insert("lost".to_owned(), lost);
     }
     object.extend(path.iter().map(|path| ("file".to_owned(), path.clone().into())));
     let mut lines = Vec::new();
-    let mut row = |name: &str, text: String| lines.push(format!("{:<9}  {text}", in_words(name)));
+    let mut row = |name: &str, text: String| lines.push(format!("{name:<9}  {text}"));
     let until = times.map_or(String::new(), |[first, last]| {
         format!(" in {:.3} s, until {}", (last - first) as f64 / 1e9, Time(last).text())
     });

@@ -1,7 +1,7 @@
 //! `motorlink sim`: serves simulated drives and executes commands from stdin, or plays a scenario.
 
+mod figure;
 mod mcap;
-mod plot;
 mod presets;
 mod run;
 

@@ -8,11 +8,13 @@ use motorlink_link::printable;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
-use super::{mcap, plot};
+use super::figure::figure;
+use super::mcap;
 use crate::failure::Failure;
 use crate::json;
 use crate::output::{note, print_line};
 use crate::outputs::{self, Output};
+use crate::plot;
 
 /// Values of the final state in a line of text.
 const ON_A_LINE: usize = 5;
@@ -43,13 +45,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
     }
     if let Some(plot) = &args.plot
-        && let Some(other) = other_format(plot)
+        && let Some(other) = plot::other_format(plot)
     {
         let why =
             format!("--plot writes SVG, not {other}: `{}`", printable(&plot.display().to_string()));
-        return Err(Failure::usage(why).trying(
-            "give a name that ends in .svg; browsers show it, and Inkscape or rsvg-convert convert it",
-        ));
+        return Err(Failure::usage(why).trying(plot::SVG_ADVICE));
     }
     let inputs: Vec<&Path> =
         std::iter::once(&args.scenario).chain(&scenario.files).map(|path| &**path).collect();
@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let csv = csv.as_ref().map_or(Ok(()), |out| out.write(|mut file| run.write_csv(&mut file)));
     let plot = plot.as_ref().map_or(Ok(()), |out| {
-        let picture = plot::draw(&scenario, &run).map_err(Failure::link)?;
+        let picture = plot::draw(&figure(&scenario, &run)).map_err(Failure::link)?;
         out.write(|file| file.write_all(picture.as_bytes()))
     });
     let judged = match run.as_expected() {
@@ -100,15 +100,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     // The result of the run comes first: its exit code counts.
     let failures = [judged, report, csv, plot, mcap].into_iter().filter_map(Result::err);
     failures.reduce(Failure::and).map_or(Ok(()), Err)
-}
-
-/// The extension of a file name that promises another format than SVG. Names without an extension and
-/// devices may have any content.
-fn other_format(plot: &Path) -> Option<String> {
-    let extension = plot.extension()?.to_str()?.to_ascii_lowercase();
-    let is_other = ["png", "jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
-        .contains(&&*extension);
-    is_other.then(|| extension.to_uppercase())
 }
 
 fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Vec<String> {

@@ -29,13 +29,18 @@ impl Label {
     }
 }
 
+/// Where a moment of a run is that ends at `end` s.
+pub fn place_of(at: f64, end: f64) -> i32 {
+    LEFT + (f64::from(PLOT) * at / end).round() as i32
+}
+
 /// Places labels of a run that ends at `end` s, in few rows.
 pub fn place(marks: &[Mark], end: f64) -> Vec<Label> {
     let mut labels: Vec<Label> = Vec::new();
     for marks in marks.chunk_by(|a, b| a.at == b.at) {
         let words: Vec<&str> = marks.iter().map(|mark| mark.label.as_str()).collect();
         let text = words.join(", ");
-        let x = LEFT + (f64::from(PLOT) * marks[0].at / end).round() as i32;
+        let x = place_of(marks[0].at, end);
         let right = x + 5;
         let from = if right + width(&text) <= WIDTH { right } else { x - 5 - width(&text) };
         let mut label = Label { text, x, row: 0, from };

@@ -1,12 +1,13 @@
 //! A panel of signals whose values have names: a strip for each, and a legend for what is too narrow
 //! for its name.
 
-use motorlink_testbench::scenario::{Kind, Run, short};
+use motorlink_testbench::scenario::short;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::figure::{Signal, States};
 use super::style::{
-    Area, Drawn, LEFT, PLOT, TEXT_LINE, WIDTH, at, rgb, small, state, thick, tint, width, write,
+    Area, Drawn, LEFT, PLOT, TEXT_LINE, WIDTH, at, rgb, small, thick, tint, width, write,
 };
 use crate::palette::Meaning;
 
@@ -43,48 +44,61 @@ struct Entry {
 }
 
 impl Strip {
-    /// A signal of a run; `events` are the places of the lines that cross the strip.
-    pub fn new(run: &Run, signal: usize, end: f64, events: &[i32]) -> Self {
-        let (column, kind) = (&run.columns[signal], run.signals[signal].kind);
-        let place =
-            |n: usize| LEFT + (f64::from(PLOT) * n as f64 / (column.len() - 1) as f64) as i32;
+    /// A signal whose values have names; `events` are the places of the lines that cross the strip.
+    pub fn new(signal: &Signal<'_>, states: &States<'_>, events: &[i32]) -> Self {
+        let samples = &signal.samples;
+        let place = |n: usize| LEFT + samples.place(n, f64::from(PLOT)) as i32;
         let mut spans = Vec::new();
         let mut narrow: Vec<(String, Meaning, Vec<String>)> = Vec::new();
-        let mut first = 0;
-        for same in column.chunk_by(|a, b| a == b) {
-            let next = (first + same.len()).min(column.len() - 1);
-            let (from, to) = (place(first), place(next).max(place(first) + 1));
-            let name = kind.show(same[0]);
-            let (meaning, middle) = (state(kind, &name), room(from, to, width(&name), events));
-            if middle.is_none() {
-                let moment = short(end * first as f64 / (column.len() - 1) as f64);
-                match narrow.iter_mut().find(|(known, ..)| *known == name) {
-                    Some((_, _, moments)) => moments.push(moment),
-                    None => narrow.push((name.clone(), meaning, vec![moment])),
+        for segment in samples.segments() {
+            let mut first = segment.start;
+            for same in samples.values[segment.clone()].chunk_by(|a, b| a == b) {
+                let next = (first + same.len()).min(segment.end - 1);
+                let (from, to) = (place(first), place(next).max(place(first) + 1));
+                let (name, meaning) = states(same[0]);
+                let middle = room(from, to, width(&name), events);
+                if middle.is_none() {
+                    let moment = short(samples.place(first, samples.end));
+                    match narrow.iter_mut().find(|(known, ..)| *known == name) {
+                        Some((_, _, moments)) => moments.push(moment),
+                        None => narrow.push((name.clone(), meaning, vec![moment])),
+                    }
                 }
+                spans.push(Span { name, meaning, from, to, middle });
+                first += same.len();
             }
-            spans.push(Span { name, meaning, from, to, middle });
-            first += same.len();
         }
         // The look of a state is explained where its name has room once.
         narrow.retain(|(name, ..)| {
             !spans.iter().any(|span: &Span| span.middle.is_some() && span.name == *name)
         });
         let legend = flow(narrow.into_iter().map(|(name, meaning, moments)| Entry {
-            text: format!("{name} at {} s", moments.join(", ")),
+            text: format!("{name} at {} s", listed(&moments)),
             meaning,
         }));
-        Strip { name: run.signals[signal].name.clone(), spans, legend }
+        Strip { name: signal.name.clone(), spans, legend }
+    }
+
+    /// Height of the line for a name that has no room beside the strip.
+    fn name_line(&self) -> i32 {
+        if width(&self.name) > LEFT - 12 { TEXT_LINE } else { 0 }
     }
 
     pub fn height(&self) -> i32 {
-        STRIP + GAP + self.legend.len() as i32 * TEXT_LINE
+        self.name_line() + STRIP + GAP + self.legend.len() as i32 * TEXT_LINE
     }
 
     /// Draws the strip from `top`, with the lines of events over it.
     pub fn draw(&self, area: &Area<'_>, top: i32, events: &[i32]) -> Drawn {
-        let style = small().pos(Pos::new(HPos::Right, VPos::Center));
-        area.draw(&Text::new(self.name.as_str(), at(LEFT - 8, top + STRIP / 2), style))?;
+        match self.name_line() {
+            0 => {
+                let style = small().pos(Pos::new(HPos::Right, VPos::Center));
+                let place = at(LEFT - 8, top + STRIP / 2);
+                area.draw(&Text::new(self.name.as_str(), place, style))?;
+            }
+            line => write(area, &self.name, LEFT, top + line / 2)?,
+        }
+        let top = top + self.name_line();
         for span in &self.spans {
             fill(area, span.meaning, [span.from, span.to], [top, top + STRIP])?;
         }
@@ -125,6 +139,15 @@ fn room(from: i32, to: i32, size: i32, events: &[i32]) -> Option<i32> {
     edges.sort_unstable();
     let widest = edges.windows(2).max_by_key(|pair| pair[1] - pair[0])?;
     (widest[1] - widest[0] >= size + 6).then_some((widest[0] + widest[1]) / 2)
+}
+
+/// The first moments of a state.
+fn listed(moments: &[String]) -> String {
+    const FEW: usize = 8;
+    match moments.len() {
+        0..=FEW => moments.join(", "),
+        count => format!("{} and {} more", moments[..FEW].join(", "), count - FEW),
+    }
 }
 
 fn entry_width(text: &str) -> i32 {
@@ -181,11 +204,6 @@ fn fill(
         }
     }
     Ok(())
-}
-
-/// Whether the values of a signal have names.
-pub fn is_named(kind: Kind) -> bool {
-    matches!(kind, Kind::Named(_))
 }
 
 #[cfg(test)]

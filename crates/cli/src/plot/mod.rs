@@ -1,21 +1,27 @@
-//! A run as a picture: panels over a common time, with the moments of events as lines through all of
+//! Signals as a picture: panels over a common time, with the moments of events as lines through all of
 //! them.
 
+mod figure;
 mod labels;
 mod points;
+mod state;
 mod strips;
 mod style;
 
-use motorlink_testbench::scenario::{Kind, Panel, Run, Scenario, Signal, short};
+use std::path::Path;
+
+use motorlink_testbench::scenario::short;
 use plotters::prelude::*;
 
 use crate::palette::Meaning;
+pub use figure::{Figure, Panel, Samples, Signal, States, Times};
 use labels::Label;
 use points::{thin, whole_range};
-use strips::{Strip, is_named};
+pub use state::state;
+use strips::Strip;
 use style::{
-    Area, Drawn, FINE, LEFT, PLOT, RIGHT, TEXT_LINE, WIDTH, at, bold, bold_width, quantity, rgb,
-    small, thick, width, write, write_bold,
+    Area, Drawn, FINE, LEFT, PLOT, RIGHT, TEXT_LINE, WIDTH, at, bold, bold_width, rgb, small,
+    thick, width, write, write_bold,
 };
 
 const TITLE_FONT: i32 = 21;
@@ -28,12 +34,25 @@ const TIME_AXIS: i32 = 44;
 /// Length of a line in the legend.
 const SAMPLE: i32 = 26;
 
-/// Draws the panels of a scenario as SVG.
+/// What to try after [`other_format`].
+pub const SVG_ADVICE: &str =
+    "give a name that ends in .svg; browsers show it, and Inkscape or rsvg-convert convert it";
+
+/// The extension of a file name that promises another format than SVG. Names without an extension and
+/// devices may have any content.
+pub fn other_format(plot: &Path) -> Option<String> {
+    let extension = plot.extension()?.to_str()?.to_ascii_lowercase();
+    let is_other = ["png", "jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
+        .contains(&&*extension);
+    is_other.then(|| extension.to_uppercase())
+}
+
+/// Draws a figure as SVG.
 ///
 /// # Errors
 /// What the drawing library could not do.
-pub fn draw(scenario: &Scenario, run: &Run) -> Result<String, String> {
-    let picture = Picture::new(scenario, run);
+pub fn draw(figure: &Figure<'_>) -> Result<String, String> {
+    let picture = Picture::new(figure);
     let height = picture.height();
     let mut svg = String::new();
     let size = ((WIDTH * FINE) as u32, (height * FINE) as u32);
@@ -50,9 +69,7 @@ pub fn draw(scenario: &Scenario, run: &Run) -> Result<String, String> {
 
 /// A picture with the places of its parts.
 struct Picture<'a> {
-    run: &'a Run,
-    /// Length of the run, s.
-    end: f64,
+    figure: &'a Figure<'a>,
     title: Vec<String>,
     labels: Vec<Label>,
     /// Places of the lines of events.
@@ -84,17 +101,19 @@ struct Look {
 }
 
 impl<'a> Picture<'a> {
-    fn new(scenario: &'a Scenario, run: &'a Run) -> Self {
-        let end = scenario.duration.0 as f64 / 1e6;
-        let labels = labels::place(&run.marks, end);
-        let events: Vec<i32> = labels.iter().map(|label| label.x).collect();
+    fn new(figure: &'a Figure<'a>) -> Self {
+        let labels = labels::place(&figure.marks, figure.end);
+        let unnamed = figure.unnamed.iter().map(|at| labels::place_of(*at, figure.end));
+        let events: Vec<i32> = labels.iter().map(|label| label.x).chain(unnamed).collect();
         let part = |panel: &'a Panel| {
-            let strip = |&signal: &usize| Strip::new(run, signal, end, &events);
-            let named = panel.signals.iter().filter(|&&n| is_named(run.signals[n].kind));
-            Part { panel, heading: Heading::new(panel, run), strips: named.map(strip).collect() }
+            let signals = panel.signals.iter().map(|&n| &figure.signals[n]);
+            let strip =
+                |signal: &Signal<'_>| Some(Strip::new(signal, signal.states.as_ref()?, &events));
+            let strips = signals.filter_map(strip).collect();
+            Part { panel, heading: Heading::new(panel, figure), strips }
         };
-        let panels = scenario.panels.iter().map(part).collect();
-        Picture { run, end, title: title_lines(&scenario.title), labels, events, panels }
+        let panels = figure.panels.iter().map(part).collect();
+        Picture { figure, title: title_lines(&figure.title), labels, events, panels }
     }
 
     /// Height of the title and of the labels.
@@ -123,6 +142,10 @@ impl<'a> Picture<'a> {
             let line = [at(label.x, top), at(label.x, self.height() - TIME_AXIS)];
             root.draw(&PathElement::new(line, thick(rgb(Meaning::Event), 8)))?;
         }
+        for &x in &self.events[self.labels.len()..] {
+            let line = [at(x, self.head()), at(x, self.height() - TIME_AXIS)];
+            root.draw(&PathElement::new(line, thick(rgb(Meaning::Event), 8)))?;
+        }
         // Texts are on white: no line crosses them.
         for label in &self.labels {
             write(root, &label.text, label.from, row(label))?;
@@ -136,7 +159,7 @@ impl<'a> Picture<'a> {
                 true => self.draw_lines(&area, part, axis)?,
                 false => self.draw_strips(&area, part, axis)?,
             }
-            part.heading.draw(&area, self.run)?;
+            part.heading.draw(&area, self.figure)?;
             rest = below;
         }
         Ok(())
@@ -144,10 +167,12 @@ impl<'a> Picture<'a> {
 
     /// A panel of numbers.
     fn draw_lines(&self, area: &Area<'_>, part: &Part<'_>, axis: i32) -> Drawn {
-        let [low, high] = part.panel.range.unwrap_or_else(|| whole_range(part.panel, self.run));
+        let [low, high] = part.panel.range.unwrap_or_else(|| {
+            whole_range(part.panel.signals.iter().map(|&n| &self.figure.signals[n]))
+        });
         let mut chart = chart(area, part.heading.height(), axis)
             .y_label_area_size(LEFT * FINE)
-            .build_cartesian_2d(0.0..self.end, low..high)?;
+            .build_cartesian_2d(0.0..self.figure.end, low..high)?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -163,17 +188,24 @@ impl<'a> Picture<'a> {
             .draw()?;
         // The first signal is on top.
         for look in part.heading.legend.iter().flatten().rev() {
-            let points = thin(&self.run.columns[look.signal], self.end, low, high, PLOT as usize);
+            let samples = &self.figure.signals[look.signal].samples;
             let style = look.style();
-            match look.dashes() {
-                None => chart.draw_series(LineSeries::new(points, style))?,
-                Some([on, off]) => chart.draw_series(DashedLineSeries::new(
-                    points,
-                    on * FINE,
-                    off * FINE,
-                    style,
-                ))?,
-            };
+            for points in thin(samples, low, high, PLOT as usize) {
+                if let [point] = points[..] {
+                    // A line of one point has no length.
+                    chart.draw_series([Circle::new(point, FINE, style.filled())])?;
+                    continue;
+                }
+                match look.dashes() {
+                    None => chart.draw_series(LineSeries::new(points, style))?,
+                    Some([on, off]) => chart.draw_series(DashedLineSeries::new(
+                        points,
+                        on * FINE,
+                        off * FINE,
+                        style,
+                    ))?,
+                };
+            }
         }
         Ok(())
     }
@@ -182,7 +214,7 @@ impl<'a> Picture<'a> {
     fn draw_strips(&self, area: &Area<'_>, part: &Part<'_>, axis: i32) -> Drawn {
         let mut chart = chart(area, part.heading.height(), axis)
             .y_label_area_size(LEFT * FINE)
-            .build_cartesian_2d(0.0..self.end, 0.0..1.0)?;
+            .build_cartesian_2d(0.0..self.figure.end, 0.0..1.0)?;
         chart
             .configure_mesh()
             .disable_mesh()
@@ -214,21 +246,16 @@ impl Part<'_> {
 }
 
 impl Heading {
-    fn new(panel: &Panel, run: &Run) -> Self {
-        let first = &run.signals[panel.signals[0]];
-        let title = match (first.kind, &panel.title) {
-            (Kind::Number { unit, .. }, Some(title)) => format!("{title} ({unit})"),
-            (Kind::Number { quantity, unit }, None) => format!("{quantity} ({unit})"),
-            (Kind::Named(_), title) => title.clone().unwrap_or_default(),
-        };
+    fn new(panel: &Panel, figure: &Figure<'_>) -> Self {
+        let title = panel.title.clone();
         let mut legend: Vec<Vec<Look>> = vec![Vec::new()];
         let mut x = LEFT + bold_width(&title) + 22;
-        let numbers = panel.signals.iter().filter(|&&n| !is_named(run.signals[n].kind));
+        let numbers = panel.signals.iter().filter(|&&n| figure.signals[n].states.is_none());
         for &signal in numbers {
-            let meaning = quantity(&run.signals[signal]);
+            let meaning = figure.signals[signal].meaning;
             let same = |look: &&Look| look.meaning == meaning;
             let dash = legend.iter().flatten().filter(same).count();
-            let size = Look::width(&run.signals[signal]);
+            let size = Look::width(&figure.signals[signal]);
             if x + size > WIDTH {
                 legend.push(Vec::new());
                 x = LEFT;
@@ -244,13 +271,13 @@ impl Heading {
         8 + self.legend.len() as i32 * TEXT_LINE
     }
 
-    fn draw(&self, area: &Area<'_>, run: &Run) -> Drawn {
+    fn draw(&self, area: &Area<'_>, figure: &Figure<'_>) -> Drawn {
         write_bold(area, &self.title, LEFT, 4 + TEXT_LINE / 2)?;
         for (row, looks) in self.legend.iter().enumerate() {
             let y = 4 + row as i32 * TEXT_LINE + TEXT_LINE / 2;
             for look in looks {
                 look.draw_sample(area, y)?;
-                write(area, &run.signals[look.signal].name, look.x + SAMPLE + 5, y)?;
+                write(area, &figure.signals[look.signal].name, look.x + SAMPLE + 5, y)?;
             }
         }
         Ok(())
@@ -259,7 +286,7 @@ impl Heading {
 
 impl Look {
     /// Width of a signal in a legend.
-    fn width(signal: &Signal) -> i32 {
+    fn width(signal: &Signal<'_>) -> i32 {
         SAMPLE + 5 + width(&signal.name)
     }
 
