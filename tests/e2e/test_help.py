@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from recordings import short
 from shell import Shell, asks_a_share, lines as commands
 
 ROOT = Path(__file__).parents[2]
@@ -42,11 +43,16 @@ def examples(text):
     return [line.strip() for line in block[1].replace("\\\n", "").splitlines()] if block else []
 
 
+#: What reads a recording.
+RECORDINGS = ("info", "recover", "convert", "plot")
+#: The program itself, and commands without subcommands.
+OF_THEIR_OWN = [(), *((name,) for name in ("ports", "completions", "man", "watch", "record", *RECORDINGS))]
+
+
 @pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", ""])
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
-    # The program itself, and commands without subcommands.
     pages = helps(run, command) if command else [
-        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",), ("watch",), ("record",))
+        page for page in helps(run) if page[0][:1] in OF_THEIR_OWN
     ]
     lines = {line: None for _, text in pages for line in examples(text)}
     assert len(lines) >= 2
@@ -63,8 +69,10 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
             command = next(commands(line))
             if asks_a_share(command[1]):
                 shell.run(*next(commands("motorlink share -p ./st0 -p slcan:./can0 --at unix:./share &")))
+            if command[1][1] in RECORDINGS:
+                short(tmp_path / "run.mcap")
             shell.run(*command)
-        for made in ("run.csv", "run.svg", "run.mcap", "motorlink.bash"):
+        for made in ("run.csv", "run.svg", "run.mcap", "fixed.mcap", "motorlink.bash"):
             (tmp_path / made).unlink(missing_ok=True)
 
 

@@ -10,6 +10,7 @@ from jsonschema import Draft202012Validator
 
 from peers import device, slcan_adapter
 from program import environment, eventually
+from recordings import short
 from sharing import Client
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -43,6 +44,11 @@ DECODE = {
 }
 #: What reads or writes a file of settings.
 FILES = ["dump", "dump FILE --overwrite", "diff FILE", "restore FILE", "restore FILE --dry-run"]
+#: What reads a recording.
+RECORDINGS = [
+    *("info FILE", "info FILE --events", "info FILE --settings st0/motor1", "recover FILE"),
+    *("convert FILE OUT.csv", "plot FILE -o OUT.svg"),
+]
 SCAN = "`motorlink rmd -p sim: scan` lists the motors that answer"
 
 
@@ -85,7 +91,7 @@ def test_the_schema_is_one_and_the_documents_lines_follow_it():
 def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK, *FILES]} | {"scan"}
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
-    others = {"demo", "watch", "spec", "completions", "man"}
+    others = {"demo", "watch", "spec", "completions", "man", *(word(command) for command in RECORDINGS)}
     assert subcommands(run, "share") == set(SHARE)
     assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "conformance", "decode"} | others
 
@@ -299,6 +305,18 @@ def test_a_share_tells_what_happens(sim, start, checked, tmp_path):
     share.interrupt()
     share.wait()
     assert len(check("\n".join(share.out))) > 4
+
+
+@pytest.mark.parametrize("command", RECORDINGS)
+def test_a_recording_is_told_about(checked, tmp_path, command):
+    path = tmp_path / "run.mcap"
+    short(path)
+    words = command.replace("FILE", str(path)).replace("OUT", str(tmp_path / "out")).split()
+    out, err = checked(*words)
+    assert out and not err
+    path.write_bytes(path.read_bytes()[:5000])
+    out, err = checked(*words, *(("--force",) if "OUT" in command else ()), code=4 if "recover" in words else 0)
+    assert out and bool(err) == (words[0] != "info" or "--events" in words)
 
 
 def test_a_recording_tells_how_far_it_is(checked, tmp_path):

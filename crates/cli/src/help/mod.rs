@@ -20,7 +20,7 @@ pub const GLOBAL: &str = "Options of every command";
 /// Behind `motorlink --help`.
 pub const EXIT_CODES: &str = "\
 Exit codes: 0 done, 1 the drive refused or a capture is damaged, 2 the command
-line is invalid, 3 the line failed, 130 Ctrl-C.
+line is invalid, 3 the line failed, 4 a recording is not whole, 130 Ctrl-C.
 `motorlink demo` needs no hardware. `motorlink ports` lists what is connected.";
 
 /// A command with the examples of all its subcommands.
