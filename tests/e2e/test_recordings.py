@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import struct
 from xml.etree import ElementTree
 
 import pytest
@@ -198,7 +199,7 @@ def test_missing_values_are_empty(run, tmp_path):
 
 def test_a_name_without_a_format_is_refused(run, path, tmp_path):
     assert "a name that ends in .csv" in run("convert", path, tmp_path / "run.xls").ended(2).err
-    assert "plot writes SVG, not PDF" in run("plot", path, "-o", tmp_path / "run.pdf").ended(2).err
+    assert "plot writes SVG and PNG, not PDF" in run("plot", path, "-o", tmp_path / "run.pdf").ended(2).err
     assert not list(tmp_path.glob("run.[xp]*"))
 
 
@@ -215,6 +216,16 @@ def test_a_picture_has_signals_by_unit_events_and_gaps(run, path, tmp_path):
     lines = [line for line in ElementTree.fromstring(only).iter() if line.tag.endswith("polyline")]
     speeds = [line for line in lines if line.get("stroke") == "#0072B2"]
     assert len([line for line in speeds if len(line.get("points").split()) > 10]) == 2
+
+
+def test_a_picture_is_a_png_if_its_name_says_so(run, path, tmp_path):
+    run("plot", path, "-o", tmp_path / "run.png").ended(0)
+    run("plot", path, "-o", tmp_path / "run.svg").ended(0)
+    svg = ElementTree.parse(tmp_path / "run.svg").getroot()
+    png = (tmp_path / "run.png").read_bytes()
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    size = struct.unpack(">II", png[16:24])
+    assert size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
 
 
 def test_a_spike_is_never_lost(run, tmp_path):

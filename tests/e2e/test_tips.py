@@ -55,12 +55,12 @@ def test_a_scenario_behind_sim_is_recognized(run, tmp_path):
     assert "motorlink sim run" not in run("sim", path).ended(2).err
 
 
-@pytest.mark.parametrize("name", ["run.png", "run.PDF"])
+@pytest.mark.parametrize("name", ["run.jpg", "run.PDF"])
 def test_a_plot_is_not_written_into_a_file_of_another_format(run, tmp_path, name):
     scenario = tmp_path / "rest.toml"
     scenario.write_text(SCENARIO + '[[panel]]\nsignals = ["st1.speed_rpm"]\n')
     message = run("sim", "run", scenario, "--plot", tmp_path / name).ended(2).err
-    assert "--plot writes SVG" in message and ".svg" in message
+    assert "--plot writes SVG and PNG" in message and ".svg" in message
     assert [path.name for path in tmp_path.iterdir()] == ["rest.toml"]
     run("sim", "run", scenario, "--plot", tmp_path / "run").ended(0)
 

@@ -3,6 +3,7 @@
 
 mod figure;
 mod labels;
+mod png;
 mod points;
 mod state;
 mod strips;
@@ -36,22 +37,30 @@ const SAMPLE: i32 = 26;
 
 /// What to try after [`other_format`].
 pub const SVG_ADVICE: &str =
-    "give a name that ends in .svg; browsers show it, and Inkscape or rsvg-convert convert it";
+    "give a name that ends in .svg or .png; Inkscape and rsvg-convert convert SVG to other formats";
 
-/// The extension of a file name that promises another format than SVG. Names without an extension and
+/// The extension of a file name that promises another format than SVG and PNG. Names without an extension and
 /// devices may have any content.
 pub fn other_format(plot: &Path) -> Option<String> {
     let extension = plot.extension()?.to_str()?.to_ascii_lowercase();
-    let is_other = ["png", "jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
+    let is_other = ["jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
         .contains(&&*extension);
     is_other.then(|| extension.to_uppercase())
 }
 
-/// Draws a figure as SVG.
+/// Draws a figure: as PNG if the name of the file ends so, otherwise as SVG.
 ///
 /// # Errors
 /// What the drawing library could not do.
-pub fn draw(figure: &Figure<'_>) -> Result<String, String> {
+pub fn draw(figure: &Figure<'_>, path: &Path) -> Result<Vec<u8>, String> {
+    let picture = svg(figure)?;
+    match path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        true => png::png(&picture),
+        false => Ok(picture.into_bytes()),
+    }
+}
+
+fn svg(figure: &Figure<'_>) -> Result<String, String> {
     let picture = Picture::new(figure);
     let height = picture.height();
     let mut svg = String::new();

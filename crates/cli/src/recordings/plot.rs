@@ -37,8 +37,8 @@ pub struct Args {
     input: Input,
     #[command(flatten)]
     pick: Pick,
-    /// The picture, SVG; `-` is stdout
-    #[arg(short, long, value_name = "FILE.svg", value_hint = clap::ValueHint::FilePath)]
+    /// The picture: .svg or .png; `-` is stdout, in SVG
+    #[arg(short, long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     output: PathBuf,
     /// Begin at this time, s since the first sample
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
@@ -60,7 +60,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(other) = plot::other_format(&args.output) {
         let name = printable(&args.output.display().to_string());
-        return Err(Failure::usage(format!("plot writes SVG, not {other}: `{name}`"))
+        return Err(Failure::usage(format!("plot writes SVG and PNG, not {other}: `{name}`"))
             .trying(plot::SVG_ADVICE));
     }
     let output = args.input.output("--output", &args.output, args.force)?;
@@ -70,8 +70,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let read = args.input.tables(&args.pick)?;
     let view = View::new(&read, args)?;
     let figure = view.figure(&read, args);
-    let picture = plot::draw(&figure).map_err(Failure::link)?;
-    output.write(|file| file.write_all(picture.as_bytes()))?;
+    let picture = plot::draw(&figure, &args.output).map_err(Failure::link)?;
+    output.write(|file| file.write_all(&picture))?;
     if output == Output::Stdout {
         return Ok(());
     }

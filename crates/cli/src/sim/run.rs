@@ -23,8 +23,8 @@ const ON_A_LINE: usize = 5;
 pub struct Args {
     /// The scenario, a TOML file; docs/SCENARIOS.md describes it
     scenario: PathBuf,
-    /// Draw the panels of the scenario into this file; `-` is stdout
-    #[arg(long, value_name = "FILE.svg")]
+    /// Draw the panels of the scenario into this file, .svg or .png; `-` is stdout, in SVG
+    #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Write all signals into this file, a row for each sample; `-` is stdout
     #[arg(long, value_name = "FILE.csv")]
@@ -47,8 +47,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(plot) = &args.plot
         && let Some(other) = plot::other_format(plot)
     {
-        let why =
-            format!("--plot writes SVG, not {other}: `{}`", printable(&plot.display().to_string()));
+        let why = format!(
+            "--plot writes SVG and PNG, not {other}: `{}`",
+            printable(&plot.display().to_string())
+        );
         return Err(Failure::usage(why).trying(plot::SVG_ADVICE));
     }
     let inputs: Vec<&Path> =
@@ -85,8 +87,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let csv = csv.as_ref().map_or(Ok(()), |out| out.write(|mut file| run.write_csv(&mut file)));
     let plot = plot.as_ref().map_or(Ok(()), |out| {
-        let picture = plot::draw(&figure(&scenario, &run)).map_err(Failure::link)?;
-        out.write(|file| file.write_all(picture.as_bytes()))
+        let path = args.plot.as_deref().unwrap_or(Path::new(""));
+        let picture = plot::draw(&figure(&scenario, &run), path).map_err(Failure::link)?;
+        out.write(|file| file.write_all(&picture))
     });
     let judged = match run.as_expected() {
         true => Ok(()),
