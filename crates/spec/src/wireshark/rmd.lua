@@ -134,7 +134,7 @@ local function read(field, range)
         return string.format("%d", number), Int64.new(number)
     end
     local places = "%." .. field.decimals .. "f %s"
-    return string.format(places, number * field.digit, field.symbol), value_of(field, number),
+    return string.format(places, value_of(field, number), field.symbol), value_of(field, number),
         field.signed and digits or Int64.new(number)
 end
 
@@ -231,8 +231,9 @@ local function type_of(line, motor, frame, command, tvb, sent)
         -- A reply to a request that is not in the capture, or a request of another host.
         return UNKNOWN, "nothing"
     end
+    -- The reply, or the request again because the motor is silent.
     if frame.answers then
-        return REPLY, "order"
+        return UNKNOWN, "nothing"
     end
     -- No reply comes so late behind the frame before.
     if motor.is_synced or motor.last and is_late(motor.last, frame.time) then
@@ -270,7 +271,7 @@ local function understand(pinfo, tvb, id, code)
             motor.open.by[id] = frame
         end
         motor.open = nil
-    elseif frame.type == REQUEST then
+    elseif frame.type == REQUEST or frame.answers then
         motor.open, motor.asked = frame, code
     end
     motor.is_synced = motor.is_synced or frame.type ~= UNKNOWN
