@@ -6,11 +6,13 @@
 //! | record drives in threads | [`record::Recorder`] |
 //! | write files, in a thread or not | [`write`] |
 //! | read a file, whole or broken | [`read`] |
+//! | let a recorded drive answer again | [`replay`] |
 #![forbid(unsafe_code)]
 
 mod error;
 pub mod read;
 pub mod record;
+pub mod replay;
 pub mod schema;
 pub mod write;
 

@@ -142,6 +142,11 @@ impl Code {
         matches!(self, Code::Off | Code::Stop)
     }
 
+    /// Whether it only reads. Nothing is known of an unnamed code.
+    pub fn is_read(self) -> bool {
+        self.info().is_some_and(|row| row.stem.starts_with("read_"))
+    }
+
     /// Whether a motor may turn after this command. Unnamed codes from 0xA0 to 0xAF count as motion
     /// commands: successors of this protocol have motion commands there.
     pub fn may_move(self) -> bool {

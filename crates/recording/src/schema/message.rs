@@ -1,5 +1,7 @@
 //! The messages whose types are the same in every recording.
 
+use motorlink_proto::can::CanFrame;
+
 use super::cdr::{Decoder, Encoder, Malformed};
 
 /// A message with a type of its own.
@@ -276,6 +278,17 @@ impl Frame {
     pub const EXTENDED: u32 = 1 << 31;
     /// Of [`id`](Self::id): a remote transmission request.
     pub const REMOTE: u32 = 1 << 30;
+
+    /// The frame on a CAN bus.
+    pub fn as_can(&self) -> CanFrame {
+        let (id, extended) =
+            (self.id & !(Self::EXTENDED | Self::REMOTE), self.id & Self::EXTENDED != 0);
+        match self.id & Self::REMOTE != 0 {
+            // The length that it asks for is not recorded.
+            true => CanFrame::remote_frame(id, extended, 0),
+            false => CanFrame::data_frame(id, extended, &self.data),
+        }
+    }
 }
 
 impl Message for Frame {

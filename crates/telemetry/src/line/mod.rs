@@ -266,9 +266,7 @@ impl Request {
     pub fn is_read(&self) -> bool {
         match self {
             Request::St(_, request) => request.request().is_read(),
-            Request::Rmd(_, [code, ..]) => {
-                Code::from(*code).info().is_some_and(|row| row.stem.starts_with("read_"))
-            }
+            Request::Rmd(_, [code, ..]) => Code::from(*code).is_read(),
             Request::Segment(..) | Request::Confirm(_) => true,
             Request::Raw(..) => false,
         }
