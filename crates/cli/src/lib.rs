@@ -86,6 +86,8 @@ enum Command {
     Convert(recordings::convert::Args),
     /// Draw signals of a recording
     Plot(recordings::plot::Args),
+    /// Serve the drives of a recording, which answer as they did
+    Replay(recordings::replay::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
@@ -148,6 +150,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Recover(args) => recordings::recover::run(&args),
         Command::Convert(args) => recordings::convert::run(&args),
         Command::Plot(args) => recordings::plot::run(&args),
+        Command::Replay(args) => recordings::replay::run(args),
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

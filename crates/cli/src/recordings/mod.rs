@@ -1,4 +1,4 @@
-//! Recordings: what is in them, repair, other formats, pictures. docs/RECORDING.md describes them.
+//! Recordings: what is in them, repair, other formats, pictures, drives that answer again. docs/RECORDING.md describes them.
 
 pub mod convert;
 pub mod info;
@@ -6,6 +6,7 @@ mod look;
 mod pick;
 pub mod plot;
 pub mod recover;
+pub mod replay;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
