@@ -86,7 +86,10 @@ pub fn run(args: Args) -> Result<(), Failure> {
         out.say(summary(&label, &tally));
     }
     match args.strict && missing > 0 {
-        true => Err(Failure::differs(format!("{missing} requests are not in the recording"))),
+        true => Err(Failure::differs(match missing {
+            1 => "1 request is not in the recording".to_owned(),
+            _ => format!("{missing} requests are not in the recording"),
+        })),
         false => Ok(()),
     }
 }

@@ -1,0 +1,101 @@
+"""`motorlink replay`: drives of a recording answer as they did."""
+
+import json
+
+import pytest
+from program import PATIENT
+
+
+@pytest.fixture
+def recorded(run, sim, tmp_path):
+    """A recording of an ST drive and four RMD motors, of which the first turns."""
+    drives = sim()
+    run("rmd", "-p", f"slcan:{drives.can}", *PATIENT, "speed", "360").ended(0)
+    path = tmp_path / "run.mcap"
+    ports = ("-p", drives.st, "-p", f"slcan:{drives.can}")
+    run("record", *ports, *PATIENT, "-o", path, "--duration", "1s").ended(0)
+    drives.end()
+    return path
+
+
+@pytest.fixture
+def replay(start, tmp_path):
+    """`replay(file, ...)`: `motorlink replay`, and the words that name its ports."""
+
+    def replay(path, *words, lines=("st0", "can0")):
+        folder = tmp_path / "replayed"
+        folder.mkdir()
+        ports = {"st0": f"pty:{folder}/st0", "can0": f"slcan-pty:{folder}/can0"}
+        serve = [word for line in lines for word in ("--serve", f"{line}={ports[line]}")]
+        program = start("replay", path, *serve, *words)
+        announced = [json.loads(program.line(number)) for number in range(len(lines))]
+        assert [line["line"] for line in announced] == list(lines)
+        assert all(line["requests"] > 10 for line in announced)
+        return program, folder / "st0", f"slcan:{folder}/can0"
+
+    return replay
+
+
+def column(run, path, topic, signal):
+    """The values of a signal."""
+    out = run("convert", path, "-", "--signals", f"{topic}/{signal}").ended(0).out
+    rows = [line.split(",") for line in out.splitlines()[1:]]
+    return [float(row[1]) for row in rows if row[1]]
+
+
+@pytest.mark.parametrize("speed", ["1", "max"])
+def test_the_program_that_was_recorded_gets_the_same_again(run, recorded, replay, tmp_path, speed):
+    _, st, can = replay(recorded, "--speed", speed)
+    again = tmp_path / "again.mcap"
+    run("record", "-p", st, "-p", can, *PATIENT, "-o", again, "--duration", "700ms").ended(0)
+    for topic, signal in [("can0/motor1", "multi_turn_angle_degrees"), ("st0/motor1", "SPEED_MEAS")]:
+        before = column(run, recorded, topic, signal)
+        after = column(run, again, topic, signal)
+        assert len(after) > 10
+        assert after == before[: len(after)]
+    angles = column(run, recorded, "can0/motor1", "multi_turn_angle_degrees")
+    assert angles[-1] - angles[0] > 90, "the motor turned"
+
+
+def test_other_programs_read_what_was_recorded(run, recorded, replay):
+    program, st, can = replay(recorded)
+    found = run("rmd", "-p", can, *PATIENT, "--json", "pid").ended(0)
+    assert found.json["values"]
+    assert run("st", "-p", st, *PATIENT, "--json", "get", "SPEED_KP").ended(0).values["SPEED_KP"] > 0
+    refused = run("st", "-p", st, *PATIENT, "fault-ack").ended(1)
+    assert "BAD_FRAME_ID" in refused.err
+    program.process.terminate()
+    assert program.wait() == 0
+    program.says("st0: 22010124 is not in the recording")
+    ends = [json.loads(line) for line in program.out[-2:]]
+    assert [end["line"] for end in ends] == ["st0", "can0"]
+    assert ends[0]["unknown"] == 1 and ends[0]["recorded"] > 0
+    assert ends[1]["unknown"] == 0 and ends[1]["recorded"] > 0
+
+
+def test_strict_fails_if_a_program_asked_for_more(run, recorded, replay):
+    program, st, _ = replay(recorded, "--strict", "--json", lines=("st0",))
+    run("st", "-p", st, *PATIENT, "fault-ack").ended(1)
+    program.process.terminate()
+    assert program.wait() == 1
+    errors = [json.loads(line) for line in program.err]
+    assert errors[-1]["exit"] == 1
+    assert "1 request is not in the recording" in errors[-1]["error"]["message"]
+
+
+def test_wrong_lines_are_said(run, recorded, tmp_path):
+    st, can = f"pty:{tmp_path}/a", f"slcan-pty:{tmp_path}/b"
+    for words, said in [
+        (["--serve", f"st7={st}"], "the recording has no line st7"),
+        (["--serve", f"st0={st}", "--serve", f"st0={can}"], "--serve st0= is given twice"),
+        (["--serve", st, "--serve", can, "--serve", st], "more often than lines are recorded"),
+    ]:
+        error = run("replay", recorded, *words).ended(2).err
+        assert said in error and "its lines are can0, st0" in error or "twice" in said, error
+
+
+def test_a_file_without_frames_is_said(run, tmp_path):
+    run("replay", tmp_path / "none.mcap", "--serve", f"pty:{tmp_path}/a").ended(2)
+    (tmp_path / "text.mcap").write_text("no MCAP")
+    error = run("replay", tmp_path / "text.mcap", "--serve", f"pty:{tmp_path}/a").ended(2).err
+    assert "cannot read" in error
