@@ -7,7 +7,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::{can::CanFrame, for_each_rmd_command};
 use serde_json::{Map, Value, json};
 
-use crate::{hex, line};
+use crate::out::{hex, line};
 
 /// Bytes of fields at their bounds, and mixed ones.
 const WORDS: [u64; 8] = [

@@ -9,7 +9,7 @@ use motorlink_proto::st::{
 };
 use serde_json::{Map, Value, json};
 
-use crate::{hex, line};
+use crate::out::{hex, line};
 
 pub fn frames() {
     for profile in Profile::ALL {
