@@ -120,6 +120,13 @@ local function bits_shown(field, number)
     return text
 end
 
+-- Digits with a decimal point. A double holds fewer digits than the longest angle has.
+local function exact(digits, decimals)
+    local sign, text = tostring(digits):match("^(%-?)(%d+)$")
+    text = string.rep("0", decimals + 1 - #text) .. text
+    return sign .. text:sub(1, -decimals - 1) .. "." .. text:sub(-decimals)
+end
+
 -- The text of a value, its number, and its digits.
 local function read(field, range)
     if field.words then
@@ -133,8 +140,12 @@ local function read(field, range)
     if field.symbol == "" then
         return string.format("%d", number), Int64.new(number)
     end
-    local places = "%." .. field.decimals .. "f %s"
-    return string.format(places, value_of(field, number), field.symbol), value_of(field, number),
+    local value = value_of(field, number)
+    local text = string.format("%." .. field.decimals .. "f", value)
+    if field.decimals > 0 and math.floor(1 / field.digit + 0.5) == 10 ^ field.decimals then
+        text = exact(digits, field.decimals)
+    end
+    return text .. " " .. field.symbol, value,
         field.signed and digits or Int64.new(number)
 end
 
