@@ -2,11 +2,8 @@
 
 use std::io::Read;
 
-use super::Damage;
+use super::damage::{Damage, LARGEST};
 use super::record::{ChunkHead, split};
-
-/// Larger chunks are not read. Writers begin a new chunk after about 1 MiB.
-pub const LARGEST: u64 = 256 << 20;
 
 /// A run of zeros as long as this at the end of a cut file was never written: the file system had
 /// made room for it when the machine lost power.

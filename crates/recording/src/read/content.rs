@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
 
-use super::{Message, Recording};
+use super::message::Message;
+use super::recording::Recording;
 use crate::schema::{
     DiagnosticArray, Frame, JointState, Log, MESSAGE_ENCODING, Malformed, Message as _,
     SCHEMA_ENCODING, SignalField, SignalsRow, SignalsType,

@@ -7,7 +7,7 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::record::{Channel, Fields, HEAD, Metadata, Schema, Statistics, split};
-use super::{AttachmentPlace, Place, Recording};
+use super::recording::{AttachmentPlace, Place, Recording};
 
 /// Body of the last record.
 const FOOTER: usize = 8 + 8 + 4;

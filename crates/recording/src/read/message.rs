@@ -7,8 +7,11 @@ use std::sync::Arc;
 
 use mcap::records::op;
 
+use super::chunk;
+use super::damage::{Damage, Loss};
+use super::record::Channel;
 use super::record::{ChunkHead, Fields, HEAD, MessageHead, split};
-use super::{Channel, Damage, Loss, Place, Recording, chunk};
+use super::recording::{Place, Recording};
 
 /// A message.
 #[derive(Debug, Clone)]
@@ -69,6 +72,12 @@ impl<R: Read + Seek> Iterator for Messages<'_, R> {
 }
 
 impl<R: Read + Seek> Recording<R> {
+    /// All messages in the order of the file. Damage is left out, and is in
+    /// [`losses`](Self::losses) afterwards.
+    pub fn messages(&mut self) -> Messages<'_, R> {
+        Messages::new(self)
+    }
+
     /// The messages of a place. `after` is the time of the message before it.
     fn read_place(&mut self, place: &Place, after: Option<u64>) -> io::Result<VecDeque<Message>> {
         let (Place::Chunk(at) | Place::Cut(at) | Place::Loose(at)) = place;

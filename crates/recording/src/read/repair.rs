@@ -7,8 +7,9 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Compression, McapError, WriteOptions};
 
+use super::record::Attachment;
 use super::record::HEAD;
-use super::{Attachment, Recording};
+use super::recording::Recording;
 
 /// The metadata record of a repaired file.
 const RECOVERED: &str = "recovered";

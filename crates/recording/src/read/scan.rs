@@ -7,12 +7,13 @@ use std::ops::Range;
 use mcap::MAGIC;
 use mcap::records::op;
 
+use super::damage::{Damage, LARGEST, Loss, ReadError};
 use super::message::{beginning, message_records, whole};
 use super::record::{
     Attachment, Channel, ChunkHead, Fields, HEAD, MessageHead, Metadata, Schema, Statistics,
     is_known, message_index, split,
 };
-use super::{AttachmentPlace, Damage, Loss, Place, ReadError, Recording, chunk};
+use super::recording::{AttachmentPlace, Place, Recording};
 
 /// Loose records are read in groups of about this size.
 const GROUP: u64 = 1 << 20;
@@ -125,7 +126,7 @@ impl<R: Read + Seek> Recording<R> {
             seen.has_chunks = true;
             return self.step_chunk(at..next, seen);
         }
-        if length > chunk::LARGEST {
+        if length > LARGEST {
             return self.damaged(Damage::TooLarge, next);
         }
         let bytes = self.source.bytes(body, length)?;
@@ -199,7 +200,7 @@ impl<R: Read + Seek> Recording<R> {
     fn step_chunk(&mut self, at: Range<u64>, seen: &mut Seen) -> io::Result<Next> {
         let length = at.end - at.start;
         seen.in_chunk = None;
-        if length > chunk::LARGEST {
+        if length > LARGEST {
             return self.damaged(Damage::TooLarge, at.end);
         }
         let records = whole(self.source.bytes(at.start, length)?);
@@ -264,7 +265,7 @@ impl<R: Read + Seek> Recording<R> {
             return Ok(());
         }
         if damage == Damage::Cut {
-            let at = bytes.start..bytes.end.min(bytes.start + chunk::LARGEST);
+            let at = bytes.start..bytes.end.min(bytes.start + LARGEST);
             let record = self.source.bytes(at.start, at.end - at.start)?;
             let (head, records) = beginning(record);
             if let Some(head) = head {

@@ -1,0 +1,102 @@
+//! What is wrong with a file.
+
+use std::ops::Range;
+use std::{fmt, io};
+
+/// Larger chunks are not read. Writers begin a new chunk after about 1 MiB.
+pub const LARGEST: u64 = 256 << 20;
+
+/// Bytes of a file that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Loss {
+    /// Where they are. Empty if nothing is known to be missing but the end of the recording.
+    pub bytes: Range<u64>,
+    /// Time of the last message before, ns since 1970.
+    pub after: Option<u64>,
+    /// What is wrong with them.
+    pub damage: Damage,
+}
+
+/// What is wrong with bytes of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Damage {
+    /// The file ends inside a record.
+    Cut,
+    /// The file ends between records, but its writer did not finish it.
+    Unfinished,
+    /// A checksum differs.
+    Checksum,
+    /// It is no record of the format.
+    NoRecord,
+    /// An index is missing or wrong. This costs no message.
+    Index,
+    /// A chunk is larger than this program reads.
+    TooLarge,
+    /// A chunk has a compression that this program does not know.
+    Compression(String),
+    /// Messages belong to a channel whose description was lost.
+    UnknownChannel,
+    /// Fewer messages were found than the end of the file says.
+    Fewer {
+        /// As many are missing.
+        missing: u64,
+    },
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Damage::Cut => write!(f, "the file ends inside a record"),
+            Damage::Unfinished => write!(f, "the file was not finished by its writer"),
+            Damage::Checksum => write!(f, "a checksum differs"),
+            Damage::NoRecord => write!(f, "these bytes are no record"),
+            Damage::Index => write!(f, "an index is missing or wrong"),
+            Damage::TooLarge => write!(f, "a chunk is larger than {} MiB", LARGEST >> 20),
+            Damage::Compression(name) => {
+                write!(f, "a chunk has the unknown compression `{}`", name.escape_default())
+            }
+            Damage::UnknownChannel => write!(f, "the description of a channel was lost"),
+            Damage::Fewer { missing } => {
+                write!(f, "the file should have {missing} messages more")
+            }
+        }
+    }
+}
+
+/// Why a file cannot be read at all.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file system failed.
+    Io(io::Error),
+    /// The file is empty.
+    Empty,
+    /// It is no MCAP file.
+    NotMcap,
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ReadError::Io(error) => error.fmt(f),
+            ReadError::Empty => write!(f, "the file is empty"),
+            ReadError::NotMcap => write!(f, "this is no MCAP file"),
+        }
+    }
+}
+
+impl std::error::Error for ReadError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            ReadError::Io(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<io::Error> for ReadError {
+    fn from(error: io::Error) -> Self {
+        ReadError::Io(error)
+    }
+}
