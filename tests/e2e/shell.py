@@ -42,6 +42,8 @@ def serves(words):
         return "--prove" not in words
     if words[:2] == ["motorlink", "share"]:
         return not asks_a_share(words)
+    if words[:2] == ["motorlink", "replay"]:
+        return True
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
 
 

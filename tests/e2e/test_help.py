@@ -46,7 +46,7 @@ def examples(text):
 #: What reads a recording.
 RECORDINGS = ("info", "recover", "convert", "plot")
 #: The program itself, and commands without subcommands.
-OF_THEIR_OWN = [(), *((name,) for name in ("ports", "completions", "man", "watch", "record", *RECORDINGS))]
+OF_THEIR_OWN = [(), *((name,) for name in ("ports", "completions", "man", "watch", "record", "replay", *RECORDINGS))]
 
 
 @pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", ""])
@@ -71,6 +71,8 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
                 shell.run(*next(commands("motorlink share -p ./st0 -p slcan:./can0 --at unix:./share &")))
             if command[1][1] in RECORDINGS:
                 short(tmp_path / "run.mcap")
+            if command[1][1] == "replay":
+                shell.run(*next(commands("motorlink record -p ./st0 -o run.mcap --duration 300ms")))
             shell.run(*command)
         for made in ("run.csv", "run.svg", "run.mcap", "fixed.mcap", "motorlink.bash"):
             (tmp_path / made).unlink(missing_ok=True)

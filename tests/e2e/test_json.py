@@ -93,7 +93,7 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "spec", "completions", "man", *(word(command) for command in RECORDINGS)}
     assert subcommands(run, "share") == set(SHARE)
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "conformance", "decode"} | others
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "replay", "conformance", "decode"} | others
 
 
 @pytest.mark.parametrize("protocol", DECODE)

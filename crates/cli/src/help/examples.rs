@@ -125,6 +125,8 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("rmd torque4", "rmd -p slcan:./can0 torque4 0.1 0.1 0 0"),
     ("rmd torque4", "rmd -p slcan:./can0 torque4 0.1 0.1 0 0 --expect 1,2"),
     ("rmd raw", "rmd -p slcan:./can0 raw 9a"),
+    ("replay", "replay run.mcap --serve pty:./replayed"),
+    ("replay", "replay run.mcap --serve st0=pty:./replayed --speed max --strict"),
     ("conformance st", "conformance st -p ./st0 --only ST-4.5"),
     ("conformance rmd", "conformance rmd -p slcan:./can0 --only RMD-33"),
     (

@@ -33,6 +33,7 @@ const HARMLESS: &[&str] = &[
     "presets",
     "record",
     "recover",
+    "replay",
     "registers",
     "revup-data",
     "rmd",

@@ -8,7 +8,7 @@ use motorlink_recording::read::{Table, Tables};
 use motorlink_recording::schema::Log;
 use serde_json::json;
 
-use super::Input;
+use super::input::Input;
 use super::pick::Pick;
 use crate::failure::Failure;
 use crate::output::Printer;

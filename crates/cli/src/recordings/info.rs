@@ -8,7 +8,7 @@ use motorlink_recording::read::{Content, Metadata, Recording};
 use motorlink_recording::schema::{self, Log, SETTINGS_TYPE, SignalField, Time, drive};
 use serde_json::{Map, Value, json};
 
-use super::{Input, lost};
+use super::input::{Input, lost};
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;

@@ -5,7 +5,6 @@ use std::fs::File;
 use motorlink_recording::read::Recording;
 use motorlink_recording::schema::SignalField;
 
-use super::Input;
 use crate::failure::Failure;
 
 /// Signals by their names.
@@ -28,8 +27,8 @@ impl Pick {
         !self.is_some() || self.signals.iter().any(|wanted| is_meant(wanted, topic, field))
     }
 
-    /// An error if a name is that of no signal of the recording.
-    pub fn check(&self, recording: &Recording<File>, input: &Input) -> Result<(), Failure> {
+    /// An error if a name is that of no signal of the recording, whose file has the name `file`.
+    pub fn check(&self, recording: &Recording<File>, file: &str) -> Result<(), Failure> {
         let types = recording.types();
         let all: Vec<(&str, &SignalField)> = recording
             .channels()
@@ -37,13 +36,14 @@ impl Pick {
             .flat_map(|(topic, signals)| signals.fields().iter().map(move |field| (topic, field)))
             .collect();
         if all.is_empty() {
-            return Err(Failure::usage(format!("{} has no signals", input.name())));
+            return Err(Failure::usage(format!("{file} has no signals")));
         }
         for wanted in &self.signals {
             if !all.iter().any(|(topic, field)| is_meant(wanted, topic, field)) {
-                let failure = format!("{} has no signal `{wanted}`", input.name());
-                return Err(Failure::usage(failure)
-                    .trying(format!("`motorlink info {}` lists them", input.name())));
+                let failure = format!("{file} has no signal `{wanted}`");
+                return Err(
+                    Failure::usage(failure).trying(format!("`motorlink info {file}` lists them"))
+                );
             }
         }
         Ok(())

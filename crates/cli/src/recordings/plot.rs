@@ -9,7 +9,7 @@ use motorlink_recording::schema::Time;
 use motorlink_testbench::scenario::Mark;
 use serde_json::json;
 
-use super::Input;
+use super::input::Input;
 use super::look::{meaning, quantity, states};
 use super::pick::Pick;
 use crate::failure::Failure;

@@ -9,7 +9,7 @@ use motorlink_recording::read::{Damage, Recording};
 use motorlink_recording::schema::Time;
 use serde_json::{Map, json};
 
-use super::{Input, lost};
+use super::input::{Input, lost};
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;

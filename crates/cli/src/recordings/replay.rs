@@ -9,7 +9,7 @@ use motorlink_recording::replay::{RmdLine, RmdReplay, Speed, StLine, StReplay, T
 use motorlink_recording::schema::{Frame, Message, drive};
 use serde_json::{Value, json};
 
-use super::Input;
+use super::input::Input;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 use crate::output::{self, note};
@@ -220,7 +220,7 @@ fn report(label: &str, tally: &Tally) -> u64 {
 fn summary(label: &str, tally: &Tally) -> Value {
     let unknown: u64 = tally.unknown().iter().map(|(_, count)| count).sum();
     json!({
-        "line": label, "event": "ended", "recorded": tally.recorded(),
+        "event": "replayed", "line": label, "recorded": tally.recorded(),
         "repeated": tally.repeated(), "unknown": unknown, "damaged": tally.damaged(),
     })
 }

@@ -1,0 +1,104 @@
+//! A recording to read, and what was lost of it.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use motorlink_link::printable;
+use motorlink_recording::read::{Damage, Loss, ReadError, Recording, Tables};
+use motorlink_recording::schema::Time;
+
+use super::pick::Pick;
+use crate::failure::Failure;
+use crate::output::note;
+use crate::outputs::{self, Output};
+
+/// A recording to read.
+#[derive(clap::Args)]
+pub struct Input {
+    /// The recording, an MCAP file
+    #[arg(value_name = "RUN.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub file: PathBuf,
+}
+
+impl Input {
+    /// Opens the file, whatever its condition.
+    pub fn open(&self) -> Result<Recording<File>, Failure> {
+        Recording::open(&self.file).map_err(|error| self.unreadable(&error))
+    }
+
+    pub fn name(&self) -> String {
+        printable(&self.file.display().to_string())
+    }
+
+    pub fn unreadable(&self, error: &ReadError) -> Failure {
+        let failure = Failure::usage(format!("cannot read `{}`: {error}", self.name()));
+        match error {
+            ReadError::NotMcap => failure.trying("give a file that `motorlink record` wrote"),
+            _ => failure,
+        }
+    }
+
+    /// After the file system failed while the file was read.
+    pub fn failed(&self, error: &std::io::Error) -> Failure {
+        Failure::usage(format!("cannot read `{}`: {error}", self.name()))
+    }
+
+    /// Says what could not be read, if there is something.
+    pub fn note_losses(&self, losses: &[Loss]) {
+        if let Some(text) = lost(losses) {
+            note(format!("{} is not whole: {text}", self.name()));
+        }
+    }
+
+    /// Reads signals and events, and says what could not be read.
+    pub fn tables(&self, pick: &Pick) -> Result<Tables, Failure> {
+        let mut recording = self.open()?;
+        let read = recording.tables(|topic, field| pick.has(topic, field));
+        let read = read.map_err(|error| self.failed(&error))?;
+        self.note_losses(recording.losses());
+        if read.malformed > 0 {
+            note(format!("{} messages are not of the type of their topic", read.malformed));
+        }
+        pick.check(&recording, &self.name())?;
+        Ok(read)
+    }
+
+    /// Where a result is written to. A file that exists is replaced with `force` only.
+    pub fn output(&self, name: &str, path: &Path, force: bool) -> Result<Output, Failure> {
+        let outputs = outputs::resolve(&[(name, Some(path))], &[&self.file])?;
+        let output = outputs.into_iter().flatten().next().expect("the output was resolved");
+        if !force {
+            output.check_free("--force")?;
+        }
+        Ok(output)
+    }
+}
+
+/// What was lost, and after which time.
+pub fn lost(losses: &[Loss]) -> Option<String> {
+    // An index costs no message, so other damage is more important.
+    let is_index = |loss: &&Loss| loss.damage == Damage::Index;
+    let first = losses.iter().find(|loss| !is_index(loss)).or(losses.first())?;
+    let bytes: u64 = losses.iter().map(|loss| loss.bytes.end - loss.bytes.start).sum();
+    let messages = losses.iter().find_map(|loss| match loss.damage {
+        Damage::Fewer { missing } => Some(format!("{missing} messages and ")),
+        _ => None,
+    });
+    let more = match losses.len() {
+        1 => String::new(),
+        count => format!(" (the first of {count} places)"),
+    };
+    let why = first.damage.to_string();
+    Some(match (&first.damage, first.after) {
+        (Damage::Index, _) => format!("{why}; no message was lost"),
+        (Damage::Unfinished, Some(after)) => format!("{why}; it ends at {}", Time(after).text()),
+        (Damage::Unfinished, None) => why,
+        (_, after) => {
+            let after = after.map_or("from its beginning".to_owned(), |after| {
+                format!("after {}", Time(after).text())
+            });
+            let messages = messages.unwrap_or_default();
+            format!("{why}; {messages}{bytes} bytes were lost, {after}{more}")
+        }
+    })
+}
