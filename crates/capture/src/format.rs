@@ -30,6 +30,9 @@ const PCAP: [[u8; 4]; 4] = [
     [0x4D, 0x3C, 0xB2, 0xA1],
 ];
 
+/// Begins an MCAP file.
+const MCAP: [u8; 4] = [0x89, b'M', b'C', b'A'];
+
 /// The number of bytes that [`Format::of_file`] needs.
 pub(crate) const MAGIC_LEN: usize = 4;
 
@@ -59,6 +62,7 @@ impl Format {
             &PCAPNG => Ok(Some(Format::Pcapng)),
             magic if PCAP.contains(magic) => Err("this is an old pcap file: convert it with \
                 `editcap -F pcapng OLD NEW`"),
+            &MCAP => Err("this is a recording: give its file, not a pipe"),
             _ => Ok(None),
         }
     }
@@ -140,6 +144,7 @@ mod tests {
         }
         assert_eq!(Format::of_file(&PCAPNG), Ok(Some(Format::Pcapng)));
         assert!(Format::of_file(&PCAP[1]).is_err());
+        assert!(Format::of_file(&MCAP).is_err());
         assert_eq!(Format::of_file(b"(1.0"), Ok(None));
     }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | know what a file contains, encode and decode its messages | [`schema`] |
 //! | record drives in threads | [`record::Recorder`] |
-//! | write files, in a thread or not | [`write`] |
+//! | write files, in a thread or not | [`mod@write`] |
 //! | read a file, whole or broken | [`read`] |
 //! | let a recorded drive answer again | [`replay`] |
 #![forbid(unsafe_code)]

@@ -53,9 +53,13 @@ impl Decoder {
 
     /// Passes an entry. `said` gets the entry in which each item ends, its bytes, and the item.
     pub fn decode(&mut self, entry: &Captured, mut said: impl FnMut(&Captured, &[u8], Item<'_>)) {
-        let Wire::Serial(bytes) = &entry.wire else {
-            self.lines.iter_mut().for_each(|line| line.transcript.lose());
-            return;
+        let bytes = match &entry.wire {
+            Wire::Serial(bytes) => bytes,
+            Wire::Damage(_) => {
+                return self.lines.iter_mut().for_each(|line| line.transcript.lose());
+            }
+            // Of a bus that was captured at the same time.
+            Wire::Can(_) | Wire::Fd(_) | Wire::Error { .. } => return,
         };
         let slot = match entry.direction {
             Some(Direction::Sent) => 0,
@@ -122,5 +126,36 @@ impl Line {
                 said(last, bytes, Item::Broken(broken));
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motorlink_proto::can::CanFrame;
+
+    use super::*;
+
+    #[test]
+    fn frames_of_a_bus_that_was_captured_too_change_nothing() {
+        let entry = |channel: &str, wire| Captured {
+            place: 1,
+            time: None,
+            channel: Some(channel.into()),
+            direction: None,
+            wire,
+        };
+        let mut decoder = Decoder::new(Profile::Spec);
+        let mut said = Vec::new();
+        for (channel, wire) in [
+            ("st0", Wire::Serial(vec![0x22, 0x01, 0x1E, 0x41])),
+            ("can0", Wire::Can(CanFrame::new(0x141, [0x9A, 0, 0, 0, 0, 0, 0, 0]))),
+            ("st0", Wire::Serial(vec![0xF0, 0x04, 0xCE, 0x07, 0x00, 0x00, 0xCA])),
+        ] {
+            decoder.decode(&entry(channel, wire), |_, _, item| match item {
+                Item::Message(message) => said.push(message.to_string()),
+                Item::Broken(broken) => panic!("{broken:?}"),
+            });
+        }
+        assert_eq!(said, ["GET_REG SPEED_MEAS, motor 1", "ACK 1998 rpm"]);
     }
 }

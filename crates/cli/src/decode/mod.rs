@@ -5,9 +5,12 @@ mod entry;
 mod input;
 mod object;
 mod out;
+mod source;
 mod text;
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
 
 use clap::{Subcommand, ValueEnum};
 use motorlink::rmd::{self, MotorId};
@@ -16,11 +19,15 @@ use motorlink_capture::{
     Captured, Damage, Format, Plain, Reader, Wire, rmd as rmd_capture, st as st_capture,
 };
 
+use motorlink_recording::read::{Line, MAGIC};
+use motorlink_telemetry::share::words::Speaks;
+
 use crate::failure::Failure;
-use crate::hint;
 use crate::output::note;
+use crate::{hint, recordings};
 use entry::{Entry, Meaning};
 use out::Out;
+use source::{Recorded, Source};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -109,29 +116,73 @@ pub fn run(args: Args) -> Result<(), Failure> {
         (_, true) => Out::new(out::Shape::Csv),
         _ => Out::new(out::Shape::Text),
     };
+    if let [path] = &common.input[..]
+        && common.format.is_none()
+        && is_recording(Path::new(path))
+    {
+        return decode_recording(&recordings::Input::of(path), decoder, out);
+    }
     let input = input::open(&common.input, common.format, plain)?;
     let (is_file, is_hex, name) = (input.is_file, input.is_hex, input.name.clone());
-    let failed = |error: std::io::Error| Failure::usage(format!("cannot read {name}: {error}"));
-    let reader = Reader::new(input.content, input.format, plain).map_err(&failed)?;
-    let counts = decode(reader, decoder, out, (is_file, is_hex), failed)?;
+    let failed = |error: io::Error| Failure::usage(format!("cannot read {name}: {error}"));
+    let mut reader = Reader::new(input.content, input.format, plain).map_err(&failed)?;
+    let counts = decode(&mut reader, decoder, out, (is_file, is_hex), failed)?;
     counts.report(!is_hex)
 }
 
+/// Decodes the frames of a recording. What its drives speak is recorded, too.
+fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Result<(), Failure> {
+    let mut recording = input.open()?;
+    let lines = recording.lines();
+    let is_wanted: fn(&Line) -> bool = match decoder {
+        Decoder::St(_) => |line| matches!(line.speaks, Speaks::St(_)),
+        Decoder::Rmd(_) => |line| line.speaks == Speaks::Rmd,
+    };
+    let Some(first) = lines.values().find(|line| is_wanted(line)) else {
+        let labels: Vec<&str> = lines.values().map(|line| &*line.label).collect();
+        return Err(match labels.is_empty() {
+            true => input.has_no_frames(),
+            false => Failure::usage(format!("{} has no line with this protocol", input.name()))
+                .trying(format!("its lines are {}; try the other protocol", labels.join(", "))),
+        });
+    };
+    let decoder = match first.speaks {
+        Speaks::St(profile) => Decoder::St(st_capture::Decoder::new(profile)),
+        Speaks::Rmd => decoder,
+    };
+    let mut source = Recorded::new(recording.frames(), is_wanted);
+    let failed = |error: io::Error| input.failed(&error);
+    let counts = decode(&mut source, decoder, out, (true, false), failed)?;
+    let malformed = source.malformed();
+    input.note_frames(&recording, malformed);
+    counts.report(true)
+}
+
+/// Whether a file is an MCAP file.
+fn is_recording(path: &Path) -> bool {
+    let mut magic = [0; MAGIC.len()];
+    let read = File::open(path).and_then(|mut file| {
+        // A FIFO is not read before its turn.
+        if file.metadata()?.is_file() { file.read_exact(&mut magic) } else { Ok(()) }
+    });
+    read.is_ok() && magic == MAGIC
+}
+
 /// Decodes everything. Before it waits for more input, all output is written.
-fn decode<R: Read>(
-    mut reader: Reader<R>,
+fn decode(
+    source: &mut dyn Source,
     mut decoder: Decoder,
     mut out: Out,
     (is_file, is_hex): (bool, bool),
-    failed: impl Fn(std::io::Error) -> Failure,
+    failed: impl Fn(io::Error) -> Failure,
 ) -> Result<Counts, Failure> {
     let mut counts = Counts::default();
     out.begin()?;
     loop {
-        if !is_file && reader.may_wait() {
+        if !is_file && source.may_wait() {
             out.flush()?;
         }
-        let Some(captured) = reader.next().map_err(&failed)? else { break };
+        let Some(captured) = source.next().map_err(&failed)? else { break };
         if let (Wire::Damage(damage @ Damage::Line { .. }), true) = (&captured.wire, is_hex) {
             return Err(Failure::usage(damage.to_string()));
         }

@@ -27,7 +27,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("watch", "watch -p slcan:./can0 --id 1-4 --rate 50 --gear-ratio 6"),
     ("watch", "watch -p ./st0 --motor 1 --full-scale 16.5"),
     ("record", "record -p ./st0 -p slcan:./can0 -o run.mcap --duration 3s"),
-    ("record", "record -p ./st0 -o speed.mcap SPEED_MEAS TORQUE_MEAS --duration 2s"),
+    ("record", "record -p ./st0 -o run.mcap SPEED_MEAS --duration 2s"),
     ("record", "record -p ./st0 -o run.mcap --rotate 100MB --duration 1s"),
     ("decode", "decode rmd 141#9A1900F000000009"),
     ("decode st", "decode st 22 01 1e 41 f0 04 ce 07 00 00 ca"),

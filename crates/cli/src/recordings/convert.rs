@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use motorlink_capture::{Format, WriteError, Writer};
 use motorlink_link::printable;
 use motorlink_recording::read::{Table, Tables};
 use motorlink_recording::schema::Log;
@@ -11,15 +12,16 @@ use serde_json::json;
 use super::input::Input;
 use super::pick::Pick;
 use crate::failure::Failure;
-use crate::output::Printer;
+use crate::output::{Printer, note};
 use crate::outputs::Output;
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     input: Input,
-    /// The new file; its ending is the format: `.csv`. `-` is stdout, in CSV
-    #[arg(value_name = "OUT.csv", value_hint = clap::ValueHint::FilePath)]
+    /// The new file; its ending is the format: `.csv` has the signals; `.log` (candump), `.asc` and
+    /// `.pcapng` have the frames. `-` is stdout, in CSV
+    #[arg(value_name = "OUT", value_hint = clap::ValueHint::FilePath)]
     output: PathBuf,
     #[command(flatten)]
     pick: Pick,
@@ -34,18 +36,46 @@ pub struct Args {
     json: bool,
 }
 
+/// What the new file has.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Signals,
+    Frames(Format),
+}
+
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let ending = |path: &Path| path.extension()?.to_str().map(str::to_ascii_lowercase);
-    let is_csv = ending(&args.output).as_deref() == Some("csv");
-    if !is_csv && args.output.as_os_str() != "-" && !is_stream(&args.output) {
-        let name = printable(&args.output.display().to_string());
-        return Err(Failure::usage(format!("`{name}` does not say the format"))
-            .trying("give a name that ends in .csv"));
+    let kind = kind(&args.output)?;
+    if kind != Kind::Signals && (args.pick.is_some() || args.unix) {
+        return Err(Failure::usage("--signals and --unix are for .csv: other formats have frames"));
     }
-    let output = args.input.output("OUT.csv", &args.output, args.force)?;
+    let output = args.input.output("OUT", &args.output, args.force)?;
     if output == Output::Stdout && args.json {
         return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
     }
+    match kind {
+        Kind::Signals => signals(args, &output),
+        Kind::Frames(format) => frames(args, format, &output),
+    }
+}
+
+/// The format that the ending of a name says.
+fn kind(path: &Path) -> Result<Kind, Failure> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+    match ending.as_deref() {
+        Some("csv") => Ok(Kind::Signals),
+        Some("log") => Ok(Kind::Frames(Format::Candump)),
+        Some("asc") => Ok(Kind::Frames(Format::Asc)),
+        Some("pcapng") => Ok(Kind::Frames(Format::Pcapng)),
+        _ if path.as_os_str() == "-" || is_stream(path) => Ok(Kind::Signals),
+        _ => {
+            let name = printable(&path.display().to_string());
+            Err(Failure::usage(format!("`{name}` does not say the format"))
+                .trying("give a name that ends in .csv, .log, .asc or .pcapng"))
+        }
+    }
+}
+
+fn signals(args: &Args, output: &Output) -> Result<(), Failure> {
     let tables = args.input.tables(&args.pick)?;
     let csv = Csv::new(&tables, args.unix);
     let mut rows = 0;
@@ -53,14 +83,51 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         rows = csv.write(out)?;
         Ok(())
     })?;
-    if output == Output::Stdout {
+    let columns = csv.columns();
+    done(args, output, &format!("{rows} rows of {columns} signals"), ("rows", rows))
+}
+
+fn frames(args: &Args, format: Format, output: &Output) -> Result<(), Failure> {
+    let mut recording = args.input.open()?;
+    if recording.lines().is_empty() {
+        return Err(args.input.has_no_frames());
+    }
+    let (mut count, mut serial, mut malformed) = (0, 0, 0);
+    output.write(|out| {
+        let mut writer = Writer::new(format, out)?.expect("the format is written");
+        let mut frames = recording.frames();
+        for (place, frame) in (1..).zip(&mut frames) {
+            let (line, frame) = frame?;
+            match writer.write(&frame.captured(place, &line)) {
+                Ok(()) => count += 1,
+                Err(WriteError::Unwritable(_)) => serial += 1,
+                Err(WriteError::Io(error)) => return Err(error),
+            }
+        }
+        malformed = frames.malformed();
+        writer.into_inner().map(drop)
+    })?;
+    args.input.note_frames(&recording, malformed);
+    if serial > 0 {
+        let left = format!("{serial} frames of serial lines are left out: only .pcapng has them");
+        note(left);
+    }
+    done(args, output, &format!("{count} frames"), ("frames", count))
+}
+
+/// Says what was written.
+fn done(
+    args: &Args,
+    output: &Output,
+    what: &str,
+    (name, count): (&str, u64),
+) -> Result<(), Failure> {
+    if *output == Output::Stdout {
         return Ok(());
     }
     let file = printable(&args.output.display().to_string());
-    let columns = csv.columns();
-    let text = format!("{rows} rows of {columns} signals are in {file}");
-    let object = json!({ "ok": true, "recording": args.input.name(), "file": file, "rows": rows });
-    Printer { json: args.json }.result(text, object)
+    let object = json!({ "ok": true, "recording": args.input.name(), "file": file, name: count });
+    Printer { json: args.json }.result(format!("{what} are in {file}"), object)
 }
 
 /// Whether it is a device or a FIFO, whose names have no ending.

@@ -21,6 +21,10 @@ pub struct Input {
 }
 
 impl Input {
+    pub fn of(path: &str) -> Self {
+        Input { file: path.into() }
+    }
+
     /// Opens the file, whatever its condition.
     pub fn open(&self) -> Result<Recording<File>, Failure> {
         Recording::open(&self.file).map_err(|error| self.unreadable(&error))
@@ -47,6 +51,20 @@ impl Input {
     pub fn note_losses(&self, losses: &[Loss]) {
         if let Some(text) = lost(losses) {
             note(format!("{} is not whole: {text}", self.name()));
+        }
+    }
+
+    /// The recording has no frames.
+    pub fn has_no_frames(&self) -> Failure {
+        Failure::usage(format!("{} has no frames", self.name()))
+            .trying("`motorlink record` records them; files of other programs have none")
+    }
+
+    /// Says what could not be read of frames.
+    pub fn note_frames(&self, recording: &Recording<File>, malformed: u64) {
+        self.note_losses(recording.losses());
+        if malformed > 0 {
+            note(format!("{malformed} messages are not of the type of their topic"));
         }
     }
 

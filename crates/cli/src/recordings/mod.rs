@@ -9,3 +9,5 @@ mod pick;
 pub mod plot;
 pub mod recover;
 pub mod replay;
+
+pub use input::Input;

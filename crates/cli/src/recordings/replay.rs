@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use motorlink::st::Profile;
 use motorlink_link::serve::{ServeName, Server};
 use motorlink_recording::replay::{RmdLine, RmdReplay, Speed, StLine, StReplay, Tally};
-use motorlink_recording::schema::{Frame, Message, drive};
+use motorlink_recording::schema::drive;
+use motorlink_telemetry::share::words::Speaks;
 use serde_json::{Value, json};
 
 use super::input::Input;
@@ -97,43 +97,28 @@ pub fn run(args: Args) -> Result<(), Failure> {
 /// The recorded lines, by label.
 fn read(input: &Input) -> Result<BTreeMap<String, Line>, Failure> {
     let mut recording = input.open()?;
-    let mut labels = BTreeMap::new();
-    let mut lines = BTreeMap::new();
-    for channel in recording.channels() {
-        let is_of_frames =
-            recording.schema(channel).is_some_and(|schema| schema.name == Frame::TYPE);
-        let fact = |key| channel.metadata.get(key).map(String::as_str).unwrap_or_default();
-        let line = match fact(drive::PROTOCOL) {
-            _ if !is_of_frames => continue,
-            drive::ST => {
-                let profile = fact(drive::PROFILE).parse::<Profile>();
-                Line::St(StLine::new(profile.unwrap_or_default()))
-            }
-            _ => Line::Rmd(RmdLine::default()),
+    let mut lines: BTreeMap<String, Line> = BTreeMap::new();
+    for line in recording.lines().into_values() {
+        let empty = match line.speaks {
+            Speaks::St(profile) => Line::St(StLine::new(profile)),
+            Speaks::Rmd => Line::Rmd(RmdLine::default()),
         };
-        labels.insert(channel.id, fact(drive::LABEL).to_owned());
-        lines.insert(fact(drive::LABEL).to_owned(), line);
+        lines.insert(line.label.to_string(), empty);
     }
     if lines.is_empty() {
-        return Err(Failure::usage(format!("{} has no frames", input.name())).trying(
-            "a recording made by `motorlink record` has them; other MCAP files cannot be replayed",
-        ));
+        return Err(input.has_no_frames());
     }
-    let mut malformed = 0;
-    for message in recording.messages() {
-        let message = message.map_err(|error| input.failed(&error))?;
-        let line = labels.get(&message.channel.id).and_then(|label| lines.get_mut(label));
-        let Some(line) = line else { continue };
-        match (line, Frame::decode(message.data())) {
-            (Line::St(line), Ok(frame)) => line.add(frame),
-            (Line::Rmd(line), Ok(frame)) => line.add(&frame),
-            (_, Err(_)) => malformed += 1,
+    let mut frames = recording.frames();
+    for frame in &mut frames {
+        let (line, frame) = frame.map_err(|error| input.failed(&error))?;
+        match lines.get_mut(&*line.label) {
+            Some(Line::St(line)) => line.add(frame),
+            Some(Line::Rmd(line)) => line.add(&frame),
+            None => {}
         }
     }
-    input.note_losses(recording.losses());
-    if malformed > 0 {
-        note(format_args!("{malformed} frames are damaged and left out"));
-    }
+    let malformed = frames.malformed();
+    input.note_frames(&recording, malformed);
     Ok(lines)
 }
 

@@ -7,6 +7,7 @@
 mod chunk;
 mod content;
 mod damage;
+mod frames;
 mod index;
 mod message;
 mod record;
@@ -15,8 +16,11 @@ mod repair;
 mod scan;
 mod source;
 
+pub use mcap::MAGIC;
+
 pub use content::{Content, Table, Tables, Types};
 pub use damage::{Damage, Loss, ReadError};
+pub use frames::{Frames, Line};
 pub use message::{Message, Messages};
 pub use record::{Attachment, Channel, Metadata, Schema};
 pub use recording::Recording;

@@ -24,7 +24,7 @@ pub const MESSAGE_ENCODING: &str = "cdr";
 /// The media type of settings.
 pub const SETTINGS_TYPE: &str = "application/toml";
 
-/// Keys of the metadata of a recording, which is named [`recording::NAME`](self::recording::NAME).
+/// Keys of the metadata of a recording, which is named [`recording::NAME`].
 pub mod recording {
     /// The name of the metadata record.
     pub const NAME: &str = "motorlink";
@@ -44,7 +44,7 @@ pub mod recording {
     pub const PART: &str = "part";
 }
 
-/// Keys of the metadata of a motor, which is named [`drive::NAME`](self::drive::NAME). Channels of
+/// Keys of the metadata of a motor, which is named [`drive::NAME`]. Channels of
 /// frames have some of them, too.
 pub mod drive {
     /// The name of the metadata record.

@@ -52,11 +52,14 @@ impl<T: Weighed> Queue<T> {
         Queue(Arc::new(Shared { held, came, most_bytes }))
     }
 
-    /// Adds an item; `false`: the queue is full or closed, and drops and counts it.
+    /// Adds an item; `false`: it is dropped. If the queue is full, it is counted as lost.
     pub fn push(&self, item: T) -> bool {
         let mut held = self.lock();
         let bytes = held.bytes + item.bytes();
-        if bytes > self.0.most_bytes || held.is_closed {
+        if held.is_closed {
+            return false;
+        }
+        if bytes > self.0.most_bytes {
             held.lost += 1;
             return false;
         }
@@ -70,7 +73,7 @@ impl<T: Weighed> Queue<T> {
         self.lock().bytes <= self.0.most_bytes / 2
     }
 
-    /// Items that were dropped in all.
+    /// Items that were dropped in all because the queue was full.
     pub fn lost(&self) -> u64 {
         self.lock().lost
     }
@@ -119,6 +122,6 @@ mod tests {
         queue.close();
         assert!(!queue.push("late"));
         let taken = queue.take();
-        assert_eq!((taken.items.len(), taken.is_last), (1, true));
+        assert_eq!((taken.items.len(), taken.is_last, queue.lost()), (1, true, 2));
     }
 }

@@ -1,7 +1,8 @@
-"""`motorlink replay`: drives of a recording answer as they did."""
+"""The frames of a recording: drives that answer as they did, captures for other programs, their meaning."""
 
 import json
 
+import can
 import pytest
 from program import PATIENT
 
@@ -99,3 +100,45 @@ def test_a_file_without_frames_is_said(run, tmp_path):
     (tmp_path / "text.mcap").write_text("no MCAP")
     error = run("replay", tmp_path / "text.mcap", "--serve", f"pty:{tmp_path}/a").ended(2).err
     assert "cannot read" in error
+
+
+def decoded(run, protocol, path):
+    """What frames of a protocol mean, without their place in the file; and their times."""
+    lines = [line for line in run("decode", protocol, path, "--json").ended(0).lines if "message" in line]
+    return [{**line, "entry": 0, "wall": 0} for line in lines], [line["wall"] for line in lines]
+
+
+@pytest.mark.parametrize("ending, reader", [("log", can.CanutilsLogReader), ("asc", can.ASCReader)])
+def test_a_bus_is_converted_for_python_can(run, recorded, tmp_path, ending, reader):
+    path = tmp_path / f"run.{ending}"
+    done = run("convert", recorded, path, "--json").ended(0)
+    assert "frames of serial lines are left out: only .pcapng has them" in done.err
+    messages = list(reader(str(path)))
+    assert len(messages) == done.json["frames"] > 100
+    assert {message.arbitration_id for message in messages if message.is_rx} == {0x141, 0x142, 0x143, 0x144}
+    assert not all(message.is_rx for message in messages)
+    times = [message.timestamp for message in messages]
+    assert times == sorted(times)
+
+
+def test_a_recording_means_what_its_captures_mean(run, recorded, tmp_path):
+    for ending in ("log", "pcapng"):
+        run("convert", recorded, tmp_path / f"run.{ending}").ended(0)
+    frames, times = decoded(run, "rmd", recorded)
+    assert len(frames) > 100
+    assert {line["direction"] for line in frames} == {"request", "reply"}
+    assert any(line["message"] == "read_pid" for line in frames)
+    # A log has microseconds.
+    assert decoded(run, "rmd", tmp_path / "run.log") == (frames, pytest.approx(times, abs=1e-6))
+    serial = decoded(run, "st", recorded)
+    assert {"GET_REG", "ACK"} <= {line["message"] for line in serial[0]}
+    assert decoded(run, "st", tmp_path / "run.pcapng") == serial
+
+
+def test_a_recording_without_this_protocol_is_said(run, piped, sim, tmp_path):
+    drives = sim(rmd=())
+    path = tmp_path / "run.mcap"
+    run("record", "-p", drives.st, *PATIENT, "-o", path, "--duration", "200ms").ended(0)
+    error = run("decode", "rmd", path).ended(2).err
+    assert "has no line with this protocol" in error and "st0" in error
+    assert "give its file, not a pipe" in piped("decode st", f"< {path}").ended(2).err
