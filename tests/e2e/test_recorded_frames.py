@@ -67,7 +67,7 @@ def test_other_programs_read_what_was_recorded(run, recorded, replay):
     assert "BAD_FRAME_ID" in refused.err
     program.process.terminate()
     assert program.wait() == 0
-    program.says("st0: 22010124 is not in the recording")
+    program.says("st0: 22 01 01 24 is not in the recording")
     ends = [json.loads(line) for line in program.out[-2:]]
     assert [end["line"] for end in ends] == ["st0", "can0"]
     assert ends[0]["unknown"] == 1 and ends[0]["recorded"] > 0

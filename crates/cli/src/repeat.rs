@@ -14,11 +14,11 @@ use motorlink_telemetry::subscription::Full;
 use serde_json::Value;
 
 use crate::columns::Columns;
+use crate::csv::CsvFile;
 use crate::failure::{Failure, Kind, Problem};
 use crate::interrupt;
 use crate::json::{Cell, Line};
 use crate::output::{Printer, is_read, missed, missed_text, never_wait, note, print_line};
-use crate::recording::Recording;
 use crate::span::parse_span;
 
 /// Records that wait until stdout is read.
@@ -195,7 +195,7 @@ struct Sink<'a> {
     output: Printer,
     object: &'a Line,
     columns: Columns,
-    recording: Option<Recording>,
+    recording: Option<CsvFile>,
     /// Whether stdout has the table.
     prints: bool,
     /// The first value that the drive refused.
@@ -217,9 +217,9 @@ impl<'a> Sink<'a> {
         object: &'a Line,
         patience: Option<Duration>,
     ) -> Result<Self, Failure> {
-        let create = |path: &PathBuf| Recording::create(path, repeat.force);
+        let create = |path: &PathBuf| CsvFile::create(path, repeat.force);
         let recording = repeat.csv.as_ref().map(create).transpose()?;
-        let is_stdout = recording.as_ref().is_some_and(Recording::is_stdout);
+        let is_stdout = recording.as_ref().is_some_and(CsvFile::is_stdout);
         if is_stdout && output.json {
             return Err(Failure::usage("--json and --csv - both write to stdout")
                 .trying("leave one out, or give --csv a file"));

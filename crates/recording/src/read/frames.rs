@@ -24,12 +24,15 @@ pub struct Line {
 /// Frames of several lines may be out of order by this time: each line is recorded in turns.
 const SPREAD_NS: u64 = 1_000_000_000;
 
+/// Time, number in the file, channel, message.
+type Waiting = (u64, u64, u16, Vec<u8>);
+
 /// The frames of a recording, from [`Recording::frames`].
 pub struct Frames<'a, R> {
     messages: Messages<'a, R>,
     lines: BTreeMap<u16, Arc<Line>>,
-    /// Frames that wait for earlier ones: time, number in the file, channel, message.
-    waiting: BinaryHeap<Reverse<(u64, u64, u16, Vec<u8>)>>,
+    /// Frames that wait for earlier ones.
+    waiting: BinaryHeap<Reverse<Waiting>>,
     /// The number of the last frame in the file.
     number: u64,
     /// The latest time so far.

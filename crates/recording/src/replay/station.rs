@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use motorlink_link::serve::Station;
+use motorlink_proto::Hex;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::st::{ErrorCode, Frame, HEADER_NACK, Parse};
 use motorlink_proto::time::{Instant, Micros};
@@ -99,7 +100,7 @@ impl Station<u8> for StReplay {
             match Frame::parse(&self.received) {
                 Parse::Frame(_, size) => {
                     let request: Vec<u8> = self.received.drain(..size).collect();
-                    if !self.player.ask(now, &request, |request| hex(request)) {
+                    if !self.player.ask(now, &request, |request| Hex(request).to_string()) {
                         self.player.due.push_back((now, refusal()));
                     }
                 }
@@ -142,8 +143,7 @@ impl Station<CanFrame> for RmdReplay {
     fn receive(&mut self, now: Instant, frames: &[CanFrame], replies: &mut Vec<CanFrame>) {
         // What others on the bus send to other nodes is not for these motors.
         for frame in frames.iter().filter(|frame| !super::lanes(frame).is_empty()) {
-            self.player
-                .ask(now, frame, |frame| format!("{:03x}#{}", frame.id(), hex(frame.data())));
+            self.player.ask(now, frame, frame_text);
         }
         self.poll(now, replies);
     }
@@ -166,6 +166,7 @@ fn refusal() -> Vec<u8> {
     frame.encode(&mut out).map(<[u8]>::to_vec).unwrap_or_default()
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+/// As in the log of candump.
+fn frame_text(frame: &CanFrame) -> String {
+    format!("{:03x}#{}", frame.id(), Hex(frame.data()).to_string().replace(' ', ""))
 }

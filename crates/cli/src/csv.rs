@@ -13,7 +13,7 @@ use crate::output::print_line;
 const EVENT: &str = "event";
 
 /// A file that samples go to.
-pub struct Recording {
+pub struct CsvFile {
     out: Out,
     /// Names of the values; known after the first sample.
     columns: Option<usize>,
@@ -26,7 +26,7 @@ enum Out {
     File(File, PathBuf),
 }
 
-impl Recording {
+impl CsvFile {
     /// `-` is stdout. A regular file that exists is overwritten with `force` only.
     pub fn create(path: &Path, force: bool) -> Result<Self, Failure> {
         let out = if path.as_os_str() == "-" {
@@ -41,7 +41,7 @@ impl Recording {
             })?;
             Out::File(file, path.to_owned())
         };
-        Ok(Recording { out, columns: None, early: Vec::new() })
+        Ok(CsvFile { out, columns: None, early: Vec::new() })
     }
 
     pub fn is_stdout(&self) -> bool {
