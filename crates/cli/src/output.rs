@@ -94,6 +94,15 @@ pub fn in_words(name: &str) -> String {
     if name.starts_with(char::is_uppercase) { name.to_owned() } else { name.replace('_', " ") }
 }
 
+/// The option --json of commands whose stdout always has JSON. It is read before the command line is
+/// parsed: [`put_messages_in_json`].
+pub fn json_messages() -> clap::Arg {
+    clap::Arg::new("json")
+        .long("json")
+        .action(clap::ArgAction::SetTrue)
+        .help("Print errors and notes as JSON, too; stdout always has JSON")
+}
+
 /// From now on stderr has JSON, an object a line, or text.
 pub fn put_messages_in_json(json: bool) {
     JSON.store(json, Ordering::Relaxed);

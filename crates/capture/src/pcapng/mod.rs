@@ -48,6 +48,14 @@ pub(crate) struct Packet {
     pub(crate) wire: Wire,
 }
 
+impl Packet {
+    /// A place of the file that is not a frame.
+    fn damaged(number: u64, damage: Damage) -> Self {
+        let wire = Wire::Damage(damage);
+        Packet { number, time: None, channel: None, direction: None, wire }
+    }
+}
+
 impl<R: Read> Packets<R> {
     pub(crate) fn new(input: R) -> Self {
         let blocks = Blocks::new(input);
@@ -65,15 +73,7 @@ impl<R: Read> Packets<R> {
                 Err(BrokenFile::Io(error)) => return Err(error),
                 Err(BrokenFile::Content(why)) => {
                     self.is_at_end = true;
-                    let number = self.blocks.packets + 1;
-                    let wire = Wire::Damage(Damage::End(why));
-                    return Ok(Some(Packet {
-                        number,
-                        time: None,
-                        channel: None,
-                        direction: None,
-                        wire,
-                    }));
+                    return Ok(Some(Packet::damaged(self.blocks.packets + 1, Damage::End(why))));
                 }
             };
             match block {
@@ -83,16 +83,8 @@ impl<R: Read> Packets<R> {
                 }
                 Block::Packet { number, interface, units, data, original, direction, dropped } => {
                     let Some(interface) = self.interfaces.get(interface as usize) else {
-                        let wire = Wire::Damage(Damage::Packet(
-                            "a packet of an interface that the file does not have",
-                        ));
-                        return Ok(Some(Packet {
-                            number,
-                            time: None,
-                            channel: None,
-                            direction: None,
-                            wire,
-                        }));
+                        let why = "a packet of an interface that the file does not have";
+                        return Ok(Some(Packet::damaged(number, Damage::Packet(why))));
                     };
                     let time = units.and_then(|units| interface.time(units));
                     let (wire, seen) = packet::parse(interface.link_type, data, original);

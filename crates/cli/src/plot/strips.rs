@@ -79,7 +79,7 @@ impl Strip {
         Strip { name: signal.name.clone(), spans, legend }
     }
 
-    /// Height of the line for a name that has no room beside the strip.
+    /// Height of the line for a name that is too wide for the place left of the strip.
     fn name_line(&self) -> i32 {
         if width(&self.name) > LEFT - 12 { TEXT_LINE } else { 0 }
     }

@@ -19,11 +19,7 @@ const IDLE: Duration = Duration::from_secs(1);
 
 #[derive(clap::Args)]
 #[command(
-    // Read before the command line is parsed: `output::put_messages_in_json`.
-    arg = clap::Arg::new("json")
-        .long("json")
-        .action(clap::ArgAction::SetTrue)
-        .help("Print errors and notes as JSON, too; stdout always has JSON"),
+    arg = output::json_messages(),
     after_help = "\
 Rules, for requests that are equal byte for byte: each request gets the next recorded reply to the \
 same request. A command moves the recording forward: replies from before the recorded command are \

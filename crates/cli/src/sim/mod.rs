@@ -29,11 +29,7 @@ const IDLE: Duration = Duration::from_millis(20);
 
 #[derive(clap::Args)]
 #[command(
-    // Read before the command line is parsed: `output::put_messages_in_json`.
-    arg = clap::Arg::new("json")
-        .long("json")
-        .action(clap::ArgAction::SetTrue)
-        .help("Print errors and notes as JSON, too; stdout always has JSON"),
+    arg = output::json_messages(),
     args_conflicts_with_subcommands = true,
     after_help = "\
 Ports that are served: pty:PATH (a serial line), slcan-pty:PATH (a CAN adapter), \

@@ -37,7 +37,7 @@ pub fn beginning(head: &ChunkHead, stored: &[u8]) -> Vec<u8> {
     records
 }
 
-/// At most `limit` bytes. What was read before an error is beside the error.
+/// At most `limit` bytes. The error has the bytes that were read before it.
 fn inflated(compression: &str, stored: &[u8], limit: u64) -> Result<Vec<u8>, (Damage, Vec<u8>)> {
     let mut records = Vec::new();
     let read = match compression {

@@ -20,7 +20,7 @@ pub enum Content {
     Frame(Frame),
     /// Position, speed and current of a motor.
     JointState(JointState),
-    /// The condition of motors in words.
+    /// State and faults of motors as text.
     Diagnostics(DiagnosticArray),
     /// Something that happened.
     Event(Log),

@@ -27,7 +27,7 @@ pub enum Damage {
     Unfinished,
     /// A checksum differs.
     Checksum,
-    /// It is no record of the format.
+    /// The bytes are not a record.
     NoRecord,
     /// An index is missing or wrong. This costs no message.
     Index,
@@ -72,7 +72,7 @@ pub enum ReadError {
     Io(io::Error),
     /// The file is empty.
     Empty,
-    /// It is no MCAP file.
+    /// The file is not an MCAP file.
     NotMcap,
 }
 

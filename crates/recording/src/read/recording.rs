@@ -46,7 +46,7 @@ impl Recording<File> {
     /// Opens a file.
     ///
     /// # Errors
-    /// The file cannot be read, or it is no MCAP file. Damage is no error.
+    /// The file cannot be read, or is not an MCAP file. Damage is not an error.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         Recording::new(File::open(path)?)
     }

@@ -62,7 +62,7 @@ impl<R: Read + Seek> Recording<R> {
                     let is_right = self.has_right_end(next)?;
                     let more = if is_right { None } else { self.find_chunk(next)? };
                     if let Some(chunk) = more {
-                        // Another recording was appended, or this is no end.
+                        // Another recording was appended, or this is not the end.
                         self.lose(at..chunk, &seen, Damage::NoRecord);
                         at = chunk;
                         continue;
