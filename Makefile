@@ -36,7 +36,7 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 ALL_PARTS := firmware-test miri lint unit python e2e pages ffi-test fuzz-replay probe determinism test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
-TIMED := unit e2e python firmware-test ffi-test
+TIMED := unit e2e python pages firmware-test ffi-test test-socketcan
 RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
@@ -54,7 +54,7 @@ WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 test: toolchain $(if $(SUDO),packages) ## 18 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
+	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
 check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) fmt --all --check

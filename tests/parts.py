@@ -3,7 +3,8 @@
 
 A part is a target of the Makefile. Its output goes to target/parts/PART.log and is printed when the
 part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
-the end.
+the end. A part of --again that fails runs a second time, alone, when the others are over: if it passes
+then, a pause of the machine made it fail, or a defect that is rare. It is reported as flaky.
 """
 
 import argparse
@@ -102,6 +103,15 @@ class Runner:
                     print(f"\n---- {run.log}\n{run.output}\n----", flush=True)
                 print(run, flush=True)
 
+    def again(self, parts):
+        """Runs a second time those of the parts that failed. Gives those that pass now."""
+        failed = [run for run in self.over if not run.passed and run.part in parts]
+        self.over = [run for run in self.over if run not in failed]
+        others = len(self.over)
+        self.waiting.extend((run.part, f"{run.label}-again") for run in failed)
+        self.work()
+        return [run.part for run in self.over[others:] if run.passed]
+
     def stop(self):
         with self.lock:
             self.stopped = True
@@ -130,6 +140,7 @@ def main():
     arguments.add_argument("--runs", type=number, default=1, help="runs of each part (default 1)")
     arguments.add_argument("--load", type=int, default=0, help="processes that compute beside them")
     arguments.add_argument("--strict", action="store_true", help="a skipped check is a failure")
+    arguments.add_argument("--again", default="", help="parts that run again, alone, if they fail")
     arguments.add_argument("parts", nargs="+", metavar="PART")
     given = arguments.parse_args()
     parts = list(dict.fromkeys(given.parts))
@@ -156,6 +167,7 @@ def main():
             worker.start()
         for worker in workers:
             worker.join()
+        flaky = runner.again(given.again.split())
     finally:
         runner.stop()
         if hogs:
@@ -166,6 +178,8 @@ def main():
     for run in runner.over:
         for line in run.skipped:
             print(line)
+    for part in flaky:
+        print(f"FLAKY: {part} failed, and passed when it ran again alone: see {part}.log")
     if idle:
         print("the load ended before the parts")
     skipped = sum(run.passed and bool(run.skipped) for run in runner.over)

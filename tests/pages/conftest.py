@@ -19,8 +19,13 @@ FOLDERS = ["bindings", "contrib", "crates", "docs", "scenarios", "tests", "vecto
 SERVE = "motorlink sim --st pty:./st0 --rmd slcan-pty:./can0"
 
 
-#: What a reader's commands have: `motorlink` and `python3` are those of the package.
-VARIABLES = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "MPLBACKEND": "Agg"}
+#: What a reader's commands have: `motorlink` and `python3` are those of the package. A busy machine may
+#: be late with a reply of a simulated motor.
+VARIABLES = {
+    "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+    "MPLBACKEND": "Agg",
+    "MOTORLINK_RMD_TIMEOUT": "1s",
+}
 
 
 @pytest.fixture(scope="session")

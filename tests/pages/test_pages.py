@@ -65,13 +65,18 @@ def test_python_blocks(found, folder, shell, drives, environment):
     program = ""
     for block in found:
         program += "\n" * (block.line - program.count("\n")) + block.text
-    python(["-c", simulated(program)], folder, environment)
+    python(["-c", patient(simulated(program))], folder, environment)
 
 
 @each(blocks.of("python", "pytest"))
 def test_python_tests(block, folder, environment):
     (folder / "test_page.py").write_text(block.text)
     python(["-m", "pytest", "-q", "test_page.py"], folder, environment)
+
+
+def patient(program):
+    """The program with time for replies of simulated RMD motors on a busy machine."""
+    return re.sub(r'rmd\.open\("[^"]+"(?!.*timeout)', r"\g<0>, timeout=1", program)
 
 
 def python(arguments, folder, environment):

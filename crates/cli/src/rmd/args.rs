@@ -31,8 +31,8 @@ pub struct MotorArgs {
           value_parser = hint::ids(), hide_possible_values = true)]
     pub id: Vec<MotorSet>,
     /// How long to wait for a reply, 1ms to 10s
-    #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
-          value_parser = span_up_to(Duration::from_secs(10)))]
+    #[arg(long, env = "MOTORLINK_RMD_TIMEOUT", default_value = "50ms", global = true,
+          value_name = "TIME", value_parser = span_up_to(Duration::from_secs(10)))]
     pub timeout: Duration,
     /// Refuse commands for more speed than this, °/s, rounded down; moves need --max-speed
     ///
