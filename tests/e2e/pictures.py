@@ -82,10 +82,10 @@ def prompt(command):
 
 def output(folder, motorlink, command):
     """What a command prints."""
-    program, *words = command.split()
+    path = {"PATH": f"{Path(motorlink).parent}:{os.environ['PATH']}"}
     done = subprocess.run(
-        [motorlink if program == "motorlink" else program, *words],
-        cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
+        ["bash", "-c", command],
+        cwd=folder, env=environment(path), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
     )
     return done.stdout
 
@@ -150,10 +150,57 @@ def share(folder, motorlink, _):
     return screen
 
 
+START = "motorlink st -p ./st0 start --ramp 1500 3s"
+STOP = "motorlink st -p ./st0 stop"
+
+
+def record(folder, motorlink, _):
+    """A motor that gets faster is recorded."""
+    return shell(
+        folder, motorlink,
+        START,
+        "motorlink record -p ./st0 -m 1 -o run.mcap --duration 4s",
+        STOP,
+        "motorlink info run.mcap",
+    )
+
+
+def decode(folder, motorlink, _):
+    """A short log of a bus, with damage in its last line. Bit 3 of `errors` is an over temperature."""
+    Path(folder, "can0.log").write_text(
+        "(1.000000) can0 142#A200000010270000 T\n"
+        "(1.000310) can0 142#A219640064000000 R\n"
+        "(1.010000) can0 143#9A00000000000000 T\n"
+        "(1.010290) can0 143#9A32000501000008 R\n"
+        "(1.020000) can0 142#8100000000 R\n"
+    )
+    words = "motorlink decode rmd can0.log"
+    terminal = Terminal([motorlink, *words.split()[1:]], COLUMNS, 20, folder)
+    try:
+        assert terminal.wait(60) == 0
+        lines = [line.rstrip() for line in terminal.screen.display]
+    finally:
+        terminal.end()
+    screen, stream = paper()
+    stream.feed(prompt(words) + "\n".join(lines))
+    return screen
+
+
+def plot(folder, motorlink, _):
+    """What the shell records, as `motorlink plot` draws it: an SVG."""
+    commands = (START, "motorlink record -p ./st0 -m 1 -o run.mcap --duration 4s", STOP)
+    for command in (*commands, "motorlink plot run.mcap --signals 'SPEED_*,TORQUE_MEAS,STATUS' --title 'run.mcap' -o run.svg"):
+        output(folder, motorlink, command)
+    return Path(folder, "run.svg").read_text(encoding="utf8")
+
+
 #: Each picture: how its screen comes about, and its title, for screen readers.
 PICTURES = {
     "watch": (watch, "motorlink watch: a row for each of six motors with state, speed, current, temperature, supply and rate; one motor is too hot"),
     "share": (share, "motorlink share holds two ports; motorlink st and motorlink rmd use its lines; its log lists their requests"),
+    "record": (record, "motorlink record writes a starting motor into run.mcap; motorlink info lists drives, topics, signals and rates"),
+    "recording": (plot, "plot of a recording: speed, torque current and state of a motor that starts and follows a ramp to 1500 rpm"),
+    "decode": (decode, "motorlink decode rmd prints the frames of a candump log with direction, motor, command and values; the last one is damaged"),
     "dump": (dump, "motorlink st dump writes settings into a file, diff shows a changed gain, restore writes the old value"),
 }
 
@@ -164,7 +211,8 @@ def picture(name, motorlink):
     with tempfile.TemporaryDirectory() as folder:
         drives = Sim([motorlink, "sim", "--stdin", "--json", "--st", f"pty:{folder}/st0", "--rmd", f"slcan-pty:{folder}/can0"], 2)
         try:
-            return draw(scene(folder, motorlink, drives), title)
+            found = scene(folder, motorlink, drives)
+            return found if isinstance(found, str) else draw(found, title)
         finally:
             drives.end()
 

@@ -51,9 +51,9 @@ def test_info_says_what_is_in_a_recording(run, path):
     text = run("info", path).ended(0).out
     for part in [
         "from 2026-09-21T14:13:20.000Z to 2026-09-21T14:13:21.991Z",
-        "st0/motor1 at serial:./st0, st: board",
+        "st0/motor1 at serial:./st0, st\n             board\n",
         "motorlink record",
-        "SPEED_MEAS [rpm]",
+        "SPEED_MEAS [rpm]  STATUS\n",
         "1 commanded, 1 lost, 1 back",
         "lost       nothing",
     ]:

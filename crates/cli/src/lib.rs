@@ -33,6 +33,7 @@ mod span;
 mod spec;
 mod st;
 mod terminal;
+mod text;
 mod trace;
 mod voice;
 mod watch;

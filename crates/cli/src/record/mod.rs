@@ -177,7 +177,7 @@ fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
     }
     let files = progress.written.files.iter().map(|path| path.display().to_string());
     let files: Vec<String> = files.collect();
-    output::print_line(&format!("recorded {}: {}", files.join(", "), words(progress)))
+    output::print_line(&format!("recorded {}\n{}", files.join(", "), words(progress)))
 }
 
 fn words(progress: &Progress) -> String {

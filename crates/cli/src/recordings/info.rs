@@ -12,6 +12,10 @@ use super::input::{Input, lost};
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;
+use crate::text::flow;
+
+/// The width of a line of signals.
+const SIGNALS: usize = 66;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -179,15 +183,18 @@ impl Contents {
         }
         for (n, drive) in drives(recording).enumerate() {
             row(if n == 0 { "drives" } else { "" }, drive_line(drive));
+            for line in identity(drive) {
+                row("", format!("  {line}"));
+            }
         }
         let width = self.topics.iter().map(|topic| topic.name.len()).max().unwrap_or(0);
         for (n, topic) in self.topics.iter().enumerate() {
             let rate = topic.rate().map_or(String::new(), |rate| format!(", {rate:.1} Hz"));
             let text = format!("{:<width$}  {} messages{rate}", topic.name, topic.messages);
             row(if n == 0 { "topics" } else { "" }, text);
-            for field in &topic.fields {
-                let unit = if field.unit.is_empty() { "" } else { &*format!(" [{}]", field.unit) };
-                row("", format!("{:<width$}  {}{unit}", "", field.signal));
+            let signals: Vec<String> = topic.fields.iter().map(in_words).collect();
+            for line in flow(&signals, "  ", SIGNALS) {
+                row("", format!("  {line}"));
             }
         }
         let kinds: Vec<String> =
@@ -249,16 +256,26 @@ fn drives(recording: &Recording<File>) -> impl Iterator<Item = &Metadata> {
     recording.metadata().iter().filter(|metadata| metadata.name == drive::NAME)
 }
 
-/// `st0/motor1 on /dev/ttyACM0, st, spec: identity`.
+/// `st0/motor1 at serial:/dev/ttyACM0, st spec`.
 fn drive_line(drive: &Metadata) -> String {
     let fact = |name: &str| drive.values.get(name).map_or("", String::as_str);
     let (label, motor, port) = (fact(drive::LABEL), fact(drive::MOTOR), fact(drive::PORT));
     let kind = [fact(drive::PROTOCOL), fact(drive::PROFILE)];
     let kind: Vec<&str> = kind.into_iter().filter(|text| !text.is_empty()).collect();
-    let identity = drive.values.iter().filter(|(name, _)| name.starts_with(drive::IDENTITY));
-    let identity: Vec<&str> = identity.map(|(_, text)| &**text).collect();
-    let colon = if identity.is_empty() { "" } else { ": " };
-    format!("{label}/motor{motor} at {port}, {}{colon}{}", kind.join(" "), identity.join(", "))
+    format!("{label}/motor{motor} at {port}, {}", kind.join(" "))
+}
+
+fn identity(drive: &Metadata) -> impl Iterator<Item = &str> {
+    let lines = drive.values.iter().filter(|(name, _)| name.starts_with(drive::IDENTITY));
+    lines.map(|(_, text)| &**text)
+}
+
+/// `SPEED_MEAS [rpm]`.
+fn in_words(field: &SignalField) -> String {
+    match &*field.unit {
+        "" => field.signal.clone(),
+        unit => format!("{} [{unit}]", field.signal),
+    }
 }
 
 fn event_line(event: &Log) -> String {

@@ -10,7 +10,7 @@ use super::super::row::{Row, hertz};
 use super::super::values::details;
 use super::motors::short;
 use super::parts::{Shown, Theme, events, trend};
-use super::text::{fit, right, wrapped};
+use crate::text::{fit, right, wrapped};
 
 /// The least number of lines for events.
 const EVENTS: usize = 1;

@@ -4,7 +4,7 @@ use ratatui::text::Line;
 
 use super::super::keys::{HELP, View};
 use super::parts::Theme;
-use super::text::fit;
+use crate::text::fit;
 
 const KEY: usize = 20;
 const PLACE: usize = 11;

@@ -5,7 +5,6 @@ mod help;
 mod motors;
 mod parts;
 pub mod settings;
-mod text;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -13,9 +12,9 @@ use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
 use super::keys::{Field, HELP, Place, View};
+use crate::text::{self, wrapped};
 use parts::MARK;
 pub use parts::{Shown, Theme};
-use text::wrapped;
 
 /// The character after typed text.
 const CURSOR: char = '_';

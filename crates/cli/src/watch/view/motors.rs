@@ -5,7 +5,7 @@ use ratatui::text::{Line, Span};
 use super::super::model::Model;
 use super::super::row::Row;
 use super::parts::{Shown, Theme, first, listed, notices, trend};
-use super::text::{fit, right};
+use crate::text::{fit, right};
 
 /// The widths of the sparklines.
 struct Columns {

@@ -10,7 +10,7 @@ use super::super::keys::Place;
 use super::super::model::{Model, Said, age};
 use super::super::row::HISTORY;
 use super::super::settings::Item;
-use super::text::{sparkline, wrapped};
+use crate::text::{sparkline, wrapped};
 
 /// The mark of the selected line.
 pub const MARK: &str = ">";

@@ -5,7 +5,7 @@ use ratatui::text::{Line, Span};
 use super::super::keys::Place;
 use super::super::settings::Item;
 use super::parts::{Shown, Theme, first, listed};
-use super::text::{fit, wrapped};
+use crate::text::{fit, wrapped};
 
 /// The number of registers around the selected one that are read. Terminals show fewer lines.
 const AROUND: usize = 60;
