@@ -10,8 +10,7 @@ use motorlink_proto::st::Profile;
 
 use crate::captured::{Captured, Direction, Wire};
 pub use message::{Answer, Message, Value};
-use split::Splitter;
-pub use split::{Broken, Piece};
+pub use split::{Broken, Piece, Splitter};
 pub use transcript::Transcript;
 
 /// A pause after which a frame is not continued. Adapters deliver bytes up to 16 ms late.

@@ -49,22 +49,23 @@ impl fmt::Display for Broken {
 
 /// Bytes of one direction, from which the frames so far were taken.
 #[derive(Debug, Default)]
-pub(super) struct Splitter {
+pub struct Splitter {
     bytes: Vec<u8>,
 }
 
 impl Splitter {
-    pub(super) fn push(&mut self, bytes: &[u8]) {
+    /// Adds the next bytes.
+    pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
     /// Takes all frames that are complete, and what is certainly none.
-    pub(super) fn pieces(&mut self, mut said: impl FnMut(&[u8], Piece<'_>)) {
+    pub fn pieces(&mut self, mut said: impl FnMut(&[u8], Piece<'_>)) {
         self.take(false, &mut said);
     }
 
     /// Takes everything: no more bytes come.
-    pub(super) fn end(&mut self, mut said: impl FnMut(&[u8], Piece<'_>)) {
+    pub fn end(&mut self, mut said: impl FnMut(&[u8], Piece<'_>)) {
         self.take(true, &mut said);
     }
 

@@ -1,5 +1,5 @@
 //! Records of an MCAP file, parsed from bytes that may be damaged: a length is believed only as far
-//! as bytes are there.
+//! as bytes are there. `mcap::parse_record` is for whole files: it panics if an attachment is cut.
 
 use std::collections::BTreeMap;
 

@@ -5,10 +5,8 @@ use std::time::Duration;
 
 use motorlink::can::CanFrame;
 use motorlink::port::{Direction as Way, EventBytes, EventCan, TapBytes, TapCan};
-use motorlink_proto::rmd::IDENTIFIERS;
-use motorlink_proto::st::{
-    Bad, Frame as StFrame, HEADER_ACK, HEADER_ATR, HEADER_NACK, OVERHEAD, Parse,
-};
+use motorlink_capture::st::{self, Piece};
+use motorlink_proto::st::HEADER_NACK;
 
 use super::wall::{Anchor, wall_now};
 use crate::schema::{Direction, Frame, FrameResult, Time};
@@ -109,14 +107,9 @@ impl Seen {
 /// Makes frames of what a tap has seen.
 #[derive(Debug, Default)]
 pub struct Splitter {
-    /// Bytes that may be the beginning of a frame, and when the last of them came.
-    received: Partial,
-    sent: Partial,
-}
-
-#[derive(Debug, Default)]
-struct Partial {
-    bytes: Vec<u8>,
+    received: st::Splitter,
+    sent: st::Splitter,
+    /// When the last bytes came.
     time: Time,
 }
 
@@ -125,84 +118,38 @@ impl Splitter {
     pub fn take(&mut self, seen: Seen, put: &mut dyn FnMut(Frame)) {
         let Seen { time, direction, what } = seen;
         match what {
-            Wire::Can(frame) => put(of_can(time, direction, &frame)),
+            Wire::Can(frame) => put(Frame::of_can(time, direction, &frame)),
             Wire::Bytes(bytes) if direction == Direction::Sent => {
                 // The reply to the last request is over, or incomplete for good.
-                self.received.end(Direction::Received, put);
-                self.sent.take(time, &bytes, direction, put);
+                self.end(put);
                 // A request is written at once.
-                self.sent.end(Direction::Sent, put);
+                self.sent.push(&bytes);
+                self.sent.end(|bytes, piece| put(frame(time, direction, bytes, &piece)));
             }
-            Wire::Bytes(bytes) => self.received.take(time, &bytes, direction, put),
+            Wire::Bytes(bytes) => {
+                self.time = time;
+                self.received.push(&bytes);
+                self.received.pieces(|bytes, piece| put(frame(time, direction, bytes, &piece)));
+            }
         }
     }
 
     /// Nothing more comes.
     pub fn end(&mut self, put: &mut dyn FnMut(Frame)) {
-        self.received.end(Direction::Received, put);
+        let (time, direction) = (self.time, Direction::Received);
+        self.received.end(|bytes, piece| put(frame(time, direction, bytes, &piece)));
     }
 }
 
-impl Partial {
-    fn take(&mut self, time: Time, bytes: &[u8], way: Direction, put: &mut dyn FnMut(Frame)) {
-        self.time = time;
-        self.bytes.extend(bytes);
-        let mut damaged = 0;
-        loop {
-            let rest = &self.bytes[damaged..];
-            let begins = way == Direction::Sent
-                || rest
-                    .first()
-                    .is_none_or(|byte| [HEADER_ACK, HEADER_NACK, HEADER_ATR].contains(byte));
-            if !begins {
-                damaged += 1;
-                continue;
-            }
-            match StFrame::parse(rest) {
-                Parse::More => break,
-                // What follows the header may be a frame.
-                Parse::Bad(Bad::Length(_)) => damaged += 1,
-                Parse::Bad(Bad::Checksum { .. }) => damaged += usize::from(rest[1]) + OVERHEAD,
-                Parse::Frame(frame, size) => {
-                    let result = match way == Direction::Received && frame.header == HEADER_NACK {
-                        true => FrameResult::Nack,
-                        false => FrameResult::Frame,
-                    };
-                    self.put(damaged, FrameResult::Damaged, way, put);
-                    self.put(size, result, way, put);
-                    damaged = 0;
-                }
-            }
+fn frame(stamp: Time, direction: Direction, bytes: &[u8], piece: &Piece<'_>) -> Frame {
+    let result = match piece {
+        Piece::Frame(frame) if direction == Direction::Received && frame.header == HEADER_NACK => {
+            FrameResult::Nack
         }
-        self.put(damaged, FrameResult::Damaged, way, put);
-    }
-
-    fn end(&mut self, way: Direction, put: &mut dyn FnMut(Frame)) {
-        self.put(self.bytes.len(), FrameResult::Damaged, way, put);
-    }
-
-    fn put(
-        &mut self,
-        size: usize,
-        result: FrameResult,
-        direction: Direction,
-        put: &mut dyn FnMut(Frame),
-    ) {
-        if size > 0 {
-            let data = self.bytes.drain(..size).collect();
-            put(Frame { stamp: self.time, direction, id: 0, result, data });
-        }
-    }
-}
-
-fn of_can(stamp: Time, direction: Direction, frame: &CanFrame) -> Frame {
-    let is_ours = frame.eight_bytes().is_some_and(|(id, _)| (IDENTIFIERS.is_used)(id));
-    let result = if is_ours { FrameResult::Frame } else { FrameResult::Foreign };
-    let flag = |is_set, flag| if is_set { flag } else { 0 };
-    let id = frame.id()
-        | flag(frame.is_extended(), Frame::EXTENDED)
-        | flag(frame.is_remote(), Frame::REMOTE);
-    Frame { stamp, direction, id, result, data: frame.data().to_vec() }
+        Piece::Frame(_) => FrameResult::Frame,
+        Piece::Broken(_) => FrameResult::Damaged,
+    };
+    Frame { stamp, direction, id: 0, result, data: bytes.to_vec() }
 }
 
 #[cfg(test)]
@@ -259,14 +206,5 @@ mod tests {
         let expected =
             [(Direction::Received, FrameResult::Damaged), (Direction::Sent, FrameResult::Frame)];
         assert_eq!(results, expected);
-    }
-
-    #[test]
-    fn frames_of_others_on_a_bus_are_foreign() {
-        let result = |frame| of_can(Time(0), Direction::Received, &frame);
-        assert_eq!(result(CanFrame::new(0x141, [0x9C; 8])).result, FrameResult::Frame);
-        assert_eq!(result(CanFrame::new(0x701, [5; 8])).result, FrameResult::Foreign);
-        let extended = result(CanFrame::data_frame(0x1_0141, true, &[1]));
-        assert_eq!((extended.id, extended.result), (0x8001_0141, FrameResult::Foreign));
     }
 }

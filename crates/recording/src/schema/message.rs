@@ -1,7 +1,5 @@
 //! The messages whose types are the same in every recording.
 
-use motorlink_proto::can::CanFrame;
-
 use super::cdr::{Decoder, Encoder, Malformed};
 
 /// A message with a type of its own.
@@ -234,117 +232,6 @@ impl Message for DiagnosticArray {
     }
 }
 
-/// `motorlink/msg/Frame`: one frame on the wire, or bytes that are none.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Frame {
-    /// When it was sent, or its last byte came.
-    pub stamp: Time,
-    /// From the program's point of view.
-    pub direction: Direction,
-    /// The CAN identifier, with the flags [`Frame::EXTENDED`] and [`Frame::REMOTE`]; 0 on a serial line.
-    pub id: u32,
-    /// What it is.
-    pub result: FrameResult,
-    /// The bytes on a serial line, the data of a CAN frame.
-    pub data: Vec<u8>,
-}
-
-/// The direction of a [`Frame`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Direction {
-    /// From the program to the motors.
-    Sent = 0,
-    /// From the motors to the program.
-    Received = 1,
-}
-
-/// What a [`Frame`] is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum FrameResult {
-    /// A frame of the protocol.
-    Frame = 0,
-    /// A frame of the protocol in which the drive refuses a request.
-    Nack = 1,
-    /// Bytes that are no frame.
-    Damaged = 2,
-    /// A CAN frame that is not of this protocol.
-    Foreign = 3,
-}
-
-impl Frame {
-    /// Of [`id`](Self::id): the identifier has 29 bits.
-    pub const EXTENDED: u32 = 1 << 31;
-    /// Of [`id`](Self::id): a remote transmission request.
-    pub const REMOTE: u32 = 1 << 30;
-
-    /// The frame on a CAN bus.
-    pub fn as_can(&self) -> CanFrame {
-        let (id, extended) =
-            (self.id & !(Self::EXTENDED | Self::REMOTE), self.id & Self::EXTENDED != 0);
-        match self.id & Self::REMOTE != 0 {
-            // The length that it asks for is not recorded.
-            true => CanFrame::remote_frame(id, extended, 0),
-            false => CanFrame::data_frame(id, extended, &self.data),
-        }
-    }
-}
-
-impl Message for Frame {
-    const TYPE: &'static str = "motorlink/msg/Frame";
-
-    fn definition() -> String {
-        let fields = format!(
-            "# One frame on the wire, or bytes that are none.\n\
-             builtin_interfaces/Time stamp # when it was sent, or its last byte came\n\
-             # from the point of view of the program that recorded\n\
-             uint8 SENT={}\nuint8 RECEIVED={}\nuint8 direction\n\
-             # the CAN identifier; these flags are added; 0 on a serial line\n\
-             uint32 EXTENDED={}\nuint32 REMOTE={}\nuint32 id\n\
-             # a frame of the protocol; one in which the drive refuses a request; bytes that are no\n\
-             # frame; a CAN frame that is not of the protocol\n\
-             uint8 FRAME={}\nuint8 NACK={}\nuint8 DAMAGED={}\nuint8 FOREIGN={}\nuint8 result\n\
-             uint8[] data # the bytes on a serial line, the data of a CAN frame\n",
-            Direction::Sent as u8,
-            Direction::Received as u8,
-            Frame::EXTENDED,
-            Frame::REMOTE,
-            FrameResult::Frame as u8,
-            FrameResult::Nack as u8,
-            FrameResult::Damaged as u8,
-            FrameResult::Foreign as u8,
-        );
-        with_dependencies(&fields, &[Time::DEPENDENCY])
-    }
-
-    fn write(&self, out: &mut Encoder) {
-        self.stamp.write(out);
-        out.u8(self.direction as u8);
-        out.u32(self.id);
-        out.u8(self.result as u8);
-        out.bytes(&self.data);
-    }
-
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        Ok(Frame {
-            stamp: Time::read(from)?,
-            direction: match from.u8()? {
-                0 => Direction::Sent,
-                _ => Direction::Received,
-            },
-            id: from.u32()?,
-            result: match from.u8()? {
-                0 => FrameResult::Frame,
-                1 => FrameResult::Nack,
-                3 => FrameResult::Foreign,
-                _ => FrameResult::Damaged,
-            },
-            data: from.bytes()?,
-        })
-    }
-}
-
 /// `rcl_interfaces/msg/Log`: something that happened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Log {
@@ -432,10 +319,10 @@ impl Message for Log {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn returns<M: Message + PartialEq + std::fmt::Debug>(message: M) {
+    pub fn returns<M: Message + PartialEq + std::fmt::Debug>(message: M) {
         let bytes = message.encode();
         assert_eq!(M::decode(&bytes).as_ref(), Ok(&message));
         for end in 0..bytes.len() {
@@ -461,13 +348,6 @@ mod tests {
             values: vec![("state".to_owned(), "FAULT_OVER".to_owned())],
         };
         returns(DiagnosticArray { stamp, status: vec![status] });
-        returns(Frame {
-            stamp,
-            direction: Direction::Received,
-            id: Frame::EXTENDED | 0x141,
-            result: FrameResult::Foreign,
-            data: vec![0x9A, 0, 1],
-        });
         returns(Log {
             stamp,
             severity: Severity::Warn,

@@ -3,14 +3,15 @@
 //! The types are those of ROS 2 where it has one. [`SignalsType`] is made for each motor.
 
 mod cdr;
+mod frame;
 mod message;
 pub mod name;
 mod signals;
 
 pub use cdr::Malformed;
+pub use frame::{Direction, Frame, FrameResult};
 pub use message::{
-    DiagnosticArray, DiagnosticStatus, Direction, Frame, FrameResult, JointState, Level, Log,
-    Message, Severity, Time,
+    DiagnosticArray, DiagnosticStatus, JointState, Level, Log, Message, Severity, Time,
 };
 pub use name::snake_case;
 pub use signals::{PACKAGE, SignalField, SignalsRow, SignalsType};
