@@ -62,7 +62,7 @@ check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
 flakes: PARTS = $(TIMED)
-flakes: toolchain $(if $(SUDO),packages) ## 45 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
+flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(PARTS)
 
