@@ -355,6 +355,18 @@ def test_what_cannot_be_known_is_not_known(packets, tshark):
         "?<><": [(0, "<", ASK), (1, "<", STATUS), (10, "<", ASK), (11, "<", STATUS)],
         "?<>< ": [(0, "<", ASK), (1, ">", STATUS), (10, "<", off), (11, ">", off)],
     }
+    # Several requests at once: the angle of 0 degrees looks like its request.
+    status_2, reply_2 = bytes.fromhex("9c00000000000000"), bytes.fromhex("9c19000000000010")
+    cases["?<>>?<>><>"] = [
+        *[(0, "-", ASK), (1, "-", STATUS), (10, "-", angle), (11, "-", status_2), (12, "-", angle), (13, "-", reply_2)],
+        *[(14, "-", off), (15, "-", ASK), (16, "-", STATUS), (17, "-", off)],
+    ]
+    # A machine that sent everything may be both ends, as on a virtual bus.
+    cases[">?><><>?"] = [
+        *[(0, ">", off), (1, ">", off), (2, ">", ASK), (3, ">", STATUS), (4, ">", ASK), (5, ">", STATUS)],
+        *[(6, ">", off), (7, ">", off)],
+    ]
+    cases["><>>"] = [(0, ">", off), (1, "<", off), (2, ">", off), (3, ">", off)]
     # A motor's capture without a certain reply: what it sends may answer a request.
     cases["?>?"] = [(0, "<", off), (60, "<", off), (61, ">", off)]
     for expected, frames in cases.items():

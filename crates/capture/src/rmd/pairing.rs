@@ -54,6 +54,8 @@ const REPLY_WITHIN_NS: i64 = DEFAULT_TIMEOUT.0 as i64 * 1_000;
 pub(super) struct Bus {
     motors: [Motor; MotorId::COUNT],
     sender: Sender,
+    /// Whether the capturing machine received a frame. On a virtual bus it sends them all.
+    has_received: bool,
 }
 
 /// Who is behind frames that the capturing machine sent.
@@ -65,11 +67,12 @@ enum Sender {
     Drive,
 }
 
-#[derive(Debug, Default, Clone, Copy)]
+#[derive(Debug, Default)]
 struct Motor {
     /// Whether the direction of an earlier frame is known.
     is_synced: bool,
-    open: Option<Open>,
+    /// The last request of each code, in the order of time. A host may send several at once.
+    open: Vec<Open>,
     last: Option<Stamp>,
 }
 
@@ -80,10 +83,21 @@ struct Open {
     time: Option<Stamp>,
 }
 
-impl Open {
-    /// Whether a frame with this code and time may be the reply.
+impl Motor {
+    /// Whether a frame with this code and time may be a reply.
     fn is_answered_by(&self, code: Code, time: Option<Stamp>) -> bool {
-        self.code.is_answered_by(code) && !is_late(self.time, time)
+        self.open.iter().any(|open| open.code.is_answered_by(code) && !is_late(open.time, time))
+    }
+
+    fn request(&mut self, code: Code, time: Option<Stamp>) {
+        self.open.retain(|open| open.code != code && !is_late(open.time, time));
+        self.open.push(Open { code, time });
+    }
+
+    /// A motor replies in the order of the requests: earlier ones get no reply any more.
+    fn reply(&mut self, code: Code) {
+        let answered = self.open.iter().position(|open| open.code.is_answered_by(code));
+        self.open.drain(..answered.map_or(0, |at| at + 1));
     }
 }
 
@@ -103,10 +117,11 @@ impl Bus {
     ) -> Way {
         let motor = &mut self.motors[id.index()];
         let is_reply = code.info().is_some_and(|row| !row.may_be_request(data));
-        let answers = motor.open.is_some_and(|open| open.is_answered_by(code, entry.time));
+        let answers = motor.is_answered_by(code, entry.time);
         // No reply comes so late after the frame before.
         let is_first = motor.last.is_some() && is_late(motor.last, entry.time);
         motor.last = entry.time;
+        self.has_received |= entry.direction == Some(captured::Direction::Received);
 
         let (direction, by) = match (entry.direction, self.sender) {
             (_, _) if is_reply => {
@@ -115,7 +130,8 @@ impl Bus {
                 }
                 (Some(Direction::DriveToHost), KnownBy::Frame)
             }
-            (Some(captured::Direction::Sent), Sender::Host) => {
+            // If nothing was received, the motors may be on this machine, too.
+            (Some(captured::Direction::Sent), Sender::Host) if self.has_received || !answers => {
                 (Some(Direction::HostToDrive), KnownBy::Log)
             }
             (Some(captured::Direction::Sent), Sender::Unknown) if !answers => {
@@ -128,39 +144,35 @@ impl Bus {
             (Some(captured::Direction::Received), Sender::Host) if answers => {
                 (Some(Direction::DriveToHost), KnownBy::Log)
             }
-            (Some(captured::Direction::Sent), Sender::Drive) if answers => {
+            (Some(captured::Direction::Sent), Sender::Drive) if self.has_received && answers => {
                 (Some(Direction::DriveToHost), KnownBy::Log)
             }
             // A reply to a request that is not in the capture, or a request of another host.
-            (Some(captured::Direction::Received), Sender::Host)
-            | (Some(captured::Direction::Sent), Sender::Drive) => (None, KnownBy::Nothing),
+            (Some(captured::Direction::Received), Sender::Host) => (None, KnownBy::Nothing),
+            (Some(captured::Direction::Sent), Sender::Drive) if self.has_received => {
+                (None, KnownBy::Nothing)
+            }
             _ if answers => (None, KnownBy::Nothing),
             _ if motor.is_synced || is_first => (Some(Direction::HostToDrive), KnownBy::Pairing),
             _ => (None, KnownBy::Nothing),
         };
         match direction {
-            Some(Direction::HostToDrive) => {
-                motor.is_synced = true;
-                motor.open = Some(Open { code, time: entry.time });
-            }
-            Some(Direction::DriveToHost) => {
-                motor.is_synced = true;
-                motor.open = None;
-            }
-            None => {
-                if answers {
-                    motor.open = Some(Open { code, time: entry.time });
-                }
-            }
+            Some(Direction::HostToDrive) => motor.request(code, entry.time),
+            Some(Direction::DriveToHost) => motor.reply(code),
+            // It may be the request again.
+            None if answers => motor.request(code, entry.time),
+            None => {}
         }
+        motor.is_synced |= direction.is_some();
         Way { direction, by }
     }
 
     /// After 0x280, which opens an exchange with each of its motors.
     pub(super) fn torque4(&mut self, entry: &Captured) {
         for id in MotorSet::TORQUE4 {
-            let open = Some(Open { code: Code::SetTorque, time: entry.time });
-            self.motors[id.index()] = Motor { is_synced: true, open, last: entry.time };
+            let motor = &mut self.motors[id.index()];
+            motor.request(Code::SetTorque, entry.time);
+            (motor.is_synced, motor.last) = (true, entry.time);
         }
     }
 
@@ -270,6 +282,50 @@ mod tests {
         let mut bus = Bus::default();
         let frames = [(0, '<', READ), (1, '<', STATUS), (10, '<', READ), (11, '<', STATUS)];
         assert_eq!(told(&mut bus, &frames), "?<><");
+    }
+
+    #[test]
+    fn a_reply_is_no_request_although_other_requests_were_sent_before_it() {
+        let alive = [(0, '-', READ), (1, '-', STATUS)];
+        let status_2 = [0x9C, 0, 0, 0, 0, 0, 0, 0];
+        let reply_2 = [0x9C, 25, 0, 0, 0, 0, 0, 16];
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &alive), "?<");
+        // The motor is at 0 °, so that its reply looks like the request.
+        let frames = [(10, '-', ANGLE), (11, '-', status_2), (12, '-', ANGLE), (13, '-', reply_2)];
+        assert_eq!(told(&mut bus, &frames), ">>?<");
+        // It replies in order, so that the exchange before is over.
+        assert_eq!(told(&mut bus, &[(14, '-', OFF), (15, '-', READ), (16, '-', STATUS)]), ">><");
+        assert_eq!(told(&mut bus, &[(17, '-', OFF)]), ">");
+    }
+
+    #[test]
+    fn a_frame_to_four_motors_does_not_end_their_exchanges() {
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &[(0, '-', READ), (1, '-', STATUS), (10, '-', ANGLE)]), "?<>");
+        let four = Captured {
+            place: 1,
+            time: Some(Stamp::Relative(10_500_000)),
+            channel: None,
+            direction: None,
+            wire: Wire::Can(CanFrame::new(0x280, [0; 8])),
+        };
+        bus.torque4(&four);
+        assert_eq!(told(&mut bus, &[(11, '-', ANGLE)]), "?");
+    }
+
+    #[test]
+    fn a_machine_that_sent_everything_may_be_both_ends() {
+        // A virtual bus: the second frame may be the reply.
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &[(0, '>', OFF), (1, '>', OFF)]), ">?");
+        assert_eq!(told(&mut bus, &[(2, '>', READ), (3, '>', STATUS)]), "><");
+        assert_eq!(told(&mut bus, &[(4, '>', READ), (5, '>', STATUS), (6, '>', OFF)]), "><>");
+        assert_eq!(told(&mut bus, &[(7, '>', OFF)]), "?");
+        // It received a reply, so that it is the host.
+        let mut bus = Bus::default();
+        assert_eq!(told(&mut bus, &[(0, '>', OFF), (1, '<', OFF), (2, '>', OFF)]), "><>");
+        assert_eq!(told(&mut bus, &[(3, '>', OFF)]), ">");
     }
 
     #[test]

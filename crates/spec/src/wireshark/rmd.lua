@@ -200,18 +200,26 @@ local function is_late(earlier, now)
     return (now - earlier) * 1000 > rmd.prefs.patience_ms
 end
 
--- Whether a frame with this code may be the reply to the open request.
-local function is_answer(motor, code, now)
-    local open = motor.open
-    if not open or is_late(open.time, now) then
-        return false
-    end
-    for _, asked in ipairs(table_of.answers[code] or { code }) do
-        if motor.asked == asked then
-            return true
+-- A motor has the last request of each code that has no reply yet, in the order of time: a host may
+-- send several at once. Returns the place of the one to which a frame with this code may be the reply.
+local function place_of(motor, code, now)
+    for place, open in ipairs(motor.open) do
+        for _, asked in ipairs(table_of.answers[code] or { code }) do
+            if open.code == asked and not is_late(open.frame.time, now) then
+                return place
+            end
         end
     end
-    return false
+end
+
+local function add_open(motor, frame, code)
+    for place = #motor.open, 1, -1 do
+        local open = motor.open[place]
+        if open.code == code or is_late(open.frame.time, frame.time) then
+            table.remove(motor.open, place)
+        end
+    end
+    motor.open[#motor.open + 1] = { frame = frame, code = code }
 end
 
 -- Request and reply have the same identifier and code. What a frame is comes from the user, from the
@@ -225,6 +233,7 @@ local function type_of(line, motor, frame, command, tvb, sent)
     if rmd.prefs.direction ~= AUTO then
         sent = nil
     end
+    line.has_received = line.has_received or sent == false
     if command and not may_be_request(command, tvb) then
         if sent then
             line.sender = AT_DRIVE
@@ -234,7 +243,9 @@ local function type_of(line, motor, frame, command, tvb, sent)
     if sent and line.sender == nil and not frame.answers then
         line.sender = AT_HOST
     end
-    if sent ~= nil and line.sender then
+    -- If nothing was received, both ends may be on this machine.
+    local is_told = line.has_received or line.sender == AT_HOST and not frame.answers
+    if sent ~= nil and line.sender and is_told then
         local type = direction_of(sent, line.sender)
         if type == REQUEST or frame.answers then
             return type, "capture"
@@ -260,7 +271,7 @@ local function bus_of(pinfo)
 end
 
 local function motor_at(bus, id)
-    bus.motors[id] = bus.motors[id] or {}
+    bus.motors[id] = bus.motors[id] or { open = {} }
     return bus.motors[id]
 end
 
@@ -272,18 +283,22 @@ local function understand(pinfo, tvb, id, code)
     local bus = bus_of(pinfo)
     local motor = motor_at(bus, id)
     local frame = { number = pinfo.number, time = pinfo.rel_ts, by = {} }
-    frame.answers = is_answer(motor, code, frame.time)
+    local place = place_of(motor, code, frame.time)
+    frame.answers = place ~= nil
     frame.type, frame.source =
         type_of(bus, motor, frame, table_of.commands[code], tvb, was_sent(pinfo))
     motor.last = frame.time
     if frame.type == REPLY then
-        if frame.answers then
-            frame.to = motor.open
-            motor.open.by[id] = frame
+        if place then
+            frame.to = motor.open[place].frame
+            frame.to.by[id] = frame
         end
-        motor.open = nil
+        -- A motor replies in the order of the requests: earlier ones get no reply any more.
+        for _ = 1, place or 0 do
+            table.remove(motor.open, 1)
+        end
     elseif frame.type == REQUEST or frame.answers then
-        motor.open, motor.asked = frame, code
+        add_open(motor, frame, code)
     end
     motor.is_synced = motor.is_synced or frame.type ~= UNKNOWN
     packets[pinfo.number] = frame
@@ -299,7 +314,7 @@ local function ask_four(pinfo)
     frame.type, frame.source = REQUEST, "frame"
     for id = 1, #table_of.torque4 do
         local motor = motor_at(bus_of(pinfo), id)
-        motor.open, motor.asked = frame, table_of.torque4_code
+        add_open(motor, frame, table_of.torque4_code)
         motor.is_synced, motor.last = true, frame.time
     end
     packets[pinfo.number] = frame
