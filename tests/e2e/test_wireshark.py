@@ -141,7 +141,8 @@ def on_can(frames, told=True):
 def on_line(frames):
     capture = Capture(RTAC_SERIAL)
     for frame in frames:
-        capture.serial(frame["data"], frame["sent"])
+        # So late that no reply to an earlier request comes any more.
+        capture.serial(frame["data"], frame["sent"], after_ms=1001 if frame["sent"] else 1)
     return capture
 
 
@@ -291,10 +292,11 @@ def test_damage_is_shown_where_it_is(packets, tshark):
     capture.serial(GET_SPEED[:-1] + b"\x00", True)
     capture.serial(b"\x02\xff\xff" + GET_SPEED, True)
     capture.serial(SPEED_1500[:4] + b"\x06" + SPEED_1500[5:], False)
+    capture.serial(GET_SPEED, True)
     capture.serial(b"\x10" + SPEED_1500[:3] + SPEED_1500, False)
     capture.serial(b"\x00\x00\x00", True)
     capture.serial(b"\x02\x04" + GET_SPEED + GET_SPEED, True)
-    noise, bad_request, bad_length, bad_reply, twice, zeros, swallowed = packets(capture, "-2")[1:]
+    noise, bad_request, bad_length, bad_reply, _, twice, zeros, swallowed = packets(capture, "-2")[1:]
     assert noise["motorlink.st.stray"] == ["55:03"] and noise["motorlink.st.value"] == ["1500"]
     assert noise["motorlink.st.response_to"] == ["1"]
     assert bad_request["motorlink.st.bad_checksum"] == [""] and bad_request["motorlink.st.checksum.status"] == ["0"]
@@ -303,13 +305,54 @@ def test_damage_is_shown_where_it_is(packets, tshark):
     assert bad_length["motorlink.st.stray"] == ["02:ff:ff"] and bad_length["motorlink.st.register"] == ["0x1e"]
     assert bad_reply["motorlink.st.bad_checksum"] == [""] and not bad_reply["motorlink.st.value"]
     assert twice["motorlink.st.stray"] == ["10:f0:04:dc"]
-    assert twice["motorlink.st.value"] == ["1500"] and twice["motorlink.st.response_to"] == ["4"]
+    assert twice["motorlink.st.value"] == ["1500"] and twice["motorlink.st.response_to"] == ["6"]
     assert zeros["motorlink.st.unknown_code"] == [""] and zeros["motorlink.st.checksum.status"] == ["1"]
     # A wrong length does not swallow the frames behind it.
     assert swallowed["motorlink.st.stray"] == ["02:04"] and swallowed["motorlink.st.register"] == ["0x1e"] * 2
     info = tshark(capture, "-T", "fields", "-e", "_ws.col.Info").splitlines()
     assert info[1] == "< 2 bytes that are no frame | < ACK 1500 rpm"
     assert info[2] == "> bad checksum 0x00 instead of 0x21"
+
+
+def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
+    """The same cases as those of `motorlink decode`."""
+    speed, reference, status = (frame_of(b"\x22", bytes([register])) for register in (0x1E, 0x04, 0x02))
+    configure = [frame_of(b"\x2e", bytes([0, register])) for register in (0x1E, 0x04)]
+    reply, short, done = (frame_of(b"\xf0", data) for data in (bytes([7, 0, 0, 0]), b"\0", b""))
+    segment = frame_of(b"\x2d", b"\0")
+    line = Capture(RTAC_SERIAL)
+    texts = []
+
+    def exchange(data, text=None, after_ms=1):
+        line.serial(data, data[0] != 0xF0, after_ms=after_ms)
+        texts.append(text)
+
+    doubtful = "< ACK, 4 bytes, to one of several requests"
+    # A retry: two replies may come.
+    exchange(speed), exchange(speed), exchange(reply, "< ACK 7 rpm")
+    exchange(reference), exchange(reply, doubtful), exchange(reply, "< ACK 7 rpm")
+    # Each reply may be that of the request before.
+    exchange(speed), exchange(reference), exchange(reply, doubtful)
+    exchange(speed), exchange(reply, doubtful)
+    # The size tells it.
+    exchange(status), exchange(short, "< ACK IDLE")
+    # No reply comes after a second.
+    exchange(reference), exchange(speed, after_ms=1001), exchange(reply, "< ACK 7 rpm")
+    exchange(configure[0]), exchange(done, "< ACK"), exchange(segment), exchange(reply, "< ACK SPEED_MEAS 7 rpm")
+    exchange(frame_of(b"\x23", b"\x07")), exchange(configure[1]), exchange(done, "< ACK")
+    exchange(segment, after_ms=1001), exchange(reply, "< ACK, 4 bytes")
+    info = tshark(line, "-T", "fields", "-e", "_ws.col.Info").splitlines()
+    assert [text if text is None else shown for text, shown in zip(texts, info)] == texts
+    for fields, text in zip(packets(line, "-2"), texts):
+        if text == doubtful:
+            assert fields["motorlink.st.doubtful"] == [""] and not fields["motorlink.st.response_to"]
+            assert not fields["motorlink.st.value"] and not fields["motorlink.st.unasked"]
+
+
+def frame_of(header, payload):
+    """A frame of ST's protocol."""
+    total = header[0] + len(payload) + sum(payload)
+    return header + bytes([len(payload)]) + payload + bytes([((total >> 8) + total) & 0xFF])
 
 
 def test_requests_and_replies_are_linked(packets):

@@ -6,7 +6,7 @@ use motorlink::can::CanFrame;
 use motorlink::port::Direction;
 use motorlink::rmd;
 use motorlink::st::Profile;
-use motorlink_capture::st::Transcript;
+use motorlink_capture::{Stamp, st::Transcript};
 
 use crate::output::{hex, print_message};
 
@@ -15,7 +15,8 @@ pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send 
     let mut transcript = Transcript::new(profile);
     move |direction, at, bytes| {
         let sent = direction == Direction::Sent;
-        let meaning = transcript.note(sent, bytes);
+        let time = i64::try_from(at.as_nanos()).ok().map(Stamp::Relative);
+        let meaning = transcript.note(time, sent, bytes);
         print_message(&format!(
             "{:>10.6} {} {:<24} {meaning}",
             at.as_secs_f64(),

@@ -32,8 +32,10 @@ pub enum Message<'a> {
 pub enum Answer<'a> {
     /// No values, or bytes whose request is not known.
     Bytes,
-    /// It may answer one of two requests.
+    /// It may answer one of several requests.
     Doubtful,
+    /// It has not the size of the reply to the request before it. The profile that has this size.
+    WrongSize(Option<Profile>),
     /// A register.
     Register(Reading),
     /// A register with a value that another profile has.
@@ -160,7 +162,9 @@ fn names(registers: &[u8]) -> String {
 impl Answer<'_> {
     fn values(&self) -> Vec<Value> {
         match self {
-            Answer::Bytes | Answer::Doubtful | Answer::Implausible(_) => Vec::new(),
+            Answer::Bytes | Answer::Doubtful | Answer::WrongSize(_) | Answer::Implausible(_) => {
+                Vec::new()
+            }
             Answer::Register(reading) => vec![Value::Register(*reading)],
             Answer::Segment(readings) => readings.iter().copied().map(Value::Register).collect(),
             Answer::Board(BoardInfo { version: [major, minor, patch], name, .. }) => vec![
@@ -192,7 +196,13 @@ impl fmt::Display for Message<'_> {
                 write!(f, "ACK, {} bytes", payload.len())
             }
             Message::Acknowledged(payload, Answer::Doubtful) => {
-                write!(f, "ACK, {} bytes, to one of two requests", payload.len())
+                write!(f, "ACK, {} bytes, to one of several requests", payload.len())
+            }
+            Message::Acknowledged(payload, Answer::WrongSize(None)) => {
+                write!(f, "ACK, {} bytes, a wrong size for this request", payload.len())
+            }
+            Message::Acknowledged(payload, Answer::WrongSize(Some(profile))) => {
+                write!(f, "ACK, {} bytes, its size in profile {}", payload.len(), profile.name())
             }
             Message::Acknowledged(_, answer) => write!(f, "ACK {answer}"),
             Message::Refused(Some(code)) => write!(f, "NACK {code}: {}", code.doc()),
@@ -245,7 +255,7 @@ fn show(request: &Request<'_>, profile: Profile, f: &mut fmt::Formatter<'_>) -> 
 impl fmt::Display for Answer<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Answer::Bytes | Answer::Doubtful => Ok(()),
+            Answer::Bytes | Answer::Doubtful | Answer::WrongSize(_) => Ok(()),
             Answer::Register(reading) => reading.fmt(f),
             Answer::Implausible(why) => why.fmt(f),
             Answer::Board(BoardInfo { version: [major, minor, patch], name, .. }) => {

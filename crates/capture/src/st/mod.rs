@@ -107,7 +107,9 @@ impl Line {
         let Line { transcript, splitters, last, .. } = self;
         let Some(last) = &last[slot] else { return };
         splitters[slot].pieces(|bytes, piece| match piece {
-            Piece::Frame(frame) => said(last, bytes, Item::Message(transcript.read(None, &frame))),
+            Piece::Frame(frame) => {
+                said(last, bytes, Item::Message(transcript.read(last.time, None, &frame)))
+            }
             Piece::Broken(broken) => {
                 transcript.lose();
                 said(last, bytes, Item::Broken(broken));
@@ -119,7 +121,9 @@ impl Line {
         let Line { transcript, splitters, last, .. } = self;
         let Some(last) = &last[slot] else { return };
         splitters[slot].end(|bytes, piece| match piece {
-            Piece::Frame(frame) => said(last, bytes, Item::Message(transcript.read(None, &frame))),
+            Piece::Frame(frame) => {
+                said(last, bytes, Item::Message(transcript.read(last.time, None, &frame)))
+            }
             Piece::Broken(broken) => {
                 transcript.lose();
                 said(last, bytes, Item::Broken(broken));

@@ -406,11 +406,11 @@ impl Harness {
             [] => "nothing".to_owned(),
             bytes => format!("{}  {words}", Hex(bytes)),
         };
-        let mut sent = said(&self.sent, words.note(true, &self.sent));
+        let mut sent = said(&self.sent, words.note(None, true, &self.sent));
         if let Some(register) = self.register_sent().filter(|id| id.shape().is_some()) {
             sent += &format!("; {register} has the id {:#04x}", register.0);
         }
-        let received = said(&self.received, words.note(false, &self.received));
+        let received = said(&self.received, words.note(None, false, &self.received));
         Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received, reading: None }))
     }
 
@@ -458,7 +458,7 @@ impl Harness {
     }
 
     fn transcribe(&mut self, sent: bool, bytes: &[u8]) {
-        let words = self.words.note(sent, bytes);
+        let words = self.words.note(None, sent, bytes);
         let direction = if sent { '>' } else { '<' };
         self.transcript.push(format!("{direction} {}  {words}", Hex(bytes)));
     }

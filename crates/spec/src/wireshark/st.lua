@@ -2,28 +2,85 @@
 
 local lines, sent
 
+-- The message of a request; nil if the profile lacks its code.
+local function message_of(request)
+    return table_of.codes[profile_of()][code_of(request.bytes:byte(1))]
+end
+
+local function segment_of(request)
+    return request.bytes:byte(3)
+end
+
+-- Requests that are kept. A capture may have no replies.
+local MOST_PENDING = 64
+
+-- A drive replies in the order of the requests, or not at all.
+local function ask(line, request)
+    if message_of(request) == table_of.segment.configure then
+        -- Until the acknowledge it may have the old registers or the new ones.
+        line.segments[segment_of(request)] = nil
+    end
+    local first = line.pending[1]
+    while first and (#line.pending == MOST_PENDING
+        or (request.time - first.time) * 1000 >= st.prefs.silence_ms) do
+        table.remove(line.pending, 1)
+        first = line.pending[1]
+    end
+    line.pending[#line.pending + 1] = request
+end
+
+-- A damaged frame may have been a reply, or a request.
+local function lose(line)
+    table.remove(line.pending, 1)
+    for at, request in ipairs(line.pending) do
+        line.pending[at] = { bytes = "", time = request.time }
+    end
+end
+
+-- Takes the request that a reply with this payload answers. Returns it, and whether it is certain.
+local function take_answered(line, takes)
+    local first, is_certain = nil, true
+    for at, request in ipairs(line.pending) do
+        if takes(request) then
+            first = first or at
+            is_certain = is_certain and request.bytes == line.pending[first].bytes
+        end
+    end
+    -- None takes it: it has a wrong size for the first one.
+    local answered = line.pending[first or 1]
+    for _ = 1, first or 1 do
+        table.remove(line.pending, 1)
+    end
+    return answered, is_certain
+end
+
 local function understand(line, frame)
     local header = frame.bytes:byte(1)
     frame.direction = frame.direction or (is_reply(header) and REPLY or REQUEST)
+    line.pending = line.pending or {}
     if not frame.is_good then
-        return
+        return lose(line)
     end
     if frame.direction == REQUEST then
-        line.asked = frame
+        return ask(line, frame)
+    end
+    local reply = table_of.replies[header]
+    if reply == "ATR" then
         return
     end
-    local request = line.asked
-    if not request or table_of.replies[header] == "ATR" then
+    local request, is_certain = take_answered(line, function(request)
+        return reply ~= "ACK" or takes_size(request.bytes, #frame.bytes - table_of.overhead)
+    end)
+    if not request or not is_certain or request.bytes == "" then
+        frame.is_doubtful = request ~= nil
         return
     end
-    line.asked = nil
     frame.to, request.by = request, frame
-    local message = table_of.codes[profile_of()][code_of(request.bytes:byte(1))]
-    local segment = request.bytes:byte(3)
-    if table_of.replies[header] == "ACK" and message == table_of.segment.configure then
-        line.segments[segment] = request.bytes:sub(4, -2)
+    local message = message_of(request)
+    if reply == "ACK" and message == table_of.segment.configure then
+        line.segments[segment_of(request)] = request.bytes:sub(4, -2)
     elseif message == table_of.segment.read then
-        frame.registers = line.segments[segment]
+        frame.registers = line.segments[segment_of(request)]
     end
 end
 
@@ -79,6 +136,11 @@ local function add_request(tree, frame, range, profile, item)
 end
 
 local function add_acknowledge(tree, frame, range, profile)
+    if frame.is_doubtful then
+        tree:add_proto_expert_info(expert.doubtful)
+        return range:len() == 0 and "ACK"
+            or string.format("ACK, %d bytes, to one of several requests", range:len())
+    end
     if not frame.to then
         tree:add_proto_expert_info(expert.unasked)
         return string.format("ACK, %d bytes without a request", range:len())
@@ -120,7 +182,7 @@ local function add_reply(tree, frame, range, profile)
         row and row.doc or table_of.unknown_doc)
     tree:add(own.error, range(0, 1)):add_proto_expert_info(expert.refused, text)
     if not frame.to then
-        tree:add_proto_expert_info(expert.unasked)
+        tree:add_proto_expert_info(frame.is_doubtful and expert.doubtful or expert.unasked)
     end
     return text
 end

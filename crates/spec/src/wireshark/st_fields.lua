@@ -127,6 +127,8 @@ local expert = {
         expert.severity.WARN),
     unasked = ProtoExpert.new("motorlink.st.unasked", "a reply without a request",
         expert.group.SEQUENCE, expert.severity.NOTE),
+    doubtful = ProtoExpert.new("motorlink.st.doubtful", "a reply to one of several requests",
+        expert.group.SEQUENCE, expert.severity.NOTE),
     alone = ProtoExpert.new("motorlink.st.no_reply", "no reply in this capture",
         expert.group.SEQUENCE, expert.severity.NOTE),
     stray = ProtoExpert.new("motorlink.st.no_frame", "bytes that are no frame",

@@ -141,13 +141,18 @@ local function add_value(tree, range, id, profile)
     return text
 end
 
--- Adds the values of a fixed layout. Returns their texts and the number of bytes; nil if it is too
--- short.
-local function add_layout(tree, range, layout)
-    local size, texts = 0, {}
+local function size_of(layout)
+    local size = 0
     for _, field in ipairs(layout) do
         size = size + SIZES[field.type]
     end
+    return size
+end
+
+-- Adds the values of a fixed layout. Returns their texts and the number of bytes; nil if it is too
+-- short.
+local function add_layout(tree, range, layout)
+    local size, texts = size_of(layout), {}
     if range:len() < size then
         return nil
     end
@@ -244,13 +249,28 @@ local REQUESTS = {
     end,
 }
 
+-- Whether the acknowledge of a request may have this size.
+local function takes_size(request, size)
+    local name = #request > 0 and table_of.codes[profile_of()][code_of(request:byte(1))]
+    local message = name and table_of.messages[name]
+    if not message or message.gives and message.gives ~= "register_value" then
+        return true
+    elseif not message.gives then
+        return size == size_of(message.reply)
+    end
+    local register = table_of.registers[request:byte(3)]
+    local expected = register and register.read_sizes[profile_of()] or 0
+    if expected == 0 then
+        return size == 1 or size == 2 or size == 4
+    end
+    return size == expected
+end
+
 local REPLIES = {
     register_value = function(tree, range, profile, frame)
-        local id = frame.to.bytes:byte(3)
-        local register = id and table_of.registers[id]
-        local expected = register and register.read_sizes[profile] or 0
-        if id and (expected == 0 or expected == range:len()) then
-            return add_value(tree, range, id, profile)
+        local request = frame.to.bytes
+        if #request > table_of.overhead and takes_size(request, range:len()) then
+            return add_value(tree, range, request:byte(3), profile)
         end
     end,
     board_info = function(tree, range)

@@ -124,13 +124,13 @@ fn described(speaks: Speaks, request: &Request) -> String {
         (Request::St(_, request), Speaks::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
             let frame = Frame::command(0, &request.request(), &mut bytes);
-            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
+            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(None, true, frame))
         }
         (Request::Raw(_, code, payload), Speaks::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
             let frame = Frame { header: Frame::header(*code, 0), payload };
             let frame = frame.encode(&mut bytes);
-            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(true, frame))
+            frame.map_or_else(String::new, |frame| Transcript::new(profile).note(None, true, frame))
         }
         (Request::Rmd(id, data), _) => {
             let frame = CanFrame::new(id.can_id(), *data);
