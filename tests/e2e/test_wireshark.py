@@ -514,6 +514,15 @@ def test_random_bytes_raise_no_error_of_lua(packets, passes):
         assert sum("motorlink.st.message" in fields for fields in found) > 200
 
 
+def test_a_packet_of_noise_is_searched_once(packets):
+    """If the rest of the packet was searched for each broken frame, this would take minutes."""
+    serial = Capture(RTAC_SERIAL)
+    serial.serial(bytes.fromhex("010005") * 20_000, True)
+    serial.serial(GET_SPEED, True)
+    noise, behind = packets(serial, preferences=ALL_ST)
+    assert len(noise["motorlink.st.bad_checksum"]) == 20_000 and behind["motorlink.st.register"] == ["0x1e"]
+
+
 def test_no_byte_of_a_line_is_left_out(tshark):
     """Frames, parts of frames and stray bytes are together the bytes of each packet."""
     numbers = random.Random(7)

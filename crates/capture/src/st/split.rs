@@ -70,7 +70,7 @@ impl Splitter {
     }
 
     fn take(&mut self, is_end: bool, said: &mut impl FnMut(&[u8], Piece<'_>)) {
-        let mut at = 0;
+        let (mut at, mut next) = (0, NextFrame::default());
         while at < self.bytes.len() {
             let rest = &self.bytes[at..];
             let (size, piece) = match Frame::parse(rest) {
@@ -79,10 +79,10 @@ impl Splitter {
                 Parse::More => {
                     let incomplete =
                         rest.get(1).map_or(0, |&length| usize::from(length) + OVERHEAD);
-                    let size = next_frame(rest).unwrap_or(rest.len());
+                    let size = next.behind(&self.bytes, at).unwrap_or(rest.len());
                     (size, Piece::Broken(Broken::Incomplete(incomplete)))
                 }
-                Parse::Bad(bad) => match broken(rest, bad, is_end) {
+                Parse::Bad(bad) => match broken(rest, bad, next.behind(&self.bytes, at), is_end) {
                     Some((size, why)) => (size, Piece::Broken(why)),
                     None => break,
                 },
@@ -94,8 +94,9 @@ impl Splitter {
     }
 }
 
-/// How many bytes to drop, and why. `None` if more bytes are needed to say it.
-fn broken(rest: &[u8], bad: Bad, is_end: bool) -> Option<(usize, Broken)> {
+/// How many bytes to drop, and why. `None` if more bytes are needed to say it. `next` is where the next
+/// whole frame begins.
+fn broken(rest: &[u8], bad: Bad, next: Option<usize>, is_end: bool) -> Option<(usize, Broken)> {
     let why = match bad {
         Bad::Checksum { expected, received } => Broken::Checksum { expected, received },
         Bad::Length(length) => Broken::Length(length),
@@ -106,22 +107,37 @@ fn broken(rest: &[u8], bad: Bad, is_end: bool) -> Option<(usize, Broken)> {
         Bad::Length(_) => rest.len(),
     };
     // Or the frame was cut, and the next one filled it up.
-    let filled = next_frame(rest).filter(|&at| frame_size(&rest[at..]) == Some(rest.len() - at));
+    let filled = next.filter(|&at| frame_size(&rest[at..]) == Some(rest.len() - at));
     if let (Some(size), true) = (filled, rest.len() == whole) {
         return Some((size, why));
     }
     if rest.len() == whole || is_known(rest[whole]) && is_frame(&rest[whole..]) {
         return Some((whole, why));
     }
-    if let Some(size) = next_frame(rest) {
+    if let Some(size) = next {
         return Some((size, why));
     }
     (is_end || rest.len() > 2 * MAX_FRAME).then_some((whole, why))
 }
 
-/// Where the next whole frame with a known header begins, behind the first byte.
-fn next_frame(rest: &[u8]) -> Option<usize> {
-    (1..rest.len()).find(|&at| is_known(rest[at]) && is_frame(&rest[at..]))
+/// Where the next whole frame with a known header begins. It is searched once for all broken bytes
+/// before it: there may be megabytes of them.
+#[derive(Default)]
+struct NextFrame {
+    is_searched: bool,
+    found: Option<usize>,
+}
+
+impl NextFrame {
+    /// The number of bytes from `at` to the first frame that begins behind it.
+    fn behind(&mut self, bytes: &[u8], at: usize) -> Option<usize> {
+        if !self.is_searched || self.found.is_some_and(|found| found <= at) {
+            let is_frame = |from: &usize| is_known(bytes[*from]) && is_frame(&bytes[*from..]);
+            self.found = (at + 1..bytes.len()).find(is_frame);
+            self.is_searched = true;
+        }
+        self.found.map(|found| found - at)
+    }
 }
 
 fn is_frame(bytes: &[u8]) -> bool {
@@ -194,6 +210,23 @@ mod tests {
             assert!(found.iter().any(|&size| size < 0), "{bit}: {found:?}");
             assert_eq!(found[found.len() - 2..], [4, 7], "{bit}: {found:?}");
         }
+    }
+
+    #[test]
+    fn many_broken_bytes_are_searched_once() {
+        // Without a memory of the search this takes a minute.
+        let noise = [0x01, 0x00, 0x05].repeat(100_000);
+        let mut splitter = Splitter::default();
+        splitter.push(&[&noise[..], &ASK].concat());
+        let (mut broken, mut frames) = (0, 0);
+        splitter.pieces(|_, piece| match piece {
+            Piece::Frame(_) => frames += 1,
+            Piece::Broken(_) => broken += 1,
+        });
+        assert_eq!((broken, frames), (1, 1));
+        splitter.push(&noise);
+        splitter.end(|_, _| broken += 1);
+        assert_eq!(broken, 100_001);
     }
 
     #[test]

@@ -46,10 +46,23 @@ local function new_lines(rules)
         end
     end
 
+    -- Finds the next whole frame behind a place. It is searched once for all bytes before it: a packet
+    -- may have many bytes that are no frame.
+    local function new_search(bytes, direction)
+        local is_searched, next_at, next_size = false, nil, nil
+        return function(from)
+            if not is_searched or next_at and next_at <= from then
+                is_searched = true
+                next_at, next_size = find(bytes, from + 1, direction)
+            end
+            return next_at, next_size
+        end
+    end
+
     -- The number of bytes that are not part of a frame, if the frame at `from` has no right checksum or
     -- is not whole.
-    local function stray(bytes, from, direction, found, size, is_over)
-        local next_at, next_size = find(bytes, from + 1, direction)
+    local function stray(bytes, from, direction, search, found, size, is_over)
+        local next_at, next_size = search(from)
         if found == "stray" then
             if next_at then
                 return next_at - from
@@ -119,12 +132,14 @@ local function new_lines(rules)
                 table.remove(items)
             end
         end
-        while stream.at <= #stream.bytes do
-            local bytes, at = stream.bytes, stream.at
+        local bytes = stream.bytes
+        local search = new_search(bytes, stream.direction)
+        while stream.at <= #bytes do
+            local at = stream.at
             local found, size, is_good = parse(bytes, at, stream.direction)
             local skipped = nil
             if not is_good then
-                skipped = stray(bytes, at, stream.direction, found, size, is_over)
+                skipped = stray(bytes, at, stream.direction, search, found, size, is_over)
             end
             if skipped then
                 take(stream, skipped, new_item("stray", stream))
