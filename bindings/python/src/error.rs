@@ -1,6 +1,7 @@
 //! Errors of the host library as exceptions of `motorlink.errors`, with the library's messages.
 
 use std::fmt::Display;
+use std::path::Path;
 
 use motorlink::port::{NotDone, PortError};
 use motorlink::st::{ErrorCode, Failure, Implausible, Target};
@@ -25,6 +26,7 @@ enum Kind {
     UnknownRegister,
     Closed,
     Settings,
+    Recording,
     Any,
 }
 
@@ -51,7 +53,7 @@ struct Facts<'a> {
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 12] = [const { PyOnceLock::new() }; 12];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 13] = [const { PyOnceLock::new() }; 13];
         let name = match self {
             Kind::Refused => "RefusedError",
             Kind::Implausible => "ImplausibleValueError",
@@ -64,6 +66,7 @@ impl Kind {
             Kind::UnknownRegister => "UnknownRegisterError",
             Kind::Closed => "ClosedError",
             Kind::Settings => "SettingsError",
+            Kind::Recording => "RecordingError",
             Kind::Any => "MotorlinkError",
         };
         CLASSES[self as usize].import(py, "motorlink.errors", name)
@@ -136,6 +139,19 @@ pub(crate) fn settings_error(
     }
     error.set_cause(py, cause);
     error
+}
+
+/// A recording that cannot be read or written. `errno` is what the system says.
+pub(crate) fn recording_error(
+    py: Python<'_>,
+    message: impl Display,
+    path: &Path,
+    errno: Option<i32>,
+) -> PyErr {
+    let error = Kind::Recording.raise(py, message, Facts::default());
+    let value = error.value(py);
+    let set = value.setattr("path", path).and_then(|()| value.setattr("errno", errno));
+    set.err().unwrap_or(error)
 }
 
 /// What an exception of an exchange says about its request.

@@ -9,6 +9,7 @@ mod can;
 mod error;
 mod event;
 mod number;
+mod recording;
 mod rmd;
 mod sampling;
 mod settings;
@@ -37,6 +38,8 @@ mod _core {
     use super::can::CanPort;
     #[pymodule_export]
     use super::event::{RmdEventClient, StEventClient};
+    #[pymodule_export]
+    use super::recording::{RecordingFile, recorded_directions, recorded_results};
     #[pymodule_export]
     use super::rmd::{
         RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_arrival, rmd_decode, rmd_encode,

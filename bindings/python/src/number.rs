@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use motorlink_proto::units::{Quantity, inward};
 use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
 
 use crate::error::invalid_value;
 
@@ -83,4 +84,34 @@ pub(crate) fn span(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duratio
             format_args!("{what} of {seconds} s: give more than 0, up to a day"),
         )),
     }
+}
+
+/// A number of an array.
+pub(crate) trait Native: Copy {
+    /// Writes the bytes in native order, as NumPy reads them.
+    fn write(self, to: &mut [u8]);
+}
+
+macro_rules! native {
+    ($($kind:ty),+) => {
+        $(impl Native for $kind {
+            fn write(self, to: &mut [u8]) {
+                to.copy_from_slice(&self.to_ne_bytes());
+            }
+        })+
+    };
+}
+
+native!(f64, u64, u32);
+
+/// Numbers in native byte order, which NumPy takes without a copy.
+pub(crate) fn array_bytes<'py, T: Native>(
+    py: Python<'py>,
+    numbers: &[T],
+) -> PyResult<Bound<'py, PyByteArray>> {
+    PyByteArray::new_with(py, size_of_val(numbers), |bytes| {
+        let places = bytes.chunks_exact_mut(size_of::<T>());
+        places.zip(numbers).for_each(|(place, number)| number.write(place));
+        Ok(())
+    })
 }

@@ -3,8 +3,14 @@
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+
+/// Longest delay of a signal, such as Ctrl-C.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Whether the waits of a bus ignore signals.
 #[derive(Clone, Default)]
@@ -28,6 +34,28 @@ impl Deafness {
         move || match deaf.load(Ordering::Relaxed) {
             true => Ok(()),
             false => Ok(Python::attach(|py| py.check_signals())?),
+        }
+    }
+}
+
+/// Does something that takes long, in a thread of its own. Signal handlers run meanwhile. If one raises,
+/// the result is not used.
+pub(crate) fn attended<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (tell, mut told) = mpsc::channel();
+    // After a signal the result is not used.
+    std::thread::Builder::new().spawn(move || drop(tell.send(work())))?;
+    loop {
+        let heard;
+        (heard, told) = py.detach(move || (told.recv_timeout(LOOK), told));
+        match heard {
+            Ok(done) => return Ok(done),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err("a thread of motorlink has ended early"));
+            }
         }
     }
 }

@@ -14,11 +14,11 @@ from typing import Any
 
 import motorlink
 from conftest import REPOSITORY
-from motorlink import _core, aio, can, errors, rmd, sim, st
+from motorlink import _core, aio, can, errors, recording, rmd, sim, st
 
 PAGE = REPOSITORY / "docs" / "PYTHON.md"
 MARK = "<!-- `make python-docs` writes everything below this line. -->\n"
-MODULES = [motorlink, st, rmd, aio, aio.st, aio.rmd, can, sim, errors]
+MODULES = [motorlink, st, rmd, aio, aio.st, aio.rmd, can, recording, sim, errors]
 #: What has the same arguments or methods, without `await`.
 BLOCKING: dict[Any, Any] = {
     aio.st.open: st.open,

@@ -7,11 +7,12 @@
 ...     motor.get("SPEED_MEAS")
 0
 
-=====================  ===============================================================
+=======================  =============================================================
 ``motorlink.st``       ST drives on a serial line: ``open``, ``scan``, ``Client``, ``Motor``
 ``motorlink.rmd``      RMD motors on a CAN bus: ``open``, ``Client``, ``Motor``, requests
 ``motorlink.aio``      both protocols for asyncio: ``aio.st``, ``aio.rmd``
 ``motorlink.can``      any bus of python-can as a port
+``motorlink.recording``  files with all that drives say: ``motorlink.read`` opens them
 ``motorlink.sim``      simulated drives in the process, for tests without hardware
 ``motorlink.errors``   the exceptions; all are a ``MotorlinkError``
 =====================  ===============================================================
@@ -37,6 +38,8 @@ __all__ = [
     "MotorlinkError",
     "NotArrivedError",
     "PortError",
+    "RecordingError",
+    "RecordingWarning",
     "RefusedError",
     "ReplyTimeoutError",
     "Sample",
@@ -49,6 +52,8 @@ __all__ = [
     "aio",
     "can",
     "errors",
+    "read",
+    "recording",
     "rmd",
     "sim",
     "st",
@@ -56,7 +61,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from motorlink import aio, can, errors, rmd, sim, st
+    from motorlink import aio, can, errors, recording, rmd, sim, st
     from motorlink._core import __version__
     from motorlink._sampling import Sample, Sampling, to_pandas
     from motorlink._settings import SettingDifference, Settings, SettingsDump
@@ -69,18 +74,23 @@ if TYPE_CHECKING:
         MotorlinkError,
         NotArrivedError,
         PortError,
+        RecordingError,
+        RecordingWarning,
         RefusedError,
         ReplyTimeoutError,
         SettingsError,
     )
+    from motorlink.recording import read
 else:
     _FROM = {"__version__": "motorlink._core"}
     _FROM |= dict.fromkeys(("Sample", "Sampling", "to_pandas"), "motorlink._sampling")
     _FROM |= dict.fromkeys(("SettingDifference", "Settings", "SettingsDump"), "motorlink._settings")
 
+    _FROM["read"] = "motorlink.recording"
+
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""
-        if name in ("aio", "can", "errors", "rmd", "sim", "st"):
+        if name in ("aio", "can", "errors", "recording", "rmd", "sim", "st"):
             return import_module(f"motorlink.{name}")
         if name not in __all__:
             raise AttributeError(f"module 'motorlink' has no attribute {name!r}")

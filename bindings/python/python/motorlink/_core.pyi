@@ -1,6 +1,7 @@
 """The extension module. Its users are ``motorlink.st`` and ``motorlink.rmd``."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, final
 
 from typing_extensions import Self, disjoint_base
@@ -16,6 +17,7 @@ __all__ = [
     "Arrival",
     "CanPort",
     "MotorSettings",
+    "RecordingFile",
     "RMD_FULL_TURN_TOLERANCE",
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
@@ -51,6 +53,8 @@ __all__ = [
     "__version__",
     "cli",
     "open_descriptors",
+    "recorded_directions",
+    "recorded_results",
     "rmd_arrival",
     "rmd_decode",
     "rmd_encode",
@@ -544,3 +548,38 @@ class CanPort:
     def __new__(cls, bus: Any, message: Any, name: str) -> CanPort: ...
     @property
     def name(self) -> str: ...
+
+@final
+class RecordingFile:
+    """An open recording."""
+
+    @staticmethod
+    def open(path: Path) -> RecordingFile: ...
+    def tables(
+        self,
+    ) -> tuple[
+        int,
+        list[tuple[str, str, list[tuple[str, str, bytearray]], bytearray, bytearray]],
+        list[tuple[float, int, str, str, str, str, str]],
+        int,
+    ]: ...
+    def frames(
+        self, label: str
+    ) -> tuple[bytearray, bytearray, bytearray, bytearray, bytearray, bytes, int]: ...
+    @property
+    def lines(self) -> list[str]: ...
+    @property
+    def lost(self) -> str | None: ...
+    @property
+    def lost_bytes(self) -> int: ...
+    @property
+    def metadata(self) -> list[tuple[str, dict[str, str]]]: ...
+    @property
+    def about(self) -> dict[str, str]: ...
+    @property
+    def drives(
+        self,
+    ) -> list[tuple[str, str, str, str, str | None, int | None, list[str], str | None]]: ...
+
+def recorded_directions() -> list[str]: ...
+def recorded_results() -> list[str]: ...

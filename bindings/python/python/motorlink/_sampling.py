@@ -174,9 +174,13 @@ def to_pandas(samples: Samples) -> Any:
 
     Raises ``ImportError`` if pandas is not installed.
     """
+    return data_frame({name: samples[name] for name in samples.dtype.names or ()})
+
+
+def data_frame(columns: Mapping[str, npt.NDArray[Any]]) -> Any:
+    """A ``pandas.DataFrame`` of columns. ``t`` is its index."""
     try:
         pandas = importlib.import_module("pandas")
     except ImportError as error:
         raise ImportError("to_pandas needs pandas: `pip install pandas`", name="pandas") from error
-    named = {name: samples[name] for name in samples.dtype.names or ()}
-    return pandas.DataFrame(named).set_index("t")
+    return pandas.DataFrame(dict(columns)).set_index("t")

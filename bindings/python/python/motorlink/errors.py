@@ -1,4 +1,5 @@
-"""The exceptions of this package. Each is a :class:`MotorlinkError`.
+"""The exceptions of this package. Each is a :class:`MotorlinkError`. There is one warning:
+:class:`RecordingWarning`.
 
 After :class:`RefusedError` the drive has not executed the request. After :class:`LinkError` and
 :class:`ReplyTimeoutError` it is unknown whether the drive executed it.
@@ -6,6 +7,7 @@ After :class:`RefusedError` the drive has not executed the request. After :class
 
 from __future__ import annotations
 
+import pathlib
 from typing import Any
 
 __all__ = [
@@ -17,6 +19,8 @@ __all__ = [
     "MotorlinkError",
     "NotArrivedError",
     "PortError",
+    "RecordingError",
+    "RecordingWarning",
     "RefusedError",
     "ReplyTimeoutError",
     "SettingsError",
@@ -159,6 +163,25 @@ class SettingsError(MotorlinkError):
     def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
         super().__init__(message, port=port, motor=motor)
         self.rolled_back = self.changed = self.unknown = self.unknown_in_rom = ()
+
+
+class RecordingError(MotorlinkError, OSError):
+    """A recording cannot be read or written. What was written stays readable.
+
+    ``errno`` is the number that the system gave, such as ``errno.ENOSPC`` or ``errno.EEXIST``, if it gave
+    one.
+    """
+
+    #: The file.
+    path: pathlib.Path
+
+    def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
+        super().__init__(message, port=port, motor=motor)
+        self.path = pathlib.Path()
+
+
+class RecordingWarning(RuntimeWarning):
+    """A part of a recording could not be read. The message says what is lost."""
 
 
 class ClosedError(MotorlinkError, ValueError):

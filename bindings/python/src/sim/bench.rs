@@ -11,11 +11,10 @@ use motorlink_testbench::{Bench, BenchConfig, Command, Recording};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 
-use super::bytes;
 use super::port::SimPort;
 use super::serving::SimServing;
 use crate::error::invalid_value;
-use crate::number::digits;
+use crate::number::{array_bytes, digits};
 
 /// Step of virtual time between checks of the real time.
 const SLICE: Micros = Micros::from_millis(20);
@@ -174,9 +173,9 @@ pub(crate) struct SimRecording {
 #[pymethods]
 impl SimRecording {
     /// The values since the last call as `float64` in native byte order, row by row.
-    fn take<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+    fn take<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyByteArray>> {
         let rows = py.detach(|| self.lock().as_ref().map(Recording::take));
-        bytes(py, rows.as_deref().unwrap_or(&[]))
+        array_bytes(py, rows.as_deref().unwrap_or(&[]))
     }
 
     /// Ends it. A second call does nothing.

@@ -12,7 +12,6 @@ pub(crate) use serving::SimServing;
 
 use motorlink_testbench::preset;
 use pyo3::prelude::*;
-use pyo3::types::PyByteArray;
 
 use crate::error::invalid_value;
 
@@ -24,10 +23,4 @@ pub(crate) fn sim_presets(py: Python<'_>) -> PyResult<String> {
         Ok(format!("{name:?}:{}", plant.map_err(|error| invalid_value(py, error))?))
     });
     Ok(format!("{{{}}}", presets.collect::<PyResult<Vec<_>>>()?.join(",")))
-}
-
-/// Numbers as `float64` in native byte order, which NumPy takes without a copy.
-fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyByteArray> {
-    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
-    PyByteArray::new(py, &bytes)
 }

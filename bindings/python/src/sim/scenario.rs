@@ -1,18 +1,14 @@
 //! Runs of scenarios.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
 
 use motorlink_testbench::scenario::{Run, Scenario};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::bytes;
 use crate::error::invalid_value;
-
-/// Longest delay of a signal, such as Ctrl-C.
-const LOOK: Duration = Duration::from_millis(20);
+use crate::number::array_bytes;
+use crate::signals::attended;
 
 /// Runs a scenario, from its text or from a file. Returns the result.
 #[pyfunction]
@@ -27,18 +23,7 @@ pub(crate) fn sim_run<'py>(
         None => Scenario::parse(text, Path::new("")).map_err(|why| invalid_value(py, why))?,
     };
     let (title, about) = (scenario.title.clone(), scenario.about.clone());
-    let (tell, mut told) = mpsc::channel();
-    // After a signal the result is not used.
-    std::thread::spawn(move || drop(tell.send(scenario.run())));
-    let run = loop {
-        let heard;
-        (heard, told) = py.detach(move || (told.recv_timeout(LOOK), told));
-        match heard {
-            Ok(run) => break run.map_err(|error| invalid_value(py, error))?,
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => return Err(invalid_value(py, "the run failed")),
-        }
-    };
+    let run = attended(py, move || scenario.run())?.map_err(|error| invalid_value(py, error))?;
     let told = PyDict::new(py);
     told.set_item("title", title)?;
     told.set_item("about", about)?;
@@ -50,8 +35,8 @@ fn fill(told: &Bound<'_, PyDict>, run: &Run) -> PyResult<()> {
     let py = told.py();
     let signals = run.signals.iter().map(|signal| (signal.name.as_str(), signal.kind.unit()));
     told.set_item("signals", signals.collect::<Vec<_>>())?;
-    let columns = run.columns.iter().map(|column| bytes(py, column));
-    told.set_item("columns", columns.collect::<Vec<_>>())?;
+    let columns = run.columns.iter().map(|column| array_bytes(py, column));
+    told.set_item("columns", columns.collect::<PyResult<Vec<_>>>()?)?;
     told.set_item("sample", run.sample.0)?;
     let verdicts = run.verdicts.iter().map(|one| (&one.why, &one.signal, one.holds, &one.found));
     told.set_item("expectations", verdicts.collect::<Vec<_>>())?;

@@ -147,10 +147,10 @@ struct Csv<'a> {
 
 impl<'a> Csv<'a> {
     fn new(read: &'a Tables, is_unix: bool) -> Self {
-        let zero = read.first.or(read.events.first().map(|event| event.stamp.0)).unwrap_or(0);
         let mut motors: Vec<&str> = read.tables.iter().map(Table::motor).collect();
         motors.dedup();
         let has_motors = motors.len() > 1;
+        let zero = read.zero();
         Csv { tables: &read.tables, events: &read.events, zero, is_unix, has_motors }
     }
 

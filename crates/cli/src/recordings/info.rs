@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fs::File;
 
 use motorlink_link::printable;
-use motorlink_recording::read::{Content, Metadata, Recording};
+use motorlink_recording::read::{Content, Drive, Metadata, Recording, lost};
 use motorlink_recording::schema::{self, Log, SETTINGS_TYPE, SignalField, Time, drive};
 use serde_json::{Map, Value, json};
 
-use super::input::{Input, lost};
+use super::input::Input;
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;
@@ -181,9 +181,9 @@ impl Contents {
         if let Some(command) = fact(schema::recording::COMMAND) {
             row("command", command.clone());
         }
-        for (n, drive) in drives(recording).enumerate() {
-            row(if n == 0 { "drives" } else { "" }, drive_line(drive));
-            for line in identity(drive) {
+        for (n, drive) in recording.drives().enumerate() {
+            row(if n == 0 { "drives" } else { "" }, drive_line(&drive));
+            for line in &drive.identity {
                 row("", format!("  {line}"));
             }
         }
@@ -257,17 +257,10 @@ fn drives(recording: &Recording<File>) -> impl Iterator<Item = &Metadata> {
 }
 
 /// `st0/motor1 at serial:/dev/ttyACM0, st spec`.
-fn drive_line(drive: &Metadata) -> String {
-    let fact = |name: &str| drive.values.get(name).map_or("", String::as_str);
-    let (label, motor, port) = (fact(drive::LABEL), fact(drive::MOTOR), fact(drive::PORT));
-    let kind = [fact(drive::PROTOCOL), fact(drive::PROFILE)];
+fn drive_line(drive: &Drive) -> String {
+    let kind = [drive.protocol.as_str(), drive.profile.as_deref().unwrap_or("")];
     let kind: Vec<&str> = kind.into_iter().filter(|text| !text.is_empty()).collect();
-    format!("{label}/motor{motor} at {port}, {}", kind.join(" "))
-}
-
-fn identity(drive: &Metadata) -> impl Iterator<Item = &str> {
-    let lines = drive.values.iter().filter(|(name, _)| name.starts_with(drive::IDENTITY));
-    lines.map(|(_, text)| &**text)
+    format!("{} at {}, {}", drive.name, drive.port, kind.join(" "))
 }
 
 /// `SPEED_MEAS [rpm]`.

@@ -4,8 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use motorlink_link::printable;
-use motorlink_recording::read::{Damage, Loss, ReadError, Recording, Tables};
-use motorlink_recording::schema::Time;
+use motorlink_recording::read::{Loss, ReadError, Recording, Tables, lost};
 
 use super::pick::Pick;
 use crate::failure::Failure;
@@ -90,33 +89,4 @@ impl Input {
         }
         Ok(output)
     }
-}
-
-/// What was lost, and after which time.
-pub fn lost(losses: &[Loss]) -> Option<String> {
-    // An index costs no message, so other damage is more important.
-    let is_index = |loss: &&Loss| loss.damage == Damage::Index;
-    let first = losses.iter().find(|loss| !is_index(loss)).or(losses.first())?;
-    let bytes: u64 = losses.iter().map(|loss| loss.bytes.end - loss.bytes.start).sum();
-    let messages = losses.iter().find_map(|loss| match loss.damage {
-        Damage::Fewer { missing } => Some(format!("{missing} messages and ")),
-        _ => None,
-    });
-    let more = match losses.len() {
-        1 => String::new(),
-        count => format!(" (the first of {count} places)"),
-    };
-    let why = first.damage.to_string();
-    Some(match (&first.damage, first.after) {
-        (Damage::Index, _) => format!("{why}; no message was lost"),
-        (Damage::Unfinished, Some(after)) => format!("{why}; it ends at {}", Time(after).text()),
-        (Damage::Unfinished, None) => why,
-        (_, after) => {
-            let after = after.map_or("from its beginning".to_owned(), |after| {
-                format!("after {}", Time(after).text())
-            });
-            let messages = messages.unwrap_or_default();
-            format!("{why}; {messages}{bytes} bytes were lost, {after}{more}")
-        }
-    })
 }

@@ -5,11 +5,11 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use motorlink_link::printable;
-use motorlink_recording::read::{Damage, Recording};
+use motorlink_recording::read::{Damage, Recording, lost};
 use motorlink_recording::schema::Time;
 use serde_json::{Map, json};
 
-use super::input::{Input, lost};
+use super::input::Input;
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;

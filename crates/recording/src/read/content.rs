@@ -103,6 +103,13 @@ pub struct Tables {
     pub malformed: u64,
 }
 
+impl Tables {
+    /// Time 0 of the recording, ns since 1970: the first row, or the first event without any row.
+    pub fn zero(&self) -> u64 {
+        self.first.or(self.events.first().map(|event| event.stamp.0)).unwrap_or(0)
+    }
+}
+
 impl<R: Read + Seek> Recording<R> {
     /// The types of the channels.
     pub fn types(&self) -> Types {

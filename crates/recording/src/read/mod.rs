@@ -19,8 +19,8 @@ mod source;
 pub use mcap::MAGIC;
 
 pub use content::{Content, Table, Tables, Types};
-pub use damage::{Damage, Loss, ReadError};
+pub use damage::{Damage, Loss, ReadError, lost};
 pub use frames::{Frames, Line};
 pub use message::{Message, Messages};
 pub use record::{Attachment, Channel, Metadata, Schema};
-pub use recording::Recording;
+pub use recording::{Drive, Recording};

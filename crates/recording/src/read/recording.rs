@@ -10,6 +10,7 @@ use std::sync::Arc;
 use super::damage::{Loss, ReadError};
 use super::record::{Attachment, Channel, HEAD, Metadata, Schema, Statistics};
 use super::source::Source;
+use crate::schema::{drive, name};
 
 /// An open recording.
 pub struct Recording<R> {
@@ -40,6 +41,46 @@ pub enum Place {
 pub struct AttachmentPlace {
     pub name: String,
     pub at: Range<u64>,
+}
+
+/// A motor that was recorded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Drive {
+    /// Label of the port and motor: `st0/motor1`.
+    pub name: String,
+    /// The label of its port.
+    pub label: String,
+    /// The name of its port.
+    pub port: String,
+    /// `st` or `rmd`.
+    pub protocol: String,
+    /// The profile of an ST drive.
+    pub profile: Option<String>,
+    /// Number or ID; `None` if the file does not say it.
+    pub motor: Option<u8>,
+    /// What is known of the drive.
+    pub identity: Vec<String>,
+    /// The name of the attachment with its settings at the start.
+    pub settings: Option<String>,
+}
+
+impl Drive {
+    fn of(values: &BTreeMap<String, String>) -> Self {
+        let fact = |key| values.get(key).cloned();
+        let text = |key| fact(key).unwrap_or_default();
+        let (label, motor) = (text(drive::LABEL), text(drive::MOTOR));
+        let identity = values.iter().filter(|(key, _)| key.starts_with(drive::IDENTITY));
+        Drive {
+            name: name::numbered(&label, &motor),
+            label,
+            port: text(drive::PORT),
+            protocol: text(drive::PROTOCOL),
+            profile: fact(drive::PROFILE),
+            motor: motor.parse().ok(),
+            identity: identity.map(|(_, line)| line.clone()).collect(),
+            settings: fact(drive::SETTINGS),
+        }
+    }
 }
 
 impl Recording<File> {
@@ -123,6 +164,11 @@ impl<R: Read + Seek> Recording<R> {
     /// Facts about the recording and its drives.
     pub fn metadata(&self) -> &[Metadata] {
         &self.metadata
+    }
+
+    /// The motors, in the order in which they were recorded.
+    pub fn drives(&self) -> impl Iterator<Item = Drive> {
+        self.metadata.iter().filter(|it| it.name == drive::NAME).map(|it| Drive::of(&it.values))
     }
 
     /// Names of the attachments.

@@ -4,7 +4,7 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::IDENTIFIERS;
 
 use super::cdr::{Decoder, Encoder, Malformed};
-use super::message::{Message, Time, with_dependencies};
+use super::message::{Message, Time, named, with_dependencies};
 
 /// `motorlink/msg/Frame`: one frame on the wire, or bytes that are none.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub enum Direction {
     Received = 1,
 }
 
+named!(Direction as "uint8": Sent = "SENT", Received = "RECEIVED");
+
 /// What a [`Frame`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -45,6 +47,9 @@ pub enum FrameResult {
     /// A CAN frame that is not of this protocol.
     Foreign = 3,
 }
+
+named!(FrameResult as "uint8": Frame = "FRAME", Nack = "NACK", Damaged = "DAMAGED",
+       Foreign = "FOREIGN");
 
 impl Frame {
     /// Of [`id`](Self::id): the identifier has 29 bits.
@@ -83,22 +88,18 @@ impl Message for Frame {
             "# One frame on the wire, or bytes that are none.\n\
              builtin_interfaces/Time stamp # when it was sent, or its last byte came\n\
              # from the point of view of the program that recorded\n\
-             uint8 SENT={}\nuint8 RECEIVED={}\nuint8 direction\n\
+             {}uint8 direction\n\
              # the CAN identifier; these flags are added; 0 on a serial line\n\
              uint32 EXTENDED={}\nuint32 REMOTE={}\nuint32 id\n\
              # a frame of the protocol; one in which the drive refuses a request; bytes that are no\n\
              # frame; a CAN frame that is not of the protocol\n\
-             uint8 FRAME={}\nuint8 NACK={}\nuint8 DAMAGED={}\nuint8 FOREIGN={}\nuint8 result\n\
+             {}uint8 result\n\
              # the bytes on a serial line, the data of a CAN frame; of a remote frame zeros\n\
              uint8[] data\n",
-            Direction::Sent as u8,
-            Direction::Received as u8,
+            Direction::constants(),
             Frame::EXTENDED,
             Frame::REMOTE,
-            FrameResult::Frame as u8,
-            FrameResult::Nack as u8,
-            FrameResult::Damaged as u8,
-            FrameResult::Foreign as u8,
+            FrameResult::constants(),
         );
         with_dependencies(&fields, &[Time::DEPENDENCY])
     }

@@ -34,6 +34,30 @@ pub trait Message: Sized {
 
 const NANOS: u64 = 1_000_000_000;
 
+/// Gives the values of an enum the names that they have in definitions.
+macro_rules! named {
+    ($kind:ident as $integer:literal: $($variant:ident = $name:literal),+) => {
+        impl $kind {
+            /// All values.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// The name in the definition of the type.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+
+            /// The values as constants of a definition.
+            pub(in crate::schema) fn constants() -> String {
+                let constant = |it: &Self| format!("{} {}={}\n", $integer, it.name(), *it as u8);
+                Self::ALL.iter().map(constant).collect()
+            }
+        }
+    };
+}
+pub(super) use named;
+
 /// `builtin_interfaces/msg/Time`: ns since 1970.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Time(pub u64);
@@ -174,6 +198,8 @@ pub enum Level {
     Stale = 3,
 }
 
+named!(Level as "byte": Ok = "OK", Warn = "WARN", Error = "ERROR", Stale = "STALE");
+
 impl From<u8> for Level {
     fn from(level: u8) -> Self {
         match level {
@@ -191,12 +217,9 @@ impl Message for DiagnosticArray {
     fn definition() -> String {
         let fields = "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n";
         let status = format!(
-            "byte OK={}\nbyte WARN={}\nbyte ERROR={}\nbyte STALE={}\nbyte level\nstring name\n\
-             string message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values\n",
-            Level::Ok as u8,
-            Level::Warn as u8,
-            Level::Error as u8,
-            Level::Stale as u8
+            "{}byte level\nstring name\nstring message\nstring hardware_id\n\
+             diagnostic_msgs/KeyValue[] values\n",
+            Level::constants(),
         );
         let value = ("diagnostic_msgs/KeyValue", "string key\nstring value\n");
         let status = ("diagnostic_msgs/DiagnosticStatus", status.as_str());
@@ -265,6 +288,9 @@ pub enum Severity {
     Fatal = 50,
 }
 
+named!(Severity as "byte": Debug = "DEBUG", Info = "INFO", Warn = "WARN", Error = "ERROR",
+       Fatal = "FATAL");
+
 impl From<u8> for Severity {
     fn from(level: u8) -> Self {
         match level {
@@ -282,14 +308,9 @@ impl Message for Log {
 
     fn definition() -> String {
         let fields = format!(
-            "byte DEBUG={}\nbyte INFO={}\nbyte WARN={}\nbyte ERROR={}\nbyte FATAL={}\n\
-             builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\n\
+            "{}builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\n\
              string function\nuint32 line\n",
-            Severity::Debug as u8,
-            Severity::Info as u8,
-            Severity::Warn as u8,
-            Severity::Error as u8,
-            Severity::Fatal as u8
+            Severity::constants(),
         );
         with_dependencies(&fields, &[Time::DEPENDENCY])
     }

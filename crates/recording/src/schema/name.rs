@@ -53,6 +53,11 @@ pub fn path(label: &str, of: Motor) -> String {
     format!("{label}/{}", motor(of))
 }
 
+/// As [`path`], with the number of the motor as text.
+pub(crate) fn numbered(label: &str, number: &str) -> String {
+    format!("{label}/motor{number}")
+}
+
 /// The name of the attachment with a motor's settings.
 pub fn settings_attachment(label: &str, of: Motor) -> String {
     format!("{}.toml", joint(label, of))

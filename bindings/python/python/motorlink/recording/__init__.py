@@ -1,0 +1,26 @@
+"""Recordings of motors as NumPy arrays.
+
+>>> import motorlink
+>>> run = motorlink.read("run.mcap")                     # doctest: +SKIP
+>>> run["st0/motor1"]["SPEED_MEAS"].mean()               # doctest: +SKIP
+1499.6
+
+docs/RECORDING.md says what a file contains.
+"""
+
+from motorlink.recording._frames import Frame, Frames
+from motorlink.recording._read import Drive, Event, Recording, Table, read
+
+__all__ = [
+    "Drive",
+    "Event",
+    "Frame",
+    "Frames",
+    "Recording",
+    "Table",
+    "read",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
