@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::{asc, text};
+use crate::{asc, plain, text};
 
 /// A format of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,28 +62,31 @@ impl Format {
             &PCAPNG => Ok(Some(Format::Pcapng)),
             magic if PCAP.contains(magic) => Err("this is an old pcap file: convert it with \
                 `editcap -F pcapng OLD NEW`"),
+            [0x1F, 0x8B, ..] => Err("this is a compressed file: decode it with \
+                `gunzip -c FILE | motorlink decode ..`"),
+            b"LOGG" => Err("this is a BLF file: convert it with `can_logconvert OLD.blf NEW.asc` \
+                of python-can"),
             &MCAP => Err("this is a recording: give its file, not a pipe"),
             _ => Ok(None),
         }
     }
 
-    /// The text format of a file with this first line. `None` if the line can begin any of them.
+    /// The text format of a file with this line. `None` if the line is damaged, or can be one of any
+    /// format.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
-        let mut words = text::words(line);
-        let first = words.next()?;
         if asc::is_head(line) {
             return Some(Format::Asc);
         }
-        if first == b"DROPCOUNT:" {
-            return None;
-        }
-        if first.starts_with(b"(") {
-            let is_log = words.nth(1).is_some_and(|word| word.contains(&b'#'));
-            return Some(if is_log { Format::Candump } else { Format::CandumpTerminal });
-        }
         // can0  141   [8]  9A ..
-        let has_length = words.any(|word| word.starts_with(b"[") && word.ends_with(b"]"));
-        Some(if has_length { Format::CandumpTerminal } else { Format::Hex })
+        if text::words(line).any(|word| word.starts_with(b"[") && word.ends_with(b"]")) {
+            return Some(Format::CandumpTerminal);
+        }
+        let mut words = text::words(line);
+        if words.next()?.starts_with(b"(") && words.nth(1).is_some_and(|word| word.contains(&b'#'))
+        {
+            return Some(Format::Candump);
+        }
+        plain::is_like(line).then_some(Format::Hex)
     }
 }
 
@@ -139,12 +142,18 @@ mod tests {
             ("141#9A00000000000000", Some(Format::Hex)),
             ("DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 7)", None),
             ("", None),
+            // Damaged lines: those behind them show the format.
+            ("hello", None),
+            ("(14365090", None),
+            ("3.249713) can0 141#9A00000000000000", None),
         ] {
             assert_eq!(Format::of_line(line.as_bytes()), format, "{line}");
         }
         assert_eq!(Format::of_file(&PCAPNG), Ok(Some(Format::Pcapng)));
         assert!(Format::of_file(&PCAP[1]).is_err());
         assert!(Format::of_file(&MCAP).is_err());
+        assert!(Format::of_file(&[0x1F, 0x8B, 8, 0]).is_err());
+        assert!(Format::of_file(b"LOGG").is_err());
         assert_eq!(Format::of_file(b"(1.0"), Ok(None));
     }
 

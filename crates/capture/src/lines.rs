@@ -7,17 +7,20 @@ use memchr::memchr;
 /// Bytes that are read at once.
 const SIZE: usize = 1 << 16;
 
-/// A stream of lines. A line of more than 64 KiB comes in parts.
+/// A stream of lines. A line of more than 64 KiB comes in parts, divided between words.
 pub(crate) struct Lines<R> {
     input: R,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
+    /// The number of the last line.
+    number: u64,
+    is_within_line: bool,
 }
 
 impl<R: Read> Lines<R> {
     pub(crate) fn new(input: R) -> Self {
-        Lines { input, buffer: vec![0; SIZE], start: 0, end: 0 }
+        Lines { input, buffer: vec![0; SIZE], start: 0, end: 0, number: 0, is_within_line: false }
     }
 
     /// Whether the next line is there already.
@@ -25,22 +28,28 @@ impl<R: Read> Lines<R> {
         memchr(b'\n', &self.buffer[self.start..self.end]).is_some()
     }
 
-    /// The next line without its end. `None` at the end of the stream.
-    pub(crate) fn line(&mut self) -> io::Result<Option<&[u8]>> {
+    /// The number of the next line, which is 1 for the first one, and the line without its end. `None` at
+    /// the end of the stream.
+    pub(crate) fn line(&mut self) -> io::Result<Option<(u64, &[u8])>> {
         let mut searched = self.start;
+        self.number += u64::from(!self.is_within_line);
         loop {
             if let Some(at) = memchr(b'\n', &self.buffer[searched..self.end]) {
                 let (from, to) = (self.start, searched + at);
                 self.start = to + 1;
+                self.is_within_line = false;
                 let line = &self.buffer[from..to];
-                return Ok(Some(line.strip_suffix(b"\r").unwrap_or(line)));
+                return Ok(Some((self.number, line.strip_suffix(b"\r").unwrap_or(line))));
             }
             searched = self.end;
             let moved = self.start;
-            if self.end - self.start == SIZE || !self.more()? {
-                let (from, to) = (self.start, self.end);
+            let is_full = self.end - self.start == SIZE;
+            if is_full || !self.more()? {
+                let space = self.buffer[..self.end].iter().rposition(u8::is_ascii_whitespace);
+                let (from, to) = (self.start, space.filter(|_| is_full).unwrap_or(self.end));
                 self.start = to;
-                return Ok((from < to).then(|| &self.buffer[from..to]));
+                self.is_within_line = is_full;
+                return Ok((from < to).then(|| (self.number, &self.buffer[from..to])));
             }
             // The bytes were moved to the front.
             searched -= moved - self.start;
@@ -106,7 +115,7 @@ mod tests {
         for step in [1, 2, 3, 7, SIZE - 1, SIZE, 2 * SIZE] {
             let mut lines = Lines::new(Trickle(&text, step));
             let mut all = Vec::new();
-            while let Some(line) = lines.line().unwrap() {
+            while let Some((_, line)) = lines.line().unwrap() {
                 all.push(line.to_vec());
             }
             let expected: [&[u8]; 6] = [b"a", b"", b"bcd", &long[..SIZE], &long[SIZE..], b"last"];
@@ -115,11 +124,24 @@ mod tests {
     }
 
     #[test]
+    fn a_long_line_is_divided_between_words_and_has_one_number() {
+        let text = format!("a\n{}\nb\n", "0f ".repeat(SIZE));
+        let mut lines = Lines::new(text.as_bytes());
+        let (mut words, mut numbers) = (0, Vec::new());
+        while let Some((number, line)) = lines.line().unwrap() {
+            words += crate::text::words(line).filter(|word| *word == b"0f").count();
+            numbers.push(number);
+        }
+        assert_eq!(words, SIZE);
+        assert_eq!(numbers, [1, 2, 2, 2, 2, 3]);
+    }
+
+    #[test]
     fn what_was_peeked_is_still_there() {
         let mut lines = Lines::new(Trickle(b"abc\ndef", 1));
         assert_eq!(lines.peek(4).unwrap(), b"abc\n");
         assert!(lines.has_line());
-        assert_eq!(lines.line().unwrap(), Some(&b"abc"[..]));
+        assert_eq!(lines.line().unwrap(), Some((1, &b"abc"[..])));
         let mut rest = Vec::new();
         lines.read_to_end(&mut rest).unwrap();
         assert_eq!(rest, b"def");

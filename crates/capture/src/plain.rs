@@ -39,6 +39,11 @@ pub(crate) fn parse(line: &[u8], plain: Plain) -> Result<Option<Entry<'static>>,
     Ok(Some(Entry::of(wire)))
 }
 
+/// Whether a line may be hexadecimal text.
+pub(crate) fn is_like(line: &[u8]) -> bool {
+    candump::frame(line.trim_ascii()).is_ok() || bytes(line).is_some()
+}
+
 /// Bytes as people write them: with or without spaces, colons, commas, hyphens and `0x`.
 fn bytes(line: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();

@@ -14,6 +14,8 @@ use crate::lines::Lines;
 use crate::pcapng::Packets;
 use crate::plain::{self, Plain};
 
+const BYTE_ORDER_MARK: &[u8] = "\u{FEFF}".as_bytes();
+const NO_FORMAT: &str = "a line that no format has";
 /// Characters of a damaged line that are shown.
 const SHOWN: usize = 60;
 
@@ -24,7 +26,6 @@ pub struct Reader<R> {
     plain: Plain,
     asc: Asc,
     channels: Channels,
-    line: u64,
 }
 
 enum Source<R> {
@@ -55,7 +56,7 @@ impl<R: Read> Reader<R> {
             format => Source::Text(lines, format),
         };
         let (asc, channels) = (Asc::default(), Channels::default());
-        Ok(Reader { source, plain, asc, channels, line: 0 })
+        Ok(Reader { source, plain, asc, channels })
     }
 
     /// The format, as soon as it is known.
@@ -102,11 +103,12 @@ impl<R: Read> Reader<R> {
                 }
                 Source::Text(lines, format) => (lines, format),
             };
-            let Some(line) = lines.line()? else {
+            let Some((place, line)) = lines.line()? else {
                 self.source = Source::End;
                 return Ok(None);
             };
-            self.line += 1;
+            // Some editors of Windows begin a file with it.
+            let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
             if format.is_none() {
                 *format = Format::of_line(line);
             }
@@ -116,7 +118,7 @@ impl<R: Read> Reader<R> {
                 Some(Format::Asc) => self.asc.parse(line),
                 Some(Format::Hex) => plain::parse(line, self.plain),
                 // A line that can begin any format, and pcapng is not text.
-                None | Some(Format::Pcapng) => candump::log_line(line),
+                None | Some(Format::Pcapng) => candump::log_line(line).map_err(|_| NO_FORMAT),
             };
             let entry = match parsed {
                 Ok(None) => continue,
@@ -129,14 +131,17 @@ impl<R: Read> Reader<R> {
             };
             let Entry { time, channel, direction, wire } = entry;
             let channel = channel.map(|name| self.channels.get(name));
-            return Ok(Some(Captured { place: self.line, time, channel, direction, wire }));
+            return Ok(Some(Captured { place, time, channel, direction, wire }));
         }
     }
 }
 
 /// Whether a file with this first byte may be a binary one.
 fn is_binary(first: u8) -> bool {
-    first == b'\n' || first > 0x7F || first < b' ' && !first.is_ascii_whitespace() || first == b'M'
+    first == b'\n'
+        || first > 0x7F
+        || first < b' ' && !first.is_ascii_whitespace()
+        || b"ML".contains(&first)
 }
 
 /// The names of channels, each once.

@@ -8,9 +8,11 @@ pub use writer::Writer;
 
 use crate::captured::{Damage, Direction, FdFrame, Stamp, Wire};
 use crate::line::Entry;
-use crate::text::{decimal, digit, hex, nanoseconds, word};
+use crate::text::{self, decimal, digit, hex, nanoseconds, word};
 use motorlink_proto::can::CanFrame;
 
+/// The bit of a CAN FD frame in the flags of a `CANFD` line.
+pub(super) const FD: u32 = 0x1000;
 const NOT_A_LINE: &str = "not a line of an asc file";
 
 /// Words with which the lines of an asc file begin that have no time.
@@ -40,8 +42,7 @@ impl Asc {
         let mut rest = line;
         let Some(first) = word(&mut rest) else { return Ok(None) };
         if HEADS.contains(&first) || first.starts_with(b"//") {
-            self.head(first, rest);
-            return Ok(None);
+            return self.head(first, rest).map(|()| None);
         }
         let time = nanoseconds(first).ok_or(NOT_A_LINE)?;
         self.now = if self.is_relative { self.now.saturating_add(time) } else { time };
@@ -81,6 +82,12 @@ impl Asc {
                 let mut data = [0; 8];
                 let data = data.get_mut(..len).ok_or("a CAN frame has at most 8 bytes")?;
                 self.data(&mut rest, data)?;
+                // Behind the bytes there may be `Length = ..`.
+                if word(&mut rest)
+                    .is_some_and(|word| word.len() <= 3 && word[0].is_ascii_hexdigit())
+                {
+                    return Err("the line has more bytes than it says");
+                }
                 Wire::Can(CanFrame::data_frame(id, extended, data))
             }
             _ => return Err(NOT_A_LINE),
@@ -88,17 +95,23 @@ impl Asc {
         Ok(Some(Entry { time, channel: Some(channel), direction, wire }))
     }
 
-    fn head(&mut self, first: &[u8], rest: &[u8]) {
+    fn head(&mut self, first: &[u8], rest: &[u8]) -> Result<(), &'static str> {
         let mut rest = rest;
         if first == b"base" {
-            self.is_decimal = word(&mut rest) == Some(b"dec");
+            self.is_decimal = match word(&mut rest) {
+                Some(b"dec") => true,
+                Some(b"hex") => false,
+                _ => return Err("the base is neither hex nor dec"),
+            };
             let kind = (word(&mut rest) == Some(b"timestamps")).then(|| word(&mut rest)).flatten();
             self.is_relative = kind == Some(b"relative");
         }
+        Ok(())
     }
 
     /// `CANFD 1 Rx 141 [name] 1 0 d 12 00 11 .. `: channel, direction, identifier, perhaps a name,
-    /// bit rate switch, error state, length code, number of bytes, bytes.
+    /// bit rate switch, error state, length code, number of bytes, bytes, and more. A file of a bus
+    /// with CAN FD has all its frames in this form, also the classic ones.
     fn fd<'a>(&self, time: Option<Stamp>, rest: &'a [u8]) -> Result<Entry<'a>, &'static str> {
         const WRONG: &str = "not a CAN FD line of an asc file";
         let mut rest = rest;
@@ -116,12 +129,21 @@ impl Asc {
         }
         let brs = u8::from(flag == b"1");
         let esi = u8::from(word(&mut rest).ok_or(WRONG)? == b"1");
-        word(&mut rest).ok_or(WRONG)?;
+        let code = word(&mut rest).ok_or(WRONG)?;
         let len = word(&mut rest).and_then(decimal).filter(|&len| len <= 64).ok_or(WRONG)?;
         let mut data = vec![0; len as usize];
         self.data(&mut rest, &mut data)?;
-        let frame = FdFrame { id, extended, flags: brs | esi << 1, data };
-        Ok(Entry { time, channel: Some(channel), direction, wire: Wire::Fd(Box::new(frame)) })
+        // Duration, length in bits, flags.
+        let is_fd = text::words(rest).nth(2).and_then(hex).is_none_or(|flags| flags & FD != 0);
+        let wire = match (is_fd, data.len()) {
+            (false, 0) if code != b"0" => {
+                let len = length(code).filter(|&len| len <= 8).ok_or(WRONG)?;
+                Wire::Can(CanFrame::remote_frame(id, extended, len as u8))
+            }
+            (false, 0..=8) => Wire::Can(CanFrame::data_frame(id, extended, &data)),
+            _ => Wire::Fd(Box::new(FdFrame { id, extended, flags: brs | esi << 1, data })),
+        };
+        Ok(Entry { time, channel: Some(channel), direction, wire })
     }
 
     /// An identifier; one of 29 bits has an `x` behind it.
@@ -188,10 +210,13 @@ mod tests {
              18.200000 1  142             Rx   r 8\n\
              19.0 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n\
              20.0 CANFD   1 Rx        300                                  1 0 9 12 00 01 02 03 04 05 06 07 08 09 0a 0b\n\
+             21.0 CANFD   1 Rx        141                                  0 0 8  8 9a 19 00 f0 00 00 00 09   130000  130        0 46500250 0 0 0 0\n\
+             22.0 CANFD   1 Rx        141                                  0 0 8  0   130000  130       10 46500250 0 0 0 0\n\
+             23.0 CANFD   1 Rx        141                                  0 0 8  8 9a 19 00 f0 00 00 00 09   130000  130     1000 46500250 0 0 0 0\n\
              End TriggerBlock\n"
         );
         let found: Vec<_> = entries(&text).into_iter().map(Result::unwrap).collect();
-        assert_eq!(found.len(), 5);
+        assert_eq!(found.len(), 8);
         assert_eq!(found[0].time, Some(Stamp::Relative(2_501_000_000)));
         assert_eq!(
             (found[0].channel, found[0].direction),
@@ -203,6 +228,11 @@ mod tests {
         assert_eq!(found[3].wire, Wire::Can(CanFrame::remote_frame(0x142, false, 8)));
         let Wire::Fd(fd) = &found[4].wire else { panic!("no FD frame") };
         assert_eq!((fd.id, fd.flags, fd.data.len()), (0x300, 1, 12));
+        // A bus with CAN FD has classic frames, too.
+        let status = CanFrame::new(0x141, [0x9A, 0x19, 0, 0xF0, 0, 0, 0, 0x09]);
+        assert_eq!(found[5].wire, Wire::Can(status));
+        assert_eq!(found[6].wire, Wire::Can(CanFrame::remote_frame(0x141, false, 8)));
+        assert!(matches!(found[7].wire, Wire::Fd(_)));
     }
 
     #[test]
@@ -229,6 +259,8 @@ mod tests {
             "1.0 1 141 Up d 0",
             "1.0 1 141 TxRq d 0",
             "1.0 CANFD 1 Rx 141 1 0 9 65",
+            "1.0 1 141 Rx d 1 00 11",
+            "base oct  timestamps absolute",
         ] {
             assert!(matches!(&entries(wrong)[..], [Err(_)]), "{wrong}");
         }

@@ -76,7 +76,7 @@ impl<W: Write> Writer<W> {
                     let _ = write!(line, " {byte:02X}");
                 }
                 // Duration, length in bits, flags, checksum and timing, which python-can reads.
-                let flags = 0x1000 | u32::from(brs) << 13 | u32::from(esi) << 14;
+                let flags = super::FD | u32::from(brs) << 13 | u32::from(esi) << 14;
                 let _ = write!(line, " {:>8} {:>4} {flags:>8X} 0 0 0 0 0", 0, 0);
             }
             _ => drop(write!(line, "{channel}  ErrorFrame")),
