@@ -166,24 +166,24 @@ def test_a_closed_reader_ends_it_quietly(motorlink, tmp_path):
     assert done.returncode == 0 and len(done.stdout.splitlines()) == 1 and not done.stderr
 
 
-def block(kind, body):
+def block(kind, body, order="<"):
     """A block of a pcapng file."""
     body += bytes(-len(body) % 4)
-    length = struct.pack("<I", len(body) + 12)
-    return struct.pack("<I", kind) + length + body + length
+    length = struct.pack(f"{order}I", len(body) + 12)
+    return struct.pack(f"{order}I", kind) + length + body + length
 
 
-def pcapng(link_type, *packets):
+def pcapng(link_type, *packets, order="<"):
     """A file of Wireshark with packets a millisecond apart: bytes, and their direction flag or None."""
-    section = struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1)
-    interface = struct.pack("<HHI", link_type, 0, 0) + struct.pack("<HH4s", 2, 4, b"can0")
-    file = block(0x0A0D0D0A, section) + block(1, interface)
+    section = struct.pack(f"{order}IHHq", 0x1A2B3C4D, 1, 0, -1)
+    interface = struct.pack(f"{order}HHI", link_type, 0, 0) + struct.pack(f"{order}HH4s", 2, 4, b"can0")
+    file = block(0x0A0D0D0A, section, order) + block(1, interface, order)
     for n, (data, flags) in enumerate(packets):
         us = 1436509053_000000 + n * 1000
-        head = struct.pack("<IIIII", 0, us >> 32, us & 0xFFFFFFFF, len(data), len(data))
+        head = struct.pack(f"{order}IIIII", 0, us >> 32, us & 0xFFFFFFFF, len(data), len(data))
         padded = data + bytes(-len(data) % 4)
-        options = b"" if flags is None else struct.pack("<HHIHH", 2, 4, flags, 0, 0)
-        file += block(6, head + padded + options)
+        options = b"" if flags is None else struct.pack(f"{order}HHIHH", 2, 4, flags, 0, 0)
+        file += block(6, head + padded + options, order)
     return file
 
 
@@ -209,6 +209,58 @@ def test_files_of_wireshark_are_read(run, tmp_path):
     done = run("decode", "st", path).ended(1)
     out = done.out.splitlines()
     assert "GET_REG SPEED_MEAS" in out[0] and "ACK 1998 rpm" in out[1] and "parity error" in out[2]
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("link_type, head", [(113, ">HHH8sH"), (276, ">HHIHBB8s")])
+def test_a_capture_of_all_interfaces_has_directions(run, tmp_path, order, link_type, head):
+    def packet(data, sent, protocol=0x0C):
+        kind = 4 if sent else 0
+        words = (kind, 280, 0, b"", protocol) if link_type == 113 else (protocol, 0, 3, 280, kind, 0, b"")
+        return struct.pack(head, *words) + struct.pack(f"{order}IBBBB", 0x141, 8, 0, 0, 0) + bytes.fromhex(data)
+
+    packets = [packet(READ[4:], True), packet("9a00000000000000", False), packet(READ[4:], True, 0x0800)]
+    path = tmp_path / "any.pcapng"
+    path.write_bytes(pcapng(link_type, *((data, None) for data in packets), order=order))
+    lines = run("decode", "rmd", "--json", path).ended(1).lines
+    assert [(line.get("direction"), line.get("known_by"), line.get("id")) for line in lines] == [
+        ("request", "log", 0x141), ("reply", "log", 0x141), (None, None, None)
+    ]
+    assert "neither CAN nor a serial line" in lines[2]["damage"]
+
+
+def test_packets_of_other_forms_and_lost_packets_are_not_skipped(run, tmp_path):
+    path = tmp_path / "bus.pcapng"
+    frame = struct.pack(">IBBBB", 0x141, 8, 0, 0, 0) + bytes.fromhex(STATUS[4:])
+    old = block(2, struct.pack("<HHIIII", 0, 2, 0, 0, len(frame), len(frame)) + frame)
+    simple = block(3, struct.pack("<I", len(frame)) + frame)
+    lost = block(5, struct.pack("<III", 0, 0, 0) + struct.pack("<HHQHHQ", 5, 8, 4, 7, 8, 1))
+    path.write_bytes(pcapng(227) + old + simple + lost)
+    lines = run("decode", "rmd", "--json", path).ended(1).lines
+    assert [line.get("message") for line in lines] == [None, "read_status", "read_status", None]
+    assert [line["entry"] for line in lines] == [1, 1, 2, 2]
+    assert lines[0]["damage"] == "the capture lost 2 frames here"
+    assert lines[3]["damage"] == "the capture lost 3 frames somewhere before" and lines[3]["channel"] == "can0"
+    # The last bytes of a simple packet are padding if the interface cuts packets.
+    cut = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1)) + block(1, struct.pack("<HHI", 227, 0, 13))
+    path.write_bytes(cut + block(3, struct.pack("<I", len(frame)) + frame[:13]))
+    [line] = run("decode", "rmd", "--json", path).ended(1).lines
+    assert line["damage"] == "the capture has 13 of the 16 bytes of this packet"
+
+
+def test_text_is_read_behind_a_damaged_first_line(run, tmp_path):
+    for first, failed in (("\ufeff", 0), ("hello\n", 1), ("(14365090\n", 1), ("9053.2) can0 141#9A\n", 1)):
+        lines = run("decode", "rmd", "--json", stdin=first + log(STATUS)).ended(failed).lines
+        assert lines[-1]["message"] == "read_status" and len(lines) == 1 + failed
+    # A line of any length, between whose bytes it is divided.
+    line = f"{ASK} {REPLY} " * 10_000 + "\n"
+    done = run("decode", "st", stdin=line + ASK + "\n").ended(0)
+    assert "20001 frames: 10001 requests, 10000 replies" in done.err
+    assert done.out.count("ACK 1998 rpm") == 10_000
+    for name, content, text in (("log.gz", b"\x1f\x8b\x08\0", "gunzip"), ("log.blf", b"LOGG\0", "can_logconvert")):
+        path = tmp_path / name
+        path.write_bytes(content)
+        assert text in run("decode", "rmd", path).ended(2).err
 
 
 def test_a_binary_file_of_another_kind_is_refused(run, motorlink, tmp_path):

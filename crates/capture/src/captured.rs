@@ -116,6 +116,8 @@ pub enum Damage {
     Packet(&'static str),
     /// The capture lost frames here: their number.
     Dropped(u64),
+    /// The capture lost frames somewhere before: their number.
+    LostBefore(u64),
     /// The capture has only a part of a packet.
     Cut {
         /// Bytes in the capture.
@@ -134,6 +136,10 @@ impl fmt::Display for Damage {
             Damage::Packet(why) | Damage::End(why) => f.write_str(why),
             Damage::Dropped(1) => f.write_str("the capture lost a frame here"),
             Damage::Dropped(count) => write!(f, "the capture lost {count} frames here"),
+            Damage::LostBefore(1) => f.write_str("the capture lost a frame somewhere before"),
+            Damage::LostBefore(count) => {
+                write!(f, "the capture lost {count} frames somewhere before")
+            }
             Damage::Cut { captured, original } => {
                 write!(f, "the capture has {captured} of the {original} bytes of this packet")
             }

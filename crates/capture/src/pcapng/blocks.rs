@@ -6,7 +6,10 @@ use crate::captured::Direction;
 
 pub(super) const SECTION: u32 = 0x0A0D_0D0A;
 pub(super) const INTERFACE: u32 = 1;
+/// Of older programs.
+const OLD_PACKET: u32 = 2;
 const SIMPLE_PACKET: u32 = 3;
+const STATISTICS: u32 = 5;
 pub(super) const PACKET: u32 = 6;
 /// Shows the byte order of a section.
 pub(super) const ORDER: u32 = 0x1A2B_3C4D;
@@ -16,6 +19,8 @@ pub(super) const INBOUND: u32 = 1;
 pub(super) const OUTBOUND: u32 = 2;
 /// Option of a packet: packets lost before it.
 const DROPPED: u16 = 4;
+/// Options of statistics: packets that the interface lost, and that the system lost.
+const LOST: [u16; 2] = [5, 7];
 /// A block is not larger; a damaged file may say anything.
 const MOST: usize = 1 << 24;
 
@@ -54,7 +59,14 @@ pub(super) enum Block<'a> {
     Section,
     Interface {
         link_type: u16,
+        /// Bytes that a packet has at most; 0 for any number.
+        snap_length: u32,
         options: Options<'a>,
+    },
+    /// How many packets of an interface were lost so far.
+    Lost {
+        interface: u32,
+        count: u64,
     },
     Packet {
         number: u64,
@@ -104,11 +116,14 @@ impl<R: Read> Blocks<R> {
     pub(super) fn next(&mut self) -> Result<Option<Block<'_>>, BrokenFile> {
         let kind = loop {
             let Some(kind) = self.read()? else { return Ok(None) };
-            if matches!(kind, SECTION | INTERFACE | SIMPLE_PACKET | PACKET) {
+            if matches!(
+                kind,
+                SECTION | INTERFACE | OLD_PACKET | SIMPLE_PACKET | STATISTICS | PACKET
+            ) {
                 break kind;
             }
         };
-        self.packets += u64::from(matches!(kind, SIMPLE_PACKET | PACKET));
+        self.packets += u64::from(matches!(kind, OLD_PACKET | SIMPLE_PACKET | PACKET));
         let (number, order) = (self.packets, self.order);
         let mut rest = &self.block[..];
         Ok(Some(match kind {
@@ -116,8 +131,20 @@ impl<R: Read> Blocks<R> {
             INTERFACE => {
                 let link_type = order.u16(take(&mut rest)?);
                 let _reserved: [u8; 2] = take(&mut rest)?;
-                let _snap_length: [u8; 4] = take(&mut rest)?;
-                Block::Interface { link_type, options: Options { rest, order } }
+                let snap_length = order.u32(take(&mut rest)?);
+                Block::Interface { link_type, snap_length, options: Options { rest, order } }
+            }
+            STATISTICS => {
+                let interface = order.u32(take(&mut rest)?);
+                let _time: [u8; 8] = take(&mut rest)?;
+                let mut count = 0u64;
+                for (code, value) in (Options { rest, order }) {
+                    if LOST.contains(&code) {
+                        let lost = value.first_chunk().map_or(0, |bytes| order.i64(*bytes));
+                        count = count.saturating_add(lost as u64);
+                    }
+                }
+                Block::Lost { interface, count }
             }
             SIMPLE_PACKET => {
                 let original = order.u32(take(&mut rest)?);
@@ -134,7 +161,18 @@ impl<R: Read> Blocks<R> {
                 }
             }
             _ => {
-                let interface = order.u32(take(&mut rest)?);
+                let interface = take(&mut rest)?;
+                let (interface, mut dropped) = match interface {
+                    [a, b, c, d] if kind == OLD_PACKET => {
+                        // All bits set: not known.
+                        let dropped = order.u16([c, d]);
+                        (
+                            order.u16([a, b]).into(),
+                            if dropped == u16::MAX { 0 } else { dropped.into() },
+                        )
+                    }
+                    interface => (order.u32(interface), 0),
+                };
                 let [high, low, captured, original] = [
                     order.u32(take(&mut rest)?),
                     order.u32(take(&mut rest)?),
@@ -144,7 +182,7 @@ impl<R: Read> Blocks<R> {
                 let captured = captured as usize;
                 let (data, options) =
                     rest.split_at_checked(captured.next_multiple_of(4)).ok_or(BROKEN)?;
-                let (mut direction, mut dropped) = (None, 0);
+                let mut direction = None;
                 for (code, value) in (Options { rest: options, order }) {
                     match code {
                         FLAGS => {
@@ -155,7 +193,7 @@ impl<R: Read> Blocks<R> {
                                 _ => None,
                             };
                         }
-                        DROPPED => {
+                        DROPPED if kind == PACKET => {
                             let count = value.first_chunk().map_or(0, |bytes| order.i64(*bytes));
                             dropped = count.unsigned_abs();
                         }

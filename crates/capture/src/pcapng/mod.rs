@@ -1,4 +1,5 @@
-//! Files of Wireshark: CAN as LINKTYPE_CAN_SOCKETCAN, serial lines as LINKTYPE_RTAC_SERIAL.
+//! Files of Wireshark: CAN as LINKTYPE_CAN_SOCKETCAN, and as LINKTYPE_LINUX_SLL and LINKTYPE_LINUX_SLL2 of
+//! all interfaces together; serial lines as LINKTYPE_RTAC_SERIAL.
 
 mod blocks;
 mod packet;
@@ -9,7 +10,7 @@ pub use writer::Writer;
 use std::io::{self, Read};
 
 use crate::captured::{Damage, Direction, Stamp, Wire};
-use blocks::{Block, Blocks, BrokenFile};
+use blocks::{Block, Blocks, BrokenFile, Order};
 
 /// The packets of a file.
 pub(crate) struct Packets<R> {
@@ -24,6 +25,11 @@ pub(crate) struct Packets<R> {
 #[derive(Debug, Clone)]
 struct Interface {
     link_type: u16,
+    order: Order,
+    /// Bytes that a simple packet has at most.
+    snap_length: usize,
+    /// Packets that were lost so far.
+    lost: u64,
     name: Option<String>,
     resolution: Resolution,
     offset_s: i64,
@@ -78,16 +84,33 @@ impl<R: Read> Packets<R> {
             };
             match block {
                 Block::Section => self.interfaces.clear(),
-                Block::Interface { link_type, options } => {
-                    self.interfaces.push(Interface::new(link_type, options));
+                Block::Interface { link_type, snap_length, options } => {
+                    self.interfaces.push(Interface::new(link_type, snap_length, options));
+                }
+                Block::Lost { interface, count } => {
+                    let Some(interface) = self.interfaces.get_mut(interface as usize) else {
+                        continue;
+                    };
+                    let lost = count.saturating_sub(interface.lost);
+                    if lost > 0 {
+                        interface.lost = count;
+                        let channel = interface.name.clone();
+                        let packet = Packet::damaged(self.blocks.packets, Damage::LostBefore(lost));
+                        return Ok(Some(Packet { channel, ..packet }));
+                    }
                 }
                 Block::Packet { number, interface, units, data, original, direction, dropped } => {
-                    let Some(interface) = self.interfaces.get(interface as usize) else {
+                    let Some(interface) = self.interfaces.get_mut(interface as usize) else {
                         let why = "a packet of an interface that the file does not have";
                         return Ok(Some(Packet::damaged(number, Damage::Packet(why))));
                     };
                     let time = units.and_then(|units| interface.time(units));
-                    let (wire, seen) = packet::parse(interface.link_type, data, original);
+                    // A simple packet does not say how many bytes of it are padding.
+                    let len = if units.is_none() { interface.snap_length } else { usize::MAX };
+                    let data = &data[..data.len().min(len)];
+                    let link = (interface.link_type, interface.order);
+                    let (wire, seen) = packet::parse(link, data, original);
+                    interface.lost = interface.lost.saturating_add(dropped);
                     let channel = interface.name.clone();
                     let direction = direction.or(seen);
                     let packet = Packet { number, time, channel: channel.clone(), direction, wire };
@@ -105,12 +128,19 @@ impl<R: Read> Packets<R> {
 }
 
 impl Interface {
-    fn new(link_type: u16, options: blocks::Options<'_>) -> Self {
+    fn new(link_type: u16, snap_length: u32, options: blocks::Options<'_>) -> Self {
         const NAME: u16 = 2;
         const RESOLUTION: u16 = 9;
         const OFFSET: u16 = 14;
-        let mut interface =
-            Interface { link_type, name: None, resolution: Resolution::Decimal(6), offset_s: 0 };
+        let mut interface = Interface {
+            link_type,
+            order: options.order(),
+            snap_length: if snap_length == 0 { usize::MAX } else { snap_length as usize },
+            lost: 0,
+            name: None,
+            resolution: Resolution::Decimal(6),
+            offset_s: 0,
+        };
         for (code, value) in options {
             match (code, value) {
                 (NAME, name) => interface.name = Some(String::from_utf8_lossy(name).into_owned()),
