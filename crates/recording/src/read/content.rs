@@ -113,8 +113,8 @@ impl Tables {
 impl<R: Read + Seek> Recording<R> {
     /// The types of the channels.
     pub fn types(&self) -> Types {
-        let known = self.channels.values().filter_map(|channel| {
-            let schema = self.schemas.get(&channel.schema_id)?;
+        let known = self.channels().filter_map(|channel| {
+            let schema = self.schema(channel)?;
             if (&*schema.encoding, &*channel.encoding) != (SCHEMA_ENCODING, MESSAGE_ENCODING) {
                 return None;
             }

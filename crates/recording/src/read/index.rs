@@ -7,7 +7,7 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::record::{Channel, Fields, HEAD, Metadata, Schema, Statistics, split};
-use super::recording::{AttachmentPlace, Place, Recording};
+use super::recording::{AttachmentPlace, Kind, Recording};
 
 /// Body of the last record.
 const FOOTER: usize = 8 + 8 + 4;
@@ -70,10 +70,9 @@ impl<R: Read + Seek> Recording<R> {
         }
         self.metadata = metadata;
         found.chunks.sort_by_key(|at| at.start);
-        self.places = found.chunks.into_iter().map(Place::Chunk).collect();
         self.attachments = found.attachments;
-        found.schemas.into_iter().for_each(|schema| self.add_schema(schema));
-        found.channels.into_iter().for_each(|channel| self.add_channel(channel));
+        self.catalogue.add(found.schemas, found.channels);
+        found.chunks.into_iter().for_each(|at| self.add_place(Kind::Chunk, at));
         self.statistics = statistics;
         Ok(Some(()))
     }
@@ -113,7 +112,10 @@ impl<R: Read + Seek> Recording<R> {
     pub(super) fn read_descriptions(&mut self) -> io::Result<Option<Statistics>> {
         let Some(footer) = self.footer()? else { return Ok(None) };
         let length = footer.summary.end - footer.summary.start;
-        if length > LARGEST {
+        // A recording that was appended counts from its own beginning: this would be the summary of
+        // another one.
+        let is_behind = self.places.last().is_none_or(|last| last.at.end <= footer.summary.start);
+        if length > LARGEST || !is_behind {
             return Ok(None);
         }
         let bytes = self.source.bytes(footer.summary.start, length)?.to_vec();
@@ -122,8 +124,7 @@ impl<R: Read + Seek> Recording<R> {
         while let Some(rest) = found.take(records) {
             records = rest;
         }
-        found.schemas.into_iter().for_each(|schema| self.add_schema(schema));
-        found.channels.into_iter().for_each(|channel| self.add_channel(channel));
+        self.catalogue.add(found.schemas, found.channels);
         Ok(found.statistics)
     }
 

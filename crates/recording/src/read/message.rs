@@ -11,7 +11,7 @@ use super::chunk;
 use super::damage::{Damage, Loss};
 use super::record::Channel;
 use super::record::{ChunkHead, Fields, HEAD, MessageHead, split};
-use super::recording::{Place, Recording};
+use super::recording::{Kind, Place, Recording};
 
 /// A message.
 #[derive(Debug, Clone)]
@@ -80,12 +80,12 @@ impl<R: Read + Seek> Recording<R> {
 
     /// The messages of a place. `after` is the time of the message before it.
     fn read_place(&mut self, place: &Place, after: Option<u64>) -> io::Result<VecDeque<Message>> {
-        let (Place::Chunk(at) | Place::Cut(at) | Place::Loose(at)) = place;
+        let Place { kind, at, part } = place;
         let bytes = self.source.bytes(at.start, at.end - at.start)?;
-        let records = match place {
-            Place::Chunk(_) => whole(bytes),
-            Place::Cut(_) => Ok(beginning(bytes).1),
-            Place::Loose(_) => Ok(bytes.to_vec()),
+        let records = match kind {
+            Kind::Chunk => whole(bytes),
+            Kind::Cut => Ok(beginning(bytes).1),
+            Kind::Loose => Ok(bytes.to_vec()),
         };
         let records = Arc::new(records.unwrap_or_else(|damage| {
             self.add_loss(Loss { bytes: at.clone(), after, damage });
@@ -93,7 +93,7 @@ impl<R: Read + Seek> Recording<R> {
         }));
         let mut messages = VecDeque::new();
         for (head, data) in message_records(&records) {
-            let Some(channel) = self.channels.get(&head.channel) else {
+            let Some(channel) = self.catalogue.channel(*part, head.channel) else {
                 self.add_loss(Loss { bytes: at.clone(), after, damage: Damage::UnknownChannel });
                 continue;
             };

@@ -4,6 +4,7 @@
 //! writer was killed, is read from its beginning. What is damaged is left out and listed as
 //! [`Loss`]es. Messages of a chunk with a wrong checksum are never given: any value could be wrong.
 
+mod catalogue;
 mod chunk;
 mod content;
 mod damage;

@@ -68,6 +68,11 @@ pub struct Schema {
 }
 
 impl Schema {
+    /// Whether all but the numbers is equal.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (&self.name, &self.encoding, &self.data) == (&other.name, &other.encoding, &other.data)
+    }
+
     pub(super) fn parse(body: &[u8]) -> Option<Self> {
         let mut fields = Fields(body);
         let (id, name, encoding) = (fields.u16()?, fields.text()?, fields.text()?);
@@ -92,6 +97,12 @@ pub struct Channel {
 }
 
 impl Channel {
+    /// Whether all but the numbers is equal.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (&self.topic, &self.encoding, &self.metadata)
+            == (&other.topic, &other.encoding, &other.metadata)
+    }
+
     pub(super) fn parse(body: &[u8]) -> Option<Self> {
         let mut fields = Fields(body);
         let (id, schema_id) = (fields.u16()?, fields.u16()?);
@@ -231,15 +242,17 @@ impl Statistics {
 }
 
 impl Statistics {
-    /// Adds a message.
-    pub fn count(&mut self, message: &MessageHead) {
+    /// Adds a message of the channel with this number.
+    pub fn count(&mut self, message: &MessageHead, channel: Option<u16>) {
         let [first, last] = self.times;
         self.times = match self.messages {
             0 => [message.log_time; 2],
             _ => [first.min(message.log_time), last.max(message.log_time)],
         };
         self.messages += 1;
-        *self.counts.entry(message.channel).or_default() += 1;
+        if let Some(channel) = channel {
+            *self.counts.entry(channel).or_default() += 1;
+        }
     }
 
     /// Time of the last message.

@@ -1,12 +1,12 @@
 //! An open recording.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::catalogue::Catalogue;
 use super::damage::{Loss, ReadError};
 use super::record::{Attachment, Channel, HEAD, Metadata, Schema, Statistics};
 use super::source::Source;
@@ -17,8 +17,7 @@ pub struct Recording<R> {
     pub(super) source: Source<R>,
     pub(super) profile: String,
     pub(super) library: String,
-    pub(super) schemas: BTreeMap<u16, Arc<Schema>>,
-    pub(super) channels: BTreeMap<u16, Arc<Channel>>,
+    pub(super) catalogue: Catalogue,
     pub(super) places: Vec<Place>,
     pub(super) metadata: Vec<Metadata>,
     pub(super) attachments: Vec<AttachmentPlace>,
@@ -28,13 +27,22 @@ pub struct Recording<R> {
 
 /// Bytes of the file that have messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub struct Place {
+    pub kind: Kind,
+    pub at: Range<u64>,
+    /// The part of the file: numbers of channels have one meaning in it.
+    pub part: usize,
+}
+
+/// What is at a [`Place`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
     /// The record of a whole chunk.
-    Chunk(Range<u64>),
+    Chunk,
     /// The record of a chunk whose end is missing.
-    Cut(Range<u64>),
+    Cut,
     /// Records outside of chunks.
-    Loose(Range<u64>),
+    Loose,
 }
 
 #[derive(Debug, Clone)]
@@ -126,8 +134,7 @@ impl<R: Read + Seek> Recording<R> {
             source,
             profile: String::new(),
             library: String::new(),
-            schemas: BTreeMap::new(),
-            channels: BTreeMap::new(),
+            catalogue: Catalogue::default(),
             places: Vec::new(),
             metadata: Vec::new(),
             attachments: Vec::new(),
@@ -153,12 +160,12 @@ impl<R: Read + Seek> Recording<R> {
 
     /// All channels.
     pub fn channels(&self) -> impl Iterator<Item = &Arc<Channel>> {
-        self.channels.values()
+        self.catalogue.channels.values()
     }
 
     /// The description of a channel's messages.
     pub fn schema(&self, channel: &Channel) -> Option<&Arc<Schema>> {
-        self.schemas.get(&channel.schema_id)
+        self.catalogue.schemas.get(&channel.schema_id)
     }
 
     /// Facts about the recording and its drives.
@@ -210,11 +217,7 @@ impl<R: Read + Seek> Recording<R> {
         (self.statistics.messages > 0).then_some(self.statistics.times)
     }
 
-    pub(super) fn add_schema(&mut self, schema: Schema) {
-        self.schemas.entry(schema.id).or_insert_with(|| Arc::new(schema));
-    }
-
-    pub(super) fn add_channel(&mut self, channel: Channel) {
-        self.channels.entry(channel.id).or_insert_with(|| Arc::new(channel));
+    pub(super) fn add_place(&mut self, kind: Kind, at: Range<u64>) {
+        self.places.push(Place { kind, at, part: self.catalogue.part() });
     }
 }

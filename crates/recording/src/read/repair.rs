@@ -46,14 +46,14 @@ impl<R: Read + Seek> Recording<R> {
             let attachment = mcap::Attachment { log_time, create_time, name, media_type, data };
             writer.attach(&attachment).map_err(failed)?;
         }
-        for schema in self.schemas.values() {
+        for schema in self.catalogue.schemas.values() {
             writer
                 .add_schema_with_id(schema.id, &schema.name, &schema.encoding, &schema.data)
                 .map_err(failed)?;
         }
-        for channel in self.channels.values() {
+        for channel in self.catalogue.channels.values() {
             // A schema that was lost is not named.
-            let is_known = self.schemas.contains_key(&channel.schema_id);
+            let is_known = self.catalogue.schemas.contains_key(&channel.schema_id);
             let schema = if is_known { channel.schema_id } else { 0 };
             let (topic, encoding) = (&channel.topic, &channel.encoding);
             writer

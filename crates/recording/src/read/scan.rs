@@ -13,7 +13,7 @@ use super::record::{
     Attachment, Channel, ChunkHead, Fields, HEAD, MessageHead, Metadata, Schema, Statistics,
     is_known, message_index, split,
 };
-use super::recording::{AttachmentPlace, Place, Recording};
+use super::recording::{AttachmentPlace, Kind, Place, Recording};
 
 /// Loose records are read in groups of about this size.
 const GROUP: u64 = 1 << 20;
@@ -64,6 +64,7 @@ impl<R: Read + Seek> Recording<R> {
                     if let Some(chunk) = more {
                         // Another recording was appended, or this is not the end.
                         self.lose(at..chunk, &seen, Damage::NoRecord);
+                        self.catalogue.begin_part();
                         at = chunk;
                         continue;
                     }
@@ -135,8 +136,20 @@ impl<R: Read + Seek> Recording<R> {
                 let bytes = bytes.to_vec();
                 self.take_header(&bytes)
             }
-            op::SCHEMA => Schema::parse(bytes).map(|schema| self.add_schema(schema)).is_some(),
-            op::CHANNEL => Channel::parse(bytes).map(|channel| self.add_channel(channel)).is_some(),
+            op::SCHEMA => match Schema::parse(bytes) {
+                Some(schema) => {
+                    self.catalogue.add(vec![schema], vec![]);
+                    true
+                }
+                None => false,
+            },
+            op::CHANNEL => match Channel::parse(bytes) {
+                Some(channel) => {
+                    self.catalogue.add(vec![], vec![channel]);
+                    true
+                }
+                None => false,
+            },
             op::MESSAGE => self.step_message(at..next, seen)?,
             op::MESSAGE_INDEX => match message_index(bytes).filter(|_| is_behind_chunk) {
                 Some(entries) => match &seen.in_chunk {
@@ -184,15 +197,18 @@ impl<R: Read + Seek> Recording<R> {
         let record = self.source.bytes(at.start, at.end - at.start)?;
         let Some((head, _)) = message_records(record).next() else { return Ok(false) };
         // A damaged opcode makes any record a message. No checksum would tell.
-        if seen.has_chunks || !self.channels.contains_key(&head.channel) {
+        let part = self.catalogue.part();
+        if seen.has_chunks || self.catalogue.channel(part, head.channel).is_none() {
             return Ok(false);
         }
-        seen.statistics.count(&head);
+        seen.statistics.count(&head, self.catalogue.number(head.channel));
         match self.places.last_mut() {
-            Some(Place::Loose(group)) if group.end == at.start && at.end - group.start <= GROUP => {
+            Some(Place { kind: Kind::Loose, at: group, part: same })
+                if *same == part && group.end == at.start && at.end - group.start <= GROUP =>
+            {
                 group.end = at.end;
             }
-            _ => self.places.push(Place::Loose(at)),
+            _ => self.add_place(Kind::Loose, at),
         }
         Ok(true)
     }
@@ -212,7 +228,7 @@ impl<R: Read + Seek> Recording<R> {
                     (head.channel, head.log_time, start as u64)
                 });
                 seen.in_chunk = Some(messages.collect());
-                self.places.push(Place::Chunk(at.clone()));
+                self.add_place(Kind::Chunk, at.clone());
                 Ok(Next::Record(at.end))
             }
             Err(damage) => self.damaged(damage, at.end),
@@ -235,17 +251,19 @@ impl<R: Read + Seek> Recording<R> {
 
     /// Schemas and channels of a chunk; counts its messages.
     fn take_records(&mut self, records: &[u8], seen: &mut Seen) {
+        let (mut schemas, mut channels) = (Vec::new(), Vec::new());
         let mut rest = records;
         while let Some((opcode, body, behind)) = split(rest) {
             match opcode {
-                op::SCHEMA => Schema::parse(body).into_iter().for_each(|it| self.add_schema(it)),
-                op::CHANNEL => Channel::parse(body).into_iter().for_each(|it| self.add_channel(it)),
+                op::SCHEMA => schemas.extend(Schema::parse(body)),
+                op::CHANNEL => channels.extend(Channel::parse(body)),
                 _ => {}
             }
             rest = behind;
         }
+        self.catalogue.add(schemas, channels);
         for (head, _) in message_records(records) {
-            seen.statistics.count(&head);
+            seen.statistics.count(&head, self.catalogue.number(head.channel));
         }
     }
 
@@ -270,7 +288,7 @@ impl<R: Read + Seek> Recording<R> {
             let (head, records) = beginning(record);
             if let Some(head) = head {
                 self.take_records(&records, seen);
-                self.places.push(Place::Cut(at));
+                self.add_place(Kind::Cut, at);
                 if head.compression.is_empty() {
                     lost.start += HEAD as u64 + head.length + records.len() as u64;
                 }

@@ -1,5 +1,6 @@
 //! Files that are whole, cut, damaged, and written by others.
 
+mod appended;
 mod damage;
 mod files;
 mod repair;
