@@ -75,6 +75,17 @@ pub enum WriteError {
         /// Bytes that the file has.
         bytes: u64,
     },
+    /// Another program wrote or shortened it.
+    #[error(
+        "{} was changed by another program after {bytes} bytes: messages are lost",
+        .path.display()
+    )]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that it had.
+        bytes: u64,
+    },
     /// Somebody removed it.
     #[error("{} was removed while it was written: {bytes} bytes are lost", .path.display())]
     Removed {

@@ -165,6 +165,50 @@ fn a_file_that_exists_is_overwritten_only_when_asked_and_only_by_a_recording_tha
 }
 
 #[test]
+fn two_recordings_never_share_a_file() {
+    let folder = Folder::new("shared");
+    let output = Output { force: true, ..folder.output("run.mcap") };
+    let mut first = begin(output.clone());
+    first.take(message(1)).unwrap();
+    let refused = Series::create(output.clone()).map(drop).unwrap_err();
+    assert!(refused.to_string().ends_with("another recording writes it"), "{refused}");
+    let written = first.finish().unwrap();
+    assert_eq!(whole(&written.files[0]), [1]);
+    assert!(Series::create(output).is_ok());
+}
+
+#[test]
+fn only_a_regular_file_is_overwritten() {
+    let folder = Folder::new("regular");
+    for path in ["/dev/null".into(), folder.0.clone()] {
+        for force in [false, true] {
+            let output = Output { path: PathBuf::clone(&path), force, ..Output::default() };
+            let refused = Series::create(output).map(drop).unwrap_err();
+            assert!(refused.to_string().ends_with("it is not a regular file"), "{refused}");
+        }
+    }
+}
+
+#[test]
+fn a_rotated_recording_begins_only_if_the_names_of_all_its_files_are_free() {
+    let folder = Folder::new("parts");
+    for other in ["run_x01.mcap", "run_01.mcap", "run_001.csv", "other_001.mcap"] {
+        fs::write(folder.0.join(other), "other").unwrap();
+    }
+    let rotate = Some(Rotate::Bytes(4_000));
+    let output = Output { rotate, ..folder.output("run.mcap") };
+    assert!(Series::create(output.clone()).is_ok());
+    for old in ["run_1000.mcap", "run_012.mcap"] {
+        fs::write(folder.0.join(old), "old").unwrap();
+        let refused = Series::create(output.clone()).map(drop).unwrap_err();
+        let first = folder.0.join(old);
+        assert!(matches!(refused, WriteError::Exists { path } if path == first));
+    }
+    assert!(Series::create(Output { force: true, ..output }).is_ok());
+    assert!(Series::create(folder.output("run.mcap")).is_ok());
+}
+
+#[test]
 fn a_recording_that_does_not_begin_leaves_no_file() {
     let folder = Folder::new("none");
     drop(begin(folder.output("run.mcap")));
@@ -195,11 +239,21 @@ fn a_file_that_is_removed_is_noticed() {
 }
 
 #[test]
+fn a_file_that_another_program_shortens_is_noticed() {
+    let folder = Folder::new("shortened");
+    let mut series = begin(folder.output("run.mcap"));
+    series.flush().unwrap();
+    fs::write(folder.0.join("run.mcap"), "").unwrap();
+    series.take(message(1)).unwrap();
+    assert!(matches!(series.flush(), Err(WriteError::Changed { .. })));
+}
+
+#[test]
 fn a_file_is_whole_even_if_the_next_one_cannot_be_made() {
     let folder = Folder::new("next");
-    fs::write(folder.0.join("run_001.mcap"), "old").unwrap();
     let rotate = Some(Rotate::Time(Duration::from_nanos(40)));
     let series = begin(Output { rotate, ..folder.output("run.mcap") });
+    fs::write(folder.0.join("run_001.mcap"), "old").unwrap();
     let writer = Writer::start(series).unwrap();
     (0..100).for_each(|number| assert!(writer.queue().push(message(number))));
     assert!(matches!(writer.end(), Err(WriteError::Exists { .. })));

@@ -3,7 +3,7 @@
 //! [`McapFile::flush`] ends the chunk and writes all of it, so the file never has a part of a chunk on
 //! purpose. What a failed write leaves is cut off.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -34,20 +34,20 @@ pub(super) struct McapFile {
 }
 
 impl McapFile {
-    /// Begins a file. One that exists is overwritten with `force` only.
+    /// Begins a file. One that exists is overwritten with `force` only, and never while another
+    /// recording writes it.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, WriteError> {
         let created = OpenOptions::new().write(true).create_new(true).open(path);
         let is_new = created.is_ok();
         let file = match created {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists && force => {
-                OpenOptions::new().write(true).open(path)
-            }
-            created => created,
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => overwritten(path, force)?,
+            created => created.map_err(|error| WriteError::create(path, error))?,
         };
-        let file = file.map_err(|error| match error.kind() {
-            ErrorKind::AlreadyExists => WriteError::Exists { path: path.to_owned() },
-            _ => WriteError::create(path, error),
-        })?;
+        // Some file systems have no locks.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            let error = io::Error::other("another recording writes it");
+            return Err(WriteError::create(path, error));
+        }
         let mcap = Mcap::new(None).map_err(|error| WriteError::create(path, error))?;
         let path = path.to_owned();
         let (written, messages, unwritten, is_broken) = (0, 0, 0, false);
@@ -85,7 +85,7 @@ impl McapFile {
         self.mcap.end_chunk().map_err(|error| self.failed(&error))?;
         self.commit()?;
         self.messages += std::mem::take(&mut self.unwritten);
-        self.is_there()
+        Ok(())
     }
 
     /// Waits until the disk has what was flushed.
@@ -113,8 +113,9 @@ impl McapFile {
 
     fn commit(&mut self) -> Result<(), WriteError> {
         let bytes = self.mcap.take();
-        if self.written == 0 {
-            self.file.set_len(0).map_err(|error| self.failed(&error))?;
+        match self.written {
+            0 => self.file.set_len(0).map_err(|error| self.failed(&error))?,
+            _ => self.is_untouched()?,
         }
         if let Err(error) = self.file.write_all(&bytes) {
             self.is_broken = true;
@@ -134,11 +135,11 @@ impl McapFile {
     }
 
     /// A file that was removed takes everything and keeps nothing.
-    fn is_there(&self) -> Result<(), WriteError> {
+    fn is_untouched(&self) -> Result<(), WriteError> {
+        let (path, bytes) = (self.path.clone(), self.written);
         match self.file.metadata() {
-            Ok(found) if found.nlink() == 0 => {
-                Err(WriteError::Removed { path: self.path.clone(), bytes: self.written })
-            }
+            Ok(found) if found.nlink() == 0 => Err(WriteError::Removed { path, bytes }),
+            Ok(found) if found.len() != bytes => Err(WriteError::Changed { path, bytes }),
             _ => Ok(()),
         }
     }
@@ -159,6 +160,21 @@ impl Drop for McapFile {
             // A recording that did not begin leaves no file.
             let _ = std::fs::remove_file(&self.path);
         }
+    }
+}
+
+/// Opens a file that exists.
+fn overwritten(path: &Path, force: bool) -> Result<File, WriteError> {
+    // A FIFO would wait for its reader, and a device keeps nothing.
+    if path.metadata().is_ok_and(|found| !found.is_file()) {
+        return Err(WriteError::create(path, io::Error::other("it is not a regular file")));
+    }
+    match force {
+        true => OpenOptions::new()
+            .write(true)
+            .open(path)
+            .map_err(|error| WriteError::create(path, error)),
+        false => Err(WriteError::Exists { path: path.to_owned() }),
     }
 }
 

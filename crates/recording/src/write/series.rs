@@ -1,6 +1,8 @@
 //! The files of a recording: one, or one after the other.
 
-use std::path::PathBuf;
+use std::ffi::{OsStr, OsString};
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::entry::Entry;
@@ -59,8 +61,11 @@ impl Series {
     /// Makes the first file.
     ///
     /// # Errors
-    /// It exists, or cannot be written.
+    /// It or a later one exists, or it cannot be written.
     pub fn create(output: Output) -> Result<Self, WriteError> {
+        if let Some(path) = output.other_parts().into_iter().min().filter(|_| !output.force) {
+            return Err(WriteError::Exists { path });
+        }
         let current = McapFile::create(&output.name(0), output.force)?;
         let (before, preamble) = (Written::default(), Vec::new());
         Ok(Series { output, current, before, preamble, began: None })
@@ -186,19 +191,46 @@ impl Output {
         if self.rotate.is_none() {
             return self.path.clone();
         }
-        let extension = self.path.extension().unwrap_or("mcap".as_ref());
-        let mut name = self.path.file_stem().unwrap_or_default().to_owned();
-        name.push(format!("_{part:03}"));
-        name.push(".");
-        name.push(extension);
+        let [mut name, end] = self.around_number();
+        name.push(format!("{part:03}"));
+        name.push(end);
         self.path.with_file_name(name)
+    }
+
+    /// What is before and behind the number in the names of several files.
+    fn around_number(&self) -> [OsString; 2] {
+        let mut start = self.path.file_stem().unwrap_or_default().to_owned();
+        start.push("_");
+        let mut end = OsString::from(".");
+        end.push(self.path.extension().unwrap_or("mcap".as_ref()));
+        [start, end]
+    }
+
+    /// Files with names that this recording may need later. A recording that ends there would lose the
+    /// rest.
+    fn other_parts(&self) -> Vec<PathBuf> {
+        if self.rotate.is_none() {
+            return Vec::new();
+        }
+        let [start, end] = self.around_number();
+        let number = |name: &OsStr| {
+            let name = name.as_encoded_bytes().strip_prefix(start.as_encoded_bytes())?;
+            str::from_utf8(name.strip_suffix(end.as_encoded_bytes())?).ok()?.parse().ok()
+        };
+        let folder = match self.path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        // A folder that cannot be listed may be written all the same.
+        let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|it| it.file_name());
+        let paths = names.filter_map(|name| Some((number(&name)?, self.path.with_file_name(name))));
+        paths.filter(|(number, path)| self.name(*number) == *path).map(|(_, path)| path).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn files_of_a_rotated_recording_are_numbered() {
