@@ -1,5 +1,7 @@
 //! Rows: the values of several signals at one instant, once they are confirmed.
 
+mod motors;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -11,6 +13,8 @@ use crate::line::LineError;
 use crate::sample::{Sample, Values};
 use crate::signal::{Motor, Signal};
 use crate::subscription::Record;
+
+pub use motors::MotorRows;
 
 /// The values of all signals at one instant.
 #[derive(Debug, Clone)]

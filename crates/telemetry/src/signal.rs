@@ -67,6 +67,16 @@ pub enum UnknownSignal {
     WriteOnly(RegisterId),
 }
 
+impl Motor {
+    /// The number of the motor on its line.
+    pub fn number(self) -> u8 {
+        match self {
+            Motor::St(number) => number.number(),
+            Motor::Rmd(id) => id.number(),
+        }
+    }
+}
+
 impl Signal {
     /// The signal of a motor with this name: that of a register, of a quantity such as `speed_dps`, or of
     /// a derived value.

@@ -9,11 +9,13 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use motorlink::port::FaultBytes;
+use motorlink_link::fault::Faults;
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
 use motorlink_telemetry::share::message::*;
-use shared::{LIMIT, Share};
+use shared::{LIMIT, PATIENT, Share};
 
 impl Share {
     fn join(&self, name: &str) -> Program {
@@ -138,13 +140,18 @@ impl Program {
     }
 
     fn subscribe(&mut self, signals: &[(&str, u8, &str)], queue: u32) -> u32 {
+        self.subscribe_with(signals, queue, false)
+    }
+
+    fn subscribe_with(&mut self, signals: &[(&str, u8, &str)], queue: u32, rows: bool) -> u32 {
         let signals = signals.iter().map(|&(line, motor, name)| SignalName {
             line: line.to_owned(),
             motor,
             name: name.to_owned(),
         });
         let signals = signals.collect();
-        let ask = Ask::Subscribe { signals, period: 0.01, queue, drop: DropRule::Oldest };
+        let drop = DropRule::Oldest;
+        let ask = Ask::Subscribe { signals, period: 0.01, queue, drop, rows };
         match self.ask(ask) {
             Ok(Answer::Subscribe { subscription }) => subscription,
             other => panic!("{other:?}"),
@@ -250,6 +257,70 @@ fn samples_come_with_their_columns_while_another_program_commands() {
     assert!(rates.iter().all(|rate| rate.asked == 0.01), "{rates:?}");
 }
 
+/// The next rows of a subscription with rows, with their group.
+fn rows(viewer: &mut Program, groups: &mut Vec<Group>) -> (Group, Data) {
+    let data = viewer.data();
+    groups.extend(viewer.others.iter().filter_map(|got| match got {
+        Got::Text(Text::Group(group)) => Some(group.clone()),
+        _ => None,
+    }));
+    let group = groups.iter().find(|it| it.group == data.group).expect("described before");
+    (group.clone(), data)
+}
+
+#[test]
+fn rows_have_all_signals_of_a_motor_at_one_instant() {
+    let share = Share::new("rows");
+    let mut viewer = share.join("viewer");
+    let names = ["speed_dps", "voltage_volts", "multi_turn_angle_degrees"];
+    let signals: Vec<_> = [1, 2].iter().flat_map(|id| names.map(|it| ("rmd0", *id, it))).collect();
+    viewer.subscribe_with(&signals, 1000, true);
+    let (mut groups, mut counts) = (Vec::new(), [0; 2]);
+    while counts.iter().any(|count| *count < 20) {
+        let (group, data) = rows(&mut viewer, &mut groups);
+        assert_eq!(group.columns.len(), names.len(), "{group:?}");
+        let voltage = group.columns.iter().position(|it| it.name == "voltage_volts").unwrap();
+        assert!(data.columns[2 + voltage].iter().all(|volts| *volts > 10.0), "{data:?}");
+        assert!(data.columns.iter().flatten().all(|value| value.is_finite()), "{data:?}");
+        assert!(data.columns[0].is_sorted() && data.columns[1].iter().all(|span| *span > 0.0));
+        counts[usize::from(group.motor) - 1] += data.rows();
+    }
+    assert_eq!(
+        groups.iter().map(|it| it.group).collect::<std::collections::BTreeSet<_>>().len(),
+        2
+    );
+}
+
+#[test]
+fn rows_of_a_line_that_repeats_replies_have_no_wrong_value() {
+    let faults: Faults = "dup=0.005".parse().unwrap();
+    let mut faults = faults.on_serial().unwrap();
+    let share = Share::with("rows-dup", PATIENT, move |link| {
+        faults.seed += 1;
+        Box::new(FaultBytes::new(link, &faults))
+    });
+    let mut viewer = share.join("viewer");
+    let gain = |motor: u8| 70 + i16::from(motor);
+    for motor in [1, 2] {
+        let [low, high] = gain(motor).to_le_bytes();
+        let write = |viewer: &mut Program| {
+            viewer.command("st0", motor, &[0x01, 0x05, low, high])?;
+            viewer.ask(Ask::Confirm { line: "st0".to_owned(), motor })
+        };
+        while write(&mut viewer).is_err() {}
+    }
+    viewer.subscribe_with(&[("st0", 1, "SPEED_KP"), ("st0", 2, "SPEED_KP")], 1000, true);
+    let (mut groups, mut count) = (Vec::new(), 0);
+    let end = Instant::now() + LIMIT;
+    while count < 100 {
+        assert!(Instant::now() < end, "{count} rows");
+        let (group, data) = rows(&mut viewer, &mut groups);
+        let expected = f64::from(gain(group.motor));
+        assert!(data.columns[2].iter().all(|value| *value == expected), "{group:?}: {data:?}");
+        count += data.rows();
+    }
+}
+
 #[test]
 fn a_computed_signal_is_a_group_of_its_own() {
     let share = Share::new("computed");
@@ -281,6 +352,7 @@ fn a_computed_signal_is_a_group_of_its_own() {
         period: 0.01,
         queue: 10,
         drop: DropRule::Oldest,
+        rows: false,
     }) else {
         panic!("an ST drive has no such signal")
     };

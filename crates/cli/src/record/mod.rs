@@ -14,7 +14,6 @@ use motorlink_recording::record::{Config, Line, Port, Progress, Recorder};
 use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::message::Protocol;
-use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
 
 use crate::connection::missing_port;
@@ -132,7 +131,7 @@ fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
         return output::print_line(&json!({"event": "recording", "file": file, "lines": lines}));
     }
     let lines = recorder.lines().iter().map(|line| {
-        let motors: Vec<String> = line.motors.iter().map(|it| number(*it).to_string()).collect();
+        let motors: Vec<String> = line.motors.iter().map(|it| it.number().to_string()).collect();
         let noun = if motors.len() == 1 { "motor" } else { "motors" };
         format!("{} ({}), {noun} {}", line.label, line.port, motors.join(", "))
     });
@@ -142,15 +141,8 @@ fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
 }
 
 fn line_object(line: &Line) -> Value {
-    let motors: Vec<u8> = line.motors.iter().map(|motor| number(*motor)).collect();
+    let motors: Vec<u8> = line.motors.iter().map(|motor| motor.number()).collect();
     json!({"label": line.label, "port": line.port, "motors": motors})
-}
-
-fn number(motor: Motor) -> u8 {
-    match motor {
-        Motor::St(number) => number.number(),
-        Motor::Rmd(id) => id.number(),
-    }
 }
 
 /// A line on stderr, if that is a terminal.

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::message::{self, Answer, Ask, Line, Request, Text};
+use motorlink_telemetry::share::dialogue::{Dialogue, Heard};
+use motorlink_telemetry::share::message::{Answer, Ask, Line};
 
 /// The longest time for the answer of a share that does not wait for a drive.
 const ANSWER: Duration = Duration::from_secs(5);
@@ -15,8 +15,7 @@ const ANSWER: Duration = Duration::from_secs(5);
 /// A connection to a share that asks one thing at a time.
 pub struct Connection {
     socket: UnixStream,
-    reader: Reader,
-    last_id: u32,
+    dialogue: Dialogue,
 }
 
 impl Connection {
@@ -25,7 +24,7 @@ impl Connection {
         let socket = UnixStream::connect(path)?;
         socket.set_read_timeout(Some(ANSWER))?;
         socket.set_write_timeout(Some(ANSWER))?;
-        let mut opened = Connection { socket, reader: Reader::default(), last_id: 0 };
+        let mut opened = Connection { socket, dialogue: Dialogue::default() };
         opened.ask(Ask::Hello { protocol: VERSION, name: by.to_owned() })?;
         Ok(opened)
     }
@@ -42,28 +41,20 @@ impl Connection {
 
     /// Sends a request and waits for its answer.
     pub fn ask(&mut self, ask: Ask) -> io::Result<Answer> {
-        self.last_id = self.last_id.wrapping_add(1);
-        let request = message::encode(&Request { id: self.last_id, ask });
-        let mut stream = Vec::new();
-        frame::append(Kind::Text, &request, &mut stream).map_err(io::Error::other)?;
+        let (id, stream) = self.dialogue.request(ask).map_err(io::Error::other)?;
         self.socket.write_all(&stream)?;
         let mut bytes = [0; 4096];
         loop {
-            while let Some(frame) = self.reader.take().map_err(io::Error::other)? {
-                if frame.kind != Kind::Text {
-                    continue;
-                }
-                match message::decode(&frame.payload).map_err(io::Error::other)? {
-                    Text::Answer { id, answer } if id == self.last_id => return Ok(answer),
-                    Text::Refusal { id, message, .. } if id == self.last_id => {
-                        return Err(io::Error::other(message));
-                    }
-                    _ => {}
+            while let Some(heard) = self.dialogue.hear().map_err(io::Error::other)? {
+                if let Heard::Ended(ended) = heard
+                    && ended.id == id
+                {
+                    return ended.result.map_err(|refusal| io::Error::other(refusal.message));
                 }
             }
             match self.socket.read(&mut bytes)? {
                 0 => return Err(io::Error::other("the share closed the connection")),
-                count => self.reader.push(&bytes[..count]),
+                count => self.dialogue.push(&bytes[..count]),
             }
         }
     }

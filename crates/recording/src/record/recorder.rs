@@ -297,11 +297,7 @@ fn drive(
 ) {
     let Opened { runner, line, .. } = opened;
     let mut pairs: Pairs = line.pairs();
-    let number = match motor {
-        Motor::St(number) => number.number(),
-        Motor::Rmd(id) => id.number(),
-    };
-    pairs.insert(drive::MOTOR.to_owned(), number.to_string());
+    pairs.insert(drive::MOTOR.to_owned(), motor.number().to_string());
     let profile = match line.speaks {
         Speaks::St(profile) => profile,
         Speaks::Rmd => Profile::default(),

@@ -25,11 +25,7 @@ pub fn labels(ports: &[String]) -> Vec<String> {
 
 /// `motor1`.
 pub fn motor(motor: Motor) -> String {
-    let number = match motor {
-        Motor::St(number) => number.number(),
-        Motor::Rmd(id) => id.number(),
-    };
-    format!("motor{number}")
+    format!("motor{}", motor.number())
 }
 
 /// The topic of a motor's signals. Those that are read at a lower rate have a topic of their own.

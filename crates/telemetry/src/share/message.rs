@@ -59,6 +59,9 @@ pub enum Ask {
         queue: u32,
         /// What is lost when more would wait.
         drop: DropRule,
+        /// Whether the signals of a motor are one group, whose rows are sent once they are confirmed.
+        #[serde(default, skip_serializing_if = "is_false")]
+        rows: bool,
     },
     /// Ends a subscription.
     Unsubscribe {
@@ -154,6 +157,17 @@ pub enum Text {
     },
     /// The columns of a group. It comes before its first data.
     Group(Group),
+    /// Rows of a subscription with `rows` are missing here: nothing confirms them.
+    Unconfirmed {
+        /// The subscription.
+        subscription: u32,
+        /// The line.
+        line: String,
+        /// The motor.
+        motor: u8,
+        /// How many.
+        rows: u64,
+    },
     /// Something happened.
     Event(Event),
     /// Events before the next text are missing, because the program was too slow.
@@ -430,6 +444,10 @@ pub enum Reason {
 #[derive(Debug, thiserror::Error)]
 #[error("not a message of a share: {0}")]
 pub struct MessageError(#[from] serde_json::Error);
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
 
 /// A text of either side as JSON.
 pub fn encode(message: &impl Serialize) -> Vec<u8> {

@@ -2,15 +2,18 @@
 //!
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
-//! [`server`] connects programs to it through a Unix socket. [`port`] is a line of a share as a port.
+//! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
+//! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port.
 //! [`words`] makes sentences of the events of an engine.
 
 pub mod data;
+pub mod dialogue;
 pub mod frame;
 pub mod hub;
 pub mod message;
 pub mod port;
 pub mod server;
+pub mod stream;
 pub mod words;
 
 /// The version of the messages.

@@ -136,8 +136,9 @@ impl Hub {
                 let line = self.line(&line)?;
                 Ok(Some(Answer::Signals { signals: self.lines[line].columns() }))
             }
-            Ask::Subscribe { signals, period, queue, drop } => {
-                let subscription = self.subscribe(session, &signals, period, queue, drop)?;
+            Ask::Subscribe { signals, period, queue, drop, rows } => {
+                let queue = (queue, drop);
+                let subscription = self.subscribe(session, &signals, period, queue, rows)?;
                 Ok(Some(Answer::Subscribe { subscription }))
             }
             Ask::Unsubscribe { subscription } => {
@@ -203,8 +204,8 @@ impl Hub {
         id: SessionId,
         signals: &[SignalName],
         period: f64,
-        queue: u32,
-        drop: DropRule,
+        (queue, drop): (u32, DropRule),
+        rows: bool,
     ) -> Result<u32, Refused> {
         let mut wanted: BTreeMap<usize, BTreeSet<Signal>> = BTreeMap::new();
         if signals.is_empty() || signals.len() > MOST_SIGNALS {
@@ -229,7 +230,7 @@ impl Hub {
             return Err((Reason::Busy, message));
         }
         session.last_feed += 1;
-        let mut feed = Feed::new(session.last_feed);
+        let mut feed = Feed::new(session.last_feed, rows);
         for (line, signals) in wanted {
             self.lines[line].known.extend(signals.iter().map(|signal| signal.motor));
             feed.add(&self.lines, line, signals, period, (queue as usize, full)).map_err(ended)?;

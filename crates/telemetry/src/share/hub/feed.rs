@@ -3,18 +3,19 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
-use motorlink_proto::time::Micros;
+use motorlink_proto::time::{Instant, Micros};
 
 use super::line::Held;
-use super::place::{number, seconds};
+use super::place::seconds;
 use crate::acquisition::ConsumerId;
 use crate::plan::Wants;
+use crate::rows::{Item, MotorRows, Row};
 use crate::runner::Ended;
-use crate::sample::Values;
+use crate::sample::{Sample, Values};
 use crate::share::data::{Data, TIMES};
 use crate::share::frame::Frame;
 use crate::share::message::{self, Column, Group, Text};
-use crate::signal::Signal;
+use crate::signal::{Motor, Signal};
 use crate::subscription::{Full, Record, Subscription};
 
 /// The most records of a line that are turned into messages at once.
@@ -23,6 +24,8 @@ const AT_ONCE: usize = 2000;
 /// A subscription of a program.
 pub(super) struct Feed {
     id: u32,
+    /// Whether it has confirmed rows.
+    has_rows: bool,
     parts: Vec<Part>,
 }
 
@@ -33,6 +36,7 @@ struct Part {
     /// Set by the engine's thread.
     consumer: Arc<OnceLock<ConsumerId>>,
     wanted: BTreeSet<Signal>,
+    rows: Option<MotorRows>,
     groups: Vec<Open>,
     /// Records that were lost since the last rows.
     lost: u64,
@@ -48,8 +52,8 @@ struct Open {
 }
 
 impl Feed {
-    pub(super) fn new(id: u32) -> Self {
-        Feed { id, parts: Vec::new() }
+    pub(super) fn new(id: u32, has_rows: bool) -> Self {
+        Feed { id, has_rows, parts: Vec::new() }
     }
 
     /// Adds the signals of one line.
@@ -69,8 +73,9 @@ impl Feed {
         held.remote().post(move |engine| {
             let _ = told.set(engine.subscribe(theirs, wants));
         })?;
+        let rows = self.has_rows.then(|| MotorRows::new(wanted.iter().copied()));
         let (groups, lost) = (Vec::new(), 0);
-        self.parts.push(Part { line, subscription, consumer, wanted, groups, lost });
+        self.parts.push(Part { line, subscription, consumer, wanted, rows, groups, lost });
         Ok(())
     }
 
@@ -92,46 +97,101 @@ impl Feed {
         let mut payloads = Vec::new();
         for part in &mut self.parts {
             let name = lines.get(part.line).map_or("", |held| &held.name);
+            let mut out = Out { id: self.id, line: name, last_group, payloads: &mut payloads };
             for _ in 0..AT_ONCE {
-                match part.subscription.take() {
-                    Some(Record::Values(values)) => {
-                        let group = part.add(&values, last_group);
-                        payloads.extend(group.map(|group| {
-                            Frame::text(message::encode(&Text::Group(Group {
-                                subscription: self.id,
-                                line: name.to_owned(),
-                                ..group
-                            })))
-                        }));
+                let Some(record) = part.subscription.take() else { break };
+                if let Record::Lost(records) = record {
+                    part.flush(&mut out);
+                    part.lost += records;
+                }
+                match (&mut part.rows, &record) {
+                    (Some(rows), record) => {
+                        rows.take(record);
+                        part.add_rows(&mut out);
                     }
-                    Some(Record::Lost(records)) => {
-                        part.flush(&mut payloads);
-                        part.lost += records;
-                    }
-                    Some(Record::Event(_)) => {}
-                    None => break,
+                    (None, Record::Values(values)) => part.add_values(values, &mut out),
+                    (None, Record::Event(_) | Record::Lost(_)) => {}
                 }
             }
-            part.flush(&mut payloads);
+            part.flush(&mut out);
         }
         payloads
     }
 }
 
+/// Where the messages of a subscription go.
+struct Out<'a> {
+    id: u32,
+    line: &'a str,
+    last_group: &'a mut u32,
+    payloads: &'a mut Vec<Frame>,
+}
+
+impl Out<'_> {
+    fn text(&mut self, text: &Text) {
+        self.payloads.push(Frame::text(message::encode(text)));
+    }
+}
+
 impl Part {
-    /// Adds a row. Gives its group if it is new.
-    fn add(&mut self, values: &Values, last_group: &mut u32) -> Option<Group> {
+    /// Adds the values of an exchange.
+    fn add_values(&mut self, values: &Values, out: &mut Out<'_>) {
         let columns = values.poll.signals.iter().zip(&values.samples);
         let (signals, row): (Vec<Signal>, Vec<f64>) = columns
             .filter(|(signal, _)| self.wanted.contains(signal))
-            .map(|(signal, sample)| (*signal, sample.map_or(f64::NAN, |sample| sample.value)))
+            .map(|(signal, sample)| (*signal, sample_value(sample.as_ref().ok())))
             .unzip();
+        let span = seconds(values.replied) - seconds(values.requested);
+        self.add(values.poll.motor, signals, (values.time(), span), row, out);
+    }
+
+    /// Adds the rows that are known now.
+    fn add_rows(&mut self, out: &mut Out<'_>) {
+        while let Some((motor, item)) = self.rows.as_mut().and_then(MotorRows::next_item) {
+            match item {
+                Item::Row(row) => {
+                    let of_motor = |signal: &&Signal| signal.motor == motor;
+                    let signals = self.wanted.iter().filter(of_motor).copied().collect();
+                    let value = |sample: &Result<_, _>| sample_value(sample.as_ref().ok());
+                    let values = row.values.iter().map(value).collect();
+                    self.add(motor, signals, (row.time, span(&row)), values, out);
+                }
+                Item::Gap(gap) if gap.unconfirmed > 0 => {
+                    self.flush(out);
+                    out.text(&Text::Unconfirmed {
+                        subscription: out.id,
+                        line: out.line.to_owned(),
+                        motor: motor.number(),
+                        rows: gap.unconfirmed,
+                    });
+                }
+                // The queue counts what is lost.
+                Item::Gap(_) | Item::Lost(_) => {}
+            }
+        }
+    }
+
+    /// Adds a row. Its group is described before.
+    fn add(
+        &mut self,
+        motor: Motor,
+        signals: Vec<Signal>,
+        (time, span): (Instant, f64),
+        row: Vec<f64>,
+        out: &mut Out<'_>,
+    ) {
         let at = self.groups.iter().position(|group| group.signals == signals);
-        let is_new = at.is_none();
         let at = at.unwrap_or_else(|| {
-            *last_group += 1;
+            *out.last_group += 1;
+            out.text(&Text::Group(Group {
+                group: *out.last_group,
+                subscription: out.id,
+                line: out.line.to_owned(),
+                motor: motor.number(),
+                columns: signals.iter().map(Column::of).collect(),
+            }));
             self.groups.push(Open {
-                group: *last_group,
+                group: *out.last_group,
                 columns: vec![Vec::new(); TIMES + signals.len()],
                 signals,
                 sequence: 0,
@@ -139,25 +199,17 @@ impl Part {
             });
             self.groups.len() - 1
         });
-        let open = self.groups.get_mut(at)?;
-        let t = seconds(values.time());
+        let Some(open) = self.groups.get_mut(at) else { return };
+        let t = seconds(time);
         if open.columns.iter().all(Vec::is_empty) {
             open.t0 = t;
         }
-        let span = seconds(values.replied) - seconds(values.requested);
         let row = [t - open.t0, span].into_iter().chain(row);
         open.columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
-        is_new.then(|| Group {
-            group: open.group,
-            subscription: 0,
-            line: String::new(),
-            motor: number(values.poll.motor),
-            columns: open.signals.iter().map(Column::of).collect(),
-        })
     }
 
     /// Makes messages of the rows so far.
-    fn flush(&mut self, payloads: &mut Vec<Frame>) {
+    fn flush(&mut self, out: &mut Out<'_>) {
         for open in &mut self.groups {
             let empty = vec![Vec::new(); open.columns.len()];
             let columns = std::mem::replace(&mut open.columns, empty);
@@ -166,7 +218,7 @@ impl Part {
             if let Some(bytes) = (Data { group, sequence, lost, t0, columns }).encode() {
                 open.sequence = open.sequence.wrapping_add(1);
                 self.lost = 0;
-                payloads.push(Frame::data(bytes));
+                out.payloads.push(Frame::data(bytes));
             }
         }
     }
@@ -176,4 +228,13 @@ impl Column {
     pub(super) fn of(signal: &Signal) -> Self {
         Column { name: signal.source.to_string(), unit: signal.source.unit().to_owned() }
     }
+}
+
+/// From the first request to the last reply, in seconds. The time of a row is in the middle.
+fn span(row: &Row) -> f64 {
+    2.0 * (seconds(row.time) - seconds(row.requested))
+}
+
+fn sample_value(sample: Option<&Sample>) -> f64 {
+    sample.map_or(f64::NAN, |sample| sample.value)
 }

@@ -11,7 +11,7 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
-use super::place::{SessionId, number, seconds, wall_now};
+use super::place::{SessionId, seconds, wall_now};
 use crate::acquisition::Acquisition;
 use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
@@ -164,7 +164,7 @@ impl Held {
     }
 
     fn message(&self, time: Instant, told: Told) -> Event {
-        let motor = told.motor.map(number);
+        let motor = told.motor.map(Motor::number);
         let place = match motor {
             Some(motor) => format!("{}, motor {motor}", self.name),
             None => self.name.clone(),

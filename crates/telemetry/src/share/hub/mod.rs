@@ -22,7 +22,7 @@ use crate::line::{LineError, Reply, Stopped};
 use crate::runner::{CommandResult, Ended};
 use crate::signal::Motor;
 use line::{Configures, Motion};
-use place::{number, wall_now};
+use place::wall_now;
 use session::{Part, Session};
 
 pub use line::Held;
@@ -294,13 +294,13 @@ impl Hub {
                 let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
                     return;
                 };
-                let motor = MotorName { line: held.name.clone(), motor: number(motor) };
+                let motor = MotorName { line: held.name.clone(), motor: motor.number() };
                 session.stopped(part, motor, result.err().map(|error| error.to_string()));
             }
             Work::Unheard(part, motor) => {
                 let Some(held) = self.lines.get(line) else { return };
                 let Some(session) = self.sessions.get_mut(&session) else { return };
-                session.unheard(part, MotorName { line: held.name.clone(), motor: number(motor) });
+                session.unheard(part, MotorName { line: held.name.clone(), motor: motor.number() });
             }
             Work::Rates(part, rates) => {
                 let Some(held) = self.lines.get(line) else { return };
@@ -308,7 +308,7 @@ impl Hub {
                 let named = |rate: Rate| SignalRate {
                     signal: SignalName {
                         line: held.name.clone(),
-                        motor: number(rate.signal.motor),
+                        motor: rate.signal.motor.number(),
                         name: rate.signal.source.to_string(),
                     },
                     asked: rate.asked.0 as f64 / 1e6,

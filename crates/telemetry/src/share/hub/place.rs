@@ -4,19 +4,9 @@ use std::time::SystemTime;
 
 use motorlink_proto::time::Instant;
 
-use crate::signal::Motor;
-
 /// A program at the share. No program has the default.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub(super) u64);
-
-/// The number of a motor on its line.
-pub(super) fn number(motor: Motor) -> u8 {
-    match motor {
-        Motor::St(motor) => motor.number(),
-        Motor::Rmd(id) => id.number(),
-    }
-}
 
 pub(super) fn seconds(at: Instant) -> f64 {
     at.0 as f64 / 1e6

@@ -11,8 +11,9 @@ use motorlink_proto::rmd::{
     Command, MotorId, MotorSet, Payload, SetTorque, SetTorque4, TORQUE4_ID,
 };
 
-use super::connection::{Connection, Ended};
-use super::place::{Place, Refusal};
+use super::connection::Connection;
+use super::place::Place;
+use crate::share::dialogue::{Ended, Refusal};
 use crate::share::message::{Answer, Ask, Reason};
 
 /// Turns the frames of a host into commands, and their answers into replies.

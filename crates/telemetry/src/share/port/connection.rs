@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use motorlink::port::{ByteLink, FdLink, Holder, PortError};
 use motorlink::st::Profile;
 
-use super::place::{Place, Refusal};
+use super::place::Place;
 use crate::share::VERSION;
-use crate::share::frame::{self, Kind, Reader};
-use crate::share::message::{self, Answer, Ask, LONGEST_NAME, Line, Request, Text};
+use crate::share::dialogue::{Dialogue, DialogueError, Ended, Heard};
+use crate::share::message::{Answer, Ask, LONGEST_NAME, Line, Text};
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
@@ -24,19 +24,12 @@ const TIME_TO_LIVE: Duration = Duration::from_secs(1);
 pub(super) struct Connection {
     port: Place,
     socket: FdLink,
-    reader: Reader,
-    last_id: u32,
+    dialogue: Dialogue,
     holder: Holder,
     /// The time to live of the next request, if it is shorter.
     expires: Cell<Duration>,
     /// Why the share closes the connection.
     closing: Option<String>,
-}
-
-/// The end of a request.
-pub(super) struct Ended {
-    pub(super) id: u32,
-    pub(super) result: Result<Answer, Refusal>,
 }
 
 impl Connection {
@@ -55,8 +48,7 @@ impl Connection {
         let mut opened = Connection {
             socket: FdLink::new(stream, port.name())?,
             port: port.clone(),
-            reader: Reader::default(),
-            last_id: 0,
+            dialogue: Dialogue::default(),
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
             closing: None,
@@ -120,11 +112,8 @@ impl Connection {
 
     /// Sends a request; gives its id.
     pub(super) fn ask(&mut self, ask: Ask) -> Result<u32, PortError> {
-        self.last_id = self.last_id.wrapping_add(1);
-        let id = self.last_id;
-        let mut stream = Vec::new();
-        frame::append(Kind::Text, &message::encode(&Request { id, ask }), &mut stream)
-            .map_err(|error| self.port.failed(error.to_string()))?;
+        let request = self.dialogue.request(ask);
+        let (id, stream) = request.map_err(|error| self.port.failed(error.to_string()))?;
         match self.socket.write(&stream) {
             Ok(()) => Ok(id),
             // What came before the end says why.
@@ -144,39 +133,21 @@ impl Connection {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut bytes = [0; 4096];
         loop {
-            while let Some(text) = self.take()? {
-                match text {
-                    Text::Answer { id, answer } => {
-                        return Ok(Some(Ended { id, result: Ok(answer) }));
-                    }
-                    Text::Refusal { id, reason, message, code } => {
-                        let result = Err(Refusal { reason, message, code });
-                        return Ok(Some(Ended { id, result }));
-                    }
-                    Text::Closing { message } => self.closing = Some(message),
-                    Text::Group(_) | Text::Event(_) | Text::Missed { .. } | Text::Later => {}
+            let damaged = |error: DialogueError| self.port.failed(error.to_string());
+            while let Some(heard) = self.dialogue.hear().map_err(damaged)? {
+                match heard {
+                    Heard::Ended(ended) => return Ok(Some(ended)),
+                    Heard::Text(Text::Closing { message }) => self.closing = Some(message),
+                    Heard::Text(_) | Heard::Data(_) => {}
                 }
             }
             let left = deadline.map(|at| at.saturating_duration_since(Instant::now()));
             match self.socket.read(&mut bytes, left) {
                 Ok(0) => return Ok(None),
-                Ok(size) => self.reader.push(&bytes[..size]),
+                Ok(size) => self.dialogue.push(&bytes[..size]),
                 Err(PortError::Closed { .. }) => return Err(self.gone()),
                 Err(error) => return Err(error),
             }
-        }
-    }
-
-    /// The next text that has come.
-    fn take(&mut self) -> Result<Option<Text>, PortError> {
-        let damaged = |error: String| self.port.failed(error);
-        match self.reader.take().map_err(|error| damaged(error.to_string()))? {
-            Some(frame) if frame.kind == Kind::Text => {
-                let text = message::decode(&frame.payload);
-                text.map(Some).map_err(|error| damaged(error.to_string()))
-            }
-            Some(_) => Ok(Some(Text::Later)),
-            None => Ok(None),
         }
     }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use motorlink::port::{NotDone, PortError};
 
+use crate::share::dialogue::Refusal;
 use crate::share::message::{Protocol, Reason};
 
 /// A line of the share at a path.
@@ -12,14 +13,6 @@ pub(super) struct Place {
     pub(super) path: PathBuf,
     pub(super) line: String,
     pub(super) protocol: Protocol,
-}
-
-/// Why a share did not carry a request out.
-pub(super) struct Refusal {
-    pub(super) reason: Reason,
-    pub(super) message: String,
-    /// The error code of a drive.
-    pub(super) code: Option<u8>,
 }
 
 impl Place {

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use motorlink::port::{ByteLink, Evented, Holder, Link, PortError};
 use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Parse};
 
-use super::connection::{Connection, Ended};
+use super::connection::Connection;
 use super::place::Place;
+use crate::share::dialogue::Ended;
 use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a master into commands, and their answers into replies.
