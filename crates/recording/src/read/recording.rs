@@ -1,5 +1,6 @@
 //! An open recording.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::ops::Range;
