@@ -117,7 +117,7 @@ impl Reading {
     pub fn value(&self) -> f64 {
         match self.ty() {
             Some(Type::F32) => f64::from(f32::from_bits(self.bits as u32)),
-            Some(Type::U32) => f64::from(self.bits as u32),
+            Some(Type::U32) | None => f64::from(self.bits as u32),
             _ => f64::from(self.bits) * unit(self.register).scale(self.profile),
         }
     }
@@ -313,7 +313,17 @@ mod tests {
         for (ohms, text) in [(0.25f32, "0.25 Ω"), (0.35, "0.35 Ω"), (-0.0, "0 Ω")] {
             assert_eq!(shown(RegisterId::SC_RS, ohms.to_bits() as i32, spec), text);
         }
-        assert_eq!(shown(RegisterId(0xC0), -1, spec), "-1");
+    }
+
+    #[test]
+    fn an_unknown_register_has_no_sign() {
+        let register = RegisterId(0xC0);
+        assert!(register.shape().is_none());
+        for (bits, value) in [(-1, 4_294_967_295.0), (255, 255.0)] {
+            let reading = Reading { register, bits, profile: Profile::Spec };
+            assert_eq!((reading.value(), reading.digits()), (value, value as i64));
+            assert_eq!(reading.to_string(), value.to_string());
+        }
     }
 
     #[test]
