@@ -15,6 +15,7 @@ import pytest
 
 from program import PATIENT, Outcome, Running, Sim, environment
 from terminal import Terminal
+from wireshark import dissector, packets, sets, tshark  # noqa: F401
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -2,89 +2,15 @@
 in the same frames (crates/spec/examples/wireshark_frames).
 """
 
-import json
 import math
-import os
 import random
 import shutil
-import subprocess
-from collections import defaultdict
-from pathlib import Path
 
 import pytest
 from pcapng import COOKED, EXTENDED, REMOTE, RTAC_SERIAL, SOCKETCAN, USER0, Capture
+from wireshark import ALL_RMD, ALL_ST, GET_SPEED, NACK, PROFILES, SPEED_1500, USER0_IS_ST, on_can, on_line
 
 pytestmark = pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
-
-PROFILES = ("spec", "mcsdk-5.4")
-ALL_RMD, ALL_ST = ["motorlink.rmd.claim:all"], ["motorlink.st.claim:all"]
-USER0_IS_ST = 'uat:user_dlts:"User 0 (DLT=147)","motorlink.st","0","","0",""'
-
-
-@pytest.fixture(scope="session")
-def dissector(run, tmp_path_factory):
-    path = tmp_path_factory.mktemp("wireshark") / "motorlink.lua"
-    done = run("spec", "wireshark", "-o", path)
-    assert done.code == 0, done.err
-    return path
-
-
-@pytest.fixture(scope="session")
-def tshark(dissector, tmp_path_factory):
-    """Runs tshark on a capture. No run may report an error of Lua."""
-    home = tmp_path_factory.mktemp("home")
-
-    def tshark(capture, *arguments, preferences=()):
-        path = capture.write(home / f"{random.getrandbits(64):x}.pcapng")
-        command = ["tshark", "-n", "-r", path, "-X", f"lua_script:{dissector}", *arguments]
-        for preference in preferences:
-            command += ["-o", preference]
-        own = {"HOME": str(home), "XDG_CONFIG_HOME": str(home), "XDG_DATA_HOME": str(home)}
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, **own})
-        assert done.returncode == 0 and "lua" not in done.stderr.lower(), done.stderr
-        assert "Lua Error" not in done.stdout and "_ws.lua.error" not in done.stdout
-        path.unlink()
-        return done.stdout
-
-    return tshark
-
-
-@pytest.fixture(scope="session")
-def packets(tshark):
-    """The fields of each packet, by name: `{name: [value, ..]}`."""
-
-    def packets(capture, *arguments, preferences=()):
-        out = tshark(capture, "-T", "json", *arguments, preferences=preferences)
-        found = json.loads(out, object_pairs_hook=lambda pairs: pairs)
-        assert len(found) == capture.count
-        return [flat(dict(dict(packet)["_source"])["layers"]) for packet in found]
-
-    return packets
-
-
-def flat(pairs, fields=None):
-    fields = defaultdict(list) if fields is None else fields
-    for name, value in pairs:
-        if isinstance(value, list):
-            flat(value, fields)
-        elif name.startswith(("motorlink.", "can.")):
-            fields[name].append(value)
-    return fields
-
-
-@pytest.fixture(scope="session")
-def sets(motorlink):
-    """The frames of the example, by set."""
-    frames = Path(motorlink).parent / "examples/wireshark_frames"
-    if not frames.exists():
-        pytest.fail(f"{frames} is not built: `cargo build -p motorlink-spec --example wireshark_frames`")
-    done = subprocess.run([frames], capture_output=True, text=True, check=True, timeout=60)
-    sets = defaultdict(list)
-    for line in done.stdout.splitlines():
-        frame = json.loads(line)
-        frame["data"] = bytes.fromhex(frame["data"])
-        sets[frame["set"]].append(frame)
-    return sets
 
 
 def same(name, got, expected):
@@ -129,21 +55,6 @@ def check(frame, fields, number):
         assert link[0] == [str(number - 1)] and [float(time) for time in link[1]] == [0.001], (number, link)
     else:
         assert link == ([], [])
-
-
-def on_can(frames, told=True):
-    capture = Capture(SOCKETCAN)
-    for frame in frames:
-        capture.can(frame["id"], frame["data"], frame["sent"] if told else None)
-    return capture
-
-
-def on_line(frames):
-    capture = Capture(RTAC_SERIAL)
-    for frame in frames:
-        # So late that no reply to an earlier request comes any more.
-        capture.serial(frame["data"], frame["sent"], after_ms=1001 if frame["sent"] else 1)
-    return capture
 
 
 AS_HOST = [*ALL_RMD, "motorlink.rmd.direction:host"]
@@ -245,9 +156,6 @@ def test_a_frame_that_the_other_end_or_a_silence_cuts_is_truncated(packets, sets
             check(frame if is_last else {**frame, "notes": ["truncated"]}, fields, number)
 
 
-GET_SPEED = bytes.fromhex("02011e21")
-SPEED_1500 = bytes.fromhex("f004dc050000d6")
-NACK = bytes.fromhex("ff010a0b")
 def test_frames_are_found_however_packets_divide_them(packets, sets):
     """One packet for each byte, and packets of many frames, in place of a packet for each frame."""
     frames = [frame for frame in sets["st spec"] if len(frame["data"]) < 12][:400]
@@ -269,90 +177,6 @@ def test_frames_are_found_however_packets_divide_them(packets, sets):
     [fields] = packets(together)
     assert len(fields["motorlink.st.checksum.status"]) == len(sent)
     assert [int(code, 0) for code in fields["motorlink.st.header"]] == [data[0] for data in sent]
-
-
-def test_a_frame_in_several_packets_is_whole_in_the_last(packets):
-    capture = Capture(RTAC_SERIAL)
-    capture.serial(GET_SPEED, True)
-    for part in (SPEED_1500[:1], SPEED_1500[1:3], SPEED_1500[3:] + NACK[:2], NACK[2:]):
-        capture.serial(part, False)
-    request, first, second, third, last = packets(capture, "-2")
-    assert request["motorlink.st.response_in"] == ["4"]
-    for part in (first, second):
-        assert part["motorlink.st.whole_in"] == ["4"] and not part["motorlink.st.incomplete"]
-    assert third["motorlink.st.reg.speed_meas"] == ["1500"] and third["motorlink.st.value"] == ["1500"]
-    assert third["motorlink.st.response_to"] == ["1"] and third["motorlink.st.whole_in"] == ["5"]
-    assert last["motorlink.st.error"] == ["0x0a"] and last["motorlink.st.unasked"] == [""]
-
-
-def test_damage_is_shown_where_it_is(packets, tshark):
-    capture = Capture(RTAC_SERIAL)
-    capture.serial(GET_SPEED, True)
-    capture.serial(b"\x55\x03" + SPEED_1500, False)
-    capture.serial(GET_SPEED[:-1] + b"\x00", True)
-    capture.serial(b"\x02\xff\xff" + GET_SPEED, True)
-    capture.serial(SPEED_1500[:4] + b"\x06" + SPEED_1500[5:], False)
-    capture.serial(GET_SPEED, True)
-    capture.serial(b"\x10" + SPEED_1500[:3] + SPEED_1500, False)
-    capture.serial(b"\x00\x00\x00", True)
-    capture.serial(b"\x02\x04" + GET_SPEED + GET_SPEED, True)
-    noise, bad_request, bad_length, bad_reply, _, twice, zeros, swallowed = packets(capture, "-2")[1:]
-    assert noise["motorlink.st.stray"] == ["55:03"] and noise["motorlink.st.value"] == ["1500"]
-    assert noise["motorlink.st.response_to"] == ["1"]
-    assert bad_request["motorlink.st.bad_checksum"] == [""] and bad_request["motorlink.st.checksum.status"] == ["0"]
-    assert bad_request["motorlink.st.checksum.calculated"] == ["0x21"]
-    assert not bad_request["motorlink.st.response_in"] and not bad_request["motorlink.st.register"]
-    assert bad_length["motorlink.st.stray"] == ["02:ff:ff"] and bad_length["motorlink.st.register"] == ["0x1e"]
-    assert bad_reply["motorlink.st.bad_checksum"] == [""] and not bad_reply["motorlink.st.value"]
-    assert twice["motorlink.st.stray"] == ["10:f0:04:dc"]
-    assert twice["motorlink.st.value"] == ["1500"] and twice["motorlink.st.response_to"] == ["6"]
-    assert zeros["motorlink.st.unknown_code"] == [""] and zeros["motorlink.st.checksum.status"] == ["1"]
-    # A wrong length does not swallow the frames behind it.
-    assert swallowed["motorlink.st.stray"] == ["02:04"] and swallowed["motorlink.st.register"] == ["0x1e"] * 2
-    info = tshark(capture, "-T", "fields", "-e", "_ws.col.Info").splitlines()
-    assert info[1] == "< 2 bytes that are no frame | < ACK 1500 rpm"
-    assert info[2] == "> bad checksum 0x00 instead of 0x21"
-
-
-def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
-    """The same cases as those of `motorlink decode`."""
-    speed, reference, status = (frame_of(b"\x22", bytes([register])) for register in (0x1E, 0x04, 0x02))
-    configure = [frame_of(b"\x2e", bytes([0, register])) for register in (0x1E, 0x04)]
-    reply, short, done = (frame_of(b"\xf0", data) for data in (bytes([7, 0, 0, 0]), b"\0", b""))
-    segment = frame_of(b"\x2d", b"\0")
-    line = Capture(RTAC_SERIAL)
-    texts = []
-
-    def exchange(data, text=None, after_ms=1):
-        line.serial(data, data[0] != 0xF0, after_ms=after_ms)
-        texts.append(text)
-
-    doubtful = "< ACK, 4 bytes, to one of several requests"
-    # A retry: two replies may come.
-    exchange(speed), exchange(speed), exchange(reply, "< ACK 7 rpm")
-    exchange(reference), exchange(reply, doubtful), exchange(reply, "< ACK 7 rpm")
-    # Each reply may be that of the request before.
-    exchange(speed), exchange(reference), exchange(reply, doubtful)
-    exchange(speed), exchange(reply, doubtful)
-    # The size tells it.
-    exchange(status), exchange(short, "< ACK IDLE")
-    # No reply comes after a second.
-    exchange(reference), exchange(speed, after_ms=1001), exchange(reply, "< ACK 7 rpm")
-    exchange(configure[0]), exchange(done, "< ACK"), exchange(segment), exchange(reply, "< ACK SPEED_MEAS 7 rpm")
-    exchange(frame_of(b"\x23", b"\x07")), exchange(configure[1]), exchange(done, "< ACK")
-    exchange(segment, after_ms=1001), exchange(reply, "< ACK, 4 bytes")
-    info = tshark(line, "-T", "fields", "-e", "_ws.col.Info").splitlines()
-    assert [text if text is None else shown for text, shown in zip(texts, info)] == texts
-    for fields, text in zip(packets(line, "-2"), texts):
-        if text == doubtful:
-            assert fields["motorlink.st.doubtful"] == [""] and not fields["motorlink.st.response_to"]
-            assert not fields["motorlink.st.value"] and not fields["motorlink.st.unasked"]
-
-
-def frame_of(header, payload):
-    """A frame of ST's protocol."""
-    total = header[0] + len(payload) + sum(payload)
-    return header + bytes([len(payload)]) + payload + bytes([((total >> 8) + total) & 0xFF])
 
 
 def test_requests_and_replies_are_linked(packets):
@@ -512,33 +336,3 @@ def test_random_bytes_raise_no_error_of_lua(packets, passes):
     for profile in PROFILES:
         found = packets(serial, *passes, preferences=[*ALL_ST, USER0_IS_ST, f"motorlink.st.profile:{profile}"])
         assert sum("motorlink.st.message" in fields for fields in found) > 200
-
-
-def test_a_packet_of_noise_is_searched_once(packets):
-    """If the rest of the packet was searched for each broken frame, this would take minutes."""
-    serial = Capture(RTAC_SERIAL)
-    serial.serial(bytes.fromhex("010005") * 20_000, True)
-    serial.serial(GET_SPEED, True)
-    noise, behind = packets(serial, preferences=ALL_ST)
-    assert len(noise["motorlink.st.bad_checksum"]) == 20_000 and behind["motorlink.st.register"] == ["0x1e"]
-
-
-def test_no_byte_of_a_line_is_left_out(tshark):
-    """Frames, parts of frames and stray bytes are together the bytes of each packet."""
-    numbers = random.Random(7)
-    serial = Capture(RTAC_SERIAL)
-    sizes = []
-    for _ in range(1500):
-        data = numbers.choice([GET_SPEED, SPEED_1500, NACK, numbers.randbytes(4)])
-        data = data[: numbers.randint(1, 8)] + numbers.choice([b"", GET_SPEED, SPEED_1500])
-        sizes.append(len(data))
-        serial.serial(data, numbers.random() < 0.5)
-    for passes in ((), ("-2",)):
-        out = tshark(serial, "-T", "jsonraw", "-J", "motorlink.st", *passes, preferences=ALL_ST)
-        found = json.loads(out, object_pairs_hook=lambda pairs: pairs)
-        for number, (packet, size) in enumerate(zip(found, sizes), 1):
-            layers = dict(dict(packet)["_source"])["layers"]
-            shown = [value for name, value in layers if name == "motorlink.st_raw"]
-            # A frame that ends in this packet has the bytes of the packets before, too.
-            places = [(place[1], place[2]) for place in shown]
-            assert sum(place[1] for place in places) == size, (number, places)
