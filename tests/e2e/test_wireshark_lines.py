@@ -74,6 +74,7 @@ def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
     # Each reply may be that of the request before.
     exchange(speed), exchange(reference), exchange(reply, doubtful)
     exchange(speed), exchange(reply, doubtful)
+    exchange(speed, after_ms=1001), exchange(reference), exchange(speed), exchange(reply, doubtful)
     # The size tells it.
     exchange(status), exchange(short, "< ACK IDLE")
     # No reply comes after a second.
@@ -87,6 +88,35 @@ def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
         if text == doubtful:
             assert fields["motorlink.st.doubtful"] == [""] and not fields["motorlink.st.response_to"]
             assert not fields["motorlink.st.value"] and not fields["motorlink.st.unasked"]
+
+
+def test_a_length_over_128_begins_no_frame(packets):
+    serial = Capture(RTAC_SERIAL)
+    for length in (128, 129):
+        serial.serial(frame_of(b"\x01", b"\x08" + bytes(length - 1)), True)
+    # It is no frame at once, although its bytes have not come.
+    serial.serial(bytes.fromhex("0181"), True, after_ms=1001)
+    longest, longer, begun = packets(serial, preferences=ALL_ST)
+    assert longest["motorlink.st.length"] == ["128"] and longest["motorlink.st.checksum.status"] == ["1"]
+    assert not longer["motorlink.st.checksum.status"] and longer["motorlink.st.no_frame"] == [""]
+    assert begun["motorlink.st.stray"] == ["01:81"] and not begun["motorlink.st.incomplete"]
+
+
+def test_a_request_that_is_too_short_says_what_a_drive_answers(tshark):
+    serial, expected = Capture(RTAC_SERIAL), []
+    for code, payload, name, answer in (
+        (1, b"", "SET_REG", "WRONG_SET"),
+        (2, b"", "GET_REG", "GET_WRITE_ONLY"),
+        (3, b"", "EXECUTE_CMD", "WRONG_CMD"),
+        (7, bytes(5), "SET_RAMP", "WRONG_SET"),
+        (8, b"", "GET_REVUP_DATA", "WRONG_SET"),
+        (9, bytes(8), "SET_REVUP_DATA", "WRONG_SET"),
+        (10, bytes(3), "SET_CURRENT_REF", "WRONG_SET"),
+    ):
+        serial.serial(frame_of(bytes([0x20 | code]), payload), True)
+        expected.append(f"> {name}, too short, motor 1\tthe payload is too short: a drive answers {answer}")
+    out = tshark(serial, "-T", "fields", "-e", "_ws.col.Info", "-e", "_ws.expert.message", preferences=ALL_ST)
+    assert out.splitlines() == expected
 
 
 def test_a_packet_of_noise_is_searched_once(packets):
