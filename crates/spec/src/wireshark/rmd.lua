@@ -180,16 +180,27 @@ local function describe(fields, tvb)
     return table.concat(shown, ",")
 end
 
--- Whether the bytes that the request does not use are 0, as hosts send them.
-local function may_be_request(command, tvb)
+-- The bytes that the request of each command does not use.
+for _, command in pairs(table_of.commands) do
     local used = {}
     for _, field in ipairs(command.request) do
         for at = field.offset, field.offset + field.len - 1 do
             used[at] = true
         end
     end
+    command.unused = {}
     for at = 1, 7 do
-        if not used[at] and tvb(at, 1):uint() ~= 0 then
+        if not used[at] then
+            table.insert(command.unused, at)
+        end
+    end
+end
+
+-- Whether the bytes that the request does not use are 0, as hosts send them.
+local function may_be_request(command, tvb)
+    local bytes = tvb:raw()
+    for _, at in ipairs(command.unused) do
+        if bytes:byte(at + 1) ~= 0 then
             return false
         end
     end
@@ -328,8 +339,8 @@ end
 
 local function add_replies(tree, pinfo, frame)
     local replies = 0
-    for motor = 1, table_of.motors do
-        if frame.by and frame.by[motor] then
+    for motor = 1, next(frame.by) and table_of.motors or 0 do
+        if frame.by[motor] then
             add_links(tree, links, frame.time, nil, frame.by[motor])
             replies = replies + 1
         end
