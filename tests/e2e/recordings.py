@@ -47,9 +47,9 @@ class Recording:
         text = TOML.encode()
         self.writer.add_attachment(START, START, f"{label}_motor{motor}.toml", "application/toml", text)
 
-    def topic(self, name, kind, definition):
+    def topic(self, name, kind, definition, facts=None):
         schema = self.writer.register_schema(kind, "ros2msg", (definition + TIME).encode())
-        self.channels[name] = self.writer.register_channel(name, "cdr", schema)
+        self.channels[name] = self.writer.register_channel(name, "cdr", schema, facts or {})
 
     def signals(self, topic, **units):
         """Declares signals with their units, in capitals as keywords."""

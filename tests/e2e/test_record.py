@@ -19,6 +19,7 @@ from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from peers import Plug
 from program import PATIENT, environment, eventually
+from test_printed_text import HOSTILE, is_clean
 
 SCENARIO = Path(__file__).parents[2] / "scenarios/position-moves.toml"
 QUICK = ("--rate", "50", *PATIENT)
@@ -162,6 +163,21 @@ def test_an_existing_file_is_kept(run, drives, tmp_path):
     assert path.read_text() == "old"
     run("record", "-p", drives.st, "-o", path, "--force", "--duration", "500ms", *QUICK).ended(0)
     assert File(path).of("/st0/motor1/signals")
+
+
+def test_the_name_of_the_file_is_shown_without_control_characters(run, drives, tmp_path):
+    path = tmp_path / f"{HOSTILE.removesuffix('error: fake')}.mcap"
+    done = run("record", "-p", drives.st, "-o", path, "--duration", "300ms", *QUICK).ended(0)
+    assert is_clean(done.out) and is_clean(done.err), done.err
+    done = run("record", "-p", drives.st, "-o", path, *QUICK).ended(2)
+    assert is_clean(done.err), done.err
+
+
+def test_a_fifo_is_refused_at_once(run, tmp_path):
+    path = tmp_path / "fifo"
+    os.mkfifo(path)
+    done = run("record", "-p", "sim:", "-o", path, "--force").ended(3)
+    assert "it is not a regular file" in done.err
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_port_is_opened(run, tmp_path):

@@ -266,6 +266,42 @@ def test_texts_of_a_recording_are_shown_without_control_characters(run, tmp_path
     assert all(is_shown(text) for text in texts(picture))
 
 
+def test_names_of_lines_and_settings_are_shown_without_control_characters(run, tmp_path):
+    path, log = tmp_path / "run.mcap", tmp_path / "run.log"
+    recording = Recording(path)
+    line = {"label": HOSTILE, "port": HOSTILE, "protocol": "rmd"}
+    recording.topic("/can0/frames", "motorlink/msg/Frame", "uint8 direction\n", line)
+    status = [(1, 0x9C), *[(1, 0)] * 7]
+    recording.add("/can0/frames", 0, (1, 0), (4, 0x141), (1, 0), (4, len(status)), *status)
+    text = f"[settings]\n# {HOSTILE}\n".encode()
+    recording.writer.add_attachment(START, START, "st0_motor1.toml", "application/toml", text)
+    recording.finish()
+    for command in [("decode", "rmd", path), ("convert", path, log)]:
+        done = run(*command).ended(0)
+        assert is_clean(done.out) and is_clean(done.err), done.out
+    assert is_clean(log.read_text())
+    assert is_shown(run("info", path, "--settings", "st0/motor1").ended(0).out)
+
+
+def test_a_topic_may_have_any_length(run, tmp_path):
+    path = tmp_path / "run.mcap"
+    recording = Recording(path)
+    for topic in ("/" + 100_000 * "a", "/b"):
+        recording.topic(topic, "other/msg/Type", "int32 x\n")
+    recording.finish()
+    assert re.search("/b +0 messages", run("info", path).ended(0).out)
+
+
+def test_values_of_any_size_are_drawn(run, tmp_path):
+    path = tmp_path / "run.mcap"
+    recording = Recording(path)
+    recording.signals("/st0/motor1/signals", SPEED_MEAS="rpm")
+    for number, value in enumerate([math.inf, -math.inf, 1.7e308, -1.7e308, 5e-324, 3.4e38, -3.4e38]):
+        recording.row("/st0/motor1/signals", number / 10, value)
+    recording.finish()
+    assert "Speed (rpm)" in texts(run("plot", path, "-o", "-").ended(0).out)
+
+
 def test_a_real_recording_is_shown_converted_and_drawn(run, sim, tmp_path):
     drives, path = sim(), tmp_path / "run.mcap"
     run("record", "-p", drives.st, "-o", path, "--duration", "2s", "--rate", "50", *PATIENT).ended(0)

@@ -49,8 +49,13 @@ pub enum Times<'a> {
     /// At equal intervals from 0 to the end.
     Even,
     /// At these times, s. The line is interrupted where two are further apart than `gap`, and where a
-    /// value is not finite.
+    /// value is not drawn.
     At { times: &'a [f64], gap: f64 },
+}
+
+/// Whether a value is drawn. Drives have no larger ones, and an axis for all `f64` has no end.
+pub fn is_drawn(value: f64) -> bool {
+    value.abs() <= f64::from(f32::MAX)
 }
 
 impl Samples<'_> {
@@ -77,7 +82,7 @@ impl Samples<'_> {
             segments.push(0..self.values.len());
             return segments;
         };
-        for n in (0..self.values.len()).filter(|n| self.values[*n].is_finite()) {
+        for n in (0..self.values.len()).filter(|n| is_drawn(self.values[*n])) {
             match segments.last_mut() {
                 Some(last) if last.end == n && times[n] - times[n - 1] <= gap => last.end += 1,
                 _ => segments.push(n..n + 1),

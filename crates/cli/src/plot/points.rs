@@ -1,10 +1,10 @@
 //! Samples as points of a line.
 
-use super::figure::{Samples, Signal};
+use super::figure::{Samples, Signal, is_drawn};
 
 /// Least and greatest value of signals, with some room around.
 pub fn whole_range<'a>(signals: impl Iterator<Item = &'a Signal<'a>>) -> [f64; 2] {
-    let values = signals.flat_map(|signal| signal.samples.values).filter(|v| v.is_finite());
+    let values = signals.flat_map(|signal| signal.samples.values).filter(|v| is_drawn(**v));
     let range = values.fold(None, |range: Option<[f64; 2]>, &value| {
         let [low, high] = range.unwrap_or([value; 2]);
         Some([low.min(value), high.max(value)])

@@ -119,7 +119,7 @@ fn refused(error: RecordError) -> Failure {
 }
 
 fn broken(error: &WriteError) -> Failure {
-    Failure::unwritten(error.to_string()).trying(
+    Failure::unwritten(printable(&error.to_string())).trying(
         "`motorlink recover` makes a whole file of what is there; make room, or choose another disk",
     )
 }
@@ -136,6 +136,7 @@ fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
         format!("{} ({}), {noun} {}", line.label, line.port, motors.join(", "))
     });
     let lines: Vec<String> = lines.collect();
+    let file = printable(&file);
     note(format!("recording {} to {file}; Ctrl-C ends it", lines.join("; ")));
     Ok(())
 }
@@ -167,7 +168,8 @@ fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
     if args.json {
         return output::print_line(&object("recorded", progress));
     }
-    let files = progress.written.files.iter().map(|path| path.display().to_string());
+    let files = progress.written.files.iter();
+    let files = files.map(|path| printable(&path.display().to_string()));
     let files: Vec<String> = files.collect();
     output::print_line(&format!("recorded {}\n{}", files.join(", "), words(progress)))
 }

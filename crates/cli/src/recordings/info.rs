@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 
-use motorlink_link::printable;
+use motorlink_link::{printable, printable_lines};
 use motorlink_recording::read::{Content, Drive, Metadata, Recording, lost};
 use motorlink_recording::schema::{self, Log, SETTINGS_TYPE, SignalField, Time, drive};
 use serde_json::{Map, Value, json};
@@ -83,7 +83,7 @@ fn settings(
         return Err(Failure::usage(format!("the settings of `{motor}` in {file} are damaged")));
     };
     let object = json!({ "recording": file, "settings": text });
-    printer.result(text.trim_end(), object)
+    printer.result(printable_lines(text.trim_end()), object)
 }
 
 /// What was read of a recording.
@@ -187,7 +187,8 @@ impl Contents {
                 row("", format!("  {line}"));
             }
         }
-        let width = self.topics.iter().map(|topic| topic.name.len()).max().unwrap_or(0);
+        let widths = self.topics.iter().map(|topic| topic.name.len());
+        let width = widths.max().unwrap_or(0).min(SIGNALS);
         for (n, topic) in self.topics.iter().enumerate() {
             let rate = topic.rate().map_or(String::new(), |rate| format!(", {rate:.1} Hz"));
             let text = format!("{:<width$}  {} messages{rate}", topic.name, topic.messages);

@@ -6,6 +6,7 @@ use std::io::{self, Read, Seek};
 use std::sync::Arc;
 
 use motorlink_capture::{Captured, Direction, Stamp, Wire};
+use motorlink_link::printable;
 use motorlink_telemetry::share::words::Speaks;
 
 use super::message::Messages;
@@ -51,7 +52,8 @@ impl<R: Read + Seek> Recording<R> {
                 drive::RMD => Speaks::Rmd,
                 _ => return None,
             };
-            let label = fact(drive::LABEL)?.into();
+            // It becomes a part of captures and of lines on a terminal.
+            let label = printable(fact(drive::LABEL)?).into();
             (schema.name == Frame::TYPE).then(|| Arc::new(Line { label, speaks }))
         };
         self.channels().filter_map(|channel| Some((channel.id, line(channel)?))).collect()
