@@ -301,7 +301,7 @@ fn many_motors_are_confirmed_at_once() {
     let status = rmd::Asked::Request(rmd::Command::encode(&rmd::ReadStatus));
     let mut codes = Vec::new();
     let asked = [(one, rmd::Asked::Confirmation), (two, status)];
-    client.ask_each(&asked, |id, reply| codes.push((id, reply.unwrap()[0]))).unwrap();
+    client.ask_each(&asked, |id, reply, _| codes.push((id, reply.unwrap()[0]))).unwrap();
     codes.sort_unstable();
     assert_ne!(codes[0], (one, rmd::Command::encode(&rmd::ReadStatus)[0]));
     assert_eq!(codes[1], (two, rmd::Command::encode(&rmd::ReadStatus)[0]));

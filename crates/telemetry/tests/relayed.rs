@@ -1,5 +1,7 @@
 //! Lines of clients that have other users.
 
+use std::time::Duration;
+
 use motorlink::rmd::Asked;
 use motorlink::st::{Counters, Exchanged};
 use motorlink::{Clock, rmd, st};
@@ -205,8 +207,7 @@ fn a_client_that_waits_carries_the_steps_out() {
         relayed.advance();
         found.extend(std::iter::from_fn(|| relayed.rows.next_item()));
         for ((), step) in relay.pending() {
-            let result = step.carry_out(&client);
-            relay.ended((), StOver { result, exchanged: Some(client.exchanged()) });
+            relay.ended((), step.carry_out(&client));
         }
     }
     assert_eq!(kinds(&found), ["row"; 20]);
@@ -267,4 +268,33 @@ fn a_bus_that_was_lost_confirms_nothing() {
     relayed.advance();
     let found: Vec<_> = std::iter::from_fn(|| relayed.rows.next_item()).collect();
     assert_eq!(kinds(&found), ["failure"]);
+}
+
+#[test]
+fn a_client_that_its_owner_has_closed_loses_the_line_for_good() {
+    let (relay, mut relayed) = st_line(Profile::Spec, &[]);
+    items(&relay, &mut relayed, 2, |_| 0);
+    relay.close();
+    for _ in 0..100 {
+        relayed.advance();
+    }
+    let lost = relayed.events.iter().filter(|event| matches!(event, What::Lost(_))).count();
+    assert_eq!(lost, 1);
+    assert!(!relayed.events.iter().any(|event| matches!(event, What::Back)));
+    assert_eq!(relayed.engine.advance(&mut |_, _| {}), Some(Duration::MAX));
+}
+
+#[test]
+fn an_owner_is_woken_when_an_exchange_is_pending() {
+    let (relay, mut relayed) = st_line(Profile::Spec, &[]);
+    let waiting = relay.clone();
+    let owner = std::thread::spawn(move || {
+        while waiting.pending().is_empty() {
+            waiting.wait(Duration::from_secs(60));
+        }
+    });
+    while relay.pending().is_empty() {
+        relayed.advance();
+    }
+    owner.join().unwrap();
 }

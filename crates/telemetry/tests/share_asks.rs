@@ -58,7 +58,7 @@ fn each_of_many_motors_is_confirmed_at_once() {
     let port = format!("share:{}/rmd0", path.display()).parse().unwrap();
     let client = Client::open(&port, Default::default()).unwrap();
     let motors = [1, 2, 3].map(|id| (MotorId::new(id).unwrap(), Asked::Confirmation));
-    client.ask_each(&motors, |id, reply| assert!(reply.is_ok(), "{id}")).unwrap();
+    client.ask_each(&motors, |id, reply, _| assert!(reply.is_ok(), "{id}")).unwrap();
     drop(client);
     let confirmed: Vec<u8> = asked
         .iter()

@@ -6,6 +6,7 @@ use motorlink::port::PortName;
 use motorlink::rmd::{Asked, Error, EventClient, MotorId, ScanResult, StopAction};
 use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
+use motorlink_telemetry::line::owner::{Carried, judges};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -13,8 +14,8 @@ use super::{Driven, fileno, outcome, seconds};
 use crate::can::{CanPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::rmd::{
-    Gears, LimitChange, RmdOptions, RmdRequest, RmdSampling, RmdWanted, Sampled, four_currents,
-    judges, motor_id, motor_ids, not_stopped, scan_result,
+    Gears, LimitChange, RmdOptions, RmdRequest, RmdSampling, RmdWanted, four_currents, motor_id,
+    motor_ids, not_stopped, scan_result,
 };
 use crate::sampling::Plan;
 
@@ -75,9 +76,9 @@ fn sampled(
     id: MotorId,
     asked: Asked,
     result: Result<[u8; 8], Error>,
-) -> Sampled {
+) -> Carried {
     let confirmed = if judges(asked, &result) { bus.confirmed(id) } else { Ok(()) };
-    Sampled { result, confirmed, losses: bus.losses(id), sent: bus.sent(id) }
+    Carried { result, confirmed, losses: bus.losses(id), sent: bus.sent(id) }
 }
 
 #[pymethods]

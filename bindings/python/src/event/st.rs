@@ -3,7 +3,7 @@
 use motorlink::port::PortName;
 use motorlink::st::{Confirmation, Error, EventClient, Progress};
 use motorlink::{Clock, LinkState};
-use motorlink_telemetry::line::StExchange;
+use motorlink_telemetry::line::{StExchange, StOver};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -57,7 +57,10 @@ impl InFlight {
         match StExchange::begin(&mut self.client, step) {
             Ok(exchange) => self.asked = Asked::Sampling(sampling, exchange),
             Err(error @ Error::Port(_)) => return Err(error),
-            Err(error) => sampling.get().ended(Err(error), self.client.exchanged()),
+            Err(error) => {
+                let exchanged = Some(self.client.exchanged());
+                sampling.get().ended(StOver { result: Err(error), exchanged });
+            }
         }
         Ok(())
     }
@@ -78,7 +81,8 @@ impl InFlight {
             Asked::Sampling(sampling, exchange) => match exchange.advance(client) {
                 Progress::Wait(wait) => Progress::Wait(wait),
                 Progress::Done(result) => {
-                    sampling.get().ended(result, client.exchanged());
+                    let exchanged = Some(client.exchanged());
+                    sampling.get().ended(StOver { result, exchanged });
                     Progress::Done(Ok(Read::Sampled))
                 }
             },

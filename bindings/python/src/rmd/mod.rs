@@ -14,7 +14,7 @@ pub(crate) use gear::rmd_encoder_degrees;
 pub(crate) use gears::Gears;
 pub(crate) use options::{LimitChange, RmdOptions};
 pub(crate) use request::{RmdRequest, motor_id, rmd_encode, rmd_full_turn_tolerance};
-pub(crate) use sample::{RmdSampling, Sampled, Wanted as RmdWanted, judges, rmd_quantities};
+pub(crate) use sample::{RmdSampling, Wanted as RmdWanted, rmd_quantities};
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
 use motorlink::port::PortError;
-use motorlink::st::{Client, Error, Exchanged, Failure, MotorNumber, Profile, Target};
+use motorlink::st::{Client, Error, Failure, MotorNumber, Profile, Target};
 use motorlink_telemetry::line::{StLine, StOver, StRelay, StStep};
 use motorlink_telemetry::rows::Absent;
 use motorlink_telemetry::signal::{Motor, Signal, Source};
@@ -90,17 +90,18 @@ impl StSampling {
         step: &StStep,
         look: &impl Fn(Python<'_>) -> PyResult<()>,
     ) -> PyResult<()> {
-        match step.carry_out(client) {
+        let over = step.carry_out(client);
+        match &over.result {
             // A signal handler used the client. The row is lost.
             Err(Error::Port(PortError::Overtaken { .. })) => {
                 self.lock().gave_up();
                 Python::attach(look)
             }
-            Err(Error::Port(error)) if error.is_interruption() => {
-                Err(Python::attach(|py| st_error(py, &Error::Port(error))))
+            Err(error @ Error::Port(port)) if port.is_interruption() => {
+                Err(Python::attach(|py| st_error(py, error)))
             }
-            result => {
-                self.ended(result, client.exchanged());
+            _ => {
+                self.ended(over);
                 Ok(())
             }
         }
@@ -112,8 +113,8 @@ impl StSampling {
     }
 
     /// What was pending is over.
-    pub(crate) fn ended(&self, result: Result<Vec<u8>, Error>, exchanged: Exchanged) {
-        if let Some(error) = result.as_ref().err().filter(|error| error.is_line_failure()) {
+    pub(crate) fn ended(&self, over: StOver) {
+        if let Some(error) = over.result.as_ref().err().filter(|error| error.is_line_failure()) {
             match error {
                 // Another user has lost the line.
                 Error::Unconfirmed { why: None, .. } => {}
@@ -123,7 +124,7 @@ impl StSampling {
                 error => self.lock().doubt(error.clone().into()),
             }
         }
-        self.relay.ended((), StOver { result, exchanged: Some(exchanged) });
+        self.relay.ended((), over);
     }
 
     fn begin_rows(&self, most: Option<u64>) {

@@ -211,7 +211,7 @@ impl Client {
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
         let mut outcome = None;
-        self.run(driven, |_, result| outcome = Some(result))?;
+        self.run(driven, |_, result, _| outcome = Some(result))?;
         outcome.expect("an exchange that was begun ends")
     }
 
@@ -258,7 +258,7 @@ impl Client {
             driven.session.check_limits(*id, &exchange.request())?;
         }
         let requests = requests.iter().map(|(id, exchange)| (*id, exchange.request()));
-        self.begin_all(driven, requests, Session::request, |id, result| {
+        self.begin_all(driven, requests, Session::request, |id, result, _| {
             each(id, result.map(|reply| X::reply(&reply)));
         })
     }
@@ -277,20 +277,22 @@ impl Client {
     pub(super) fn insist(
         &self,
         requests: impl Iterator<Item = (MotorId, [u8; 8])> + Clone,
-        each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
+        let each = |id, result, _| each(id, result);
         self.begin_all(self.turns.take(), requests, Session::ask, each)
     }
 
     /// As [`cycle`](Self::cycle), with confirmations among the exchanges. The reply of a confirmation says
-    /// nothing: ask [`confirmed`](Self::confirmed) behind it.
+    /// nothing: ask [`confirmed`](Self::confirmed) behind it. `each` also receives when the request was
+    /// sent.
     ///
     /// # Errors
     /// Errors of the port. `each` receives those of single motors.
     pub fn ask_each(
         &self,
         asked: &[(MotorId, Asked)],
-        each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
         let mut driven = self.turns.take();
         let request = |&(id, asked): &(MotorId, Asked)| match asked {
@@ -322,13 +324,13 @@ impl Client {
         mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
         requests: impl Iterator<Item = (MotorId, [u8; 8])> + Clone,
         begin: fn(&mut Session, time::Instant, MotorId, [u8; 8]) -> Result<(), Error>,
-        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
         driven.ready(requests.clone().map(|(_, request)| request))?;
         for (id, request) in requests {
             let now = driven.port.now();
             if let Err(error) = begin(&mut driven.session, now, id, request) {
-                each(id, Err(error));
+                each(id, Err(error), now);
             }
         }
         self.run(driven, each)
@@ -351,7 +353,7 @@ impl Client {
         let now = driven.port.now();
         driven.session.set_torque4(now, torques, expect)?;
         let mut replies = [const { None }; 4];
-        self.run(driven, |id, result| {
+        self.run(driven, |id, result, _| {
             if let Some(slot) = replies.get_mut(id.index()) {
                 *slot = Some(result.map(|data| MotionStatus::decode(&data)));
             }
@@ -395,7 +397,7 @@ impl Client {
     fn run(
         &self,
         mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
-        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
         let exchange = driven.exchanges;
         while !driven.run(self.turns.next_look(), &mut each)? {
@@ -491,7 +493,7 @@ impl<L: CanLink> Driven<L> {
     fn run(
         &mut self,
         pause: Option<machine::Instant>,
-        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<bool, Error> {
         loop {
             let now = self.port.now();
@@ -501,13 +503,11 @@ impl<L: CanLink> Driven<L> {
                 }
                 SessionOutput::Done(id, result) => {
                     let link = self.port.open_link();
-                    each(
-                        id,
-                        result.map_err(|error| match link {
-                            Some(link) => error.behind(link),
-                            None => error,
-                        }),
-                    );
+                    let result = result.map_err(|error| match link {
+                        Some(link) => error.behind(link),
+                        None => error,
+                    });
+                    each(id, result, self.session.sent(id));
                     Ok(())
                 }
                 SessionOutput::Wait(None) => return Ok(true),

@@ -56,6 +56,9 @@ pub struct Client {
     port: Arc<str>,
 }
 
+/// How an exchange ended, and what the session has seen of it.
+pub type Seen<T> = (Result<T, Error>, Option<Exchanged>);
+
 /// How an exchange ended: with what was made of the acknowledge's payload, and its size.
 type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 
@@ -180,11 +183,6 @@ impl Client {
         result
     }
 
-    /// The last exchange. If other threads use the client, it may be one of theirs, which was later.
-    pub fn exchanged(&self) -> Exchanged {
-        self.turns.take().session.exchanged()
-    }
-
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
         self.turns.take().session.counters()
@@ -238,18 +236,42 @@ impl Client {
         request: &Request<'_>,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
-        self.rules.check(motor, request)?;
+        self.exchange_seen(motor, request, reply).0
+    }
+
+    /// As [`exchange`](Self::exchange), with what the session has seen of it; `None`: nothing was sent.
+    pub fn exchange_seen<T>(
+        &self,
+        motor: u8,
+        request: &Request<'_>,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Seen<T> {
+        if let Err(error) = self.rules.check(motor, request) {
+            return (Err(error), None);
+        }
         let mut driven = self.turns.take();
-        driven.begin(motor, request)?;
-        self.conclude(driven, reply)
+        match driven.begin(motor, request) {
+            Ok(()) => self.conclude(driven, reply),
+            Err(error) => (Err(error), None),
+        }
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
-        let effect = self.rules.check_raw(motor, code, payload)?;
+        self.raw_seen(motor, code, payload).0
+    }
+
+    /// As [`raw`](Self::raw), with what the session has seen of it; `None`: nothing was sent.
+    pub fn raw_seen(&self, motor: u8, code: u8, payload: &[u8]) -> Seen<Vec<u8>> {
+        let begin = |driven: &mut Driven<_>| {
+            let effect = self.rules.check_raw(motor, code, payload)?;
+            driven.begin_raw(motor, code, payload, effect)
+        };
         let mut driven = self.turns.take();
-        driven.begin_raw(motor, code, payload, effect)?;
-        self.conclude(driven, |payload| Some(payload.to_vec()))
+        match begin(&mut driven) {
+            Ok(()) => self.conclude(driven, |payload| Some(payload.to_vec())),
+            Err(error) => (Err(error), None),
+        }
     }
 
     /// Makes sure that the replies since the last confirmation or failed exchange went to their own
@@ -262,21 +284,33 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
+        self.confirm_seen().0
+    }
+
+    /// As [`confirm`](Self::confirm), with what the session has seen of its last exchange; `None`: nothing
+    /// was sent.
+    pub fn confirm_seen(&self) -> Seen<()> {
         let mut confirmation = self.turns.take().session.confirmation();
-        let mut answer = self.answers(&confirmation);
+        let (mut answer, mut seen) = self.answers(&confirmation);
         if matches!(answer, Err(Error::Refused { .. }))
             && self.turns.take().session.repeat(&mut confirmation)
         {
-            answer = self.answers(&confirmation);
+            (answer, seen) = self.answers(&confirmation);
         }
-        self.turns.take().session.confirmed(&confirmation, answer)
+        let mut driven = self.turns.take();
+        let confirmed = driven.session.confirmed(&confirmation, answer);
+        // The judgement may have found a loss.
+        let after = driven.session.exchanged().after;
+        (confirmed, seen.map(|seen| Exchanged { after, ..seen }))
     }
 
-    fn answers(&self, confirmation: &Confirmation) -> Result<(), Error> {
+    fn answers(&self, confirmation: &Confirmation) -> Seen<()> {
         let accepted = |payload: &[u8]| confirmation.accepts(payload.len()).then_some(());
         let mut driven = self.turns.take();
-        driven.ask(confirmation)?;
-        self.conclude(driven, accepted)
+        match driven.ask(confirmation) {
+            Ok(()) => self.conclude(driven, accepted),
+            Err(error) => (Err(error), None),
+        }
     }
 
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
@@ -318,7 +352,7 @@ impl Client {
         &self,
         mut driven: Turn<'_, Driven<Box<dyn ByteLink>>>,
         reply: impl FnOnce(&[u8]) -> Option<T>,
-    ) -> Result<T, Error> {
+    ) -> Seen<T> {
         let mut reply = Some(reply);
         let mut reply = |payload: &[u8]| reply.take()?(payload);
         let exchange = driven.exchanges;
@@ -334,17 +368,19 @@ impl Client {
             let overtaken = driven.exchanges != exchange;
             if overtaken {
                 let overtaken = PortError::Overtaken { port: port.to_string() };
-                return Err(looked.err().unwrap_or(overtaken).into());
+                let seen = driven.session.exchanged();
+                return (Err(looked.err().unwrap_or(overtaken).into()), Some(seen));
             }
             if let Err(error) = looked {
                 break Err(error);
             }
         };
         driven.ended = driven.port.now();
-        match outcome {
+        let result = match outcome {
             Ok(outcome) => driven.session.conclude(outcome),
             Err(error) => Err(driven.lost(error)),
-        }
+        };
+        (result, Some(driven.session.exchanged()))
     }
 }
 

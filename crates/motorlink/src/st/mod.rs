@@ -34,6 +34,7 @@ pub use motorlink_proto::st::{
 };
 
 pub use arrival::ArrivalOptions;
+pub use client::Seen;
 pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::{Error, Target, Unverifiable};
 pub use event::{EventClient, Progress};

@@ -72,26 +72,8 @@ pub struct StExchange {
 }
 
 impl StStep {
-    /// Carries the step out with a client that waits. Gives the payload of the acknowledge.
-    ///
-    /// # Errors
-    /// Those of the client.
-    pub fn carry_out(&self, client: &st::Client) -> Result<Vec<u8>, st::Error> {
-        match self {
-            StStep::Request(motor, request) => {
-                client.exchange(*motor, &request.request(), |payload| self.payload(payload))
-            }
-            StStep::Raw(motor, code, payload) => client.raw(*motor, *code, payload),
-            StStep::Segment(motor, number, _) => {
-                let request = Request::GetSegment(*number);
-                client.exchange(*motor, &request, |payload| self.payload(payload))
-            }
-            StStep::Confirm => client.confirm().map(|()| Vec::new()),
-        }
-    }
-
     /// The payload of the acknowledge; `None` if it does not fit the request.
-    fn payload(&self, payload: &[u8]) -> Option<Vec<u8>> {
+    pub(super) fn payload(&self, payload: &[u8]) -> Option<Vec<u8>> {
         if let StStep::Segment(_, _, registers) = self {
             let values = segment_values(registers, payload)?;
             (values.count() == registers.len()).then_some(())?;

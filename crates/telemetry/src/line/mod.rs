@@ -1,6 +1,7 @@
 //! One open port with a client for either protocol: one exchange a lane at a time.
 
 mod driver;
+pub mod owner;
 mod relay;
 mod rmd;
 mod st;

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink::st::{Counters, Exchanged, Profile, Progress};
@@ -21,7 +21,13 @@ use super::{LineError, Stopped};
 /// The owner carries out what [`pending`](Self::pending) gives, and reports each with
 /// [`ended`](Self::ended). Then it advances the engine.
 #[derive(Debug)]
-pub struct Relay<K, S, E>(Arc<Mutex<Exchanges<K, S, E>>>);
+pub struct Relay<K, S, E>(Arc<Shared<K, S, E>>);
+
+#[derive(Debug)]
+struct Shared<K, S, E> {
+    exchanges: Mutex<Exchanges<K, S, E>>,
+    begun: Condvar,
+}
 
 /// The exchanges of a line to an ST drive: one step at a time.
 pub type StRelay = Relay<(), StStep, StOver>;
@@ -53,6 +59,7 @@ pub struct RmdOver {
 struct Exchanges<K, S, E> {
     pending: BTreeMap<K, S>,
     over: BTreeMap<K, E>,
+    is_closed: bool,
 }
 
 impl<K, S, E> Clone for Relay<K, S, E> {
@@ -64,7 +71,8 @@ impl<K, S, E> Clone for Relay<K, S, E> {
 impl<K, S, E> Default for Relay<K, S, E> {
     fn default() -> Self {
         let (pending, over) = (BTreeMap::new(), BTreeMap::new());
-        Relay(Arc::new(Mutex::new(Exchanges { pending, over })))
+        let exchanges = Mutex::new(Exchanges { pending, over, is_closed: false });
+        Relay(Arc::new(Shared { exchanges, begun: Condvar::new() }))
     }
 }
 
@@ -82,8 +90,24 @@ impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
         }
     }
 
+    /// Waits for this time, or until an exchange is pending.
+    pub fn wait(&self, time: Duration) {
+        let is_idle = |exchanges: &mut Exchanges<K, S, E>| exchanges.pending.is_empty();
+        drop(self.0.begun.wait_timeout_while(self.lock(), time, is_idle));
+    }
+
+    /// The owner has closed its client. The line is lost for good.
+    pub fn close(&self) {
+        self.lock().is_closed = true;
+    }
+
+    fn is_closed(&self) -> bool {
+        self.lock().is_closed
+    }
+
     fn begin(&self, key: K, step: S) {
         self.lock().pending.insert(key, step);
+        self.0.begun.notify_all();
     }
 
     fn cancel(&self, key: K) {
@@ -97,7 +121,7 @@ impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
     }
 
     fn lock(&self) -> MutexGuard<'_, Exchanges<K, S, E>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.exchanges.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -136,7 +160,25 @@ struct Seen {
     judged: Option<u32>,
 }
 
-impl<R: Send> Driver for Relayed<R> {
+/// The exchanges of an owner.
+pub(super) trait Owned: Send {
+    /// Whether the owner has closed its client.
+    fn is_closed(&self) -> bool;
+}
+
+impl Owned for Drive {
+    fn is_closed(&self) -> bool {
+        self.relay.is_closed()
+    }
+}
+
+impl Owned for Motors {
+    fn is_closed(&self) -> bool {
+        self.relay.is_closed()
+    }
+}
+
+impl<R: Owned> Driver for Relayed<R> {
     fn clock(&self) -> Clock {
         self.clock.clone()
     }
@@ -146,13 +188,20 @@ impl<R: Send> Driver for Relayed<R> {
         Duration::MAX
     }
 
-    /// An exchange opens the port again, if it is closed.
+    /// An exchange opens the port again, if it is closed. A client that its owner has closed stays
+    /// closed.
     fn link_state(&self) -> LinkState {
-        LinkState::Open
+        match self.exchanges.is_closed() {
+            true => LinkState::Closed { retry_in: Duration::MAX },
+            false => LinkState::Open,
+        }
     }
 
     fn reopen(&mut self) -> Result<(), LineError> {
-        Ok(())
+        match self.exchanges.is_closed() {
+            true => Err(LineError::Closed),
+            false => Ok(()),
+        }
     }
 
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
