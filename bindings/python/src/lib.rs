@@ -39,7 +39,9 @@ mod _core {
     #[pymodule_export]
     use super::event::{RmdEventClient, StEventClient};
     #[pymodule_export]
-    use super::recording::{RecordingFile, recorded_directions, recorded_results};
+    use super::recording::{
+        RecordedClient, RecordingFile, RecordingInProgress, recorded_directions, recorded_results,
+    };
     #[pymodule_export]
     use super::rmd::{
         RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_arrival, rmd_decode, rmd_encode,

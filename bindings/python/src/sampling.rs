@@ -34,11 +34,16 @@ pub(crate) struct Plan {
     instants: u64,
 }
 
+/// The time between two of `rate` instants a second.
+pub(crate) fn period(py: Python<'_>, rate: f64) -> PyResult<Micros> {
+    let period = span(py, "a time between samples", 1.0 / rate)?.as_secs_f64() * 1e6;
+    Ok(Micros((period.round() as u64).max(1)))
+}
+
 impl Plan {
     /// `rate` instants a second, from the first one for `seconds`; `None`: without end.
     pub(crate) fn new(py: Python<'_>, rate: f64, seconds: Option<f64>) -> PyResult<Self> {
-        let period = span(py, "a time between samples", 1.0 / rate)?.as_secs_f64() * 1e6;
-        let period = Micros((period.round() as u64).max(1));
+        let period = period(py, rate)?;
         let Some(seconds) = seconds else {
             return Ok(Plan { period, instants: u64::MAX });
         };

@@ -79,6 +79,16 @@ impl<T: Send + Sync> Shared<T> {
         line.ok_or_else(|| closed(py, &self.port))
     }
 
+    /// One exchange of a thread that is not Python's. `None` after the close: nothing is done.
+    pub(crate) fn lend<R>(&self, act: impl FnOnce(&T) -> R) -> Option<R> {
+        let _entered = self.under_way.enter();
+        let line = match &*self.line.read().unwrap_or_else(PoisonError::into_inner) {
+            ClientState::Open(line) => Arc::clone(line),
+            ClientState::Closing(_) | ClientState::Closed => return None,
+        };
+        Some(act(&line))
+    }
+
     /// Whether it is closed.
     pub(crate) fn is_closed(&self) -> bool {
         !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), ClientState::Open(_))

@@ -1,5 +1,6 @@
 //! Signals during a wait: their Python handlers run, and may use the bus.
 
+use std::cell::Cell;
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +12,19 @@ use pyo3::prelude::*;
 
 /// Longest delay of a signal, such as Ctrl-C.
 const LOOK: Duration = Duration::from_millis(20);
+
+thread_local! {
+    /// Whether the thread is one of ours: it runs no signal handlers, and never waits for Python.
+    static IS_OURS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does something in a thread that Python does not know.
+pub(crate) fn without_python<T>(act: impl FnOnce() -> T) -> T {
+    IS_OURS.set(true);
+    let done = act();
+    IS_OURS.set(false);
+    done
+}
 
 /// Whether the waits of a bus ignore signals.
 #[derive(Clone, Default)]
@@ -31,7 +45,7 @@ impl Deafness {
         &self,
     ) -> impl Fn() -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sync + 'static {
         let deaf = Arc::clone(&self.0);
-        move || match deaf.load(Ordering::Relaxed) {
+        move || match deaf.load(Ordering::Relaxed) || IS_OURS.get() {
             true => Ok(()),
             false => Ok(Python::attach(|py| py.check_signals())?),
         }

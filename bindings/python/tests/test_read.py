@@ -324,6 +324,7 @@ def test_ctrl_c_ends_the_reading(tmp_path: Path) -> None:
     recordings.short(path)
     program = """
 import signal, sys, threading, motorlink
+motorlink.read(sys.argv[1])
 threading.Timer(0.05, signal.raise_signal, [signal.SIGINT]).start()
 try:
     while True:

@@ -10,6 +10,9 @@ use motorlink_telemetry::runner::Ended;
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::UnknownSignal;
 
+/// The number of "file exists" on all systems.
+const EEXIST: i32 = 17;
+
 /// Why nothing is recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
@@ -70,6 +73,8 @@ pub enum WriteError {
         path: PathBuf,
         /// What the system says.
         why: String,
+        /// The number of the system's error.
+        code: Option<i32>,
         /// Messages that the file has.
         messages: u64,
         /// Bytes that the file has.
@@ -97,6 +102,26 @@ pub enum WriteError {
 }
 
 impl WriteError {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        let (WriteError::Exists { path }
+        | WriteError::Create { path, .. }
+        | WriteError::Write { path, .. }
+        | WriteError::Changed { path, .. }
+        | WriteError::Removed { path, .. }) = self;
+        path
+    }
+
+    /// The number of the system's error, if it gave one.
+    pub fn code(&self) -> Option<i32> {
+        match self {
+            WriteError::Exists { .. } => Some(EEXIST),
+            WriteError::Create { error, .. } => error.raw_os_error(),
+            WriteError::Write { code, .. } => *code,
+            WriteError::Changed { .. } | WriteError::Removed { .. } => None,
+        }
+    }
+
     pub(crate) fn create(path: &Path, error: io::Error) -> Self {
         WriteError::Create { path: path.to_owned(), error: error.into() }
     }

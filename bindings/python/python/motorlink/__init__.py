@@ -7,15 +7,15 @@
 ...     motor.get("SPEED_MEAS")
 0
 
-=======================  =============================================================
-``motorlink.st``       ST drives on a serial line: ``open``, ``scan``, ``Client``, ``Motor``
-``motorlink.rmd``      RMD motors on a CAN bus: ``open``, ``Client``, ``Motor``, requests
-``motorlink.aio``      both protocols for asyncio: ``aio.st``, ``aio.rmd``
-``motorlink.can``      any bus of python-can as a port
-``motorlink.recording``  files with all that drives say: ``motorlink.read`` opens them
-``motorlink.sim``      simulated drives in the process, for tests without hardware
-``motorlink.errors``   the exceptions; all are a ``MotorlinkError``
-=====================  ===============================================================
+=======================  =====================================================================
+``motorlink.st``         ST drives on a serial line: ``open``, ``scan``, ``Client``, ``Motor``
+``motorlink.rmd``        RMD motors on a CAN bus: ``open``, ``Client``, ``Motor``, requests
+``motorlink.aio``        both protocols for asyncio: ``aio.st``, ``aio.rmd``
+``motorlink.can``        any bus of python-can as a port
+``motorlink.recording``  recordings of motors: ``motorlink.record``, ``motorlink.read``
+``motorlink.sim``        simulated drives in the process, for tests without hardware
+``motorlink.errors``     the exceptions; all are a ``MotorlinkError``
+=======================  =====================================================================
 
 ``help(motorlink.st.Motor)`` lists the methods of an ST motor, with their units and errors. The end of
 ``with`` stops the motors that the client started. Clients have no thread of their own. Threads may
@@ -53,6 +53,7 @@ __all__ = [
     "can",
     "errors",
     "read",
+    "record",
     "recording",
     "rmd",
     "sim",
@@ -80,13 +81,13 @@ if TYPE_CHECKING:
         ReplyTimeoutError,
         SettingsError,
     )
-    from motorlink.recording import read
+    from motorlink.recording import read, record
 else:
     _FROM = {"__version__": "motorlink._core"}
     _FROM |= dict.fromkeys(("Sample", "Sampling", "to_pandas"), "motorlink._sampling")
     _FROM |= dict.fromkeys(("SettingDifference", "Settings", "SettingsDump"), "motorlink._settings")
 
-    _FROM["read"] = "motorlink.recording"
+    _FROM |= dict.fromkeys(("read", "record"), "motorlink.recording")
 
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import warnings
@@ -62,7 +63,7 @@ Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
 
 def when_left_open(
-    client: object, close: Close, port: str, *, stop_on_signals: bool
+    client: AnyClient, close: Close, port: str, *, stop_on_signals: bool
 ) -> Callable[[], None]:
     """Closes a client that was left open, when it is garbage-collected or its program ends.
 
@@ -78,8 +79,29 @@ def when_left_open(
                 release()
 
     release = before_signals(end) if stop_on_signals else lambda: None
-    weakref.finalize(client, end)
+    _left_open[client] = weakref.finalize(client, end)
     return release
+
+
+#: What closes each client that was not garbage-collected.
+_left_open: weakref.WeakKeyDictionary[AnyClient, weakref.finalize[..., Any]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def close_left_open() -> None:
+    """Closes the clients that were left open, as the end of the program does."""
+    for close in list(_left_open.values()):
+        close()
+
+
+def is_any_moving() -> bool:
+    """Whether a client of this program has a motor that moves."""
+    for client in list(_left_open):
+        with contextlib.suppress(MotorlinkError):
+            if client._core.moving:
+                return True
+    return False
 
 
 def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bool) -> None:

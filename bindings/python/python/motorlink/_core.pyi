@@ -17,7 +17,9 @@ __all__ = [
     "Arrival",
     "CanPort",
     "MotorSettings",
+    "RecordedClient",
     "RecordingFile",
+    "RecordingInProgress",
     "RMD_FULL_TURN_TOLERANCE",
     "RMD_QUARANTINE",
     "RMD_SCAN_WIDTH",
@@ -256,6 +258,7 @@ class StClient:
     @staticmethod
     def open(port: str | SimPort, options: StOptions) -> StClient: ...
     def exchange(self, motor: int, request: StRequest) -> Any: ...
+    def recorded(self, profile: str, segments: Sequence[int]) -> RecordedClient: ...
     def check(self, motor: int, request: StRequest) -> None: ...
     def set_verified(self, motor: int, request: StRequest, attempts: int) -> int: ...
     def confirm(self) -> None: ...
@@ -330,6 +333,7 @@ class RmdClient:
     @staticmethod
     def open(port: str | SimPort | CanPort, options: RmdOptions) -> RmdClient: ...
     def exchange(self, id: int, request: RmdRequest) -> Any: ...
+    def recorded(self) -> RecordedClient: ...
     def confirm(self, id: int) -> None: ...
     @property
     def now(self) -> float: ...
@@ -548,6 +552,43 @@ class CanPort:
     def __new__(cls, bus: Any, message: Any, name: str) -> CanPort: ...
     @property
     def name(self) -> str: ...
+
+@final
+class RecordedClient:
+    """An open client to record."""
+
+@final
+class RecordingInProgress:
+    """A recording in progress."""
+
+    @staticmethod
+    def start(
+        ports: Sequence[str],
+        clients: Sequence[RecordedClient],
+        path: str | Path,
+        signals: Sequence[str],
+        rate: float,
+        profile: str,
+        timeout: float | None,
+        motors: Sequence[int],
+        ids: Sequence[int],
+        settings: bool,
+        force: bool,
+        max_size: int | None,
+        rotate_size: int | None,
+        rotate_seconds: float | None,
+        fsync: float | None,
+        command: str,
+    ) -> RecordingInProgress: ...
+    @property
+    def motors(self) -> list[str]: ...
+    @property
+    def is_here(self) -> bool: ...
+    def status(
+        self,
+    ) -> tuple[float, list[Path], int, int, int, int, int, int, float | None, float | None, bool]: ...
+    def begin_end(self) -> None: ...
+    def finish(self, wait: float) -> bool: ...
 
 @final
 class RecordingFile:

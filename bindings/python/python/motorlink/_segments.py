@@ -23,8 +23,8 @@ class Segments:
         with self._lock:
             if segment in self._sampled:
                 raise InvalidValueError(
-                    f"data segment {segment} is in use by a sampling; nothing was sent: use another"
-                    " segment, or configure this one before the sampling"
+                    f"data segment {segment} is in use by a sampling or a recording; nothing was sent: use another"
+                    " segment, or configure this one before"
                 )
             self._chosen.setdefault(segment, [])
 

@@ -27,12 +27,13 @@ paragraph in chapter 3 of the document.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from motorlink import _core, _rmd_table
 from motorlink._apis import Blocking
 from motorlink._client import BlockingClient, PortLike, opens
-from motorlink._core import CanPort
+from motorlink._core import CanPort, RecordedClient
 from motorlink._core import RmdClient as Core
 from motorlink._rmd import RmdClient, RmdMotor, ScanResult
 from motorlink._rmd_table import *
@@ -114,6 +115,10 @@ class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort", Sampling]):
         super().__init__(core, **options)
         self._exchange, self._cycle, self._torque4 = core.exchange, core.cycle, core.set_torque4
         self._scan, self._sample, self._confirm = core.scan, core.sample, core.confirm
+
+    def _recorded(self) -> tuple[RecordedClient, Callable[[], None]]:
+        """The client for a recording, and what to call at its end."""
+        return self._core.recorded(), lambda: None
 
 
 open = opens(Client._open)

@@ -34,12 +34,13 @@ its end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from motorlink import _core
 from motorlink._apis import Blocking, carried_out
 from motorlink._client import BlockingClient, PortLike, opens
+from motorlink._core import RecordedClient
 from motorlink._core import StClient as Core
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
@@ -74,6 +75,10 @@ __all__ = [
     "open",
     "scan",
 ]
+
+
+#: Data segments of a recording, if they are free: signals of one motor at two rates.
+_RECORDED_SEGMENTS = 2
 
 
 def __dir__() -> list[str]:
@@ -112,6 +117,15 @@ class Client(BlockingClient, StClient[Motor, PortLike, Sampling]):
         self._exchange, self._exchange_raw = core.exchange, core.raw
         self._set_verified, self._sample = core.set_verified, core.sample
         self._confirm = core.confirm
+
+    def _recorded(self) -> tuple[RecordedClient, Callable[[], None]]:
+        """The client for a recording, and what releases the data segments that it uses."""
+        segments, release = self._segments.for_sampling(_RECORDED_SEGMENTS)
+        try:
+            return self._core.recorded(self._profile, segments), release
+        except BaseException:
+            release()
+            raise
 
 
 open = opens(Client._open)

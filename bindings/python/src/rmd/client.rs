@@ -1,5 +1,7 @@
 //! A CAN bus with RMD motors, blocking.
 
+use std::sync::Arc;
+
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::rmd::{
@@ -7,6 +9,8 @@ use motorlink::rmd::{
     Stopped,
 };
 use motorlink::time;
+use motorlink_recording::record::client::Kind;
+use motorlink_recording::record::frames::Outlet;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
@@ -18,19 +22,22 @@ use super::sample::{RmdSampling, Wanted};
 use crate::can::{AnyPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
+use crate::recording::RecordedClient;
 use crate::sampling::{self, Plan, seconds};
 use crate::shared::Shared;
-use crate::signals::Deafness;
+use crate::signals::{Deafness, without_python};
 use crate::sim::{Port, SimPort};
 use crate::values;
 
 /// A CAN bus with RMD motors. Each call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdClient {
-    bus: Shared<Client>,
+    bus: Arc<Shared<Client>>,
     clock: Clock,
     gears: Gears,
     deafness: Deafness,
+    /// Where recordings see its frames.
+    outlet: Outlet,
     /// The threads of a bus of python-can.
     threads: Option<Threads>,
 }
@@ -41,12 +48,14 @@ impl RmdClient {
     #[staticmethod]
     fn open(py: Python<'_>, port: AnyPort<'_>, options: &RmdOptions) -> PyResult<Self> {
         let RmdOptions { options, gears, ref geared } = *options;
-        let deafness = Deafness::default();
+        let (deafness, outlet) = (Deafness::default(), Outlet::default());
+        let seen = outlet.clone();
         let mut threads = None;
         let (bus, port) = match port {
             AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| invalid_value(py, error))?;
-                let bus = py.detach(|| Client::open(&name, options));
+                let wrap = move |link| seen.around_bus(link);
+                let bus = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus.looking(deafness.look()), name.to_string())
             }
@@ -57,7 +66,7 @@ impl RmdClient {
             AnyPort::Can(port) => {
                 let port = port.get();
                 let mut links = threads.insert(port.start()?).links();
-                let open = Box::new(move || Ok(Box::new(links()) as _));
+                let open = Box::new(move || Ok(seen.around_bus(Box::new(links()))));
                 let bus = Client::open_with(port.name(), open, options);
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus.looking(deafness.look()), port.name().to_owned())
@@ -65,7 +74,8 @@ impl RmdClient {
         };
         geared.iter().for_each(|(id, limits)| bus.set_limits(*id, *limits));
         let clock = bus.clock();
-        Ok(RmdClient { bus: Shared::new(bus, port), clock, gears, deafness, threads })
+        let bus = Arc::new(Shared::new(bus, port));
+        Ok(RmdClient { bus, clock, gears, deafness, outlet, threads })
     }
 
     /// One exchange. Returns the value of the reply.
@@ -210,6 +220,16 @@ impl RmdClient {
     /// The gear ratio of a motor.
     fn gear_ratio(&self, py: Python<'_>, id: i64) -> PyResult<Option<f64>> {
         self.gears.ratio(py, id)
+    }
+
+    /// The client for a recording.
+    fn recorded(&self, py: Python<'_>) -> PyResult<RecordedClient> {
+        self.bus.get(py)?;
+        let shared = Arc::clone(&self.bus);
+        let with = Arc::new(move |act: &mut dyn FnMut(&Client)| {
+            without_python(|| shared.lend(act).is_some())
+        });
+        RecordedClient::new(py, self.bus.port(), &self.clock, &self.outlet, Kind::Rmd { with })
     }
 
     /// Motors that were commanded and neither stopped nor switched off.

@@ -1,27 +1,35 @@
 //! A serial line with an ST drive, blocking.
 
+use std::sync::Arc;
+
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::st::{Client, MotorNumber, Stopped};
 use motorlink::time;
+use motorlink_recording::record::client::Kind;
+use motorlink_recording::record::frames::Outlet;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 
 use super::options::StOptions;
+use super::profile;
 use super::request::{StRequest, motor_number};
 use super::sample::{StSampling, Wanted};
 use crate::error::{invalid_value, st_error};
+use crate::recording::RecordedClient;
 use crate::sampling::{self, Plan, seconds};
 use crate::shared::Shared;
-use crate::signals::Deafness;
+use crate::signals::{Deafness, without_python};
 use crate::sim::{Port, SimPort};
 
 /// A master on a serial line. Each call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StClient {
-    client: Shared<Client>,
+    client: Arc<Shared<Client>>,
     clock: Clock,
     deafness: Deafness,
+    /// Where recordings see its frames.
+    outlet: Outlet,
 }
 
 #[pymethods]
@@ -30,11 +38,13 @@ impl StClient {
     #[staticmethod]
     fn open(py: Python<'_>, port: Port<'_>, options: &StOptions) -> PyResult<Self> {
         let options = options.0;
-        let deafness = Deafness::default();
+        let (deafness, outlet) = (Deafness::default(), Outlet::default());
         let (client, port, clock) = match port {
             Port::Name(name) => {
                 let name: PortName = name.parse().map_err(|error| invalid_value(py, error))?;
-                let client = py.detach(|| Client::open(&name, options));
+                let seen = outlet.clone();
+                let wrap = move |link| seen.around_line(link);
+                let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
                 let client = client.looking(deafness.look());
                 let clock = client.clock();
@@ -45,7 +55,7 @@ impl StClient {
                 (client, SimPort::NAME.to_owned(), port.clock())
             }
         };
-        Ok(StClient { client: Shared::new(client, port), clock, deafness })
+        Ok(StClient { client: Arc::new(Shared::new(client, port)), clock, deafness, outlet })
     }
 
     /// One exchange. Returns the value of the reply.
@@ -143,6 +153,22 @@ impl StClient {
         let (taken, outcome) = py.detach(|| sampling.run(&client, look, skip, most));
         let (rows, skipped) = taken.into_python(py);
         Ok((rows, skipped, outcome.err()))
+    }
+
+    /// The client for a recording, which may use these data segments.
+    fn recorded(
+        &self,
+        py: Python<'_>,
+        profile: &str,
+        segments: Vec<u8>,
+    ) -> PyResult<RecordedClient> {
+        self.client.get(py)?;
+        let (profile, shared) = (profile::named(py, profile)?, Arc::clone(&self.client));
+        let with = Arc::new(move |act: &mut dyn FnMut(&Client)| {
+            without_python(|| shared.lend(act).is_some())
+        });
+        let kind = Kind::St { profile, segments, with };
+        RecordedClient::new(py, self.client.port(), &self.clock, &self.outlet, kind)
     }
 
     /// Motors that this client started and did not stop.

@@ -18,7 +18,7 @@ pub(crate) use client::{StClient, frame_code, not_stopped};
 pub(crate) use options::StOptions;
 pub(crate) use profile::named as profile_named;
 pub(crate) use reply::Answer;
-pub(crate) use request::{StRequest, motor_number};
+pub(crate) use request::{StRequest, motor_number, no_such_motor};
 pub(crate) use sample::{StSampling, Wanted as StWanted};
 pub(crate) use scale::Scale;
 pub(crate) use scan::{st_scan_baud, st_scan_rates};

@@ -398,7 +398,7 @@ pub(crate) fn motor_number(py: Python<'_>, motor: i64) -> PyResult<u8> {
 }
 
 /// The error of a motor number that no drive has.
-pub(super) fn no_such_motor(py: Python<'_>, motor: i64) -> PyErr {
+pub(crate) fn no_such_motor(py: Python<'_>, motor: i64) -> PyErr {
     invalid_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
 }
 

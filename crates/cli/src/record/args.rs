@@ -61,6 +61,8 @@ pub struct Args {
     pub json: bool,
 }
 
+use motorlink_recording::write::{LEAST_ROTATION, LEAST_SIZE};
+
 pub use motorlink_recording::write::Rotate;
 
 /// The units of sizes, and their bytes.
@@ -72,15 +74,13 @@ const UNITS: [(&str, f64); 6] = [
     ("MiB", 1_048_576.0),
     ("GiB", 1_073_741_824.0),
 ];
-/// The least size: a recording without a message has more.
-const LEAST_SIZE: f64 = 1e4;
 
 /// Reads a size with its unit.
 fn parse_size(text: &str) -> Result<u64, String> {
     let found = UNITS.iter().find_map(|(unit, bytes)| Some((text.strip_suffix(unit)?, bytes)));
     let size = found.and_then(|(number, bytes)| Some(number.trim().parse::<f64>().ok()? * bytes));
     match size {
-        Some(size) if (LEAST_SIZE..=1e15).contains(&size) => Ok(size as u64),
+        Some(size) if (LEAST_SIZE as f64..=1e15).contains(&size) => Ok(size as u64),
         Some(_) => Err("it must be 10kB to 1000000GB".to_owned()),
         None => Err("give a number with kB, MB or GB, such as 500MB".to_owned()),
     }
@@ -92,7 +92,7 @@ fn parse_rotate(text: &str) -> Result<Rotate, String> {
         return parse_size(text).map(Rotate::Bytes);
     }
     let span = parse_span(text).map_err(|why| format!("{why}; or give a size, such as 100MB"))?;
-    match span >= Duration::from_secs(1) {
+    match span >= LEAST_ROTATION {
         true => Ok(Rotate::Time(span)),
         false => Err("a file takes 1s at least".to_owned()),
     }

@@ -78,6 +78,7 @@ fn config(args: &Args) -> Result<Config, Failure> {
         std::env::args().map(|word| pasteable::quoted(&word).to_string()).collect();
     Ok(Config {
         ports: args.port.iter().map(port).collect::<Result<_, _>>()?,
+        clients: Vec::new(),
         signals: args.signals.clone(),
         period: args.rate.into(),
         settings: !args.no_settings,

@@ -1,14 +1,16 @@
 //! Frames on the wire: what a tap sees, and serial bytes split into frames.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{Direction as Way, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink::port::{
+    ByteLink, CanLink, Direction as Way, EventBytes, EventCan, TapBytes, TapCan,
+};
 use motorlink_capture::st::{self, Piece};
 use motorlink_proto::st::HEADER_NACK;
 
-use super::wall::{Anchor, wall_now};
+use super::wall::{Anchor, moment, wall_at, wall_now};
 use crate::schema::{Direction, Frame, FrameResult, Time};
 use crate::write::{Queue, Weighed};
 
@@ -90,6 +92,65 @@ impl Taps {
     /// How much was lost, because it was taken too late.
     pub(super) fn lost(&self) -> u64 {
         self.seen.lost()
+    }
+}
+
+/// A place in an open port where taps are put and taken away. Clones are the same place.
+#[derive(Debug, Clone, Default)]
+pub struct Outlet(Arc<Mutex<Vec<Plugged>>>);
+
+#[derive(Debug)]
+struct Plugged {
+    number: u64,
+    seen: Queue<Seen>,
+}
+
+/// Taps in an outlet, until this is dropped.
+#[derive(Debug)]
+pub(super) struct Plug {
+    outlet: Outlet,
+    number: u64,
+}
+
+impl Outlet {
+    /// Around a serial line.
+    pub fn around_line(&self, link: Box<dyn ByteLink>) -> Box<dyn ByteLink> {
+        let (outlet, began) = (self.clone(), moment());
+        Box::new(TapBytes::new(link, move |way, at, bytes: &[u8]| {
+            outlet.see(|| Seen::new(wall_at(began), way, at, Wire::Bytes(bytes.into())));
+        }))
+    }
+
+    /// Around a CAN bus.
+    pub fn around_bus(&self, link: Box<dyn CanLink>) -> Box<dyn CanLink> {
+        let (outlet, began) = (self.clone(), moment());
+        Box::new(TapCan::new(link, move |way, at, frame: &CanFrame| {
+            outlet.see(|| Seen::new(wall_at(began), way, at, Wire::Can(*frame)));
+        }))
+    }
+
+    /// Puts taps in. They see what comes from now on.
+    pub(super) fn plug(&self, taps: &Taps) -> Plug {
+        let mut plugged = self.plugged();
+        let number = plugged.last().map_or(0, |last| last.number + 1);
+        plugged.push(Plugged { number, seen: taps.seen.clone() });
+        Plug { outlet: self.clone(), number }
+    }
+
+    fn see(&self, seen: impl Fn() -> Seen) {
+        for one in &*self.plugged() {
+            one.seen.push(seen());
+        }
+    }
+
+    fn plugged(&self) -> MutexGuard<'_, Vec<Plugged>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Plug {
+    fn drop(&mut self) {
+        self.outlet.plugged().retain(|one| one.number != self.number);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Records drives: [`Recorder`] in threads, [`track`] without one.
 
 pub mod choice;
+pub mod client;
 mod condition;
 pub mod frames;
 mod joint;

@@ -15,6 +15,7 @@ use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
+use super::client::{Client, Lent};
 use super::frames::Taps;
 use super::track::Line;
 use super::wall::Anchor;
@@ -42,21 +43,35 @@ pub(super) struct Opened {
     pub(super) line: Line,
     pub(super) anchor: Anchor,
     pub(super) taps: Taps,
+    /// The client, if it is not the recording's own.
+    pub(super) lent: Option<Lent>,
 }
 
-/// Opens all ports. A port of both kinds gives a serial line and a CAN bus.
-pub(super) fn open(ports: &[Port], by: &Arc<str>) -> Result<Vec<Opened>, RecordError> {
+/// Opens all ports, and takes the clients. A port of both kinds gives a serial line and a CAN bus.
+pub(super) fn open(
+    ports: &[Port],
+    clients: &[Client],
+    by: &Arc<str>,
+) -> Result<Vec<Opened>, RecordError> {
     let mut lines = Vec::new();
     for port in ports {
         lines.extend(port.name.as_line().map(|_| (port, Protocol::St)));
         lines.extend(port.name.as_can().map(|_| (port, Protocol::Rmd)));
     }
-    let names: Vec<String> = lines.iter().map(|(port, _)| port.name.to_string()).collect();
-    let labels = name::labels(&names).into_iter().zip(lines);
-    labels.map(|(label, (port, protocol))| line(label, port, protocol, by)).collect()
+    let names = lines.iter().map(|(port, _)| port.name.to_string());
+    let names: Vec<String> = names.chain(clients.iter().map(|it| it.port.clone())).collect();
+    let mut labels = name::labels(&names).into_iter();
+    let mut opened = Vec::new();
+    for ((port, protocol), label) in lines.into_iter().zip(labels.by_ref()) {
+        opened.push(of_port(label, port, protocol, by)?);
+    }
+    for (client, label) in clients.iter().zip(labels) {
+        opened.push(of_client(label, client, by)?);
+    }
+    Ok(opened)
 }
 
-fn line(
+fn of_port(
     label: String,
     port: &Port,
     protocol: Protocol,
@@ -84,14 +99,38 @@ fn line(
         }
     };
     let anchor = Anchor::now(acquisition.clock());
-    let port = port.name.to_string();
-
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
-    let motors = match given.is_empty() {
-        true => search::motors(runner.remote(), by, protocol).map_err(|why| {
-            RecordError::NoMotor { port: port.clone(), protocol, why: Box::new(why) }
-        })?,
-        false => given,
+    let motors = found(&runner, &port.name.to_string(), speaks, &given, by)?;
+    let line = Line { label, port: port.name.to_string(), speaks, motors };
+    Ok(Opened { runner, line, anchor, taps, lent: None })
+}
+
+fn of_client(label: String, client: &Client, by: &Arc<str>) -> Result<Opened, RecordError> {
+    let (taps, (acquisition, carrier)) = (Taps::default(), client.engine());
+    let anchor = Anchor::now(acquisition.clock());
+    let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
+    let lent = carrier.start(client, client.outlet.plug(&taps), runner.remote().clone());
+    let lent = Some(lent.map_err(RecordError::Thread)?);
+    let (port, speaks) = (client.port.clone(), client.speaks());
+    let motors = found(&runner, &port, speaks, &client.motors, by)?;
+    Ok(Opened { runner, line: Line { label, port, speaks, motors }, anchor, taps, lent })
+}
+
+/// The motors that are given, or those that answer.
+fn found(
+    runner: &Runner,
+    port: &str,
+    speaks: Speaks,
+    given: &[Motor],
+    by: &Arc<str>,
+) -> Result<Vec<Motor>, RecordError> {
+    if !given.is_empty() {
+        return Ok(given.to_vec());
+    }
+    let protocol = match speaks {
+        Speaks::St(_) => Protocol::St,
+        Speaks::Rmd => Protocol::Rmd,
     };
-    Ok(Opened { runner, line: Line { label, port, speaks, motors }, anchor, taps })
+    let none = |why| RecordError::NoMotor { port: port.to_owned(), protocol, why: Box::new(why) };
+    search::motors(runner.remote(), by, protocol).map_err(none)
 }

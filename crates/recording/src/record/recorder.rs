@@ -13,11 +13,12 @@ use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::choice;
+use super::client::{Client, Lent};
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
 use super::track::{Counts, Line, Track, lost_records};
-use super::wall::wall_now;
+use super::wall::{DayInUse, wall_now};
 use crate::error::{RecordError, WriteError};
 use crate::schema::{self, Log, Severity, Time, drive, name, recording};
 use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
@@ -37,6 +38,8 @@ const RECORDER: &str = "recorder";
 pub struct Config {
     /// The ports.
     pub ports: Vec<Port>,
+    /// Open clients.
+    pub clients: Vec<Client>,
     /// The names of the signals. Empty: a set that fits most uses.
     pub signals: Vec<String>,
     /// How often they are read.
@@ -84,6 +87,7 @@ struct Shared {
 struct Recorded {
     track: Track,
     runner: Runner,
+    lent: Option<Lent>,
     /// Rates of the engine, until they are taken.
     rates: Arc<Mutex<Option<Vec<Rate>>>>,
 }
@@ -94,11 +98,12 @@ impl Recorder {
     /// # Errors
     /// See [`RecordError`]. No file is left then.
     pub fn start(config: &Config) -> Result<Self, RecordError> {
-        if config.ports.is_empty() {
+        if config.ports.is_empty() && config.clients.is_empty() {
             return Err(RecordError::NoPort);
         }
+        let day = DayInUse::new();
         let series = Series::create(config.output.clone())?;
-        let opened = open(&config.ports, &config.by)?;
+        let opened = open(&config.ports, &config.clients, &config.by)?;
         let motors: Vec<Motor> = opened.iter().flat_map(|it| it.line.motors.clone()).collect();
         choice::check(&motors, &config.signals)?;
         let mut entries = vec![about(config)];
@@ -109,14 +114,14 @@ impl Recorder {
             }
         }
         let (mut topics, mut recorded) = (Topics::default(), Vec::new());
-        for Opened { runner, line, anchor, taps } in opened {
+        for Opened { runner, line, anchor, taps, lent } in opened {
             let groups = choice::choose(&line.motors, &config.signals, config.period);
             let track = Track::new(line, groups, anchor, taps, &mut topics);
             for (subscription, wants) in track.subscriptions() {
                 let (theirs, wants) = (subscription.clone(), wants.clone());
                 runner.remote().with(|engine| engine.subscribe(theirs, wants))?;
             }
-            recorded.push(Recorded { track, runner, rates: Arc::default() });
+            recorded.push(Recorded { track, runner, lent, rates: Arc::default() });
         }
         let lines = recorded.iter().map(|it| it.track.line().clone()).collect();
         let writer = Writer::start(series).map_err(RecordError::Thread)?;
@@ -124,9 +129,13 @@ impl Recorder {
             writer.queue().push(entry);
         }
         let shared = Arc::new(Shared::default());
+        shared.progress().written = writer.progress().written;
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new().name("motorlink-record".to_owned());
-        let thread = thread.spawn(move || run(recorded, writer, &theirs));
+        let thread = thread.spawn(move || {
+            let _day = day;
+            run(recorded, writer, &theirs)
+        });
         let thread = Some(thread.map_err(RecordError::Thread)?);
         Ok(Recorder { shared, lines, thread })
     }
@@ -189,13 +198,18 @@ fn run(
         tell(&recorded, &writer, &losses, began, shared);
     }
     await_confirmation(&mut recorded, &writer, &mut losses);
-    for Recorded { mut track, runner, .. } in recorded {
+    let mut counts = Counts::default();
+    for Recorded { mut track, runner, lent, .. } in recorded {
         // It moves no motor, so there is none to be stopped.
         runner.end();
+        drop(lent);
         track.end(wall_now(), &mut |entry| {
             writer.queue().push(entry);
         });
+        counts = counts.plus(track.counts());
     }
+    counts.lost += writer.queue().lost();
+    shared.progress().counts = counts;
     writer.end()
 }
 

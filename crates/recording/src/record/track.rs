@@ -60,6 +60,8 @@ pub struct Track {
 /// What was recorded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
+    /// Rows of signals.
+    pub rows: u64,
     /// Values of signals.
     pub values: u64,
     /// Rows that are not recorded, because nothing confirms them.
@@ -74,6 +76,7 @@ impl Counts {
     /// Both together.
     pub fn plus(self, other: Self) -> Self {
         Counts {
+            rows: self.rows + other.rows,
             values: self.values + other.values,
             unconfirmed: self.unconfirmed + other.unconfirmed,
             frames: self.frames + other.frames,
@@ -218,6 +221,7 @@ impl Track {
                 match item {
                     Item::Row(row) => {
                         let time = self.anchor.wall(row.time);
+                        counts.rows += 1;
                         counts.values += of_motor.write(&row, time, put);
                         if let Some(condition) = self.conditions.get_mut(&motor) {
                             let samples = row.values.iter().map(|it| it.as_ref().ok().copied());

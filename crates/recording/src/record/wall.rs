@@ -1,6 +1,6 @@
 //! The time of the day, monotonic after one look at the clock.
 
-use std::sync::OnceLock;
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
@@ -36,14 +36,70 @@ impl Anchor {
     }
 }
 
-/// The time of the day. The clock of the machine is read once, so the time never jumps.
+/// Counts from the start of this program. Recordings add the time of the day to it.
+static CLOCK: LazyLock<Clock> = LazyLock::new(Clock::running);
+static DAY: Mutex<Day> = Mutex::new(Day { zero: None, users: 0 });
+
+/// The time of the day of the recordings that are in progress.
+struct Day {
+    /// When [`CLOCK`] was 0, ns since 1970.
+    zero: Option<u64>,
+    /// Recordings in progress.
+    users: u32,
+}
+
+/// A recording is in progress until this is dropped. Meanwhile the time of the day never jumps.
+#[derive(Debug)]
+pub struct DayInUse(());
+
+impl DayInUse {
+    /// Reads the clock of the machine, if no other recording is in progress: somebody may have set it
+    /// since the last one.
+    pub fn new() -> Self {
+        let mut day = day();
+        if day.users == 0 {
+            day.zero = None;
+        }
+        day.users += 1;
+        DayInUse(())
+    }
+}
+
+impl Default for DayInUse {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Drop for DayInUse {
+    fn drop(&mut self) {
+        day().users -= 1;
+    }
+}
+
+/// The time of the day. The clock of the machine is read at the first call of a recording, so the time
+/// never jumps.
 pub fn wall_now() -> Time {
-    static ANCHOR: OnceLock<(Clock, u64)> = OnceLock::new();
-    let (clock, began) = ANCHOR.get_or_init(|| {
+    wall_at(moment())
+}
+
+/// Now, for [`wall_at`].
+pub(super) fn moment() -> Instant {
+    CLOCK.now()
+}
+
+/// The time of the day at a [`moment`].
+pub(super) fn wall_at(moment: Instant) -> Time {
+    let zero = *day().zero.get_or_insert_with(|| {
+        let now = CLOCK.now();
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        (Clock::running(), u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX).saturating_sub(now.0 * 1000)
     });
-    Time(began + clock.now().0 * 1000)
+    Time(zero.saturating_add(moment.0 * 1000))
+}
+
+fn day() -> MutexGuard<'static, Day> {
+    DAY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -148,6 +148,7 @@ impl McapFile {
         WriteError::Write {
             path: self.path.clone(),
             why: error.to_string(),
+            code: error.raw_os_error(),
             messages: self.messages,
             bytes: self.written,
         }

@@ -10,5 +10,5 @@ mod thread;
 pub use chunks::whole;
 pub use entry::{Attached, Entry, Pairs, Topic};
 pub use queue::{Queue, Weighed};
-pub use series::{Output, Rotate, Series, Written};
+pub use series::{LEAST_ROTATION, LEAST_SIZE, Output, Rotate, Series, Written};
 pub use thread::{FLUSH, MEMORY, Progress, Writer};

@@ -10,6 +10,11 @@ use super::file::McapFile;
 use crate::error::WriteError;
 use crate::schema::recording::{NAME, PART};
 
+/// The least bytes of a recording and of its files, if they are limited: without a message it has more.
+pub const LEAST_SIZE: u64 = 10_000;
+/// The least time of a file of a rotated recording.
+pub const LEAST_ROTATION: Duration = Duration::from_secs(1);
+
 /// Where a recording goes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Output {

@@ -43,7 +43,8 @@ impl Writer {
     /// The system gives no thread.
     pub fn start(series: Series) -> io::Result<Self> {
         let queue = Queue::new(MEMORY);
-        let progress = Arc::new(Mutex::new(Progress::default()));
+        let progress = Progress { written: series.written(), ..Progress::default() };
+        let progress = Arc::new(Mutex::new(progress));
         let (theirs, told) = (queue.clone(), Arc::clone(&progress));
         let thread = std::thread::Builder::new().name("motorlink-record".to_owned());
         let thread = thread.spawn(move || write(series, &theirs, &told))?;

@@ -1,4 +1,4 @@
-"""Recordings of motors as NumPy arrays.
+"""Recordings of motors: MCAP files, and NumPy arrays of them.
 
 >>> import motorlink
 >>> run = motorlink.read("run.mcap")                     # doctest: +SKIP
@@ -10,15 +10,19 @@ docs/RECORDING.md says what a file contains.
 
 from motorlink.recording._frames import Frame, Frames
 from motorlink.recording._read import Drive, Event, Recording, Table, read
+from motorlink.recording._record import Recorder, Status, record
 
 __all__ = [
     "Drive",
     "Event",
     "Frame",
     "Frames",
+    "Recorder",
     "Recording",
+    "Status",
     "Table",
     "read",
+    "record",
 ]
 
 
