@@ -150,6 +150,10 @@ def test_reading_commands_read_a_broken_file_and_say_so(run, cut, tmp_path):
         assert said in run(*command).ended(0).err
     assert "lost       the file ends inside a record" in run("info", cut).ended(0).out
     assert 50 < len(rows((tmp_path / "run.csv").read_text())) < 350
+    cut.write_bytes(cut.read_bytes()[:100])
+    for command in [("convert", cut, tmp_path / "run.log"), ("decode", "st", cut), ("replay", cut, "--serve", "pty:x")]:
+        refused = run(*command).ended(2).err
+        assert said in refused and "has no frames; only `motorlink record` writes frames" in refused
 
 
 @pytest.mark.parametrize("content, what", [(b"", "the file is empty"), (b"t [s],speed\n1,2\n", "this is no MCAP file")])
@@ -205,7 +209,7 @@ def test_a_name_without_a_format_is_refused(run, path, tmp_path):
 
 def test_a_picture_has_signals_by_unit_events_and_gaps(run, path, tmp_path):
     done = run("plot", path, "-o", tmp_path / "run.svg").ended(0)
-    assert done.out == f"4 signals are in {tmp_path / 'run.svg'}\n"
+    assert done.out == f"{tmp_path / 'run.svg'} has 4 signals\n"
     picture = (tmp_path / "run.svg").read_text()
     shown = texts(picture)
     for text in ["Speed (rpm)", "Voltage (V)", "Speed (°/s)", "States", "lost st0", "back st0", "RUN", "IDLE"]:
@@ -245,7 +249,10 @@ def test_a_spike_is_never_lost(run, tmp_path):
 def test_a_part_of_the_time_is_drawn(run, path):
     picture = run("plot", path, "-o", "-", "--signals", "can0/*", "--from", "0.7", "--to", "0.85").ended(0).out
     assert "run.mcap, 2026-09-21T14:13:20.700Z" in " ".join(texts(picture))
-    assert "nothing was recorded from 7 s to" in run("plot", path, "-o", "-", "--from", "7").ended(2).err
+    refused = run("plot", path, "-o", "-", "--from", "7").ended(2).err
+    assert "no sample is after 7 s: the last one is at 1.991 s" in refused
+    refused = run("plot", path, "-o", "-", "--from", "1", "--to", "0.5").ended(2).err
+    assert "--to 0.5 is before --from 1" in refused
 
 
 def test_texts_of_a_recording_are_shown_without_control_characters(run, tmp_path):

@@ -14,6 +14,7 @@ use super::pick::Pick;
 use crate::failure::Failure;
 use crate::output::{Printer, note};
 use crate::outputs::Output;
+use crate::text::counted;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -83,14 +84,15 @@ fn signals(args: &Args, output: &Output) -> Result<(), Failure> {
         rows = csv.write(out)?;
         Ok(())
     })?;
-    let columns = csv.columns();
-    done(args, output, &format!("{rows} rows of {columns} signals"), ("rows", rows))
+    let columns = csv.columns() as u64;
+    let what = format!("{} of {}", counted(rows, "row"), counted(columns, "signal"));
+    done(args, output, &what, ("rows", rows))
 }
 
 fn frames(args: &Args, format: Format, output: &Output) -> Result<(), Failure> {
     let mut recording = args.input.open()?;
     if recording.lines().is_empty() {
-        return Err(args.input.has_no_frames());
+        return Err(args.input.has_no_frames(recording.losses()));
     }
     let (mut count, mut serial, mut malformed) = (0, 0, 0);
     output.write(|out| {
@@ -112,7 +114,7 @@ fn frames(args: &Args, format: Format, output: &Output) -> Result<(), Failure> {
         let left = format!("{serial} frames of serial lines are left out: only .pcapng has them");
         note(left);
     }
-    done(args, output, &format!("{count} frames"), ("frames", count))
+    done(args, output, &counted(count, "frame"), ("frames", count))
 }
 
 /// Says what was written.
@@ -127,7 +129,7 @@ fn done(
     }
     let file = printable(&args.output.display().to_string());
     let object = json!({ "ok": true, "recording": args.input.name(), "file": file, name: count });
-    Printer { json: args.json }.result(format!("{what} are in {file}"), object)
+    Printer { json: args.json }.result(format!("{file} has {what}"), object)
 }
 
 /// Whether it is a device or a FIFO, whose names have no ending.

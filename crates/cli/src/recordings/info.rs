@@ -12,9 +12,9 @@ use super::input::Input;
 use crate::failure::Failure;
 use crate::json;
 use crate::output::Printer;
-use crate::text::flow;
+use crate::text::{counted, flow};
 
-/// The width of a line of signals.
+/// The width of a line of signals or files.
 const SIGNALS: usize = 66;
 
 #[derive(clap::Args)]
@@ -191,7 +191,8 @@ impl Contents {
         let width = widths.max().unwrap_or(0).min(SIGNALS);
         for (n, topic) in self.topics.iter().enumerate() {
             let rate = topic.rate().map_or(String::new(), |rate| format!(", {rate:.1} Hz"));
-            let text = format!("{:<width$}  {} messages{rate}", topic.name, topic.messages);
+            let messages = counted(topic.messages, "message");
+            let text = format!("{:<width$}  {messages}{rate}", topic.name);
             row(if n == 0 { "topics" } else { "" }, text);
             let signals: Vec<String> = topic.fields.iter().map(in_words).collect();
             for line in flow(&signals, "  ", SIGNALS) {
@@ -201,9 +202,9 @@ impl Contents {
         let kinds: Vec<String> =
             self.kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
         row("events", if kinds.is_empty() { "none".to_owned() } else { kinds.join(", ") });
-        let attached: Vec<&str> = recording.attachments().collect();
-        if !attached.is_empty() {
-            row("attached", attached.join(", "));
+        let attached: Vec<String> = recording.attachments().map(str::to_owned).collect();
+        for (n, line) in flow(&attached, "  ", SIGNALS).into_iter().enumerate() {
+            row(if n == 0 { "attached" } else { "" }, line);
         }
         row("lost", lost(recording.losses()).unwrap_or_else(|| "nothing".to_owned()));
         lines

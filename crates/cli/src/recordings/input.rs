@@ -53,10 +53,11 @@ impl Input {
         }
     }
 
-    /// The recording has no frames.
-    pub fn has_no_frames(&self) -> Failure {
+    /// The recording has no frames. Says first what could not be read: the frames may be lost.
+    pub fn has_no_frames(&self, losses: &[Loss]) -> Failure {
+        self.note_losses(losses);
         Failure::usage(format!("{} has no frames", self.name()))
-            .trying("`motorlink record` records them; files of other programs have none")
+            .trying("only `motorlink record` writes frames into a recording")
     }
 
     /// Says what could not be read of frames.

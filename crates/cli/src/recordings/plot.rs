@@ -17,6 +17,7 @@ use crate::output::{Printer, note};
 use crate::outputs::Output;
 use crate::palette::Meaning;
 use crate::plot::{self, Figure, Panel, Samples, Signal, Times};
+use crate::text::counted;
 
 /// Events that are named in a picture. More would fill it.
 const MOST_NAMED: usize = 24;
@@ -78,7 +79,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (signals, file) = (figure.signals.len(), shown(&args.output));
     let recording = args.input.name();
     let object = json!({ "ok": true, "recording": recording, "file": file, "signals": signals });
-    Printer { json: args.json }.result(format!("{signals} signals are in {file}"), object)
+    let what = counted(signals as u64, "signal");
+    Printer { json: args.json }.result(format!("{file} has {what}"), object)
 }
 
 fn shown(path: &Path) -> String {
@@ -110,8 +112,10 @@ impl View {
         }
         let end = args.to.unwrap_or(f64::INFINITY).min((last - zero) as f64 / 1e9);
         if args.from.is_nan() || args.from > end {
-            let why = format!("nothing was recorded from {} s to {end} s", args.from);
-            return Err(Failure::usage(why));
+            return Err(Failure::usage(match args.to {
+                Some(to) if to < args.from => format!("--to {to} is before --from {}", args.from),
+                _ => format!("no sample is after {} s: the last one is at {end} s", args.from),
+            }));
         }
         let shown = args.from..=end;
         let mut motors: Vec<&str> = read.tables.iter().map(Table::motor).collect();

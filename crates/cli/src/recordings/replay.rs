@@ -34,7 +34,7 @@ pub struct Args {
     #[command(flatten)]
     input: Input,
     /// A port to serve a recorded line on: PORT, or LABEL=PORT, such as can0=slcan-pty:./can0;
-    /// repeat for several lines. Without a label lines are taken in the order of `motorlink info`
+    /// repeat for several lines. Without a label lines are taken in the order of their labels: can0 before st0
     #[arg(long, value_name = "[LABEL=]PORT", required = true)]
     serve: Vec<String>,
     /// How fast replies come: 1 is with the recorded delays, max is at once
@@ -102,7 +102,7 @@ fn read(input: &Input) -> Result<BTreeMap<String, Line>, Failure> {
         lines.insert(line.label.to_string(), empty);
     }
     if lines.is_empty() {
-        return Err(input.has_no_frames());
+        return Err(input.has_no_frames(recording.losses()));
     }
     let mut frames = recording.frames();
     for frame in &mut frames {
