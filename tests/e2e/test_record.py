@@ -194,6 +194,10 @@ def test_nothing_is_left_where_no_motor_answers(run, sim, tmp_path):
     drives, path = sim(), tmp_path / "run.mcap"
     outcome = run("record", "-p", drives.st, "-o", path, "SPED_MEAS", *QUICK).ended(2)
     assert "did you mean `SPEED_MEAS`" in outcome.err
+    assert "`motorlink st registers` lists the registers" in outcome.err
+    assert not path.exists()
+    outcome = run("record", "-p", drives.can, "-o", path, "--timeout", "100ms").ended(3)
+    assert f"no motor answers at serial:{drives.can}: reading STATUS for motor 1 failed" in outcome.err
     assert not path.exists()
 
 
@@ -237,6 +241,7 @@ def test_a_folder_that_is_removed_is_said_at_once(drives, record, tmp_path):
     folder.rmdir()
     assert running.wait() == 3
     assert any("was removed while it was written" in line for line in running.err), running.err
+    assert not any("motorlink recover" in line for line in running.err), running.err
 
 
 @contextmanager

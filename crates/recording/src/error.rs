@@ -26,7 +26,7 @@ pub enum RecordError {
     #[error(transparent)]
     Line(#[from] LineError),
     /// A port without a motor that answers.
-    #[error("no motor answers at {port}: {why}")]
+    #[error("no motor answers at {port}: {}", without_port(why, port))]
     NoMotor {
         /// The port.
         port: String,
@@ -44,6 +44,13 @@ pub enum RecordError {
     /// The system gives no thread.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
+}
+
+/// The error without the port, if it begins with it.
+fn without_port(why: &CommandError, port: &str) -> String {
+    let text = why.to_string();
+    let rest = text.strip_prefix(port).and_then(|rest| rest.strip_prefix(": "));
+    rest.map(str::to_owned).unwrap_or(text)
 }
 
 /// A file of a recording cannot be written.

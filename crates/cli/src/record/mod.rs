@@ -14,6 +14,7 @@ use motorlink_recording::record::{Config, Line, Port, Progress, Recorder};
 use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::signal::UnknownSignal;
 use serde_json::{Value, json};
 
 use crate::connection::missing_port;
@@ -113,16 +114,33 @@ fn refused(error: RecordError) -> Failure {
             Failure::link(error.to_string())
                 .trying(format!("to record a motor that is off now, name it: {option}"))
         }
-        RecordError::Signal(error) => Failure::usage(error.to_string()),
+        RecordError::Signal(error) => unknown(&error),
         RecordError::Ended(error) => error.into(),
         RecordError::Thread(error) => Failure::link(error.to_string()),
     }
 }
 
+fn unknown(error: &UnknownSignal) -> Failure {
+    let failure = Failure::usage(error.to_string());
+    match error {
+        UnknownSignal::Register(_) => failure
+            .trying("`motorlink st registers` lists the registers; put spaces between signals"),
+        UnknownSignal::Rmd(_) => {
+            failure.trying("`motorlink st registers` lists the signals of ST drives")
+        }
+        _ => failure,
+    }
+}
+
 fn broken(error: &WriteError) -> Failure {
-    Failure::unwritten(printable(&error.to_string())).trying(
-        "`motorlink recover` makes a whole file of what is there; make room, or choose another disk",
-    )
+    let what = match error {
+        WriteError::Removed { .. } => "record again; leave the file where it is until the end",
+        WriteError::Changed { .. } => "`motorlink recover` makes a whole file of what is there",
+        _ => {
+            "`motorlink recover` makes a whole file of what is there; make room, or choose another disk"
+        }
+    };
+    Failure::unwritten(printable(&error.to_string())).trying(what)
 }
 
 fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
