@@ -77,7 +77,7 @@ enum Command {
     Watch(watch::Args),
     /// Record motors into an MCAP file: signals, frames, events, settings
     Record(record::Args),
-    /// Decode captures: candump, asc, pcapng, hexadecimal text
+    /// Decode captures: recordings, candump, asc, pcapng, hexadecimal text
     Decode(decode::Args),
     /// Show what a recording contains: drives, signals, events, losses
     Info(recordings::info::Args),
@@ -91,7 +91,7 @@ enum Command {
     Replay(recordings::replay::Args),
     /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
-    /// Write the tables of the protocols for other programs: DBC, JSON, Markdown
+    /// Write the tables of the protocols for other programs: DBC, Wireshark, JSON, Markdown
     Spec(spec::Args),
     /// Print completions for a shell
     Completions {

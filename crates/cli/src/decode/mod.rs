@@ -68,7 +68,7 @@ enum Protocol {
 
 #[derive(clap::Args)]
 struct Common {
-    /// A file, `-` for stdin (the default), or the frames in hexadecimal
+    /// A capture or a recording (.mcap), `-` for stdin (the default), or the frames in hexadecimal
     #[arg(value_name = "FILE|HEX", value_hint = clap::ValueHint::FilePath)]
     input: Vec<String>,
     /// The format of the input, if its content does not show it
@@ -141,7 +141,7 @@ fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Re
     let Some(first) = lines.values().find(|line| is_wanted(line)) else {
         let labels: Vec<&str> = lines.values().map(|line| &*line.label).collect();
         return Err(match labels.is_empty() {
-            true => input.has_no_frames(),
+            true => input.has_no_frames(recording.losses()),
             false => Failure::usage(format!("{} has no line with this protocol", input.name()))
                 .trying(format!("its lines are {}; try the other protocol", labels.join(", "))),
         });

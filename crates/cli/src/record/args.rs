@@ -18,8 +18,9 @@ pub struct Args {
     /// The file, such as run.mcap; with --rotate its name before the number: run_000.mcap
     #[arg(short, long, value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
     pub output: PathBuf,
-    /// Signals of the motors, such as SPEED_MEAS or speed_dps [default: state, speed, current, angle;
-    /// twice a second voltage and temperature]
+    /// Signals of the motors, with a space between them, such as SPEED_MEAS TORQUE_MEAS, or speed_dps.
+    /// `motorlink st registers` lists those of ST drives, docs/RECORDING.md those of RMD motors
+    /// [default: state, speed, current, angle; twice a second voltage and temperature]
     #[arg(value_name = "SIGNAL")]
     pub signals: Vec<String>,
     /// How often signals are read, Hz, 0.1 to 1000
