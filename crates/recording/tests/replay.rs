@@ -92,6 +92,28 @@ fn a_program_for_an_st_drive_gets_what_it_got() {
     }
 }
 
+#[test]
+fn an_unknown_request_is_refused_at_once_while_a_late_reply_is_due() {
+    let mut line = StLine::new(Profile::default());
+    let request = |register: RegisterId| [0x22, 1, register.0, 0x23 + register.0];
+    let frame = |direction, millis: u64, data: &[u8]| {
+        let (stamp, data) = (Time(millis * 1_000_000), data.to_vec());
+        Frame { stamp, direction, id: 0, result: FrameResult::Frame, data }
+    };
+    let known = request(RegisterId::STATUS);
+    line.add(frame(schema::Direction::Sent, 0, &known));
+    line.add(frame(schema::Direction::Received, 800, &[0xF0, 1, 6, 0xF7]));
+    let mut station = StReplay::new(line, Speed::Recorded, Tally::default());
+    let mut replies = Vec::new();
+    station.receive(Instant(0), &known, &mut replies);
+    assert!(replies.is_empty(), "{replies:?}");
+    station.receive(Instant(1_000), &request(RegisterId::SPEED_MEAS), &mut replies);
+    assert_eq!(replies[..2], [0xFF, 1], "{replies:?}");
+    replies.clear();
+    station.poll(Instant(800_000), &mut replies);
+    assert_eq!(replies, [0xF0, 1, 6, 0xF7]);
+}
+
 /// Turns two motors, watches one, stops both.
 fn rmd_program(link: Box<dyn CanLink>) -> Vec<String> {
     let client = rmd::Client::over("can", link, rmd::Options::default());

@@ -64,8 +64,7 @@ impl<F: Clone + Eq + std::hash::Hash> Player<F> {
                 Speed::Recorded => now + *delay,
                 Speed::Max => now,
             };
-            let place = self.due.partition_point(|(other, _)| *other <= at);
-            self.due.insert(place, (at, reply.clone()));
+            schedule(&mut self.due, at, reply.clone());
         }
         true
     }
@@ -101,7 +100,7 @@ impl Station<u8> for StReplay {
                 Parse::Frame(_, size) => {
                     let request: Vec<u8> = self.received.drain(..size).collect();
                     if !self.player.ask(now, &request, |request| Hex(request).to_string()) {
-                        self.player.due.push_back((now, refusal()));
+                        schedule(&mut self.player.due, now, refusal());
                     }
                 }
                 Parse::More => break,
@@ -157,6 +156,12 @@ impl Station<CanFrame> for RmdReplay {
     fn deadline(&self) -> Option<Instant> {
         self.player.deadline()
     }
+}
+
+/// Adds a reply behind those that are due before.
+fn schedule<F>(due: &mut VecDeque<(Instant, F)>, at: Instant, reply: F) {
+    let place = due.partition_point(|(other, _)| *other <= at);
+    due.insert(place, (at, reply));
 }
 
 /// The drive does not know the request.
