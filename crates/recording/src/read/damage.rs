@@ -20,7 +20,7 @@ pub struct Loss {
 }
 
 /// What is wrong with bytes of a file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Damage {
     /// The file ends inside a record.

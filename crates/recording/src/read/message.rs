@@ -111,8 +111,7 @@ impl<R: Read + Seek> Recording<R> {
 
     /// Adds a loss once, however often the file is read.
     pub(super) fn add_loss(&mut self, loss: Loss) {
-        let is_same = |known: &Loss| known.bytes == loss.bytes && known.damage == loss.damage;
-        if !self.losses.iter().any(is_same) {
+        if self.known_losses.insert((loss.bytes.clone(), loss.damage.clone())) {
             self.losses.push(loss);
         }
     }

@@ -1,6 +1,6 @@
 //! An open recording.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::ops::Range;
@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::catalogue::Catalogue;
-use super::damage::{Loss, ReadError};
+use super::damage::{Damage, Loss, ReadError};
 use super::record::{Attachment, Channel, HEAD, Metadata, Schema, Statistics};
 use super::source::Source;
 use crate::schema::{drive, name};
@@ -23,6 +23,8 @@ pub struct Recording<R> {
     pub(super) metadata: Vec<Metadata>,
     pub(super) attachments: Vec<AttachmentPlace>,
     pub(super) losses: Vec<Loss>,
+    /// Bytes and damage of the losses: a broken disk has many.
+    pub(super) known_losses: HashSet<(Range<u64>, Damage)>,
     pub(super) statistics: Statistics,
 }
 
@@ -140,6 +142,7 @@ impl<R: Read + Seek> Recording<R> {
             metadata: Vec::new(),
             attachments: Vec::new(),
             losses: Vec::new(),
+            known_losses: HashSet::new(),
             statistics: Statistics::default(),
         })
     }

@@ -184,6 +184,20 @@ fn the_file_of_a_killed_writer_gives_all_that_was_written() {
 }
 
 #[test]
+fn a_file_with_very_many_damaged_places_is_read() {
+    let mut file = finished(options(), 1);
+    let start = chunk_starts(&file)[0];
+    // Its messages are damaged, and a byte behind it is no record.
+    file[start + 60] ^= 0x10;
+    let end =
+        start + 9 + u64::from_le_bytes(file[start + 1..start + 9].try_into().unwrap()) as usize;
+    let chunk = [&file[start..end], b"x"].concat();
+    let file = [&file[..start], &chunk.repeat(30_000)].concat();
+    let (got, losses) = check(&file);
+    assert_eq!((got.len(), losses.len()), (0, 30_000));
+}
+
+#[test]
 fn sizes_of_a_damaged_file_take_no_memory() {
     let file = finished(compressed(), 1);
     let start = chunk_starts(&file)[0];
