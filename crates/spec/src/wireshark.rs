@@ -6,7 +6,7 @@ use motorlink_proto::rmd::{
     COMMANDS, Code, Command as _, DEFAULT_TIMEOUT, Dialect, Errors, Field, MOTOR_BASE, Meaning,
     MotorId, Payload as _, SetTorque, SetTorque4, TORQUE4_ID, Version,
 };
-use motorlink_proto::st::register::{Shape, Unit, Writing};
+use motorlink_proto::st::register::{Shape, Type, Unit, Writing};
 use motorlink_proto::st::{
     Command, ControlMode, ErrorCode, Features, Flags, FrameCode, HEADER_ACK, HEADER_ATR,
     HEADER_NACK, MAX_PAYLOAD, OVERHEAD, Profile, RegisterId, Request, Status, TIMEOUT,
@@ -262,6 +262,10 @@ fn register(lua: &mut Lua, register: RegisterId, shape: Shape) {
     lua.set("kind", text(kind));
     lua.set("types", list(&|profile| text(shape.ty(profile).name())));
     lua.set("scales", list(&|profile| format!("{:?}", shape.unit.scale(profile))));
+    lua.set(
+        "other_profile_only",
+        list(&|profile| other_profile_only(register, shape.ty(profile), profile)),
+    );
     // 0 if a drive refuses.
     let read = |profile| shape.read_size(profile, built).unwrap_or(0);
     lua.set("read_sizes", list(&|profile| read(profile).to_string()));
@@ -270,4 +274,17 @@ fn register(lua: &mut Lua, register: RegisterId, shape: Shape) {
         Writing::ReadOnly | Writing::Refused => 0,
     };
     lua.set("write_sizes", list(&|profile| written(profile).to_string()));
+}
+
+/// The least and the greatest value that a drive of the other profile only can give; `false` if there is
+/// none.
+fn other_profile_only(register: RegisterId, ty: Type, profile: Profile) -> String {
+    let is_odd = |&value: &i32| register.value_of_other_profile(profile, value).is_some();
+    // Registers of other types have no such values.
+    let most = if ty == Type::U16 { u16::MAX.into() } else { 0 };
+    let mut odd = (0..=most).filter(is_odd);
+    match (odd.next(), odd.next_back()) {
+        (Some(least), Some(most)) => format!("{{ {least}, {most} }}"),
+        _ => "false".to_owned(),
+    }
 }

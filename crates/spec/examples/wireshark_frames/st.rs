@@ -73,7 +73,13 @@ impl St {
             let payload = &bits.to_le_bytes()[..size];
             self.ask(1, &Request::GetRegister(register));
             self.reply(HEADER_ACK, payload, |fields, notes| {
-                self.value(register, payload, fields, notes);
+                let bits = register.decode(self.profile, payload);
+                let value =
+                    bits.and_then(|bits| register.value_of_other_profile(self.profile, bits));
+                match value {
+                    Some(_) => notes.push("other_profile"),
+                    None => self.value(register, payload, fields, notes),
+                }
             });
             let size = usize::from(register.write_size(self.profile));
             let value = &bits.to_le_bytes()[..size];

@@ -121,6 +121,8 @@ local expert = {
         expert.group.PROTOCOL, expert.severity.WARN),
     size = ProtoExpert.new("motorlink.st.wrong_size", "not the size of the profile",
         expert.group.PROTOCOL, expert.severity.WARN),
+    implausible = ProtoExpert.new("motorlink.st.other_profile", "a value of the other profile",
+        expert.group.PROTOCOL, expert.severity.WARN),
     surplus = ProtoExpert.new("motorlink.st.surplus_bytes", "a drive ignores surplus bytes",
         expert.group.PROTOCOL, expert.severity.NOTE),
     faults = ProtoExpert.new("motorlink.st.fault", "faults", expert.group.RESPONSE_CODE,

@@ -99,6 +99,27 @@ local function value_shown(register, value, digits, profile)
     return with_unit(string.format(places, value):gsub("%.0$", ""), register.unit)
 end
 
+-- Scales are parts of ten: digits / 10 is exact to the last place, digits * 0.1 is not.
+local function scaled(value, scale)
+    return scale == 1 and value or value / math.floor(1 / scale + 0.5)
+end
+
+-- What is wrong with a value of 16 bits that only a drive of the other profile can give; nil if nothing.
+local function implausible_shown(range, register, profile)
+    local limits, number = register.other_profile_only[profile], range:le_uint()
+    if not limits or number < limits[1] or number > limits[2] then
+        return nil
+    end
+    local texts = {}
+    for index, row in ipairs(table_of.profiles) do
+        local value, digits = number_of(range, register.types[index])
+        local text = value_shown(register, scaled(value, register.scales[index]), digits, index)
+        texts[index == profile and 1 or 2] = text .. " in profile " .. row.name
+    end
+    return string.format("%s is %s, which is not plausible, and %s", register.name, texts[1],
+        texts[2])
+end
+
 -- Adds the value of a register. Returns its text; nil if the size allows none.
 local function add_value(tree, range, id, profile)
     local size = range:len()
@@ -115,14 +136,12 @@ local function add_value(tree, range, id, profile)
         tree:add(own.digits, range, Int64.new(digits))
         return string.format("%d", digits)
     end
-    local scale = register.scales[profile]
-    -- Scales are parts of ten: digits / 10 is exact to the last place, digits * 0.1 is not.
-    local scaled = scale == 1 and value or value / math.floor(1 / scale + 0.5)
-    local text = value_shown(register, scaled, digits, profile)
+    local shown = scaled(value, register.scales[profile])
+    local text = value_shown(register, shown, digits, profile)
     local is_wide = field_of(register) == ProtoField.int64
-    local item = tree:add(registers[id], range, is_wide and Int64.new(scaled) or scaled)
+    local item = tree:add(registers[id], range, is_wide and Int64.new(shown) or shown)
     item:set_text(register.name .. ": " .. text)
-    item:add(own.value, range, scaled):set_generated()
+    item:add(own.value, range, shown):set_generated()
     item:add(own.digits, range, Int64.new(digits)):set_generated()
     if register.kind == "flags" then
         for _, fault in ipairs(table_of.faults) do
@@ -269,9 +288,17 @@ end
 local REPLIES = {
     register_value = function(tree, range, profile, frame)
         local request = frame.to.bytes
-        if #request > table_of.overhead and takes_size(request, range:len()) then
-            return add_value(tree, range, request:byte(3), profile)
+        if #request == table_of.overhead or not takes_size(request, range:len()) then
+            return nil
         end
+        local id = request:byte(3)
+        local register = table_of.registers[id]
+        local wrong = register and implausible_shown(range, register, profile)
+        if wrong then
+            tree:add_proto_expert_info(expert.implausible, wrong)
+            return wrong
+        end
+        return add_value(tree, range, id, profile)
     end,
     board_info = function(tree, range)
         if range:len() < 3 then
