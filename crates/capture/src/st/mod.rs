@@ -50,6 +50,13 @@ impl Decoder {
         Decoder { profile, lines: Vec::new() }
     }
 
+    /// Decodes the line with this name as that of a drive of `profile`.
+    #[must_use]
+    pub fn with_line(mut self, channel: &Arc<str>, profile: Profile) -> Self {
+        self.lines.push(Line::new(Some(Arc::clone(channel)), profile));
+        self
+    }
+
     /// Passes an entry. `said` gets the entry in which each item ends, its bytes, and the item.
     pub fn decode(&mut self, entry: &Captured, mut said: impl FnMut(&Captured, &[u8], Item<'_>)) {
         let bytes = match &entry.wire {
@@ -90,12 +97,7 @@ impl Decoder {
             if self.lines.len() == MOST_LINES {
                 self.lines.clear();
             }
-            self.lines.push(Line {
-                channel: channel.clone(),
-                transcript: Transcript::new(self.profile),
-                splitters: Default::default(),
-                last: Default::default(),
-            });
+            self.lines.push(Line::new(channel.clone(), self.profile));
             self.lines.len() - 1
         });
         &mut self.lines[index]
@@ -103,6 +105,11 @@ impl Decoder {
 }
 
 impl Line {
+    fn new(channel: Option<Arc<str>>, profile: Profile) -> Self {
+        let transcript = Transcript::new(profile);
+        Line { channel, transcript, splitters: Default::default(), last: Default::default() }
+    }
+
     fn pieces(&mut self, slot: usize, said: &mut impl FnMut(&Captured, &[u8], Item<'_>)) {
         let Line { transcript, splitters, last, .. } = self;
         let Some(last) = &last[slot] else { return };
@@ -137,6 +144,26 @@ mod tests {
     use motorlink_proto::can::CanFrame;
 
     use super::*;
+
+    #[test]
+    fn each_line_has_the_profile_of_its_drive() {
+        let [spec, firmware]: [Arc<str>; 2] = ["st0".into(), "st1".into()];
+        let mut decoder = Decoder::new(Profile::Spec).with_line(&firmware, Profile::Mcsdk54);
+        let mut said = Vec::new();
+        for channel in [spec, firmware] {
+            // GET_REG FLUXWK_BUS, and its reply.
+            for bytes in [vec![0x02, 0x01, 0x18, 0x1B], vec![0xF0, 0x02, 0x62, 0x00, 0x55]] {
+                let channel = Some(Arc::clone(&channel));
+                let wire = Wire::Serial(bytes);
+                let entry = Captured { place: 1, time: None, channel, direction: None, wire };
+                decoder.decode(&entry, |_, _, item| match item {
+                    Item::Message(message) => said.push(message.to_string()),
+                    Item::Broken(broken) => panic!("{broken:?}"),
+                });
+            }
+        }
+        assert_eq!((&*said[1], &*said[3]), ("ACK 98 %", "ACK 9.8 %"));
+    }
 
     #[test]
     fn frames_of_a_bus_that_was_captured_too_change_nothing() {

@@ -138,17 +138,22 @@ fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Re
         Decoder::St(_) => |line| matches!(line.speaks, Speaks::St(_)),
         Decoder::Rmd(_) => |line| line.speaks == Speaks::Rmd,
     };
-    let Some(first) = lines.values().find(|line| is_wanted(line)) else {
+    if !lines.values().any(|line| is_wanted(line)) {
         let labels: Vec<&str> = lines.values().map(|line| &*line.label).collect();
         return Err(match labels.is_empty() {
             true => input.has_no_frames(recording.losses()),
             false => Failure::usage(format!("{} has no line with this protocol", input.name()))
                 .trying(format!("its lines are {}; try the other protocol", labels.join(", "))),
         });
-    };
-    let decoder = match first.speaks {
-        Speaks::St(profile) => Decoder::St(st_capture::Decoder::new(profile)),
-        Speaks::Rmd => decoder,
+    }
+    let decoder = match decoder {
+        Decoder::St(decoder) => {
+            Decoder::St(lines.values().fold(decoder, |decoder, line| match line.speaks {
+                Speaks::St(profile) => decoder.with_line(&line.label, profile),
+                Speaks::Rmd => decoder,
+            }))
+        }
+        Decoder::Rmd(decoder) => Decoder::Rmd(decoder),
     };
     let mut source = Recorded::new(recording.frames(), is_wanted);
     let failed = |error: io::Error| input.failed(&error);
