@@ -114,9 +114,11 @@ impl Line {
         let Line { transcript, splitters, last, .. } = self;
         let Some(last) = &last[slot] else { return };
         splitters[slot].pieces(|bytes, piece| match piece {
-            Piece::Frame(frame) => {
-                said(last, bytes, Item::Message(transcript.read(last.time, None, &frame)))
-            }
+            Piece::Frame(frame) => said(
+                last,
+                bytes,
+                Item::Message(transcript.read((last.time, last.direction), None, &frame)),
+            ),
             Piece::Broken(broken) => {
                 transcript.lose();
                 said(last, bytes, Item::Broken(broken));
@@ -128,9 +130,11 @@ impl Line {
         let Line { transcript, splitters, last, .. } = self;
         let Some(last) = &last[slot] else { return };
         splitters[slot].end(|bytes, piece| match piece {
-            Piece::Frame(frame) => {
-                said(last, bytes, Item::Message(transcript.read(last.time, None, &frame)))
-            }
+            Piece::Frame(frame) => said(
+                last,
+                bytes,
+                Item::Message(transcript.read((last.time, last.direction), None, &frame)),
+            ),
             Piece::Broken(broken) => {
                 transcript.lose();
                 said(last, bytes, Item::Broken(broken));

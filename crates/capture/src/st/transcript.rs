@@ -9,7 +9,7 @@ use motorlink_proto::st::{
 };
 
 use super::message::{Answer, Message};
-use crate::captured::Stamp;
+use crate::captured::{Direction, Stamp};
 
 /// Reads the frames of one line in their order.
 #[derive(Debug)]
@@ -30,11 +30,17 @@ struct Pending {
     /// The size of its reply, and the one in the other profile.
     sizes: [ReplySize; 2],
     time: Option<Stamp>,
+    way: Option<Direction>,
 }
 
 impl Pending {
-    const fn of_unknown(motor: u8, time: Option<Stamp>) -> Self {
-        Pending { motor, asked: Asked::Unknown, sizes: [ReplySize::Any; 2], time }
+    const fn of_unknown(motor: u8, time: Option<Stamp>, way: Option<Direction>) -> Self {
+        Pending { motor, asked: Asked::Unknown, sizes: [ReplySize::Any; 2], time, way }
+    }
+
+    /// Whether this is the echo of the request before it: the capture has it as sent and as received.
+    fn is_echo_of(&self, earlier: &Self) -> bool {
+        self.is_same(earlier) && self.way.zip(earlier.way).is_some_and(|(one, other)| one != other)
     }
 
     const fn takes(&self, payload: &[u8]) -> bool {
@@ -79,7 +85,7 @@ impl Transcript {
     pub fn note(&mut self, time: Option<Stamp>, sent: bool, bytes: &[u8]) -> String {
         match Frame::parse(bytes) {
             Parse::Frame(frame, size) if size == bytes.len() => {
-                self.read(time, Some(sent), &frame).to_string()
+                self.read((time, None), Some(sent), &frame).to_string()
             }
             Parse::Frame(..) => "more than one frame".to_owned(),
             Parse::More => "the beginning of a frame".to_owned(),
@@ -87,34 +93,38 @@ impl Transcript {
         }
     }
 
-    /// Reads a frame; `sent` when it goes to the drive. If that is not known, the header says it:
-    /// no request has the header of a reply.
+    /// Reads a frame with its time and the direction of the capture; `sent` when it goes to the drive. If
+    /// that is not known, the header says it: no request has the header of a reply.
     pub fn read<'a>(
         &mut self,
-        time: Option<Stamp>,
+        at: (Option<Stamp>, Option<Direction>),
         sent: Option<bool>,
         frame: &Frame<'a>,
     ) -> Message<'a> {
         let is_reply = matches!(frame.header, HEADER_ACK | HEADER_NACK | HEADER_ATR);
-        if sent.unwrap_or(!is_reply) { self.request(time, frame) } else { self.reply(frame) }
+        if sent.unwrap_or(!is_reply) { self.request(at, frame) } else { self.reply(frame) }
     }
 
     /// After damage, which may have been a reply, or a request.
     pub fn lose(&mut self) {
         self.pending.pop_front();
         for pending in &mut self.pending {
-            *pending = Pending::of_unknown(pending.motor, pending.time);
+            *pending = Pending::of_unknown(pending.motor, pending.time, pending.way);
         }
     }
 
-    fn request<'a>(&mut self, time: Option<Stamp>, frame: &Frame<'a>) -> Message<'a> {
+    fn request<'a>(
+        &mut self,
+        (time, way): (Option<Stamp>, Option<Direction>),
+        frame: &Frame<'a>,
+    ) -> Message<'a> {
         self.pending.retain(|pending| !pending.is_over(time));
         if self.pending.len() == MOST_PENDING {
             self.pending.pop_front();
         }
         let motor = frame.motor();
         let Ok(request) = frame.request(self.profile) else {
-            self.pending.push_back(Pending::of_unknown(motor, time));
+            self.pending.push_back(Pending::of_unknown(motor, time, way));
             return Message::Unknown(motor, frame.code());
         };
         if let Request::ConfigureSegment { segment, .. } = request
@@ -124,7 +134,12 @@ impl Transcript {
             registers.clear();
         }
         let sizes = [self.profile, self.profile.other()].map(|profile| request.reply_size(profile));
-        self.pending.push_back(Pending { motor, asked: asked(&request), sizes, time });
+        let pending = Pending { motor, asked: asked(&request), sizes, time, way };
+        match self.pending.back_mut() {
+            // Once only: its own echo may follow a retry.
+            Some(earlier) if pending.is_echo_of(earlier) => earlier.way = None,
+            _ => self.pending.push_back(pending),
+        }
         Message::Request(motor, request, self.profile)
     }
 
@@ -310,6 +325,30 @@ mod tests {
         // Without a reply in between, no other request can be meant.
         note(2_000, &ask(speed));
         assert_eq!(note(3_500, &reply(6)), "ACK 6 rpm");
+    }
+
+    #[test]
+    fn the_echo_of_a_request_gets_no_reply() {
+        let mut transcript = Transcript::new(Profile::Spec);
+        let (speed, reference) = (RegisterId::SPEED_MEAS, RegisterId::SPEED_REF);
+        let (sent, received) = (Some(Direction::Sent), Some(Direction::Received));
+        let mut read = |way: Option<Direction>, bytes: &[u8]| {
+            let Parse::Frame(frame, _) = Frame::parse(bytes) else { panic!("{bytes:?} is whole") };
+            transcript.read((None, way), None, &frame).to_string()
+        };
+        for register in [speed, reference] {
+            read(sent, &frame(0x22, &[register.0]));
+            read(received, &frame(0x22, &[register.0]));
+            assert_eq!(read(received, &frame(HEADER_ACK, &[1, 0, 0, 0])), "ACK 1 rpm");
+        }
+        // A retry has an echo, too.
+        for way in [sent, received, sent, received] {
+            read(way, &frame(0x22, &[speed.0]));
+        }
+        assert_eq!(read(received, &frame(HEADER_ACK, &[1, 0, 0, 0])), "ACK 1 rpm");
+        read(sent, &frame(0x22, &[reference.0]));
+        let doubtful = "ACK, 4 bytes, to one of several requests";
+        assert_eq!(read(received, &frame(HEADER_ACK, &[1, 0, 0, 0])), doubtful);
     }
 
     #[test]
