@@ -166,7 +166,7 @@ def record(folder, motorlink, _):
 
 
 def decode(folder, motorlink, _):
-    """A short log of a bus, with damage in its last line. Bit 3 of `errors` is an over temperature."""
+    """A short log of a bus, with a frame that is too short. Bit 3 of `errors` is an over temperature."""
     Path(folder, "can0.log").write_text(
         "(1.000000) can0 142#A200000010270000 T\n"
         "(1.000310) can0 142#A219640064000000 R\n"
@@ -200,7 +200,7 @@ PICTURES = {
     "share": (share, "motorlink share holds two ports; motorlink st and motorlink rmd use its lines; its log lists their requests"),
     "record": (record, "motorlink record writes a starting motor into run.mcap; motorlink info lists drives, topics, signals and rates"),
     "recording": (plot, "plot of a recording: speed, torque current and state of a motor that starts and follows a ramp to 1500 rpm"),
-    "decode": (decode, "motorlink decode rmd prints the frames of a candump log with direction, motor, command and values; the last one is damaged"),
+    "decode": (decode, "motorlink decode rmd prints the frames of a candump log with direction, motor, command and values; the last one is too short"),
     "dump": (dump, "motorlink st dump writes settings into a file, diff shows a changed gain, restore writes the old value"),
 }
 
