@@ -19,6 +19,7 @@ from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from peers import Plug
 from program import PATIENT, environment, eventually
+from sharing import Client
 from test_printed_text import HOSTILE, is_clean
 
 SCENARIO = Path(__file__).parents[2] / "scenarios/position-moves.toml"
@@ -321,14 +322,130 @@ def test_chosen_signals_are_recorded_at_the_rate(run, drives, tmp_path):
     }
 
 
-def test_a_share_is_recorded_beside_another_program(run, start, sim, record, tmp_path):
-    drives, place = sim(), tmp_path / "share"
-    start("share", "-p", drives.st, "--at", f"unix:{place}", "--json").line(0)
+def test_a_refused_signal_is_named_and_the_others_keep_their_rate(run, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    running = record(path, "-p", f"share:{place}/st0", "--motor", "1", until=2)
+    # Motor 2 of the simulated drive has no flux weakening.
+    words = ("SPEED_MEAS", "FLUXWK_BUS", "--motor", "2", "--no-settings", "--duration", "3s", *QUICK)
+    told = run("record", "-p", drives.st, "-o", path, *words, "--json").ended(0).lines[-1]
+    assert told["refused"] == ["st0/motor2/FLUXWK_BUS"] and told["achieved_hz"] > 0, told
+    row = File(path).of("/st0/motor2/signals")[-1]
+    assert math.isnan(row.fluxwk_bus) and row.speed_meas == 0
+    text = run("record", "-p", drives.st, "-o", path, "--force", *words).ended(0).out
+    assert ", refused: st0/motor2/FLUXWK_BUS, " in text
+
+
+def test_the_current_of_an_st_drive_is_an_effort_with_its_full_scale(run, drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    words = ("TORQUE_MEAS", "--motor", "1", "--no-settings", "--duration", "500ms", *QUICK)
+    run("record", "-p", drives.st, "-o", path, *words, "--full-scale", "16.5").ended(0)
+    file = File(path)
+    rows, joints = file.of("/st0/motor1/signals"), file.of("/joint_states")
+    assert len(rows) == len(joints) > 3
+    for row, joint in zip(rows, joints):
+        assert list(joint.effort) == [pytest.approx(row.torque_meas * 16.5 / 32767)]
+    run("record", "-p", drives.st, "-o", path, "--force", *words).ended(0)
+    assert not File(path).of("/joint_states")
+    assert "is not a full scale" in run("record", "-p", drives.st, "-o", path, "--full-scale", "0").ended(2).err
+
+
+@pytest.fixture
+def share(start, sim, tmp_path):
+    """`share()`: a share of simulated drives. They stay when it ends."""
+    drives, place = sim(), tmp_path / "share"
+
+    def share():
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{place}", "--json"]
+        running = start("share", *words, *PATIENT)
+        running.line(0)
+        running.path, running.drives = place, drives
+        return running
+
+    return share
+
+
+def test_a_share_is_recorded_with_what_other_programs_do(run, share, record, tmp_path):
+    serving, path = share(), tmp_path / "run.mcap"
+    place, drives = serving.path, serving.drives
+    ports = ("-p", f"share:{place}/st0", "--motor", "1", "-p", f"share:{place}/rmd0", "--id", "2")
+    running = record(path, *ports, until=1)
+    tuner = Client(place, "tuner")
+    tuner.command("rmd0", 2, 0xA2, 0, 0, 0, 160, 140, 0, 0)
+    eventually(lambda: drives.motor(2, f"slcan-pty:{drives.can}")["speed_dps"] > 300, "it turns", 30)
+    running.more_lines(2)
+    tuner.command("rmd0", 2, 0x81, 0, 0, 0, 0, 0, 0, 0)
+    tuner.ask("latch"), tuner.ask("release")
+    running.more_lines(2)
     told = recorded(running)
-    assert told["values"] > 0 and told["achieved_hz"] is not None
-    assert File(path).of("/st0/motor1/signals")
+    assert told["lost"] == 0 and told["unconfirmed"] == 0 and told["achieved_hz"] > 0
+    # The share reads the drives: this program has sent and seen no frame.
+    assert told["frames"] == 0
+    file = File(path)
+    assert not [topic for topic, _, _ in file.messages if topic.endswith("/frames")]
+    rows = file.of("/rmd0/motor2/signals")
+    assert max(row.speed_dps for row in rows) > 100
+    stamps = [row.stamp.sec * 10**9 + row.stamp.nanosec for row in rows]
+    assert stamps == sorted(set(stamps))
+    assert all(0 < row.span_s < 5 and not math.isnan(row.multi_turn_angle_degrees) for row in rows)
+    assert {row.bus_voltage for row in file.of("/st0/motor1/signals_2_hz")} == {325.0}
+    events = [(log.function, log.name, log.file) for log in file.of("/events")]
+    for event in [
+        ("joined", "st0", "tuner"),
+        ("commanded", "rmd0/motor2", "tuner"),
+        ("stopping", "rmd0/motor2", "tuner"),
+        ("stopped", "rmd0/motor2", "tuner"),
+        ("latched", "rmd0", "tuner"),
+        ("released", "st0", "tuner"),
+    ]:
+        assert event in events, events
+    assert events.count(("joined", "st0", "tuner")) == 1
+    turned = next(log for log in file.of("/events") if log.function == "commanded")
+    assert turned.msg == "tuner sends 0xA2 Speed closed-loop command: speed 360.00 °/s", turned.msg
+    status = [status for array in file.of("/diagnostics") for status in array.status]
+    assert {it.name for it in status} == {"st0/motor1", "rmd0/motor2"}
+    info = run("info", path).ended(0).out
+    assert "frames     those of rmd0 are not recorded: a share holds the port" in info
+
+
+def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, record, tmp_path):
+    running, path = share(), tmp_path / "run.mcap"
+    recording = record(path, "-p", f"share:{running.path}/rmd0", "--id", "1", until=1)
+
+    def values():
+        return json.loads(recording.out[-1]).get("values", 0)
+
+    def continues(before):
+        eventually(lambda: values() > before + 50, "values come again", 30)
+
+    running.process.send_signal(signal.SIGSTOP)
+    silent = eventually_stands(recording, values)
+    running.process.send_signal(signal.SIGCONT)
+    continues(silent)
+    running.interrupt()
+    assert running.wait() == 0
+    recording.more_lines(2)
+    ended = values()
+    share()
+    continues(ended)
+    told = recorded(recording)
+    assert told["lost"] == 0
+    file = File(path)
+    events = [log for log in file.of("/events") if log.function in ("lost", "back")]
+    assert [log.function for log in events] == ["lost", "back"] * 2
+    assert events[0].msg == "the share does not answer"
+    assert "the share closed the connection" in events[2].msg
+    levels = [status.level for array in file.of("/diagnostics") for status in array.status]
+    assert 3 in levels and levels[-1] in (0, 1)
+
+
+def eventually_stands(recording, values):
+    """Waits until the number of values stays the same for four lines; gives it."""
+
+    def stands():
+        lines = [json.loads(line).get("values", 0) for line in recording.out[-4:]]
+        return len(lines) == 4 and len(set(lines)) == 1 and lines[0] > 0
+
+    eventually(stands, "the share is silent", 30)
+    return values()
 
 
 def test_a_scenario_is_recorded_and_has_the_same_bytes_each_time(run, tmp_path):

@@ -69,6 +69,26 @@ def test_info_says_what_is_in_a_recording(run, path):
     assert events[1]["time"] == "2026-09-21T14:13:20.800Z"
 
 
+def test_info_says_what_the_recorder_lost(run, tmp_path):
+    path = tmp_path / "run.mcap"
+    recording = Recording(path)
+    recording.signals("/st0/motor1/signals", SPEED_MEAS="rpm")
+    recording.row("/st0/motor1/signals", 0, 1)
+    for name, kind, message in [
+        ("recorder", "lost_records", "12 messages are lost here: this program or the disk was too slow"),
+        ("st0", "lost_records", "3 messages are lost here: this program or the disk was too slow"),
+        ("st0", "unconfirmed", "2 rows are left out here: nothing confirms their values"),
+        ("st0", "lost_records", "many"),
+    ]:
+        recording.event(0.1, kind, name, message)
+    recording.finish()
+    text = run("info", path).ended(0).out
+    assert "lost       15 messages in recorder, st0: the recorder or its disk was too slow" in text
+    assert "           2 rows of st0: nothing confirmed their values" in text
+    info = run("info", path, "--json").ended(0).json
+    assert (info["lost_messages"], info["unconfirmed_rows"]) == (15, 2) and "lost" not in info
+
+
 def test_info_prints_the_settings_of_a_motor(run, path):
     assert run("info", path, "--settings", "st0/motor1").ended(0).out == TOML
     assert run("info", path, "--settings", "st0/motor1", "--json").ended(0).json["settings"] == TOML

@@ -35,6 +35,14 @@ pub enum RecordError {
         /// The last error.
         why: Box<CommandError>,
     },
+    /// A share that cannot be followed.
+    #[error("`{port}`: {why}")]
+    Share {
+        /// The port.
+        port: String,
+        /// What is wrong.
+        why: String,
+    },
     /// No motor has a signal.
     #[error(transparent)]
     Signal(#[from] UnknownSignal),

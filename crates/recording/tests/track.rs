@@ -65,6 +65,7 @@ impl Recording {
             port: "virtual".to_owned(),
             speaks,
             motors: vec![motor],
+            full_scale: None,
         };
         let mut topics = Topics::default();
         let groups = choose(&[motor], &[], CENTISECOND);

@@ -70,7 +70,7 @@ pub fn state(main: &Overview, value: impl Fn(Source) -> Option<Sample>) -> Optio
     let (errors, speed) = (value(main.faults), value(main.speed)?);
     Some(match errors.is_some_and(|errors| errors.digits != 0) {
         true => "ERROR".to_owned(),
-        false if speed.digits != 0 => "turning".to_owned(),
+        false if speed.value != 0.0 => "turning".to_owned(),
         false => "at rest".to_owned(),
     })
 }

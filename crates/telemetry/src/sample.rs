@@ -27,6 +27,11 @@ impl Sample {
         Ok(Sample { digits: reading.digits(), value: reading.value() })
     }
 
+    /// A value that another program has read. Its digits are not known: they are the rounded value.
+    pub fn told(value: f64) -> Self {
+        Sample { digits: value.round() as i64, value }
+    }
+
     /// A value that no drive sent.
     pub(crate) fn computed(value: f64) -> Self {
         Sample { digits: value.to_bits() as i64, value }

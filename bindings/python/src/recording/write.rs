@@ -101,7 +101,8 @@ impl RecordingInProgress {
         let ids: MotorSet = ids.into_iter().map(|id| motor_id(py, id)).collect::<PyResult<_>>()?;
         let port = |text: String| -> PyResult<Port> {
             let name: PortName = text.parse().map_err(|error| invalid_value(py, error))?;
-            Ok(Port { name, profile, timeout, motors: motors.clone(), ids })
+            let (motors, full_scale) = (motors.clone(), None);
+            Ok(Port { name, profile, timeout, motors, ids, full_scale })
         };
         let ports = ports.into_iter().map(port).collect::<PyResult<_>>()?;
         let of_client = |client: PyRef<'_, RecordedClient>| {
@@ -303,7 +304,7 @@ fn refused(py: Python<'_>, error: RecordError) -> PyErr {
             _ => link_error(py, &error),
         },
         RecordError::NoPort | RecordError::Signal(_) => invalid_value(py, &error),
-        RecordError::Ended(_) => link_error(py, &error),
+        RecordError::Ended(_) | RecordError::Share { .. } => link_error(py, &error),
         RecordError::Thread(_) => link_error(py, &error),
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use motorlink::rmd::MotorSet;
-use motorlink::st::Profile;
+use motorlink::st::{FullScale, Profile};
 
 use crate::hint;
 use crate::span::{parse_rate, parse_span, span_up_to};
@@ -39,6 +39,10 @@ pub struct Args {
     /// Protocol variant of ST drives: spec is the document, mcsdk-5.4 is shipped firmware
     #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", value_parser = hint::profile())]
     pub profile: Profile,
+    /// Record the currents of ST drives in A, as the effort of joint states: the current of digit 32767
+    #[arg(long, value_name = "AMPS", allow_negative_numbers = true,
+          value_parser = hint::full_scale())]
+    pub full_scale: Option<FullScale>,
     /// End after this time [default: until Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub duration: Option<Duration>,

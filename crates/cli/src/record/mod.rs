@@ -73,7 +73,8 @@ fn config(args: &Args) -> Result<Config, Failure> {
         .fold(Default::default(), |ids: motorlink::rmd::MotorSet, more| ids.union(*more));
     let port = |text: &String| -> Result<Port, Failure> {
         let (name, motors) = (text.parse()?, motors.clone());
-        Ok(Port { name, profile: args.profile, timeout: args.timeout, motors, ids })
+        let (profile, timeout, full_scale) = (args.profile, args.timeout, args.full_scale);
+        Ok(Port { name, profile, timeout, motors, ids, full_scale })
     };
     let words: Vec<String> =
         std::env::args().map(|word| pasteable::quoted(&word).to_string()).collect();
@@ -114,6 +115,7 @@ fn refused(error: RecordError) -> Failure {
             Failure::link(error.to_string())
                 .trying(format!("to record a motor that is off now, name it: {option}"))
         }
+        RecordError::Share { .. } => Failure::link(error.to_string()),
         RecordError::Signal(error) => unknown(&error),
         RecordError::Ended(error) => error.into(),
         RecordError::Thread(error) => Failure::link(error.to_string()),
@@ -194,15 +196,19 @@ fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
 }
 
 fn words(progress: &Progress) -> String {
-    let Progress { elapsed, written, counts, rates, .. } = progress;
+    let Progress { elapsed, written, counts, rates, refused, .. } = progress;
     let rates = rates.map(|(asked, got)| format!(", {got:.1} of {asked:.1} Hz"));
+    let refused = match refused.is_empty() {
+        true => String::new(),
+        false => format!(", refused: {}", refused.join(", ")),
+    };
     let lost = match (counts.lost, counts.unconfirmed) {
         (0, 0) => "nothing lost".to_owned(),
         (lost, 0) => format!("{lost} LOST"),
         (lost, unconfirmed) => format!("{lost} LOST, {unconfirmed} rows not confirmed"),
     };
     format!(
-        "{:.0} s, {}, {} values, {} frames{}, {lost}",
+        "{:.0} s, {}, {} values, {} frames{}{refused}, {lost}",
         elapsed.as_secs_f64(),
         size(written.bytes),
         counts.values,
@@ -221,7 +227,7 @@ fn size(bytes: u64) -> String {
 }
 
 fn object(event: &str, progress: &Progress) -> Value {
-    let Progress { elapsed, written, counts, rates, .. } = progress;
+    let Progress { elapsed, written, counts, rates, refused, .. } = progress;
     let files = written.files.iter().map(|path| path.display().to_string());
     json!({
         "event": event,
@@ -234,5 +240,6 @@ fn object(event: &str, progress: &Progress) -> Value {
         "lost": counts.lost,
         "asked_hz": rates.map(|(asked, _)| asked),
         "achieved_hz": rates.map(|(_, achieved)| achieved),
+        "refused": refused,
     })
 }

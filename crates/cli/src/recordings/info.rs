@@ -1,11 +1,11 @@
 //! `motorlink info`: what a recording contains.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 
 use motorlink_link::{printable, printable_lines};
 use motorlink_recording::read::{Content, Drive, Metadata, Recording, lost};
-use motorlink_recording::schema::{self, Log, SETTINGS_TYPE, SignalField, Time, drive};
+use motorlink_recording::schema::{self, Log, Loss, SETTINGS_TYPE, SignalField, Time, drive};
 use serde_json::{Map, Value, json};
 
 use super::input::Input;
@@ -158,6 +158,19 @@ impl Contents {
         self.topics.iter().map(|topic| topic.messages).sum()
     }
 
+    /// How much the recorder lost, and of what: lines, and the recorder itself.
+    fn lost(&self, wanted: Loss) -> Option<(u64, String)> {
+        let losses = self.events.iter().filter_map(|log| Some((&log.name, Loss::of(log)?)));
+        let losses = losses.filter(|(_, (loss, _))| *loss == wanted);
+        let (mut sum, mut names) = (0u64, BTreeSet::new());
+        for (name, (_, count)) in losses {
+            sum = sum.saturating_add(count);
+            names.insert(name.as_str());
+        }
+        let names: Vec<&str> = names.into_iter().collect();
+        (sum > 0).then(|| (sum, names.join(", ")))
+    }
+
     fn lines(&self, input: &Input, recording: &Recording<File>) -> Vec<String> {
         let mut lines = Vec::new();
         let mut row = |name: &str, text: String| {
@@ -187,6 +200,9 @@ impl Contents {
                 row("", format!("  {line}"));
             }
         }
+        for (label, why) in without_frames(recording) {
+            row("frames", format!("those of {label} are not recorded: {why}"));
+        }
         let widths = self.topics.iter().map(|topic| topic.name.len());
         let width = widths.max().unwrap_or(0).min(SIGNALS);
         for (n, topic) in self.topics.iter().enumerate() {
@@ -206,7 +222,20 @@ impl Contents {
         for (n, line) in flow(&attached, "  ", SIGNALS).into_iter().enumerate() {
             row(if n == 0 { "attached" } else { "" }, line);
         }
-        row("lost", lost(recording.losses()).unwrap_or_else(|| "nothing".to_owned()));
+        let lost = lost(recording.losses()).into_iter();
+        let lost = lost.chain(self.lost(Loss::Messages).map(|(count, names)| {
+            format!("{count} messages in {names}: the recorder or its disk was too slow")
+        }));
+        let lost = lost.chain(self.lost(Loss::Rows).map(|(count, names)| {
+            format!("{count} rows of {names}: nothing confirmed their values")
+        }));
+        let lost: Vec<String> = lost.collect();
+        for (n, text) in lost.iter().enumerate() {
+            row(if n == 0 { "lost" } else { "" }, text.clone());
+        }
+        if lost.is_empty() {
+            row("lost", "nothing".to_owned());
+        }
         lines
     }
 
@@ -247,6 +276,9 @@ impl Contents {
             self.kinds.iter().map(|(kind, count)| (kind.clone(), (*count).into())).collect();
         add("events", kinds.into());
         add("attachments", recording.attachments().collect());
+        let count = |loss| self.lost(loss).map_or(0, |(count, _)| count).into();
+        add("lost_messages", count(Loss::Messages));
+        add("unconfirmed_rows", count(Loss::Rows));
         if let Some(why) = lost(recording.losses()) {
             add("lost", json!({ "bytes": recording.lost_bytes(), "why": why }));
         }
@@ -256,6 +288,15 @@ impl Contents {
 
 fn drives(recording: &Recording<File>) -> impl Iterator<Item = &Metadata> {
     recording.metadata().iter().filter(|metadata| metadata.name == drive::NAME)
+}
+
+/// The lines whose frames are not recorded, and why.
+fn without_frames(recording: &Recording<File>) -> BTreeMap<&str, &str> {
+    let facts = drives(recording).filter_map(|drive| {
+        let fact = |name: &str| drive.values.get(name).map(String::as_str);
+        Some((fact(drive::LABEL)?, fact(drive::NO_FRAMES)?))
+    });
+    facts.collect()
 }
 
 /// `st0/motor1 at serial:/dev/ttyACM0, st spec`.

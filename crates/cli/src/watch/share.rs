@@ -1,12 +1,13 @@
 //! The latch of a share. It holds for all programs of the share, that of an engine here does not.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use motorlink_telemetry::share::message::{Answer, Ask};
+use motorlink_telemetry::share::port::place_of;
 
 use super::model::Latch;
 use super::work::{Done, Work};
@@ -27,16 +28,12 @@ impl Share {
     pub fn of(names: &[String], work: &Work) -> Vec<Share> {
         let mut shares: Vec<Share> = Vec::new();
         for (port, name) in names.iter().enumerate() {
-            let Some((path, _)) = name.strip_prefix("share:").and_then(|it| it.rsplit_once('/'))
-            else {
-                continue;
-            };
-            let path = Path::new(path);
+            let Some((path, _)) = place_of(name) else { continue };
             match shares.iter_mut().find(|share| share.path == path) {
                 Some(share) => share.ports.push(port),
                 None => {
                     let (commands, received) = channel();
-                    let (path, number) = (path.to_owned(), shares.len());
+                    let number = shares.len();
                     let watcher = Watcher {
                         path: path.clone(),
                         by: Arc::clone(&work.by),

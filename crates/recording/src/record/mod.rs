@@ -3,6 +3,8 @@
 pub mod choice;
 pub mod client;
 mod condition;
+mod content;
+mod followed;
 pub mod frames;
 mod joint;
 mod open;

@@ -1,17 +1,19 @@
 //! Opens ports with taps around them, and finds their motors.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::port::PortName;
 use motorlink::rmd::MotorSet;
 use motorlink::{rmd, st};
-use motorlink_proto::st::{MotorNumber, Profile};
+use motorlink_proto::st::{FullScale, MotorNumber, Profile};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{LineError, RmdLine, StLine};
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::search;
 use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
@@ -35,6 +37,8 @@ pub struct Port {
     pub motors: Vec<MotorNumber>,
     /// RMD motors. Empty: those that answer.
     pub ids: MotorSet,
+    /// The current of digit 32767 of an ST drive. Without it joint states have no current.
+    pub full_scale: Option<FullScale>,
 }
 
 /// A line whose engine runs.
@@ -45,6 +49,8 @@ pub(super) struct Opened {
     pub(super) taps: Taps,
     /// The client, if it is not the recording's own.
     pub(super) lent: Option<Lent>,
+    /// The path of the share that holds the port, and its name of the line.
+    pub(super) share: Option<(PathBuf, String)>,
 }
 
 /// Opens all ports, and takes the clients. A port of both kinds gives a serial line and a CAN bus.
@@ -99,10 +105,13 @@ fn of_port(
         }
     };
     let anchor = Anchor::now(acquisition.clock());
+    let full_scale = port.full_scale.filter(|_| protocol == Protocol::St);
+    let port = port.name.to_string();
+    let share = place_of(&port);
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
-    let motors = found(&runner, &port.name.to_string(), speaks, &given, by)?;
-    let line = Line { label, port: port.name.to_string(), speaks, motors };
-    Ok(Opened { runner, line, anchor, taps, lent: None })
+    let motors = found(&runner, &port, speaks, &given, by)?;
+    let line = Line { label, port, speaks, motors, full_scale };
+    Ok(Opened { runner, line, anchor, taps, lent: None, share })
 }
 
 fn of_client(label: String, client: &Client, by: &Arc<str>) -> Result<Opened, RecordError> {
@@ -113,7 +122,8 @@ fn of_client(label: String, client: &Client, by: &Arc<str>) -> Result<Opened, Re
     let lent = Some(lent.map_err(RecordError::Thread)?);
     let (port, speaks) = (client.port.clone(), client.speaks());
     let motors = found(&runner, &port, speaks, &client.motors, by)?;
-    Ok(Opened { runner, line: Line { label, port, speaks, motors }, anchor, taps, lent })
+    let line = Line { label, port, speaks, motors, full_scale: None };
+    Ok(Opened { runner, line, anchor, taps, lent, share: None })
 }
 
 /// The motors that are given, or those that answer.

@@ -1,26 +1,30 @@
 //! Records lines in threads: an engine each, one that makes messages, one that writes them.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use motorlink_proto::st::Profile;
-use motorlink_proto::time::Micros;
+use motorlink_proto::time::{Instant as Moment, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::runner::Runner;
+use motorlink_telemetry::share::stream::{Followed as Target, Stream, Wanted};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
-use super::choice;
+use super::choice::{self, Group};
 use super::client::{Client, Lent};
+use super::content::{Content, Counts, Line};
+use super::followed::Followed;
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
-use super::track::{Counts, Line, Track, lost_records};
+use super::track::Track;
 use super::wall::{DayInUse, wall_now};
 use crate::error::{RecordError, WriteError};
-use crate::schema::{self, Log, Severity, Time, drive, name, recording};
+use crate::schema::{self, Log, Loss, Severity, Time, drive, name, recording};
 use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
 
 /// How often messages are made of what came.
@@ -29,6 +33,9 @@ const TURN: Duration = Duration::from_millis(20);
 const RATES: Duration = Duration::from_millis(1_100);
 /// How long the end waits until the last values are confirmed.
 const CONFIRMATION: Duration = Duration::from_millis(500);
+
+/// How long the end waits for the last rows of a share, which it confirms within 0.1 s.
+const OF_SHARE: Duration = Duration::from_millis(250);
 
 /// Whom losses of the recorder itself concern, in events.
 const RECORDER: &str = "recorder";
@@ -63,8 +70,10 @@ pub struct Progress {
     pub written: Written,
     /// Values, frames, losses.
     pub counts: Counts,
-    /// The rate of the signals, Hz: asked, and the least that is reached.
+    /// The rate of the signals that have values, Hz: asked, and the least that is reached.
     pub rates: Option<(f64, f64)>,
+    /// Signals that the drives refuse to give, as `st0/motor1/SPEED_MEAS`.
+    pub refused: Vec<String>,
     /// Nothing more is recorded: the file cannot be written, or has the size that it may have.
     pub is_over: bool,
 }
@@ -83,13 +92,18 @@ struct Shared {
     ends: AtomicBool,
 }
 
-/// An engine and what is made of its records.
-struct Recorded {
-    track: Track,
-    runner: Runner,
-    lent: Option<Lent>,
-    /// Rates of the engine, until they are taken.
-    rates: Arc<Mutex<Option<Vec<Rate>>>>,
+/// A line, and what is made of it.
+enum Recorded {
+    /// This program reads the drives.
+    Engine {
+        track: Track,
+        runner: Runner,
+        lent: Option<Lent>,
+        /// Rates of the engine, until they are taken.
+        rates: Arc<Mutex<Option<Vec<Rate>>>>,
+    },
+    /// A share reads them.
+    Share(Followed),
 }
 
 impl Recorder {
@@ -114,16 +128,18 @@ impl Recorder {
             }
         }
         let (mut topics, mut recorded) = (Topics::default(), Vec::new());
-        for Opened { runner, line, anchor, taps, lent } in opened {
-            let groups = choice::choose(&line.motors, &config.signals, config.period);
-            let track = Track::new(line, groups, anchor, taps, &mut topics);
-            for (subscription, wants) in track.subscriptions() {
-                let (theirs, wants) = (subscription.clone(), wants.clone());
-                runner.remote().with(|engine| engine.subscribe(theirs, wants))?;
-            }
-            recorded.push(Recorded { track, runner, lent, rates: Arc::default() });
+        let mut shares = BTreeSet::new();
+        for it in opened {
+            let groups = choice::choose(&it.line.motors, &config.signals, config.period);
+            recorded.push(match &it.share {
+                Some((path, _)) => {
+                    let is_first = shares.insert(path.clone());
+                    Recorded::follow(it, groups, &config.by, is_first, &mut topics)?
+                }
+                None => Recorded::read(it, groups, &mut topics)?,
+            });
         }
-        let lines = recorded.iter().map(|it| it.track.line().clone()).collect();
+        let lines = recorded.iter().map(|it| it.content().line().clone()).collect();
         let writer = Writer::start(series).map_err(RecordError::Thread)?;
         for entry in entries.into_iter().chain(topics.take()).chain(events) {
             writer.queue().push(entry);
@@ -192,21 +208,18 @@ fn run(
         // The engine counts the values of the last second.
         if asked.elapsed() >= RATES {
             asked = Instant::now();
-            recorded.iter().for_each(Recorded::ask_rates);
+            recorded.iter_mut().for_each(Recorded::ask_rates);
         }
         turn(&mut recorded, &writer, &mut losses);
         tell(&recorded, &writer, &losses, began, shared);
     }
     await_confirmation(&mut recorded, &writer, &mut losses);
     let mut counts = Counts::default();
-    for Recorded { mut track, runner, lent, .. } in recorded {
-        // It moves no motor, so there is none to be stopped.
-        runner.end();
-        drop(lent);
-        track.end(wall_now(), &mut |entry| {
+    for it in recorded {
+        let ended = it.end(&mut |entry| {
             writer.queue().push(entry);
         });
-        counts = counts.plus(track.counts());
+        counts = counts.plus(ended);
     }
     counts.lost += writer.queue().lost();
     shared.progress().counts = counts;
@@ -215,11 +228,8 @@ fn run(
 
 fn turn(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
     let now = wall_now();
-    for Recorded { track, rates, .. } in recorded {
-        if let Some(rates) = lock(rates).take() {
-            track.take_rates(&rates);
-        }
-        track.take(now, &mut |entry| {
+    for it in recorded {
+        it.take(now, &mut |entry| {
             writer.queue().push(entry);
         });
     }
@@ -232,11 +242,12 @@ fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant,
     progress.elapsed = began.elapsed();
     progress.written = of_writer.written;
     progress.is_over = of_writer.is_complete || of_writer.failed.is_some();
-    let counts = recorded.iter().map(|it| it.track.counts());
+    let counts = recorded.iter().map(|it| it.content().counts);
     progress.counts = counts.fold(Counts::default(), Counts::plus);
     progress.counts.lost += losses.known;
-    let rates = recorded.iter().filter_map(|it| it.track.rates());
+    let rates = recorded.iter().filter_map(|it| it.content().rates());
     progress.rates = rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)));
+    progress.refused = recorded.iter().flat_map(|it| it.content().refused()).collect();
 }
 
 /// Messages that did not fit into the queue of the writer.
@@ -251,7 +262,7 @@ impl Losses {
     fn tell(&mut self, now: Time, queue: &Queue<Entry>) {
         self.known = queue.lost();
         let new = self.known - self.told;
-        let said = || Entry::message(Topics::EVENTS, now, &lost_records(now, RECORDER, new));
+        let said = || Entry::message(Topics::EVENTS, now, &Loss::Messages.log(now, RECORDER, new));
         if new > 0 && queue.has_room() && queue.push(said()) {
             self.told = self.known;
         }
@@ -260,13 +271,12 @@ impl Losses {
 
 fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
     let began = Instant::now();
-    let ends: Vec<_> = recorded
-        .iter()
-        .map(|it| it.runner.remote().with(|engine| engine.clock().now()).ok())
-        .collect();
+    let ends: Vec<_> = recorded.iter().map(Recorded::now).collect();
     let is_pending = |recorded: &[Recorded]| {
-        let mut pairs = recorded.iter().zip(&ends);
-        pairs.any(|(it, end)| end.is_some_and(|end| it.track.is_pending_before(end)))
+        recorded.iter().zip(&ends).any(|(it, end)| match it {
+            Recorded::Engine { track, .. } => end.is_some_and(|end| track.is_pending_before(end)),
+            Recorded::Share(_) => began.elapsed() < OF_SHARE,
+        })
     };
     while is_pending(recorded) && began.elapsed() < CONFIRMATION {
         std::thread::park_timeout(TURN);
@@ -275,13 +285,102 @@ fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut L
 }
 
 impl Recorded {
-    /// Asks for the rates without waiting for them.
-    fn ask_rates(&self) {
-        let rates = Arc::clone(&self.rates);
-        // An engine that has ended has no rates.
-        let _ = self.runner.remote().post(move |engine| {
-            *lock(&rates) = Some(engine.rates().collect());
+    /// Reads a line.
+    fn read(
+        Opened { runner, line, anchor, taps, lent, .. }: Opened,
+        groups: Vec<Group>,
+        topics: &mut Topics,
+    ) -> Result<Self, RecordError> {
+        let track = Track::new(line, groups, anchor, taps, topics);
+        for (subscription, wants) in track.subscriptions() {
+            let (theirs, wants) = (subscription.clone(), wants.clone());
+            runner.remote().with(|engine| engine.subscribe(theirs, wants))?;
+        }
+        Ok(Recorded::Engine { track, runner, lent, rates: Arc::default() })
+    }
+
+    /// Follows a line of a share. Its first line has the events of the share itself.
+    fn follow(
+        Opened { runner, line, share, .. }: Opened,
+        groups: Vec<Group>,
+        by: &Arc<str>,
+        is_first: bool,
+        topics: &mut Topics,
+    ) -> Result<Self, RecordError> {
+        // The share reads the signals from now on.
+        runner.end();
+        let wanted = groups.iter().map(|group| Wanted {
+            signals: group.motors.iter().flat_map(|(_, signals)| signals).copied().collect(),
+            period: group.period.0 as f64 / 1e6,
         });
+        let wanted = wanted.filter(|wanted| !wanted.signals.is_empty()).collect();
+        let (path, name) = share.unwrap_or_default();
+        let target = Target { path, line: name, speaks: line.speaks, name: by.to_string(), wanted };
+        let stream = Stream::open(target, || wall_now().0);
+        let port = line.port.clone();
+        let stream = stream.map_err(|why| RecordError::Share { port, why })?;
+        let content = Content::new(line, groups, topics);
+        Ok(Recorded::Share(Followed::new(content, stream, is_first)))
+    }
+
+    fn content(&self) -> &Content {
+        match self {
+            Recorded::Engine { track, .. } => track.content(),
+            Recorded::Share(followed) => followed.content(),
+        }
+    }
+
+    /// The clock of an engine.
+    fn now(&self) -> Option<Moment> {
+        match self {
+            Recorded::Engine { runner, .. } => {
+                runner.remote().with(|engine| engine.clock().now()).ok()
+            }
+            Recorded::Share(_) => None,
+        }
+    }
+
+    fn take(&mut self, now: Time, put: &mut dyn FnMut(Entry)) {
+        match self {
+            Recorded::Engine { track, rates, .. } => {
+                if let Some(rates) = lock(rates).take() {
+                    track.take_rates(&rates);
+                }
+                track.take(now, put);
+            }
+            Recorded::Share(followed) => followed.take(now, put),
+        }
+    }
+
+    /// Ends it, and gives what was recorded.
+    fn end(self, put: &mut dyn FnMut(Entry)) -> Counts {
+        match self {
+            Recorded::Engine { mut track, runner, lent, .. } => {
+                // It moves no motor, so there is none to be stopped.
+                runner.end();
+                drop(lent);
+                track.end(wall_now(), put);
+                track.counts()
+            }
+            Recorded::Share(mut followed) => {
+                followed.end(wall_now(), put);
+                followed.content().counts
+            }
+        }
+    }
+
+    /// Asks for the rates without waiting for them.
+    fn ask_rates(&mut self) {
+        match self {
+            Recorded::Engine { runner, rates, .. } => {
+                let rates = Arc::clone(rates);
+                // An engine that has ended has no rates.
+                let _ = runner.remote().post(move |engine| {
+                    *lock(&rates) = Some(engine.rates().collect());
+                });
+            }
+            Recorded::Share(followed) => followed.ask_rates(wall_now()),
+        }
     }
 }
 
@@ -312,6 +411,9 @@ fn drive(
     let Opened { runner, line, .. } = opened;
     let mut pairs: Pairs = line.pairs();
     pairs.insert(drive::MOTOR.to_owned(), motor.number().to_string());
+    if opened.share.is_some() {
+        pairs.insert(drive::NO_FRAMES.to_owned(), "a share holds the port".to_owned());
+    }
     let profile = match line.speaks {
         Speaks::St(profile) => profile,
         Speaks::Rmd => Profile::default(),

@@ -4,12 +4,14 @@
 
 mod cdr;
 mod frame;
+mod loss;
 mod message;
 pub mod name;
 mod signals;
 
 pub use cdr::Malformed;
 pub use frame::{Direction, Frame, FrameResult};
+pub use loss::Loss;
 pub use message::{
     DiagnosticArray, DiagnosticStatus, JointState, Level, Log, Message, Severity, Time,
 };
@@ -66,6 +68,8 @@ pub mod drive {
     pub const MOTOR: &str = "motor";
     /// What is known of the drive; one line of [`IDENTITY`] and a number each.
     pub const IDENTITY: &str = "identity";
+    /// Why the frames of the line are not recorded.
+    pub const NO_FRAMES: &str = "no_frames";
     /// The name of the attachment with the settings.
     pub const SETTINGS: &str = "settings";
 }

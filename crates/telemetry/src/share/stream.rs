@@ -4,8 +4,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use motorlink_proto::st::Profile;
 
@@ -152,6 +151,11 @@ impl Stream {
             }
             stream.wait();
         }
+    }
+
+    /// The name of the line.
+    pub fn line(&self) -> &str {
+        &self.followed.line
     }
 
     /// Whether it follows the signals now.

@@ -5,6 +5,8 @@ mod connection;
 mod place;
 mod serial;
 
+use std::path::PathBuf;
+
 use motorlink::port::{
     self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
     NameError, Port, PortError, PortName, Scheme,
@@ -18,6 +20,12 @@ use serial::ShareLine;
 /// Registers the port `share:` in this process.
 pub fn register() {
     port::register(&Share);
+}
+
+/// The path of the share and the name of the line, if this is the name of a line of a share.
+pub fn place_of(name: &str) -> Option<(PathBuf, String)> {
+    let (path, line) = name.strip_prefix(Share.name())?.strip_prefix(':')?.rsplit_once('/')?;
+    Some((path.into(), line.to_owned()))
 }
 
 /// `share:PATH/LINE`.

@@ -1,0 +1,107 @@
+//! A line of a share: from the rows and events of the share to messages. The share reads the drives, and
+//! another program may command them.
+
+use motorlink_proto::rmd::MotorId;
+use motorlink_proto::st::MotorNumber;
+use motorlink_telemetry::sample::Sample;
+use motorlink_telemetry::share::message::{Event, Happening, SignalRate};
+use motorlink_telemetry::share::stream::{Item, Stream};
+use motorlink_telemetry::share::words::{Speaks, Told};
+use motorlink_telemetry::signal::{Motor, Signal};
+
+use super::content::{Content, Values};
+use crate::schema::Time;
+use crate::write::Entry;
+
+/// The recording of a line of a share.
+#[derive(Debug)]
+pub(super) struct Followed {
+    content: Content,
+    stream: Stream,
+    /// Whether events of the share itself are recorded here. One line of each share has them.
+    has_events_of_share: bool,
+}
+
+impl Followed {
+    pub(super) fn new(content: Content, stream: Stream, has_events_of_share: bool) -> Self {
+        Followed { content, stream, has_events_of_share }
+    }
+
+    pub(super) fn content(&self) -> &Content {
+        &self.content
+    }
+
+    pub(super) fn ask_rates(&mut self, now: Time) {
+        self.stream.ask_rates(now.0);
+    }
+
+    /// Takes what came. `put` receives the messages.
+    pub(super) fn take(&mut self, now: Time, put: &mut dyn FnMut(Entry)) {
+        for item in self.stream.take(now.0) {
+            self.item(item, now, put);
+        }
+        self.content.diagnose(now, put);
+    }
+
+    /// Nothing more comes.
+    pub(super) fn end(&mut self, now: Time, put: &mut dyn FnMut(Entry)) {
+        self.take(now, put);
+        self.content.tell_unconfirmed(now, put);
+    }
+
+    fn item(&mut self, item: Item, now: Time, put: &mut dyn FnMut(Entry)) {
+        let of_line = |event, message| Told { event, motor: None, by: None, since: None, message };
+        match item {
+            Item::Row { wanted, motor, time, span, values } => {
+                let sample = |value: f64| (!value.is_nan()).then(|| Sample::told(value));
+                let samples = values.into_iter().map(sample).collect();
+                let values = Values { stamp: Time(time), span_s: span, samples };
+                self.content.row(wanted, motor, &values, put);
+            }
+            Item::Unconfirmed(rows) => self.content.unconfirmed(rows),
+            Item::Lost(count) => self.content.lost(now, count, put),
+            Item::Rates(rates) => self.rates(&rates),
+            Item::Event(time, event) => self.event(Time(time), event, put),
+            Item::Down(why) => self.content.told(now, of_line(Happening::Lost, why), put),
+            Item::Up => {
+                let back = "the share is there again".to_owned();
+                self.content.told(now, of_line(Happening::Back, back), put);
+            }
+        }
+    }
+
+    fn rates(&mut self, rates: &[SignalRate]) {
+        let line = self.content.line();
+        let signal = |rate: &SignalRate| {
+            let motor = motor(line.speaks, rate.signal.motor)?;
+            Some((Signal::named(motor, &rate.signal.name).ok()?, rate.achieved))
+        };
+        let is_of_line = |rate: &&SignalRate| rate.signal.line == self.stream.line();
+        let rates: Vec<_> = rates.iter().filter(is_of_line).filter_map(signal).collect();
+        self.content.take_rates(&rates);
+    }
+
+    fn event(&mut self, stamp: Time, event: Event, put: &mut dyn FnMut(Entry)) {
+        let Event { line, motor: number, by, event, message, .. } = event;
+        if line.is_none() && !self.has_events_of_share {
+            return;
+        }
+        // The name of the motor is in the event.
+        let place = match (&line, number) {
+            (Some(line), Some(number)) => format!("{line}, motor {number}: "),
+            (Some(line), None) => format!("{line}: "),
+            (None, _) => String::new(),
+        };
+        let message = message.strip_prefix(&place).unwrap_or(&message).to_owned();
+        let motor = number.and_then(|number| motor(self.content.line().speaks, number));
+        let by = by.map(Into::into);
+        self.content.told(stamp, Told { event, motor, by, since: None, message }, put);
+    }
+}
+
+fn motor(speaks: Speaks, number: u8) -> Option<Motor> {
+    match speaks {
+        Speaks::St(_) => MotorNumber::new(number).map(Motor::St),
+        Speaks::Rmd => MotorId::new(number).map(Motor::Rmd),
+    }
+}
