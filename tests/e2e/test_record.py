@@ -3,10 +3,12 @@
 import json
 import math
 import os
+import pty
 import resource
 import signal
 import subprocess
 import time
+import tty
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -200,6 +202,36 @@ def test_nothing_is_left_where_no_motor_answers(run, sim, tmp_path):
     outcome = run("record", "-p", drives.can, "-o", path, "--timeout", "100ms").ended(3)
     assert f"no motor answers at serial:{drives.can}: reading STATUS for motor 1 failed" in outcome.err
     assert not path.exists()
+
+
+@pytest.mark.parametrize("ending", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGINT, signal.SIGINT]])
+def test_a_signal_ends_the_start_at_once_and_leaves_no_file(start, tmp_path, ending):
+    drive, port = pty.openpty()
+    tty.setraw(port)
+    path = tmp_path / "run.mcap"
+    words = ("--motor", "1", "--timeout", "10s", "-o", path)
+    running = start("record", "-p", os.ttyname(port), *words)
+    # The first question about the settings, which this drive never answers.
+    assert os.read(drive, 64)
+    assert path.exists()
+    for number in ending:
+        running.process.send_signal(number)
+    assert running.wait(5) == 130, running.err
+    assert not path.exists()
+    os.close(drive), os.close(port)
+
+
+def test_a_signal_before_the_start_keeps_a_file_that_exists(start, tmp_path):
+    drive, port = pty.openpty()
+    tty.setraw(port)
+    path = tmp_path / "run.mcap"
+    path.write_text("old")
+    running = start("record", "-p", os.ttyname(port), "--timeout", "10s", "-o", path, "--force")
+    assert os.read(drive, 64)
+    running.interrupt()
+    assert running.wait(5) == 130, running.err
+    assert path.read_text() == "old"
+    os.close(drive), os.close(port)
 
 
 def limited(size):

@@ -25,6 +25,9 @@ pub enum RecordError {
     /// A port.
     #[error(transparent)]
     Line(#[from] LineError),
+    /// The start was ended before the recording began.
+    #[error("the recording was ended before it began")]
+    Aborted,
     /// A port without a motor that answers.
     #[error("no motor answers at {port}: {}", without_port(why, port))]
     NoMotor {

@@ -82,8 +82,7 @@ impl Runner {
     }
 
     fn close(&mut self) -> Vec<Stopped> {
-        // The engine ends when it is told, however many remotes there are.
-        let _ = self.remote.wake.shutdown(std::net::Shutdown::Both);
+        self.remote.end();
         let ended = self.thread.take().map(JoinHandle::join);
         ended.and_then(Result::ok).unwrap_or_default()
     }
@@ -96,6 +95,13 @@ impl Drop for Runner {
 }
 
 impl Remote {
+    /// Ends the engine, however many remotes there are: what is waited for fails at once. The motors that
+    /// were started through it are stopped.
+    pub fn end(&self) {
+        // It fails if the engine has ended.
+        let _ = self.wake.shutdown(std::net::Shutdown::Both);
+    }
+
     /// Runs a function on the engine, between two steps of it, and gives its result.
     ///
     /// # Errors

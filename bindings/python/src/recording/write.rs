@@ -304,7 +304,9 @@ fn refused(py: Python<'_>, error: RecordError) -> PyErr {
             _ => link_error(py, &error),
         },
         RecordError::NoPort | RecordError::Signal(_) => invalid_value(py, &error),
-        RecordError::Ended(_) | RecordError::Share { .. } => link_error(py, &error),
+        RecordError::Ended(_) | RecordError::Aborted | RecordError::Share { .. } => {
+            link_error(py, &error)
+        }
         RecordError::Thread(_) => link_error(py, &error),
     }
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::st::MotorNumber;
 use motorlink_link::printable;
-use motorlink_recording::record::{Config, Line, Port, Progress, Recorder};
+use motorlink_recording::record::{Abort, Config, Line, Port, Progress, Recorder};
 use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::message::Protocol;
@@ -31,9 +31,8 @@ const LOOKED: Duration = Duration::from_millis(100);
 pub fn run(args: &Args) -> Result<(), Failure> {
     // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
-    interrupt::take_over();
     let config = config(args)?;
-    let recorder = Recorder::start(&config).map_err(refused)?;
+    let recorder = start(&config)?;
     begun(&recorder, args)?;
     let bar = bar(args);
     let (began, mut shown) = (Instant::now(), Instant::now());
@@ -56,6 +55,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     bar.finish_and_clear();
     let ended = ended.map_err(|error| broken(&error))?;
     over(&ended, args)
+}
+
+/// Starts the recording. A signal ends the start at once, and leaves no file.
+fn start(config: &Config) -> Result<Recorder, Failure> {
+    let abort = Abort::default();
+    let of_signal = abort.clone();
+    interrupt::take_over_with(move || of_signal.abort());
+    // A second signal must not leave an empty file.
+    interrupt::hold_on(true);
+    let started = Recorder::start_unless(&abort, config).map_err(refused);
+    interrupt::hold_on(false);
+    started
 }
 
 fn config(args: &Args) -> Result<Config, Failure> {
@@ -99,6 +110,7 @@ fn config(args: &Args) -> Result<Config, Failure> {
 fn refused(error: RecordError) -> Failure {
     match error {
         RecordError::NoPort => missing_port(),
+        RecordError::Aborted => Failure::Interrupted,
         RecordError::File(WriteError::Exists { path }) => {
             let shown = printable(&path.display().to_string()).to_string();
             Failure::usage(format!("{shown} exists already"))

@@ -1,5 +1,6 @@
 //! Records drives: [`Recorder`] in threads, [`track`] without one.
 
+mod abort;
 pub mod choice;
 pub mod client;
 mod condition;
@@ -14,6 +15,7 @@ mod topics;
 pub mod track;
 pub mod wall;
 
+pub use abort::Abort;
 pub use open::Port;
 pub use recorder::{Config, Progress, Recorder};
 pub use topics::Topics;

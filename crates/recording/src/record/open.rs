@@ -17,6 +17,7 @@ use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
+use super::abort::Abort;
 use super::client::{Client, Lent};
 use super::frames::Taps;
 use super::track::Line;
@@ -58,6 +59,7 @@ pub(super) fn open(
     ports: &[Port],
     clients: &[Client],
     by: &Arc<str>,
+    abort: &Abort,
 ) -> Result<Vec<Opened>, RecordError> {
     let mut lines = Vec::new();
     for port in ports {
@@ -69,10 +71,10 @@ pub(super) fn open(
     let mut labels = name::labels(&names).into_iter();
     let mut opened = Vec::new();
     for ((port, protocol), label) in lines.into_iter().zip(labels.by_ref()) {
-        opened.push(of_port(label, port, protocol, by)?);
+        opened.push(of_port(label, port, protocol, by, abort)?);
     }
     for (client, label) in clients.iter().zip(labels) {
-        opened.push(of_client(label, client, by)?);
+        opened.push(of_client(label, client, by, abort)?);
     }
     Ok(opened)
 }
@@ -82,7 +84,9 @@ fn of_port(
     port: &Port,
     protocol: Protocol,
     by: &Arc<str>,
+    abort: &Abort,
 ) -> Result<Opened, RecordError> {
+    abort.check()?;
     let taps = Taps::default();
     let around = taps.clone();
     let (acquisition, speaks, given): (_, _, Vec<Motor>) = match protocol {
@@ -109,19 +113,25 @@ fn of_port(
     let port = port.name.to_string();
     let share = place_of(&port);
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
-    let motors = found(&runner, &port, speaks, &given, by)?;
+    let motors = found(&runner, &port, speaks, &given, by, abort)?;
     let line = Line { label, port, speaks, motors, full_scale };
     Ok(Opened { runner, line, anchor, taps, lent: None, share })
 }
 
-fn of_client(label: String, client: &Client, by: &Arc<str>) -> Result<Opened, RecordError> {
+fn of_client(
+    label: String,
+    client: &Client,
+    by: &Arc<str>,
+    abort: &Abort,
+) -> Result<Opened, RecordError> {
+    abort.check()?;
     let (taps, (acquisition, carrier)) = (Taps::default(), client.engine());
     let anchor = Anchor::now(acquisition.clock());
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
     let lent = carrier.start(client, client.outlet.plug(&taps), runner.remote().clone());
     let lent = Some(lent.map_err(RecordError::Thread)?);
     let (port, speaks) = (client.port.clone(), client.speaks());
-    let motors = found(&runner, &port, speaks, &client.motors, by)?;
+    let motors = found(&runner, &port, speaks, &client.motors, by, abort)?;
     let line = Line { label, port, speaks, motors, full_scale: None };
     Ok(Opened { runner, line, anchor, taps, lent, share: None })
 }
@@ -133,7 +143,9 @@ fn found(
     speaks: Speaks,
     given: &[Motor],
     by: &Arc<str>,
+    abort: &Abort,
 ) -> Result<Vec<Motor>, RecordError> {
+    abort.engine(runner.remote());
     if !given.is_empty() {
         return Ok(given.to_vec());
     }
@@ -142,5 +154,7 @@ fn found(
         Speaks::Rmd => Protocol::Rmd,
     };
     let none = |why| RecordError::NoMotor { port: port.to_owned(), protocol, why: Box::new(why) };
-    search::motors(runner.remote(), by, protocol).map_err(none)
+    let found = search::motors(runner.remote(), by, protocol);
+    abort.check()?;
+    found.map_err(none)
 }

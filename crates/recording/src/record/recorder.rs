@@ -14,6 +14,7 @@ use motorlink_telemetry::share::stream::{Followed as Target, Stream, Wanted};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
+use super::abort::Abort;
 use super::choice::{self, Group};
 use super::client::{Client, Lent};
 use super::content::{Content, Counts, Line};
@@ -112,12 +113,20 @@ impl Recorder {
     /// # Errors
     /// See [`RecordError`]. No file is left then.
     pub fn start(config: &Config) -> Result<Self, RecordError> {
+        Self::start_unless(&Abort::default(), config)
+    }
+
+    /// As [`start`](Self::start), which another thread may end.
+    ///
+    /// # Errors
+    /// See [`RecordError`]. No file is left then.
+    pub fn start_unless(abort: &Abort, config: &Config) -> Result<Self, RecordError> {
         if config.ports.is_empty() && config.clients.is_empty() {
             return Err(RecordError::NoPort);
         }
         let day = DayInUse::new();
         let series = Series::create(config.output.clone())?;
-        let opened = open(&config.ports, &config.clients, &config.by)?;
+        let opened = open(&config.ports, &config.clients, &config.by, abort)?;
         let motors: Vec<Motor> = opened.iter().flat_map(|it| it.line.motors.clone()).collect();
         choice::check(&motors, &config.signals)?;
         let mut entries = vec![about(config)];
@@ -125,6 +134,7 @@ impl Recorder {
         for it in &opened {
             for motor in &it.line.motors {
                 drive(config, it, *motor, &mut entries, &mut events);
+                abort.check()?;
             }
         }
         let (mut topics, mut recorded) = (Topics::default(), Vec::new());
@@ -140,6 +150,7 @@ impl Recorder {
             });
         }
         let lines = recorded.iter().map(|it| it.content().line().clone()).collect();
+        abort.begun()?;
         let writer = Writer::start(series).map_err(RecordError::Thread)?;
         for entry in entries.into_iter().chain(topics.take()).chain(events) {
             writer.queue().push(entry);
