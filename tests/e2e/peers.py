@@ -6,6 +6,7 @@ import random
 import select
 import socket
 import threading
+import time
 import tty
 from contextlib import contextmanager
 
@@ -69,12 +70,14 @@ def slcan_adapter(deliver):
 
 
 class Plug:
-    """A cable to a drive at HOST:PORT that can be unplugged and plugged in again. `port` is what -p takes."""
+    """A cable to a drive at HOST:PORT that can be unplugged and plugged in again. `port` is what -p takes.
+    `delivered` is when the host last got something from the drive: ns since 1970."""
 
     def __init__(self, address):
         host, port = address.rsplit(":", 1)
         self._drive = (host, int(port))
         self._ours = ("127.0.0.1", 0)
+        self.delivered = 0
         self.plug_in()
         self._ours = self._listener.getsockname()
         self.port = "tcp:{}:{}".format(*self._ours)
@@ -97,11 +100,13 @@ class Plug:
                 drive = socket.create_connection(self._drive)
                 ends += [client, drive]
                 for source, sink in ((client, drive), (drive, client)):
-                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+                    ends_at = (source, sink, sink is client)
+                    threading.Thread(target=self._carry, args=ends_at, daemon=True).start()
 
-    @staticmethod
-    def _carry(source, sink):
+    def _carry(self, source, sink, is_to_host):
         with contextlib.suppress(OSError):
             while data := source.recv(4096):
                 sink.sendall(data)
+                if is_to_host:
+                    self.delivered = time.time_ns()
             sink.shutdown(socket.SHUT_RDWR)

@@ -88,8 +88,11 @@ fn write(
     progress: &Mutex<Progress>,
 ) -> Result<Written, WriteError> {
     let mut synced = Instant::now();
+    let mut due = Instant::now() + FLUSH;
     loop {
-        queue.wait(FLUSH);
+        queue.wait(due.saturating_duration_since(Instant::now()));
+        // The time that a write takes does not delay the next one.
+        due = Instant::now() + FLUSH;
         let Taken { items, is_last } = queue.take();
         let written = write_all(&mut series, items, &mut synced);
         let mut told = progress.lock().unwrap_or_else(PoisonError::into_inner);
