@@ -96,7 +96,7 @@ def test_info_prints_the_settings_of_a_motor(run, path):
     assert "no settings of `st0/motor3`" in message and "`can0/motor2`" in message
 
 
-@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.ZSTD])
+@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.ZSTD, CompressionType.LZ4])
 def test_a_repaired_file_is_read_by_others_and_has_all_that_was_whole(run, tmp_path, compression):
     path, new = tmp_path / "run.mcap", tmp_path / "run.recovered.mcap"
     short(path, compression=compression)

@@ -2,6 +2,8 @@
 
 use std::io::Read;
 
+use lz4_flex::frame::FrameDecoder;
+
 use super::damage::{Damage, LARGEST};
 use super::record::{ChunkHead, split};
 
@@ -44,6 +46,7 @@ fn inflated(compression: &str, stored: &[u8], limit: u64) -> Result<Vec<u8>, (Da
         "" => stored.take(limit).read_to_end(&mut records),
         "zstd" => zstd::stream::read::Decoder::new(stored)
             .and_then(|decoder| decoder.take(limit).read_to_end(&mut records)),
+        "lz4" => FrameDecoder::new(stored).take(limit).read_to_end(&mut records),
         _ => return Err((Damage::Compression(compression.to_owned()), records)),
     };
     match read {
