@@ -323,7 +323,8 @@ def test_a_recording_tells_how_far_it_is(checked, tmp_path):
     words = ("-o", tmp_path / "run.mcap", "--duration", "2500ms", "--timeout", "1s")
     out, err = checked("record", "-p", "sim:", *words)
     assert [line["event"] for line in out] == ["recording", "progress", "progress", "recorded"] and not err
-    assert out[0]["lines"][0] == {"label": "sim", "port": "sim:", "motors": [1, 2]}
+    assert out[0]["lines"][0] == {"label": "st", "port": "sim:", "motors": [1, 2]}
+    assert [line["label"] for line in out[0]["lines"]] == ["st", "rmd"]
     assert out[-1]["lost"] == 0 and out[-1]["values"] > 0
     _, (failed,) = checked("record", "-p", "sim:", *words, code=2)
     assert failed["error"]["kind"] == "usage"

@@ -66,7 +66,11 @@ pub(super) fn open(
         lines.extend(port.name.as_line().map(|_| (port, Protocol::St)));
         lines.extend(port.name.as_can().map(|_| (port, Protocol::Rmd)));
     }
-    let names = lines.iter().map(|(port, _)| port.name.to_string());
+    let name = |(port, protocol): &(&Port, Protocol)| {
+        let has_both = port.name.as_line().is_some() && port.name.as_can().is_some();
+        if has_both { protocol.word().to_owned() } else { port.name.to_string() }
+    };
+    let names = lines.iter().map(name);
     let names: Vec<String> = names.chain(clients.iter().map(|it| it.port.clone())).collect();
     let mut labels = name::labels(&names).into_iter();
     let mut opened = Vec::new();
