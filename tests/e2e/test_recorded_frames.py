@@ -52,8 +52,9 @@ def test_the_program_that_was_recorded_gets_the_same_again(run, recorded, replay
     for topic, signal in [("can0/motor1", "multi_turn_angle_degrees"), ("st0/motor1", "SPEED_MEAS")]:
         before = column(run, recorded, topic, signal)
         after = column(run, again, topic, signal)
-        assert len(after) > 10
-        assert after == before[: len(after)]
+        # On a busy machine either recording may have fewer rows.
+        count = min(len(before), len(after))
+        assert count > 10 and after[:count] == before[:count]
     angles = column(run, recorded, "can0/motor1", "multi_turn_angle_degrees")
     assert angles[-1] - angles[0] > 90, "the motor turned"
 
