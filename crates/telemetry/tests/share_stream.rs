@@ -3,10 +3,16 @@
 mod drives;
 mod shared;
 
+use std::io::{Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
 use std::time::{Duration, Instant, SystemTime};
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_telemetry::share::message::Happening;
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::frame::{Kind, Reader, append};
+use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Signal};
@@ -22,12 +28,16 @@ fn motor() -> Motor {
 }
 
 fn follow(share: &Share, line: &str) -> Result<Stream, String> {
+    follow_at(&share.path, line)
+}
+
+fn follow_at(path: &Path, line: &str) -> Result<Stream, String> {
     let wanted = |names: &[&str], period| Wanted {
         signals: names.iter().map(|name| Signal::named(motor(), name).unwrap()).collect(),
         period,
     };
     let followed = Followed {
-        path: share.path.clone(),
+        path: path.to_owned(),
         line: line.to_owned(),
         speaks: Speaks::Rmd,
         name: "follower".to_owned(),
@@ -92,6 +102,89 @@ fn events_of_the_line_and_of_the_share_are_told() {
     let items = until(&mut stream, is(Happening::Left));
     assert!(items.iter().any(is(Happening::Joined)));
     share.reaches("rmd2.speed_dps", |dps| dps == 0.0);
+}
+
+/// A share that was written for the test: it answers all that a stream asks at its begin.
+fn scripted(socket: &UnixListener) -> UnixStream {
+    let (mut stream, _) = socket.accept().unwrap();
+    let (mut dialogue, mut subscriptions) = (Reader::default(), 0);
+    while subscriptions < 2 {
+        let mut out = Vec::new();
+        let mut bytes = [0; 4096];
+        let size = stream.read(&mut bytes).unwrap();
+        dialogue.push(&bytes[..size]);
+        while let Some(request) = dialogue.take().unwrap() {
+            let Request { id, ask } = decode(&request.payload).unwrap();
+            let answer = match ask {
+                Ask::Hello { name, .. } => {
+                    Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
+                }
+                Ask::Lines => Answer::Lines { lines: vec![line()], latched_by: None },
+                Ask::Subscribe { rows: true, drop: DropRule::Newest, .. } => {
+                    subscriptions += 1;
+                    Answer::Subscribe { subscription: subscriptions }
+                }
+                other => panic!("{other:?}"),
+            };
+            append(Kind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
+        }
+        stream.write_all(&out).unwrap();
+    }
+    stream
+}
+
+fn line() -> Line {
+    Line {
+        line: "rmd0".to_owned(),
+        protocol: Protocol::Rmd,
+        port: "sim:".to_owned(),
+        profile: None,
+        timeout: 1.0,
+        t: 100.0,
+        wall: now() as f64 / 1e9,
+    }
+}
+
+#[test]
+fn losses_and_missing_values_are_told() {
+    let column = |name: &str| Column { name: name.to_owned(), unit: String::new() };
+    let line = || "rmd0".to_owned();
+    // In another order than they are wanted, and without one of them.
+    let columns = vec![column("other"), column("multi_turn_angle_degrees")];
+    let group = Group { group: 7, subscription: 1, line: line(), motor: 2, columns };
+    let columns = vec![vec![0.0], vec![0.001], vec![1.0], vec![90.0]];
+    let data = Data { group: 7, sequence: 0, lost: 3, t0: 101.0, columns };
+    let told = [
+        (Kind::Text, encode(&Text::Group(group))),
+        (Kind::Data, data.encode().unwrap()),
+        (Kind::Text, encode(&Text::Missed { events: 2 })),
+        (
+            Kind::Text,
+            encode(&Text::Unconfirmed { subscription: 1, line: line(), motor: 2, rows: 4 }),
+        ),
+        (Kind::Text, encode(&Text::Closing { message: "enough".to_owned() })),
+    ];
+    let path = drives::path("follow-scripted", "socket");
+    let socket = UnixListener::bind(&path).unwrap();
+    let serving = std::thread::spawn(move || scripted(&socket));
+    let began = now();
+    let mut stream = follow_at(&path, "rmd0").unwrap();
+    let mut share = serving.join().unwrap();
+    for (kind, payload) in told {
+        let mut out = Vec::new();
+        append(kind, &payload, &mut out).unwrap();
+        share.write_all(&out).unwrap();
+    }
+    drop(share);
+    let items = until(&mut stream, |item| matches!(item, Item::Down(_)));
+    let [lost, row, missed, unconfirmed, down] = &items[..] else { panic!("{items:?}") };
+    assert_eq!((lost, missed), (&Item::Lost(3), &Item::Lost(2)));
+    assert_eq!(*unconfirmed, Item::Unconfirmed(4));
+    assert_eq!(*down, Item::Down("the share closed the connection: enough".to_owned()));
+    let Item::Row { time, values, .. } = row else { panic!("{row:?}") };
+    assert!(values[0].is_nan() && values[1] == 90.0, "{values:?}");
+    // A second after the moment of the answer.
+    assert!((began + 1_000_000_000..now() + 1_000_000_000).contains(time), "{time}");
 }
 
 #[test]

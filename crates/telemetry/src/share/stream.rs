@@ -343,7 +343,11 @@ impl Connection {
                 let line = line(&lines, followed)?;
                 // Both clocks were read between question and answer.
                 let wall = (line.wall * 1e9) as u64;
-                self.clock = Some(Clock { t: line.t, wall: line.wall, own: wall.clamp(sent, now) });
+                self.clock = Some(Clock {
+                    t: line.t,
+                    wall: line.wall,
+                    own: wall.clamp(sent, now.max(sent)),
+                });
             }
             (Asked::Subscribe(number), Answer::Subscribe { subscription }) => {
                 self.subscriptions.insert(subscription, number);
