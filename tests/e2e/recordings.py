@@ -37,7 +37,9 @@ class Recording:
 
     def __init__(self, path, compression=CompressionType.ZSTD, chunk=4096):
         self.file = open(path, "wb")
-        self.writer = Writer(self.file, compression=compression, chunk_size=chunk)
+        self.writer = Writer(
+            self.file, compression=compression, chunk_size=chunk, enable_data_crcs=True
+        )
         self.writer.start(profile="ros2", library="test")
         self.channels = {}
 

@@ -135,6 +135,14 @@ def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(run, path):
     assert len(got) == done.json["messages"] and set(got) < set(whole)
 
 
+def test_a_damaged_fact_is_said(run, path):
+    damaged = path.read_bytes().replace(b"serial:./st0", b"serial:./st1")
+    path.write_bytes(damaged)
+    assert "changed that have no checksum of their own" in run("info", path).ended(0).out
+    assert "changed that have no checksum" in run("info", path, "--json").ended(0).json["lost"]["why"]
+    assert "changed that have no checksum" in run("recover", path).ended(4).out
+
+
 def test_a_damaged_index_costs_no_message(run, path):
     whole, content = messages(path), bytearray(path.read_bytes())
     with open(path, "rb") as file:

@@ -39,6 +39,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return settings(args, &mut recording, motor, printer);
     }
     let contents = Contents::read(&args.input, &mut recording)?;
+    recording.check_whole().map_err(|error| args.input.failed(&error))?;
     if args.events {
         args.input.note_losses(recording.losses());
         for event in &contents.events {

@@ -29,6 +29,8 @@ pub enum Damage {
     Unfinished,
     /// A checksum differs.
     Checksum,
+    /// The checksum of the whole file differs, and no other one.
+    Unprotected,
     /// The bytes are not a record.
     NoRecord,
     /// An index is missing or wrong. This costs no message.
@@ -52,6 +54,10 @@ impl fmt::Display for Damage {
             Damage::Cut => write!(f, "the file ends inside a record"),
             Damage::Unfinished => write!(f, "the file was not finished by its writer"),
             Damage::Checksum => write!(f, "a checksum differs"),
+            Damage::Unprotected => write!(
+                f,
+                "bytes were changed that have no checksum of their own, such as facts about drives"
+            ),
             Damage::NoRecord => write!(f, "these bytes are no record"),
             Damage::Index => write!(f, "an index is missing or wrong"),
             Damage::TooLarge => write!(f, "a chunk is larger than {} MiB", LARGEST >> 20),
@@ -84,7 +90,7 @@ pub fn lost(losses: &[Loss]) -> Option<String> {
     Some(match (&first.damage, first.after) {
         (Damage::Index, _) => format!("{why}; no message was lost"),
         (Damage::Unfinished, Some(after)) => format!("{why}; it ends at {}", Time(after).text()),
-        (Damage::Unfinished, None) => why,
+        (Damage::Unfinished, None) | (Damage::Unprotected, _) => why,
         (_, after) => {
             let after = after.map_or("from its beginning".to_owned(), |after| {
                 format!("after {}", Time(after).text())

@@ -6,6 +6,7 @@ use std::ops::Range;
 use mcap::MAGIC;
 use mcap::records::op;
 
+use super::damage::{Damage, Loss};
 use super::record::{Channel, Fields, HEAD, Metadata, Schema, Statistics, split};
 use super::recording::{AttachmentPlace, Kind, Recording};
 
@@ -126,6 +127,30 @@ impl<R: Read + Seek> Recording<R> {
         }
         self.catalogue.add(found.schemas, found.channels);
         Ok(found.statistics)
+    }
+
+    /// Compares a file that has an index with the checksum of all its data. Facts about the recording
+    /// and its drives have no other one. A difference is in [`losses`](Self::losses) afterwards.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn check_whole(&mut self) -> io::Result<()> {
+        // Other damage explains the difference.
+        if !self.losses.is_empty() {
+            return Ok(());
+        }
+        const DATA_END: u64 = HEAD as u64 + 4;
+        let Some(start) = self.summary_start()? else { return Ok(()) };
+        let Some(at) = start.checked_sub(DATA_END) else { return Ok(()) };
+        let Some((op::DATA_END, body, _)) = split(self.source.bytes(at, DATA_END)?) else {
+            return Ok(());
+        };
+        let sum = Fields(body).u32().unwrap_or(0);
+        if sum != 0 && sum != self.source.sum_before(at)? {
+            let after = self.statistics.last();
+            self.add_loss(Loss { bytes: at..at, after, damage: Damage::Unprotected });
+        }
+        Ok(())
     }
 
     /// Reads the first record.

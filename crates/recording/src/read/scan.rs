@@ -180,7 +180,7 @@ impl<R: Read + Seek> Recording<R> {
                     let is_right =
                         sum == 0 || !self.losses.is_empty() || sum == self.source.sum_before(at)?;
                     if !is_right {
-                        self.lose(at..at, seen, Damage::Checksum);
+                        self.lose(at..at, seen, Damage::Unprotected);
                     }
                     return Ok(Next::Summary(next));
                 }

@@ -4,7 +4,7 @@ use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex};
 
 use mcap::WriteOptions;
-use motorlink_recording::read::{Damage, Recording};
+use motorlink_recording::read::{Damage, Loss, Recording};
 
 use crate::files::{
     IN_A_CHUNK, check, chunk_starts, compressed, finished, messages, options, read, write,
@@ -101,6 +101,23 @@ fn a_damaged_chunk_is_left_out_and_the_others_are_read() {
         assert_eq!(losses[0].bytes.start, middle as u64);
         assert_eq!(losses[1].damage, Damage::Fewer { missing: IN_A_CHUNK });
     }
+}
+
+#[test]
+fn a_changed_fact_is_found_by_the_checksum_of_the_whole_file() {
+    let mut file = finished(compressed(), 2);
+    let mut recording = Recording::new(Cursor::new(&file)).unwrap();
+    recording.check_whole().unwrap();
+    assert_eq!(recording.losses(), []);
+    let fact = file.windows(7).position(|bytes| bytes == b"version").unwrap();
+    file[fact] ^= 1;
+    let mut recording = Recording::new(Cursor::new(&file)).unwrap();
+    assert_eq!(recording.messages().count(), messages(2).len());
+    recording.check_whole().unwrap();
+    let damage =
+        |losses: &[Loss]| losses.iter().map(|loss| loss.damage.clone()).collect::<Vec<_>>();
+    assert_eq!(damage(recording.losses()), [Damage::Unprotected]);
+    assert_eq!(damage(&check(&file).1), [Damage::Unprotected]);
 }
 
 #[test]
