@@ -586,7 +586,20 @@ class RecordingInProgress:
     def is_here(self) -> bool: ...
     def status(
         self,
-    ) -> tuple[float, list[Path], int, int, int, int, int, int, float | None, float | None, bool]: ...
+    ) -> tuple[
+        float,
+        list[Path],
+        int,
+        int,
+        int,
+        int,
+        int,
+        int,
+        float | None,
+        float | None,
+        list[str],
+        bool,
+    ]: ...
     def begin_end(self) -> None: ...
     def finish(self, wait: float) -> bool: ...
 

@@ -66,7 +66,8 @@ enum State {
 
 /// How far it is: s, files, bytes, rows, values, frames, rows that nothing confirmed, lost messages, asked
 /// and achieved rate in Hz, whether nothing more is recorded.
-type Status = (f64, Vec<PathBuf>, u64, u64, u64, u64, u64, u64, Option<f64>, Option<f64>, bool);
+type Status =
+    (f64, Vec<PathBuf>, u64, u64, u64, u64, u64, u64, Option<f64>, Option<f64>, Vec<String>, bool);
 
 #[pymethods]
 impl RecordingInProgress {
@@ -158,7 +159,7 @@ impl RecordingInProgress {
                 State::Ending(progress, _) | State::Ended(progress, _) => (progress.clone(), ended),
             }
         });
-        let Progress { elapsed, written, counts, rates, is_over } = progress;
+        let Progress { elapsed, written, counts, rates, refused, is_over } = progress;
         (
             elapsed.as_secs_f64(),
             written.files,
@@ -170,6 +171,7 @@ impl RecordingInProgress {
             counts.lost,
             rates.map(|(asked, _)| asked),
             rates.map(|(_, achieved)| achieved),
+            refused,
             is_over || ended,
         )
     }

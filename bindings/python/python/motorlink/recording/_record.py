@@ -53,6 +53,8 @@ class Status(NamedTuple):
     asked_hz: float | None
     #: The least rate that is reached, Hz.
     achieved_hz: float | None
+    #: Signals that the drives refuse: ``st0/motor1/SPEED_MEAS``.
+    refused: tuple[str, ...]
     #: Nothing more is recorded: it was closed, has ``max_size``, or the file cannot be written.
     is_over: bool
 
@@ -74,8 +76,8 @@ class Recorder(Closing):
     def status(self) -> Status:
         """How far it is. In a forked process it is unknown: raises ``RecordingError``."""
         self._check()
-        seconds, files, *counts = self._core.status()
-        return Status(seconds, tuple(files), *counts)  # type: ignore[arg-type]
+        seconds, files, *counts, refused, is_over = self._core.status()
+        return Status(seconds, tuple(files), *counts, tuple(refused), is_over)  # type: ignore[arg-type]
 
     def close(self) -> None:
         """Ends the recording and its file. Motors are not affected. A second call does nothing.
