@@ -500,3 +500,25 @@ def test_a_scenario_is_recorded_and_has_the_same_bytes_each_time(run, tmp_path):
     speeds = [numpy.float32(line.split(",")[column]) for line in lines[1:]]
     assert [numpy.float32(row.speed_dps) for row in rows] == speeds
     assert "commanded" in file.events()
+
+
+def test_a_motor_that_never_answers_is_named(run, drives, tmp_path):
+    words = ("-p", f"slcan:{drives.can}", "-o", tmp_path / "run.mcap", "--id", "1,9", "--duration", "3s")
+    words += ("--no-settings", "--rate", "10", "--timeout", "300ms")
+    assert run("record", *words, "--json").ended(0).lines[-1]["silent"] == ["can0/motor9"]
+    assert ", SILENT: can0/motor9, " in run("record", *words, "--force").ended(0).out
+
+
+@pytest.mark.parametrize("option", ["--id", "--motor"])
+def test_motors_of_a_port_that_is_not_there_are_refused(run, drives, tmp_path, option):
+    path = tmp_path / "run.mcap"
+    port = drives.st if option == "--id" else f"slcan:{drives.can}"
+    assert "no port is a" in run("record", "-p", port, "-o", path, option, "5").ended(2).err
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("ending", ["csv", "log", "asc", "pcapng", "svg", "png"])
+def test_a_recording_has_no_name_of_another_format(run, tmp_path, ending):
+    path = tmp_path / f"run.{ending}"
+    assert "MCAP" in run("record", "-p", "sim:", "-o", path, "--duration", "1s").ended(2).err
+    assert not path.exists()

@@ -38,6 +38,12 @@ pub enum RecordError {
         /// The last error.
         why: Box<CommandError>,
     },
+    /// Motors are named, and no port has such motors.
+    #[error("{}", no_line(*.protocol))]
+    NoLine {
+        /// What the motors speak.
+        protocol: Protocol,
+    },
     /// A share that cannot be followed.
     #[error("`{port}`: {why}")]
     Share {
@@ -55,6 +61,13 @@ pub enum RecordError {
     /// The system gives no thread.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
+}
+
+fn no_line(protocol: Protocol) -> &'static str {
+    match protocol {
+        Protocol::St => "numbers of motors are for ST drives, and no port is a serial line",
+        Protocol::Rmd => "IDs are for RMD motors, and no port is a CAN bus",
+    }
 }
 
 /// The error without the port, if it begins with it.

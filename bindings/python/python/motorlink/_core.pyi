@@ -584,22 +584,7 @@ class RecordingInProgress:
     def motors(self) -> list[str]: ...
     @property
     def is_here(self) -> bool: ...
-    def status(
-        self,
-    ) -> tuple[
-        float,
-        list[Path],
-        int,
-        int,
-        int,
-        int,
-        int,
-        int,
-        float | None,
-        float | None,
-        list[str],
-        bool,
-    ]: ...
+    def status(self) -> dict[str, Any]: ...
     def begin_end(self) -> None: ...
     def finish(self, wait: float) -> bool: ...
 

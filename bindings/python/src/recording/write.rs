@@ -66,8 +66,22 @@ enum State {
 
 /// How far it is: s, files, bytes, rows, values, frames, rows that nothing confirmed, lost messages, asked
 /// and achieved rate in Hz, whether nothing more is recorded.
-type Status =
-    (f64, Vec<PathBuf>, u64, u64, u64, u64, u64, u64, Option<f64>, Option<f64>, Vec<String>, bool);
+#[derive(IntoPyObject)]
+struct Status {
+    seconds: f64,
+    files: Vec<PathBuf>,
+    bytes: u64,
+    rows: u64,
+    values: u64,
+    frames: u64,
+    unconfirmed: u64,
+    lost: u64,
+    asked_hz: Option<f64>,
+    achieved_hz: Option<f64>,
+    refused: Vec<String>,
+    silent: Vec<String>,
+    is_over: bool,
+}
 
 #[pymethods]
 impl RecordingInProgress {
@@ -159,21 +173,22 @@ impl RecordingInProgress {
                 State::Ending(progress, _) | State::Ended(progress, _) => (progress.clone(), ended),
             }
         });
-        let Progress { elapsed, written, counts, rates, refused, is_over } = progress;
-        (
-            elapsed.as_secs_f64(),
-            written.files,
-            written.bytes,
-            counts.rows,
-            counts.values,
-            counts.frames,
-            counts.unconfirmed,
-            counts.lost,
-            rates.map(|(asked, _)| asked),
-            rates.map(|(_, achieved)| achieved),
+        let Progress { elapsed, written, counts, rates, refused, silent, is_over } = progress;
+        Status {
+            seconds: elapsed.as_secs_f64(),
+            files: written.files,
+            bytes: written.bytes,
+            rows: counts.rows,
+            values: counts.values,
+            frames: counts.frames,
+            unconfirmed: counts.unconfirmed,
+            lost: counts.lost,
+            asked_hz: rates.map(|(asked, _)| asked),
+            achieved_hz: rates.map(|(_, achieved)| achieved),
             refused,
-            is_over || ended,
-        )
+            silent,
+            is_over: is_over || ended,
+        }
     }
 
     /// Begins to end it, and does not wait.
@@ -305,7 +320,9 @@ fn refused(py: Python<'_>, error: RecordError) -> PyErr {
             }
             _ => link_error(py, &error),
         },
-        RecordError::NoPort | RecordError::Signal(_) => invalid_value(py, &error),
+        RecordError::NoPort | RecordError::NoLine { .. } | RecordError::Signal(_) => {
+            invalid_value(py, &error)
+        }
         RecordError::Ended(_) | RecordError::Aborted | RecordError::Share { .. } => {
             link_error(py, &error)
         }

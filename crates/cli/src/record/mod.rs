@@ -28,6 +28,11 @@ const SHOWN: Duration = Duration::from_secs(1);
 /// How often the recording is looked at.
 const LOOKED: Duration = Duration::from_millis(100);
 
+/// The least share of the asked rate that is worth no remark.
+const ENOUGH: f64 = 0.99;
+/// Endings of files that other commands make of a recording.
+const OTHERS: [&str; 6] = ["csv", "log", "asc", "pcapng", "svg", "png"];
+
 pub fn run(args: &Args) -> Result<(), Failure> {
     // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
@@ -75,6 +80,12 @@ fn config(args: &Args) -> Result<Config, Failure> {
     }
     if args.output == Path::new("-") {
         return Err(Failure::usage("a recording cannot go to stdout: give the name of a file"));
+    }
+    if let Some(ending) = args.output.extension().and_then(|it| it.to_str())
+        && OTHERS.contains(&ending)
+    {
+        return Err(Failure::usage(format!("a recording is an MCAP file, not .{ending}"))
+            .trying("-o run.mcap, and then `motorlink convert` or `motorlink plot`"));
     }
     let numbers = args.motor.iter().copied().filter_map(MotorNumber::new);
     let motors: Vec<MotorNumber> = numbers.collect();
@@ -126,6 +137,13 @@ fn refused(error: RecordError) -> Failure {
             };
             Failure::link(error.to_string())
                 .trying(format!("to record a motor that is off now, name it: {option}"))
+        }
+        RecordError::NoLine { protocol } => {
+            let option = match protocol {
+                Protocol::St => "--id names RMD motors",
+                Protocol::Rmd => "--motor names motors of ST drives",
+            };
+            Failure::usage(error.to_string()).trying(option)
         }
         RecordError::Share { .. } => Failure::link(error.to_string()),
         RecordError::Signal(error) => unknown(&error),
@@ -208,12 +226,16 @@ fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
 }
 
 fn words(progress: &Progress) -> String {
-    let Progress { elapsed, written, counts, rates, refused, .. } = progress;
-    let rates = rates.map(|(asked, got)| format!(", {got:.1} of {asked:.1} Hz"));
-    let refused = match refused.is_empty() {
+    let Progress { elapsed, written, counts, rates, refused, silent, .. } = progress;
+    let rates = rates.map(|(asked, got)| {
+        let only = if got < ENOUGH * asked { "only " } else { "" };
+        format!(", {only}{got:.1} of {asked:.1} Hz")
+    });
+    let named = |what: &str, names: &[String]| match names.is_empty() {
         true => String::new(),
-        false => format!(", refused: {}", refused.join(", ")),
+        false => format!(", {what}: {}", names.join(", ")),
     };
+    let refused = named("refused", refused) + &named("SILENT", silent);
     let lost = match (counts.lost, counts.unconfirmed) {
         (0, 0) => "nothing lost".to_owned(),
         (lost, 0) => format!("{lost} LOST"),
@@ -239,7 +261,7 @@ fn size(bytes: u64) -> String {
 }
 
 fn object(event: &str, progress: &Progress) -> Value {
-    let Progress { elapsed, written, counts, rates, refused, .. } = progress;
+    let Progress { elapsed, written, counts, rates, refused, silent, .. } = progress;
     let files = written.files.iter().map(|path| path.display().to_string());
     json!({
         "event": event,
@@ -253,5 +275,6 @@ fn object(event: &str, progress: &Progress) -> Value {
         "asked_hz": rates.map(|(asked, _)| asked),
         "achieved_hz": rates.map(|(_, achieved)| achieved),
         "refused": refused,
+        "silent": silent,
     })
 }

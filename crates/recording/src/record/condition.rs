@@ -56,6 +56,11 @@ impl Condition {
         self.at = Some(at);
     }
 
+    /// Whether there was a row.
+    pub(super) fn has_row(&self) -> bool {
+        self.at.is_some()
+    }
+
     fn value(&self, source: Source) -> Option<Sample> {
         self.last.iter().find(|(it, _)| *it == source).map(|(_, sample)| *sample)
     }

@@ -134,6 +134,14 @@ impl Content {
         })
     }
 
+    /// The motors of which no row has come, as `st0/motor1`.
+    pub(super) fn silent(&self) -> impl Iterator<Item = String> {
+        let without_row = |(motor, condition): (&Motor, &Condition)| {
+            (!condition.has_row()).then(|| name::path(&self.line.label, *motor))
+        };
+        self.conditions.iter().filter_map(without_row)
+    }
+
     /// How often signals had values in the last second.
     pub(super) fn take_rates(&mut self, rates: &[(Signal, f64)]) {
         let Some(feed) = self.feeds.first() else { return };

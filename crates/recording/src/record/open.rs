@@ -66,6 +66,14 @@ pub(super) fn open(
         lines.extend(port.name.as_line().map(|_| (port, Protocol::St)));
         lines.extend(port.name.as_can().map(|_| (port, Protocol::Rmd)));
     }
+    for (protocol, is_named) in [
+        (Protocol::St, ports.iter().any(|port| !port.motors.is_empty())),
+        (Protocol::Rmd, ports.iter().any(|port| !port.ids.is_empty())),
+    ] {
+        if is_named && !lines.iter().any(|(_, it)| *it == protocol) {
+            return Err(RecordError::NoLine { protocol });
+        }
+    }
     let name = |(port, protocol): &(&Port, Protocol)| {
         let has_both = port.name.as_line().is_some() && port.name.as_can().is_some();
         if has_both { protocol.word().to_owned() } else { port.name.to_string() }

@@ -75,6 +75,8 @@ pub struct Progress {
     pub rates: Option<(f64, f64)>,
     /// Signals that the drives refuse to give, as `st0/motor1/SPEED_MEAS`.
     pub refused: Vec<String>,
+    /// Motors of which no value came, as `st0/motor1`.
+    pub silent: Vec<String>,
     /// Nothing more is recorded: the file cannot be written, or has the size that it may have.
     pub is_over: bool,
 }
@@ -259,6 +261,7 @@ fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant,
     let rates = recorded.iter().filter_map(|it| it.content().rates());
     progress.rates = rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)));
     progress.refused = recorded.iter().flat_map(|it| it.content().refused()).collect();
+    progress.silent = recorded.iter().flat_map(|it| it.content().silent()).collect();
 }
 
 /// Messages that did not fit into the queue of the writer.
@@ -437,7 +440,7 @@ fn drive(
             name: name::path(&line.label, motor),
             message,
             by: String::new(),
-            kind: "refused".to_owned(),
+            kind: "settings".to_owned(),
         };
         events.push(Entry::message(Topics::EVENTS, stamp, &log));
     };

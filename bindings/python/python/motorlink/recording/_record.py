@@ -55,6 +55,8 @@ class Status(NamedTuple):
     achieved_hz: float | None
     #: Signals that the drives refuse: ``st0/motor1/SPEED_MEAS``.
     refused: tuple[str, ...]
+    #: Motors of which no value came: ``st0/motor1``.
+    silent: tuple[str, ...]
     #: Nothing more is recorded: it was closed, has ``max_size``, or the file cannot be written.
     is_over: bool
 
@@ -76,8 +78,8 @@ class Recorder(Closing):
     def status(self) -> Status:
         """How far it is. In a forked process it is unknown: raises ``RecordingError``."""
         self._check()
-        seconds, files, *counts, refused, is_over = self._core.status()
-        return Status(seconds, tuple(files), *counts, tuple(refused), is_over)  # type: ignore[arg-type]
+        found = self._core.status().items()
+        return Status(**{name: tuple(it) if isinstance(it, list) else it for name, it in found})
 
     def close(self) -> None:
         """Ends the recording and its file. Motors are not affected. A second call does nothing.
