@@ -81,7 +81,7 @@ fn the_owner_commands_the_motor_and_closes_its_client() {
     until("a free port", || st::Client::open(&name, options).is_ok());
     let is_lost = || {
         let read = Recording::open(&file).ok().map(|mut it| it.tables(|_, _| true).unwrap());
-        read.is_some_and(|read| read.events.last().is_some_and(|event| event.kind == "lost"))
+        read.is_some_and(|read| read.events.iter().any(|event| event.kind == "lost"))
     };
     until("the event that the line is lost", is_lost);
     let ended = recorder.end().unwrap();

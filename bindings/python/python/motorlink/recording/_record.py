@@ -85,7 +85,8 @@ class Recorder(Closing):
         """Ends the recording and its file. Motors are not affected. A second call does nothing.
 
         Raises ``RecordingError`` if the file cannot be written any more, or if the disk has not taken it
-        within 5 s. It is written to its end then, if the disk takes it later.
+        within 5 s. While a motor moves it waits for 0.6 s at most, and warns. The file is completed in the
+        background then.
         """
         self._end(in_flight=False)
 
@@ -99,7 +100,8 @@ class Recorder(Closing):
             return
         try:
             is_complete = self._core.finish(_WITH_MOTORS)
-            if not is_complete and not is_any_moving():
+            is_waited = not is_complete and not is_any_moving()
+            if is_waited:
                 is_complete = self._core.finish(_PATIENCE)
         except MotorlinkError:
             is_complete = True
@@ -108,8 +110,12 @@ class Recorder(Closing):
             self._leave()
             if is_complete:
                 _ending.pop(id(self._core), None)
-        if not is_complete:
-            raise RecordingError(f"the disk has not taken {_files(self._core)} yet; it is still being written")
+        if is_complete:
+            return
+        late = f"the disk has not taken {_files(self._core)} yet; it is still being written"
+        if is_waited:
+            raise RecordingError(late)
+        warnings.warn(late, RecordingWarning, stacklevel=3)
 
     def _check(self) -> None:
         if not self._core.is_here:
