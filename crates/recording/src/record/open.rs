@@ -70,7 +70,9 @@ pub(super) fn open(
         (Protocol::St, ports.iter().any(|port| !port.motors.is_empty())),
         (Protocol::Rmd, ports.iter().any(|port| !port.ids.is_empty())),
     ] {
-        if is_named && !lines.iter().any(|(_, it)| *it == protocol) {
+        let has_port = lines.iter().any(|(_, it)| *it == protocol);
+        let has_client = clients.iter().any(|it| it.speaks().protocol() == protocol);
+        if is_named && !has_port && !has_client {
             return Err(RecordError::NoLine { protocol });
         }
     }
@@ -161,10 +163,7 @@ fn found(
     if !given.is_empty() {
         return Ok(given.to_vec());
     }
-    let protocol = match speaks {
-        Speaks::St(_) => Protocol::St,
-        Speaks::Rmd => Protocol::Rmd,
-    };
+    let protocol = speaks.protocol();
     let none = |why| RecordError::NoMotor { port: port.to_owned(), protocol, why: Box::new(why) };
     let found = search::motors(runner.remote(), by, protocol);
     abort.check()?;

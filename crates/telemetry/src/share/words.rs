@@ -9,7 +9,7 @@ use motorlink_proto::rmd::{Direction, describe};
 use motorlink_proto::st::{Frame, MAX_FRAME, Profile};
 use motorlink_proto::time::Instant;
 
-use super::message::Happening;
+use super::message::{Happening, Protocol};
 use crate::event::What;
 use crate::line::Request;
 use crate::schedule::CommandId;
@@ -22,6 +22,16 @@ pub enum Speaks {
     St(Profile),
     /// The RMD protocol.
     Rmd,
+}
+
+impl Speaks {
+    /// The protocol, without a profile.
+    pub fn protocol(self) -> Protocol {
+        match self {
+            Speaks::St(_) => Protocol::St,
+            Speaks::Rmd => Protocol::Rmd,
+        }
+    }
 }
 
 /// An event with its sentence.

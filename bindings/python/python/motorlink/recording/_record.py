@@ -78,8 +78,9 @@ class Recorder(Closing):
     def status(self) -> Status:
         """How far it is. In a forked process it is unknown: raises ``RecordingError``."""
         self._check()
-        found = self._core.status().items()
-        return Status(**{name: tuple(it) if isinstance(it, list) else it for name, it in found})
+        found = self._core.status()
+        names = ("files", "refused", "silent")
+        return Status(**{**found, **{name: tuple(found[name]) for name in names}})
 
     def close(self) -> None:
         """Ends the recording and its file. Motors are not affected. A second call does nothing.
@@ -165,7 +166,7 @@ def _end_all() -> None:
 
 
 def _files(core: _core.RecordingInProgress) -> str:
-    return ", ".join(map(str, core.status()[1]))
+    return ", ".join(map(str, core.status()["files"]))
 
 
 def record(

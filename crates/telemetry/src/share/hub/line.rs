@@ -17,7 +17,7 @@ use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
-use crate::share::message::{Event, Happening, Line, Protocol};
+use crate::share::message::{Event, Happening, Line};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
@@ -115,10 +115,7 @@ impl Held {
 
     pub(super) fn info(&self) -> Line {
         let now = self.clock.now();
-        let protocol = match self.speaks {
-            Speaks::St(_) => Protocol::St,
-            Speaks::Rmd => Protocol::Rmd,
-        };
+        let protocol = self.speaks.protocol();
         let profile = match self.speaks {
             Speaks::St(profile) => Some(profile.name().to_owned()),
             Speaks::Rmd => None,
