@@ -31,7 +31,7 @@ pub fn frame(data: &[u8]) {
         let mut transcript = Transcript::new(profile);
         let (info, version, revup) = ([0x06, 0, 0x06], [0x0C, 0, 0x0C], [0x08, 1, 0, 0x09]);
         for asked in [data, &info, &version, &revup] {
-            for note in [transcript.note(true, asked), transcript.note(false, data)] {
+            for note in [transcript.note(None, true, asked), transcript.note(None, false, data)] {
                 assert!(!note.contains(char::is_control), "{note:?} commands a terminal");
             }
         }
