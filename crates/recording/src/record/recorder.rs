@@ -440,7 +440,7 @@ fn drive(
             name: name::path(&line.label, motor),
             message,
             by: String::new(),
-            kind: "settings".to_owned(),
+            kind: "absent_settings".to_owned(),
         };
         events.push(Entry::message(Topics::EVENTS, stamp, &log));
     };
