@@ -64,8 +64,7 @@ enum State {
     Ended(Progress, Option<WriteError>),
 }
 
-/// How far it is: s, files, bytes, rows, values, frames, rows that nothing confirmed, lost messages, asked
-/// and achieved rate in Hz, whether nothing more is recorded.
+/// How far it is. The fields are those of `recording.Status` in Python.
 #[derive(IntoPyObject)]
 struct Status {
     seconds: f64,

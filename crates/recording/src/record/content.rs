@@ -119,10 +119,9 @@ impl Content {
         &self.line
     }
 
-    /// Asked rate and the least achieved one of the fast signals that have values.
-    pub(super) fn rates(&self) -> Option<(f64, f64)> {
-        let rates = self.conditions.values().filter_map(|condition| condition.rates);
-        rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)))
+    /// Of each motor the asked rate, and the least achieved one of the fast signals that have values.
+    pub(super) fn rates(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.conditions.values().filter_map(|condition| condition.rates)
     }
 
     /// The signals that the drives refuse to give, as `st0/motor1/SPEED_MEAS`.

@@ -1,13 +1,11 @@
 //! A line of a share: from the rows and events of the share to messages. The share reads the drives, and
 //! another program may command them.
 
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::st::MotorNumber;
 use motorlink_telemetry::sample::Sample;
 use motorlink_telemetry::share::message::{Event, Happening, SignalRate};
 use motorlink_telemetry::share::stream::{Item, Stream};
-use motorlink_telemetry::share::words::{Speaks, Told};
-use motorlink_telemetry::signal::{Motor, Signal};
+use motorlink_telemetry::share::words::Told;
+use motorlink_telemetry::signal::Signal;
 
 use super::content::{Content, Values};
 use crate::schema::Time;
@@ -73,7 +71,7 @@ impl Followed {
     fn rates(&mut self, rates: &[SignalRate]) {
         let line = self.content.line();
         let signal = |rate: &SignalRate| {
-            let motor = motor(line.speaks, rate.signal.motor)?;
+            let motor = line.speaks.motor(rate.signal.motor)?;
             Some((Signal::named(motor, &rate.signal.name).ok()?, rate.achieved))
         };
         let is_of_line = |rate: &&SignalRate| rate.signal.line == self.stream.line();
@@ -93,15 +91,8 @@ impl Followed {
             (None, _) => String::new(),
         };
         let message = message.strip_prefix(&place).unwrap_or(&message).to_owned();
-        let motor = number.and_then(|number| motor(self.content.line().speaks, number));
+        let motor = number.and_then(|number| self.content.line().speaks.motor(number));
         let by = by.map(Into::into);
         self.content.told(stamp, Told { event, motor, by, since: None, message }, put);
-    }
-}
-
-fn motor(speaks: Speaks, number: u8) -> Option<Motor> {
-    match speaks {
-        Speaks::St(_) => MotorNumber::new(number).map(Motor::St),
-        Speaks::Rmd => MotorId::new(number).map(Motor::Rmd),
     }
 }

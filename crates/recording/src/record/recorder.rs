@@ -6,12 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use motorlink_proto::st::Profile;
 use motorlink_proto::time::{Instant as Moment, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::share::stream::{Followed as Target, Stream, Wanted};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
@@ -258,7 +256,7 @@ fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant,
     let counts = recorded.iter().map(|it| it.content().counts);
     progress.counts = counts.fold(Counts::default(), Counts::plus);
     progress.counts.lost += losses.known;
-    let rates = recorded.iter().filter_map(|it| it.content().rates());
+    let rates = recorded.iter().flat_map(|it| it.content().rates());
     progress.rates = rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)));
     progress.refused = recorded.iter().flat_map(|it| it.content().refused()).collect();
     progress.silent = recorded.iter().flat_map(|it| it.content().silent()).collect();
@@ -428,10 +426,7 @@ fn drive(
     if opened.share.is_some() {
         pairs.insert(drive::NO_FRAMES.to_owned(), "a share holds the port".to_owned());
     }
-    let profile = match line.speaks {
-        Speaks::St(profile) => profile,
-        Speaks::Rmd => Profile::default(),
-    };
+    let profile = line.speaks.profile().unwrap_or_default();
     let mut said = |message: String| {
         let stamp = wall_now();
         let log = Log {

@@ -36,7 +36,7 @@ pub struct Ended {
 pub struct Refusal {
     /// The reason, for programs.
     pub reason: Reason,
-    /// The reason in words.
+    /// The reason as a sentence.
     pub message: String,
     /// The error code of a drive.
     pub code: Option<u8>,

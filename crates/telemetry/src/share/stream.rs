@@ -12,8 +12,7 @@ use super::VERSION;
 use super::data::{Data, TIMES};
 use super::dialogue::{Dialogue, Ended, Heard};
 use super::message::{
-    Answer, Ask, DropRule, Event, Group, LONGEST_QUEUE, Line, Protocol, SignalName, SignalRate,
-    Text,
+    Answer, Ask, DropRule, Event, Group, LONGEST_QUEUE, Line, SignalName, SignalRate, Text,
 };
 use super::words::Speaks;
 use crate::signal::{Motor, Signal};
@@ -62,7 +61,7 @@ pub enum Item {
         time: u64,
         /// From the first request to the last reply, in seconds.
         span: f64,
-        /// The values; NaN is no value.
+        /// The values. NaN: the share has none.
         values: Vec<f64>,
     },
     /// Rows that nothing confirms are missing here.
@@ -160,8 +159,12 @@ impl Stream {
 
     /// Whether it follows the signals now.
     pub fn is_ready(&self) -> bool {
-        let is_ready = |it: &Connection| it.subscriptions.len() == self.followed.wanted.len();
-        !self.is_down && self.connection.as_ref().is_some_and(is_ready)
+        !self.is_down && self.has_subscribed()
+    }
+
+    fn has_subscribed(&self) -> bool {
+        let has_all = |it: &Connection| it.subscriptions.len() == self.followed.wanted.len();
+        self.connection.as_ref().is_some_and(has_all)
     }
 
     /// Asks for the rates of the share. It is not asked again before it has answered.
@@ -198,7 +201,6 @@ impl Stream {
             }
         }
         let Some(mut connection) = self.connection.take() else { return };
-        let was_ready = self.is_ready();
         match connection.receive(&self.followed, now, &mut self.items) {
             Ok(has_heard) => {
                 let is_silent = connection.is_silent(now);
@@ -206,10 +208,7 @@ impl Stream {
                 if is_silent {
                     self.down("the share does not answer".to_owned());
                 }
-                let all = self.followed.wanted.len();
-                let is_open =
-                    self.connection.as_ref().is_some_and(|it| it.subscriptions.len() == all);
-                if self.is_down && has_heard && is_open && !was_ready {
+                if self.is_down && has_heard && self.has_subscribed() {
                     self.is_down = false;
                     self.items.push_front(Item::Up);
                 }
@@ -425,12 +424,9 @@ fn connect(path: &Path) -> Result<UnixStream, String> {
 fn line<'a>(lines: &'a [Line], followed: &Followed) -> Result<&'a Line, String> {
     let line = lines.iter().find(|line| line.line == followed.line);
     let line = line.ok_or_else(|| format!("the share has no line {}", followed.line))?;
-    let profile = |profile: Profile| line.profile.as_deref() == Some(profile.name());
-    let is_same = match followed.speaks {
-        Speaks::St(it) => line.protocol == Protocol::St && profile(it),
-        Speaks::Rmd => line.protocol == Protocol::Rmd,
-    };
-    match is_same {
+    let is_known = |profile: Profile| line.profile.as_deref() == Some(profile.name());
+    let has_profile = followed.speaks.profile().is_none_or(is_known);
+    match has_profile && line.protocol == followed.speaks.protocol() {
         true => Ok(line),
         false => Err(format!("{} of the share has another protocol or profile", followed.line)),
     }

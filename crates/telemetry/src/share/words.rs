@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use motorlink_capture::st::Transcript;
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Direction, describe};
-use motorlink_proto::st::{Frame, MAX_FRAME, Profile};
+use motorlink_proto::rmd::{Direction, MotorId, describe};
+use motorlink_proto::st::{Frame, MAX_FRAME, MotorNumber, Profile};
 use motorlink_proto::time::Instant;
 
 use super::message::{Happening, Protocol};
@@ -30,6 +30,22 @@ impl Speaks {
         match self {
             Speaks::St(_) => Protocol::St,
             Speaks::Rmd => Protocol::Rmd,
+        }
+    }
+
+    /// The profile of ST drives.
+    pub fn profile(self) -> Option<Profile> {
+        match self {
+            Speaks::St(profile) => Some(profile),
+            Speaks::Rmd => None,
+        }
+    }
+
+    /// The motor with this number or ID. `None`: no motor can have it.
+    pub fn motor(self, number: u8) -> Option<Motor> {
+        match self {
+            Speaks::St(_) => MotorNumber::new(number).map(Motor::St),
+            Speaks::Rmd => MotorId::new(number).map(Motor::Rmd),
         }
     }
 }

@@ -200,8 +200,9 @@ class Recording(Mapping[str, Table]):
         A column is ``st0/motor1/SPEED_MEAS``. It is NaN at the instants of other tables. Raises
         ``ImportError`` without pandas.
         """
-        order = np.argsort(np.concatenate([[], *(table["t"] for table in self.values())]), kind="stable")
-        columns, before = {"t": np.concatenate([[], *(table["t"] for table in self.values())])[order]}, 0
+        times = np.concatenate([[], *(table["t"] for table in self.values())])
+        order = np.argsort(times, kind="stable")
+        columns, before = {"t": times[order]}, 0
         for table in self.values():
             end = before + len(table.time_ns)
             for name, values in table.items():
@@ -256,6 +257,6 @@ def read(path: Union[str, "os.PathLike[str]"]) -> Recording:
     Of a broken file all that can be read is given. A :class:`~motorlink.errors.RecordingWarning` says what
     is lost, and so does ``Recording.lost``.
 
-    Raises ``RecordingError`` if the file cannot be read or is no MCAP file.
+    Raises ``RecordingError`` if the file cannot be read or is not an MCAP file.
     """
     return Recording(pathlib.Path(path))

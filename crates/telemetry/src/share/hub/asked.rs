@@ -3,8 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::st::MotorNumber;
 use motorlink_proto::time::Micros;
 use serde::Deserialize;
 
@@ -23,7 +21,6 @@ use crate::share::message::{
     self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
     MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
 };
-use crate::share::words::Speaks;
 use crate::signal::{Motor, Signal, Source};
 use crate::subscription::Full;
 
@@ -352,10 +349,7 @@ impl Hub {
 impl Held {
     /// The signals of a motor.
     fn columns(&self) -> Vec<Column> {
-        let motor = match self.speaks {
-            Speaks::St(_) => MotorNumber::new(1).map(Motor::St),
-            Speaks::Rmd => MotorId::new(1).map(Motor::Rmd),
-        };
+        let motor = self.speaks.motor(1);
         let column = |motor| move |source| Column::of(&Signal { motor, source });
         motor.into_iter().flat_map(|it| Source::all(it).into_iter().map(column(it))).collect()
     }

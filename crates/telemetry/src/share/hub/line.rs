@@ -116,10 +116,7 @@ impl Held {
     pub(super) fn info(&self) -> Line {
         let now = self.clock.now();
         let protocol = self.speaks.protocol();
-        let profile = match self.speaks {
-            Speaks::St(profile) => Some(profile.name().to_owned()),
-            Speaks::Rmd => None,
-        };
+        let profile = self.speaks.profile().map(|profile| profile.name().to_owned());
         let (line, port) = (self.name.clone(), self.port.clone());
         let timeout = self.timeout.as_secs_f64();
         Line { line, protocol, port, profile, timeout, t: seconds(now), wall: self.wall(now) }
