@@ -153,7 +153,7 @@ def test_a_kill_loses_the_last_second_at_most(drives, record, tmp_path):
         running = record(path, "-p", cable.port, "-p", f"slcan:{drives.can}", until=1)
         # A moment after a flush that no rhythm of the recorder decides.
         time.sleep(after)
-        # On a busy machine the line itself may be silent, which is no loss.
+        # On a busy machine the line itself may be silent: that is not a loss.
         seen = cable.delivered
         running.kill()
         cable.unplug()

@@ -94,7 +94,7 @@ def test_a_length_over_128_begins_no_frame(packets):
     serial = Capture(RTAC_SERIAL)
     for length in (128, 129):
         serial.serial(frame_of(b"\x01", b"\x08" + bytes(length - 1)), True)
-    # It is no frame at once, although its bytes have not come.
+    # The length is wrong: the dissector does not wait for more bytes.
     serial.serial(bytes.fromhex("0181"), True, after_ms=1001)
     longest, longer, begun = packets(serial, preferences=ALL_ST)
     assert longest["motorlink.st.length"] == ["128"] and longest["motorlink.st.checksum.status"] == ["1"]

@@ -204,7 +204,7 @@ fn the_file_of_a_killed_writer_gives_all_that_was_written() {
 fn a_file_with_very_many_damaged_places_is_read() {
     let mut file = finished(options(), 1);
     let start = chunk_starts(&file)[0];
-    // Its messages are damaged, and a byte behind it is no record.
+    // Its messages are damaged, and the byte behind it does not begin a record.
     file[start + 60] ^= 0x10;
     let end =
         start + 9 + u64::from_le_bytes(file[start + 1..start + 9].try_into().unwrap()) as usize;
