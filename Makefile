@@ -41,7 +41,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web
 .PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -196,6 +196,9 @@ python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python bindings/python/tests/reference.py
 
+web-types: ## the types of messages in the page: web/src/wire.ts
+	MOTORLINK_UPDATE_WEB=1 $(CARGO) test -p motorlink-monitor --all-features --test types --locked
+
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
 
@@ -238,6 +241,11 @@ clean: ## removes all that was built or installed into this folder
 	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) probe/target fuzz/target firmware/target
 
 # ---- What they need ----
+NPM_FLAGS := --no-audit --no-fund --loglevel=error
+web: web/node_modules/.ready ## the monitor's page, in web/dist: npm ci and vite
+	cd web && npm run --silent build
+web/node_modules/.ready: web/package-lock.json
+	cd web && npm ci $(NPM_FLAGS) && touch node_modules/.ready
 # For systems where rustup does not install the toolchain of rust-toolchain.toml automatically.
 toolchain:
 	@! command -v rustup >/dev/null || rustup which rustc >/dev/null 2>&1 || rustup toolchain install

@@ -23,6 +23,7 @@ const REPLIES: u32 = 12;
 
 /// A request of a program. It gets one answer or one refusal with the same id.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "ShareRequest"))]
 pub struct Request {
     /// A number of the program's choice.
     pub id: u32,
@@ -34,6 +35,7 @@ pub struct Request {
 /// What a program asks for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "ShareAsk"))]
 pub enum Ask {
     /// The first request: the program's name, and the version that it speaks.
     Hello {
@@ -103,6 +105,7 @@ pub enum Ask {
 
 /// A motor of a share.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MotorName {
     /// The line.
     pub line: String,
@@ -112,6 +115,7 @@ pub struct MotorName {
 
 /// A signal of a share.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SignalName {
     /// The line.
     pub line: String,
@@ -124,6 +128,7 @@ pub struct SignalName {
 /// What a full queue loses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum DropRule {
     /// The oldest: for what shows the present.
     Oldest,
@@ -134,6 +139,7 @@ pub enum DropRule {
 /// A text from the share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "ShareText"))]
 pub enum Text {
     /// A request was carried out.
     Answer {
@@ -166,6 +172,7 @@ pub enum Text {
         /// The motor.
         motor: u8,
         /// How many.
+        #[cfg_attr(feature = "typescript", ts(type = "number"))]
         rows: u64,
     },
     /// Something happened.
@@ -173,6 +180,7 @@ pub enum Text {
     /// Events before the next text are missing, because the program was too slow.
     Missed {
         /// How many.
+        #[cfg_attr(feature = "typescript", ts(type = "number"))]
         events: u64,
     },
     /// The last text: the share closes the connection.
@@ -188,6 +196,7 @@ pub enum Text {
 /// The answer to each [`Ask`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "to", rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "ShareAnswer"))]
 pub enum Answer {
     /// To hello.
     Hello {
@@ -243,6 +252,7 @@ pub enum Answer {
 
 /// A line of a share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Line {
     /// Its name.
     pub line: String,
@@ -272,6 +282,7 @@ impl Line {
 /// What the drives of a line speak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Protocol {
     /// ST's Motor Control Protocol.
     St,
@@ -291,6 +302,7 @@ impl Protocol {
 
 /// A signal with its unit.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Column {
     /// The name of the register or the quantity.
     pub name: String,
@@ -300,6 +312,7 @@ pub struct Column {
 
 /// How a motor took a stop.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct StoppedMotor {
     /// The motor.
     #[serde(flatten)]
@@ -311,6 +324,7 @@ pub struct StoppedMotor {
 
 /// How often a signal is read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct SignalRate {
     /// The signal.
     #[serde(flatten)]
@@ -325,6 +339,7 @@ pub struct SignalRate {
 
 /// Signals that are read in one exchange.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Group {
     /// Its number, which is never used again.
     pub group: u32,
@@ -340,6 +355,7 @@ pub struct Group {
 
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Event {
     /// When: the wall clock, in seconds since 1970.
     pub wall: f64,
@@ -367,6 +383,7 @@ pub struct Event {
 /// The kind of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Happening {
     /// A program came.
     Joined,
@@ -412,6 +429,7 @@ impl Happening {
 /// Why a request was not carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Reason {
     /// The request is not possible: another line, motor, signal or number is needed.
     Usage,
@@ -435,6 +453,10 @@ pub enum Reason {
     Unconfirmed,
     /// The line failed. It is unknown whether the drive executed it.
     Line,
+    /// Only from a monitor: a viewer may not do this.
+    Forbidden,
+    /// Only from a monitor: the page gives no sign of life.
+    Lapsed,
     /// A reason of a later version.
     #[serde(other)]
     Later,

@@ -45,7 +45,11 @@ impl Place {
             Reason::Silent => NotDone::Silent,
             Reason::Unconfirmed => NotDone::Unconfirmed,
             // It is unknown what the drive did.
-            Reason::Displaced | Reason::Line | Reason::Later => NotDone::Line,
+            Reason::Displaced
+            | Reason::Line
+            | Reason::Forbidden
+            | Reason::Lapsed
+            | Reason::Later => NotDone::Line,
         };
         let port = self.name();
         PortError::NotDone { motor, kind, why: format!("`{port}`: {message}"), port }

@@ -1,0 +1,190 @@
+//! A program at a share, without blocking.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::frame::{self, Frame, Kind, Reader};
+use motorlink_telemetry::share::message::{self, Answer, Ask, Reason, Request, Text};
+use serde::Deserialize;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::UnixStream;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::{Mutex as AsyncMutex, oneshot};
+
+/// Ids of requests of this side begin here. Those below belong to whoever passes requests on.
+pub const OWN_IDS: u32 = 1 << 31;
+
+/// A share did not carry a request out.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{message}")]
+pub struct Refusal {
+    /// The reason, for programs.
+    pub reason: Reason,
+    /// The reason as a sentence.
+    pub message: String,
+    /// The error code of a drive.
+    pub code: Option<u8>,
+}
+
+/// Asks a share. Copies ask through the same connection. The motors that it turned stop when the
+/// [`Listener`] is dropped.
+#[derive(Clone)]
+pub struct Program {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    writer: AsyncMutex<OwnedWriteHalf>,
+    pending: Mutex<Pending>,
+}
+
+#[derive(Default)]
+struct Pending {
+    last: u32,
+    has_ended: bool,
+    answers: BTreeMap<u32, oneshot::Sender<Result<Answer, Refusal>>>,
+}
+
+/// What a share sends, besides the answers to [`Program::ask`].
+pub struct Listener {
+    reader: OwnedReadHalf,
+    frames: Reader,
+    shared: Arc<Shared>,
+}
+
+/// The part of a text that says to which request it belongs.
+#[derive(Deserialize)]
+struct Ending {
+    kind: String,
+    id: Option<u32>,
+}
+
+impl Program {
+    /// Connects to the share at `path`, and says who this is. Gives the name that events have.
+    ///
+    /// # Errors
+    /// No share is there, or it refuses.
+    pub async fn connect(path: &Path, name: &str) -> io::Result<(Self, Listener, String)> {
+        let (reader, writer) = UnixStream::connect(path).await?.into_split();
+        let shared = Arc::new(Shared {
+            writer: AsyncMutex::new(writer),
+            pending: Mutex::new(Pending { last: OWN_IDS, ..Pending::default() }),
+        });
+        let program = Program { shared: Arc::clone(&shared) };
+        let mut listener = Listener { reader, frames: Reader::default(), shared };
+        let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
+        program.pass(&Request { id: OWN_IDS - 1, ask: hello }).await?;
+        let first = listener.next().await?;
+        match message::decode(&first.payload).map_err(io::Error::other)? {
+            Text::Answer { answer: Answer::Hello { name, .. }, .. } => {
+                Ok((program, listener, name))
+            }
+            Text::Refusal { message, .. } | Text::Closing { message } => {
+                Err(io::Error::other(message))
+            }
+            _ => Err(io::Error::other("this is no share")),
+        }
+    }
+
+    /// Sends a request, and waits for its end. Somebody has to call [`Listener::next`] meanwhile.
+    ///
+    /// # Errors
+    /// The share refuses, or has ended.
+    pub async fn ask(&self, ask: Ask) -> Result<Answer, Refusal> {
+        let (sender, answer) = oneshot::channel();
+        let id = {
+            let mut pending = self.shared.pending();
+            if pending.has_ended {
+                return Err(ended());
+            }
+            pending.last = pending.last.wrapping_add(1).max(OWN_IDS);
+            let id = pending.last;
+            pending.answers.insert(id, sender);
+            id
+        };
+        if self.pass(&Request { id, ask }).await.is_err() {
+            return Err(ended());
+        }
+        answer.await.unwrap_or_else(|_| Err(ended()))
+    }
+
+    /// Sends a request with an id below [`OWN_IDS`]. The [`Listener`] gives its end.
+    ///
+    /// # Errors
+    /// The share has ended.
+    pub async fn pass(&self, request: &Request) -> io::Result<()> {
+        let mut bytes = Vec::new();
+        frame::append(Kind::Text, &message::encode(request), &mut bytes)
+            .map_err(io::Error::other)?;
+        self.shared.writer.lock().await.write_all(&bytes).await
+    }
+}
+
+impl Listener {
+    /// The next message that is no answer to [`Program::ask`]. It can be dropped while it waits.
+    ///
+    /// # Errors
+    /// The share has ended.
+    pub async fn next(&mut self) -> io::Result<Frame> {
+        let mut bytes = [0; 1 << 14];
+        loop {
+            while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
+                if let Some(frame) = self.shared.deliver(frame) {
+                    return Ok(frame);
+                }
+            }
+            match self.reader.read(&mut bytes).await? {
+                0 => return Err(io::ErrorKind::UnexpectedEof.into()),
+                size => self.frames.push(&bytes[..size]),
+            }
+        }
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        // Copies of the program keep the socket open.
+        let _ = rustix::net::shutdown(self.reader.as_ref(), rustix::net::Shutdown::Both);
+        let mut pending = self.shared.pending();
+        pending.has_ended = true;
+        pending.answers.clear();
+    }
+}
+
+impl Shared {
+    fn pending(&self) -> std::sync::MutexGuard<'_, Pending> {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives a frame back, unless it is an answer to a request of this side.
+    fn deliver(&self, frame: Frame) -> Option<Frame> {
+        if frame.kind == Kind::Data {
+            return Some(frame);
+        }
+        let ending: Option<Ending> = message::decode(&frame.payload).ok();
+        let id = ending
+            .filter(|it| matches!(it.kind.as_str(), "answer" | "refusal"))
+            .and_then(|it| it.id)
+            .filter(|id| *id >= OWN_IDS);
+        let Some(id) = id else { return Some(frame) };
+        let sender = self.pending().answers.remove(&id)?;
+        let result = match message::decode(&frame.payload) {
+            Ok(Text::Answer { answer, .. }) => Ok(answer),
+            Ok(Text::Refusal { reason, message, code, .. }) => {
+                Err(Refusal { reason, message, code })
+            }
+            _ => Err(ended()),
+        };
+        // Nobody waits any more.
+        let _ = sender.send(result);
+        None
+    }
+}
+
+fn ended() -> Refusal {
+    let message = "the share has ended; it stops the motors that this page turned".to_owned();
+    Refusal { reason: Reason::Line, message, code: None }
+}

@@ -1,0 +1,825 @@
+// Written by `make web-types` from crates/monitor and crates/telemetry.
+
+export type Alive = { 
+/**
+ * The last [`Text::Beat`] that the page had when it drew the frame.
+ */
+beat: number, 
+/**
+ * The number of the last frame that the browser drew.
+ */
+frame: number, 
+/**
+ * Whether the key or the finger of hold-to-run is down.
+ */
+held: boolean, 
+/**
+ * The page's own clock, in ms. The next beat has it, too.
+ */
+at: number, };
+
+export type Beat = { 
+/**
+ * Its number.
+ */
+beat: number, 
+/**
+ * The wall clock of the server, in seconds since 1970.
+ */
+wall: number, 
+/**
+ * [`Alive::at`] of the last sign of life.
+ */
+at: number | null, 
+/**
+ * How long ago that was received, in ms.
+ */
+since: number, 
+/**
+ * Whether this page has turned motors, so that its end stops them.
+ */
+holds: boolean, };
+
+export type Column = { 
+/**
+ * The name of the register or the quantity.
+ */
+name: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, };
+
+export type Command = { 
+/**
+ * Its name in the table.
+ */
+name: string, 
+/**
+ * What it does.
+ */
+doc: string, 
+/**
+ * Its values.
+ */
+fields: Array<Field>, 
+/**
+ * Whether it may move the motor.
+ */
+moves: boolean, 
+/**
+ * Whether it wears the ROM of the motor.
+ */
+wears_rom: boolean, };
+
+export type Controlled = { 
+/**
+ * What.
+ */
+mode: Mode, 
+/**
+ * The symbol of the unit.
+ */
+unit: string, 
+/**
+ * The signal that measures it.
+ */
+measured: string, 
+/**
+ * What the protocol can carry, forwards and backwards.
+ */
+most: number, };
+
+export type Description = { 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * What they speak.
+ */
+protocol: Protocol, 
+/**
+ * The signals of the overview of a motor.
+ */
+overview: Overview, 
+/**
+ * The registers, in the order of the table.
+ */
+registers: Array<Register>, 
+/**
+ * The commands.
+ */
+commands: Array<Command>, 
+/**
+ * What can be controlled.
+ */
+modes: Array<Controlled>, 
+/**
+ * The meaning of the signal `overview.state`.
+ */
+states: Array<State>, 
+/**
+ * The bits of the signal `overview.faults`.
+ */
+faults: Array<Fault>, };
+
+export type Difference = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, 
+/**
+ * That of the motor.
+ */
+now: string, 
+/**
+ * That of the file.
+ */
+file: string, 
+/**
+ * Whether writing it wears the ROM of the motor.
+ */
+wears_rom: boolean, 
+/**
+ * Why it cannot be written; `null`: it can.
+ */
+fixed: string | null, };
+
+export type DropRule = "oldest" | "newest";
+
+export type Event = { 
+/**
+ * When: the wall clock, in seconds since 1970.
+ */
+wall: number, 
+/**
+ * The line, unless it is about all.
+ */
+line?: string | null, 
+/**
+ * When, by the clock of the line, in seconds.
+ */
+t?: number | null, 
+/**
+ * From when on values are doubtful, by the clock of the line, in seconds.
+ */
+since?: number | null, 
+/**
+ * The motor, if it is about one.
+ */
+motor?: number | null, 
+/**
+ * The program that did it.
+ */
+by?: string | null, 
+/**
+ * What happened.
+ */
+event: Happening, 
+/**
+ * The same in words.
+ */
+message: string, };
+
+export type Fault = { 
+/**
+ * The bit of the signal, from 0.
+ */
+bit: number, 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Its meaning.
+ */
+doc: string, 
+/**
+ * What to do.
+ */
+advice: string, 
+/**
+ * Whether the cause is present. Otherwise it has occurred and is not acknowledged.
+ */
+present: boolean, };
+
+export type Field = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Its meaning.
+ */
+doc: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, 
+/**
+ * The least and the most value, and the step between values.
+ */
+range: [number, number, number], };
+
+export type FromPage = Alive | Request | ShareRequest;
+
+export type Group = { 
+/**
+ * Its number, which is never used again.
+ */
+group: number, 
+/**
+ * Whose it is.
+ */
+subscription: number, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor.
+ */
+motor: number, 
+/**
+ * The signals, in the order of the columns after `t` and `span`.
+ */
+columns: Array<Column>, };
+
+export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "later";
+
+export type Line = { 
+/**
+ * Its name.
+ */
+line: string, 
+/**
+ * `st` or `rmd`.
+ */
+protocol: Protocol, 
+/**
+ * The port that the share holds.
+ */
+port: string, 
+/**
+ * The profile in which the share reads the frames of an ST drive.
+ */
+profile?: string | null, 
+/**
+ * How long the share waits for a reply, in seconds. A stop may take several times as long.
+ */
+timeout: number, 
+/**
+ * The line's clock now, in seconds.
+ */
+t: number, 
+/**
+ * The wall clock at the same moment, in seconds since 1970.
+ */
+wall: number, };
+
+export type Mode = "speed" | "torque" | "position";
+
+export type MotorName = { 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, };
+
+export type Overview = { 
+/**
+ * The state. RMD motors report none.
+ */
+state: string | null, 
+/**
+ * The faults.
+ */
+faults: string, 
+/**
+ * The speed.
+ */
+speed: string, 
+/**
+ * The current that makes torque.
+ */
+current: string, 
+/**
+ * The temperature.
+ */
+temperature: string, 
+/**
+ * The supply.
+ */
+voltage: string, 
+/**
+ * The angle of an RMD motor.
+ */
+angle: string | null, };
+
+export type Protocol = "st" | "rmd";
+
+export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
+
+export type Register = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * What it belongs to, for headings.
+ */
+group: string, 
+/**
+ * Its meaning.
+ */
+doc: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, 
+/**
+ * Whether it can be read.
+ */
+readable: boolean, 
+/**
+ * Whether it can be written.
+ */
+writable: boolean, 
+/**
+ * Whether a write wears the ROM of the motor.
+ */
+wears_rom: boolean, 
+/**
+ * The least and the most value, and the step between values.
+ */
+range: [number, number, number] | null, };
+
+export type Request = { 
+/**
+ * A number of the page's choice.
+ */
+id: number, } & ({ "ask": "stop-all" } | { "ask": "let-go" } | { "ask": "motors", 
+/**
+ * The line.
+ */
+line: string, } | { "ask": "describe", 
+/**
+ * The line.
+ */
+line: string, } | { "ask": "read", 
+/**
+ * The names of the registers.
+ */
+names: Array<string>, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "write", 
+/**
+ * The name of the register.
+ */
+name: string, 
+/**
+ * The value, in the unit of the register.
+ */
+value: number, 
+/**
+ * Whether it is allowed to wear the ROM of the motor.
+ */
+to_rom: boolean, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "act", 
+/**
+ * The name of the command.
+ */
+command: string, 
+/**
+ * Its values, in the units of its fields.
+ */
+values: { [key in string]?: number }, 
+/**
+ * Hold-to-run: the motor stops as soon as a sign of life says that nothing is held.
+ */
+hold: boolean, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "run", 
+/**
+ * What is controlled.
+ */
+mode: Mode, 
+/**
+ * Where the reference ends.
+ */
+target: number, 
+/**
+ * How fast it changes, in units of the target a second. Of [`Mode::Position`]: the speed.
+ */
+rate: number, 
+/**
+ * As for [`Ask::Act`].
+ */
+hold: boolean, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "limit", 
+/**
+ * What.
+ */
+mode: Mode, 
+/**
+ * The most, forwards and backwards, in the unit of the mode.
+ */
+most: number | null, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "dump", 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "diff", 
+/**
+ * The file.
+ */
+text: string, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, } | { "ask": "restore", 
+/**
+ * The file.
+ */
+text: string, 
+/**
+ * Whether it is allowed to wear the ROM of the motor.
+ */
+to_rom: boolean, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, });
+
+export type Role = "operator" | "viewer";
+
+export type ShareRequest = { 
+/**
+ * A number of the program's choice.
+ */
+id: number, } & ({ "ask": "hello", 
+/**
+ * The version of the messages.
+ */
+protocol: number, 
+/**
+ * Who it is, for the log.
+ */
+name: string, } | { "ask": "lines" } | { "ask": "signals", 
+/**
+ * The line.
+ */
+line: string, } | { "ask": "subscribe", 
+/**
+ * The signals.
+ */
+signals: Array<SignalName>, 
+/**
+ * The time between two values, in seconds.
+ */
+period: number, 
+/**
+ * How many records wait at most for this program.
+ */
+queue: number, 
+/**
+ * What is lost when more would wait.
+ */
+drop: DropRule, 
+/**
+ * Whether the signals of a motor are one group, whose rows are sent once they are confirmed.
+ */
+rows?: boolean, } | { "ask": "unsubscribe", 
+/**
+ * The subscription.
+ */
+subscription: number, } | { "ask": "command", 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor.
+ */
+motor: number, 
+/**
+ * ST: frame code and payload, without motor, length and checksum. RMD: the eight bytes.
+ */
+bytes: Array<number>, 
+/**
+ * The time to live in seconds: it is not sent later.
+ */
+time_to_live: number, } | { "ask": "confirm", 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor.
+ */
+motor: number, } | { "ask": "stop", 
+/**
+ * The motor; all motors that were started or read, without it.
+ */
+motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" });
+
+export type ShareText = { "kind": "answer", 
+/**
+ * That of the request.
+ */
+id: number, } & ({ "to": "hello", 
+/**
+ * The version of the messages.
+ */
+protocol: number, 
+/**
+ * The name of the program at the other end, with its version.
+ */
+share: string, 
+/**
+ * The name that the log has for this program. Others may have the same.
+ */
+name: string, } | { "to": "lines", 
+/**
+ * All lines.
+ */
+lines: Array<Line>, 
+/**
+ * Who stopped the motors, if motion is refused.
+ */
+latched_by?: string | null, } | { "to": "signals", 
+/**
+ * All signals of a motor.
+ */
+signals: Array<Column>, } | { "to": "subscribe", 
+/**
+ * Its number.
+ */
+subscription: number, } | { "to": "unsubscribe" } | { "to": "command", 
+/**
+ * ST: the payload of the reply. RMD: the eight bytes.
+ */
+bytes: Array<number>, } | { "to": "confirm" } | { "to": "stop", 
+/**
+ * The motors and how they took it.
+ */
+motors: Array<StoppedMotor>, } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
+/**
+ * Those of all signals that are read.
+ */
+rates: Array<SignalRate>, }) | { "kind": "refusal", 
+/**
+ * That of the request.
+ */
+id: number, 
+/**
+ * The reason, for programs.
+ */
+reason: Reason, 
+/**
+ * The reason in words.
+ */
+message: string, 
+/**
+ * The error code of an ST drive that refused.
+ */
+code?: number | null, } | { "kind": "group" } & Group | { "kind": "unconfirmed", 
+/**
+ * The subscription.
+ */
+subscription: number, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor.
+ */
+motor: number, 
+/**
+ * How many.
+ */
+rows: number, } | { "kind": "event" } & Event | { "kind": "missed", 
+/**
+ * How many.
+ */
+events: number, } | { "kind": "closing", 
+/**
+ * Why, in words.
+ */
+message: string, } | { "kind": "later" };
+
+export type SignalName = { 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, 
+/**
+ * The name of the register or the quantity.
+ */
+name: string, };
+
+export type SignalRate = { 
+/**
+ * The shortest period that a program asked for, in seconds.
+ */
+asked: number, 
+/**
+ * The period that the line carries, in seconds.
+ */
+predicted: number, 
+/**
+ * Values in the last second.
+ */
+achieved: number, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, 
+/**
+ * The name of the register or the quantity.
+ */
+name: string, };
+
+export type State = { 
+/**
+ * The value of the signal.
+ */
+value: number, 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Its meaning.
+ */
+doc: string, };
+
+export type StoppedMotor = { 
+/**
+ * Why it may still be turning; without it the drive confirmed the stop.
+ */
+failure?: string | null, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, };
+
+export type Text = { "kind": "welcome" } & Welcome | { "kind": "beat" } & Beat | { "kind": "answer", 
+/**
+ * That of the request.
+ */
+id: number, } & ({ "to": "stop-all", 
+/**
+ * The motors and how they took it.
+ */
+motors: Array<StoppedMotor>, } | { "to": "let-go" } | { "to": "motors", 
+/**
+ * Their numbers or IDs.
+ */
+motors: Array<number>, } | { "to": "describe" } & Description | { "to": "read", 
+/**
+ * In the order of the names.
+ */
+values: Array<Value>, } | { "to": "write", 
+/**
+ * What was read back: the register, and others that the same request writes.
+ */
+values: Array<Value>, } | { "to": "act", 
+/**
+ * The values of the reply, by field.
+ */
+values: Array<Value>, } | { "to": "run", 
+/**
+ * The measured value that it began with.
+ */
+from: number, } | { "to": "limit" } | { "to": "dump", 
+/**
+ * The file.
+ */
+text: string, 
+/**
+ * Its usual name.
+ */
+file: string, 
+/**
+ * What the motor refused to give.
+ */
+warnings: Array<string>, } | { "to": "diff", 
+/**
+ * What differs.
+ */
+differences: Array<Difference>, } | { "to": "restore", 
+/**
+ * What was written and read back.
+ */
+written: Array<Difference>, }) | { "kind": "lapsed", 
+/**
+ * Why, in words.
+ */
+message: string, } | { "kind": "share", 
+/**
+ * Why it is lost; `null`: it is there.
+ */
+lost: string | null, };
+
+export type Value = { 
+/**
+ * The register or the field.
+ */
+name: string, 
+/**
+ * In its unit; `null`: there is none.
+ */
+value: number | null, 
+/**
+ * As text: a state, faults, a version, or the value with its decimals. Without a value: why.
+ */
+text: string, };
+
+export type Welcome = { 
+/**
+ * The program and its version.
+ */
+server: string, 
+/**
+ * The name of this page in events.
+ */
+name: string, 
+/**
+ * What it may do.
+ */
+role: Role, 
+/**
+ * How long a page may give no sign of life until its motors stop, in ms.
+ */
+deadline: number, 
+/**
+ * Which run of the server it is. Another one knows nothing of the page's subscriptions and motors.
+ */
+run: string, };
