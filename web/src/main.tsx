@@ -1,3 +1,5 @@
 import { render } from 'preact';
+import { start, state } from './link';
 
-render(<h1>Motorlink monitor</h1>, document.getElementById('app')!);
+start();
+render(<h1>Motorlink monitor: {state}</h1>, document.getElementById('app')!);
