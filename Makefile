@@ -33,10 +33,10 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
-ALL_PARTS := firmware-test miri lint unit python e2e pages ffi-test fuzz-replay probe determinism test-socketcan deny
+ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test fuzz-replay probe determinism test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
-TIMED := unit e2e python pages firmware-test ffi-test test-socketcan
+TIMED := unit e2e python browser pages firmware-test ffi-test test-socketcan
 RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
@@ -82,6 +82,14 @@ e2e: $(VENV)/ready ## 5 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
+
+web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
+	cd web && npm run --silent check && npm test && npm run --silent size
+
+browser: web ## 4 min: the monitor in Debian's Chromium, on simulated drives
+	-@tests/install browser
+	$(PROGRAM)
+	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent browser -- $(T)
 
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
@@ -238,11 +246,14 @@ fmt: ## formats the Rust code
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
-	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) probe/target fuzz/target firmware/target
+	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) web/node_modules web/dist probe/target fuzz/target firmware/target
 
 # ---- What they need ----
 NPM_FLAGS := --no-audit --no-fund --loglevel=error
-web: web/node_modules/.ready ## the monitor's page, in web/dist: npm ci and vite
+# Two parts may want it at once.
+web: ## the monitor's page, in web/dist: npm ci and vite
+	@mkdir -p target && flock target/web.lock $(MAKE) --no-print-directory web/dist/index.html
+web/dist/index.html: web/node_modules/.ready $(shell find web/src web/index.html web/vite.config.ts -type f)
 	cd web && npm run --silent build
 web/node_modules/.ready: web/package-lock.json
 	cd web && npm ci $(NPM_FLAGS) && touch node_modules/.ready
@@ -257,7 +268,7 @@ packages:
 	$(WHOLE)
 	-@$(if $(filter e2e python pages firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
 		tests/install python3-venv)
-	-@tests/install $(filter e2e ffi-test firmware-test test-socketcan,$(PARTS))
+	-@tests/install $(filter e2e browser ffi-test firmware-test test-socketcan,$(PARTS))
 
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(BOARD) || rustup target add $(BOARD)
