@@ -1,13 +1,7 @@
 import { defineConfig, devices } from '@playwright/test';
+import { ARGUMENTS, PROGRAM } from './tests/chromium';
 
-/** Debian's browser. Its background services would look for the network. */
-const chromium = {
-  executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-  args: [
-    '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
-    '--disable-component-update', '--disable-sync',
-  ],
-};
+const chromium = { executablePath: PROGRAM, args: ARGUMENTS };
 
 export default defineConfig({
   testDir: 'tests',

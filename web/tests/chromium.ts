@@ -1,0 +1,73 @@
+// A browser as people have it: its tabs are hidden when another one is in front, and its processes can be
+// killed and frozen.
+import { chromium, type Browser, type Page } from '@playwright/test';
+import { type ChildProcess, spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+export const PROGRAM = process.env.CHROMIUM ?? '/usr/bin/chromium';
+/** Its background services would look for the network. Root has no sandbox. */
+export const ARGUMENTS = [
+  '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
+  '--disable-component-update', '--disable-sync',
+];
+
+export class Chromium {
+  private constructor(
+    private readonly process: ChildProcess,
+    private readonly folder: string,
+    readonly browser: Browser,
+  ) {}
+
+  static async open({ proxy }: { proxy?: { server: string; bypass: string } } = {}) {
+    const folder = mkdtempSync(join(tmpdir(), 'chromium-'));
+    const through = proxy ? [`--proxy-server=${proxy.server}`, `--proxy-bypass-list=${proxy.bypass}`] : [];
+    const started = spawn(
+      PROGRAM,
+      [...ARGUMENTS, ...through, '--headless', '--remote-debugging-port=0', `--user-data-dir=${folder}`, 'about:blank'],
+      { stdio: 'ignore' },
+    );
+    const file = join(folder, 'DevToolsActivePort');
+    while (!existsSync(file) || !readFileSync(file, 'utf8').includes('\n')) {
+      if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);
+      await new Promise((done) => setTimeout(done, 20));
+    }
+    const port = readFileSync(file, 'utf8').split('\n')[0];
+    // The defaults of Playwright keep every tab visible.
+    const browser = await chromium.connectOverCDP(`http://127.0.0.1:${port}`, { noDefaults: true });
+    return new Chromium(started, folder, browser);
+  }
+
+  /** Opens a tab, in front of the others. */
+  async tab(): Promise<Page> {
+    return this.browser.contexts()[0]!.newPage();
+  }
+
+  /** The processes that run pages. */
+  private async renderers() {
+    const session = await this.browser.newBrowserCDPSession();
+    const { processInfo } = await session.send('SystemInfo.getProcessInfo');
+    return processInfo.filter(({ type }) => type === 'renderer').map(({ id }) => id);
+  }
+
+  /** What sends a signal to the processes that run pages, at once. */
+  async signals(signal: NodeJS.Signals) {
+    const ids = await this.renderers();
+    return () => ids.forEach((id) => process.kill(id, signal));
+  }
+
+  /** Ends the whole browser, as a crash does. */
+  kill() {
+    this.process.kill('SIGKILL');
+  }
+
+  async close() {
+    const ended = new Promise((done) => this.process.once('exit', done));
+    if (this.process.exitCode === null && this.process.signalCode === null) {
+      this.process.kill('SIGKILL');
+      await ended;
+    }
+    rmSync(this.folder, { recursive: true, force: true, maxRetries: 5 });
+  }
+}
