@@ -82,12 +82,16 @@ export class Bench {
     await this.drives.line((line) => line['protocol'] === 'rmd');
   }
 
-  async serve(...args: string[]) {
+  /** As `plug`, with an ST drive on TCP. Gives its port. */
+  async listen() {
+    this.drives = new Program(['sim', '--st', 'tcp-listen:127.0.0.1:0', '--stdin', '--json'], this.folder);
+    const ready = await this.drives.line((line) => line['protocol'] === 'st');
+    return Number(String(ready['path']).split(':').at(-1));
+  }
+
+  async serve(ports = ['-p', `${this.folder}/st0`, '-p', `slcan:${this.folder}/can0`]) {
     this.monitor = new Program(
-      [
-        'monitor', '-p', `${this.folder}/st0`, '-p', `slcan:${this.folder}/can0`, '--timeout', '1s',
-        '--listen', '127.0.0.1:0', '--json', ...args,
-      ],
+      ['monitor', ...ports, '--timeout', '1s', '--listen', '127.0.0.1:0', '--json'],
       this.folder,
     );
     const ready = await this.monitor.line((line) => line['event'] === 'ready');

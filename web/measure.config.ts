@@ -1,0 +1,4 @@
+import { defineConfig } from '@playwright/test';
+
+/** Measurements: `make deadman`. */
+export default defineConfig({ testDir: 'tests', testMatch: /\.measure\.ts$/, workers: 1, reporter: [['line']] });

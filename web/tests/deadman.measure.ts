@@ -1,0 +1,146 @@
+// How long a motor turns on after what moved it is gone: `make deadman`, docs/BENCHMARKS.md.
+import { test } from '@playwright/test';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { Bench, Program, spin } from './bench';
+import { Chromium } from './chromium';
+import { Network, Wire } from './network';
+
+const RUNS = Number(process.env.RUNS ?? 50);
+const PAGE = '../docs/BENCHMARKS.md';
+/** EXECUTE_CMD STOP_MOTOR to motor 1, without its checksum. */
+const STOP = Buffer.from([0x23, 0x01, 0x02]);
+/** Below this a motor stands still, rpm. */
+const STILL = 5;
+
+/** What one run has: simulated drives, a wire that is watched, a server, a network, a browser. */
+interface World {
+  bench: Bench;
+  wire: Wire;
+  network: Network;
+  chromium: Chromium;
+  guard: Program | undefined;
+}
+
+interface Case {
+  name: string;
+  /** Whether `motorlink guard` is between the server and the drive. */
+  guarded?: boolean;
+  /** Prepares the event. What it returns makes it happen. */
+  event: (world: World) => Promise<() => void | Promise<unknown>>;
+  /** From when on the time is measured, if not from the event. */
+  from?: (world: World) => Promise<number>;
+}
+
+const CASES: Case[] = [
+  { name: 'page killed (its process)', event: async ({ chromium }) => chromium.signals('SIGKILL') },
+  { name: 'browser killed', event: async ({ chromium }) => () => chromium.kill() },
+  { name: 'tab frozen (SIGSTOP)', event: async ({ chromium }) => chromium.signals('SIGSTOP') },
+  { name: 'network cut', event: async ({ network }) => () => network.set({ cut: 'both' }) },
+  { name: 'tab hidden', event: async ({ chromium }) => () => chromium.tab() },
+  {
+    name: 'server killed, guard beneath',
+    guarded: true,
+    event: async ({ bench }) => () => bench.monitor.process.kill('SIGKILL'),
+  },
+  {
+    name: 'server frozen (SIGSTOP), guard with --silence 500ms beneath',
+    guarded: true,
+    event: async ({ bench }) => () => bench.monitor.process.kill('SIGSTOP'),
+  },
+  {
+    name: 'drive unplugged for 1 s, page killed meanwhile; from plugged in',
+    event: async ({ wire, chromium }) => {
+      const kill = await chromium.signals('SIGKILL');
+      return async () => {
+        wire.unplug();
+        kill();
+        await new Promise((done) => setTimeout(done, 1000));
+        wire.plug();
+      };
+    },
+    from: async () => performance.now(),
+  },
+];
+
+async function world(guarded: boolean): Promise<World> {
+  const bench = new Bench();
+  const port = await bench.listen();
+  const wire = await Wire.open(port);
+  let serial = `tcp:127.0.0.1:${wire.port}`;
+  let guard: Program | undefined;
+  if (guarded) {
+    const at = `${bench.folder}/guarded`;
+    guard = new Program(
+      ['guard', 'st', '-p', serial, '--serve', `pty:${at}`, '--silence', '500ms', '--json'], bench.folder,
+    );
+    await guard.line(() => true);
+    serial = at;
+  }
+  await bench.serve(['-p', serial]);
+  const network = await Network.open();
+  const chromium = await Chromium.open({ proxy: network.proxy });
+  return { bench, wire, network, chromium, guard };
+}
+
+/** Time until STOP is on the wire, and until the motor stands still, ms. `null`: not within 20 s. */
+async function run({ guarded = false, event, from }: Case) {
+  const all = await world(guarded);
+  const { bench, wire, network, chromium, guard } = all;
+  try {
+    const page = await chromium.tab();
+    await page.goto(bench.url);
+    await spin(page, 1500);
+    while ((await bench.speed('st', 1)) < 1000);
+    const happens = await event(all);
+    let at = performance.now();
+    await happens();
+    if (from) at = await from(all);
+    const patience = at + 20_000;
+    let still: number | null = null;
+    while (still === null && performance.now() < patience) {
+      if (Math.abs(await bench.speed('st', 1)) < STILL) still = performance.now() - at;
+    }
+    const stop = wire.when(STOP, at);
+    return { stop: stop === undefined ? null : stop - at, still };
+  } finally {
+    await chromium.close();
+    await bench.end();
+    await guard?.end();
+    await wire.close();
+    await network.close();
+  }
+}
+
+const row = (cells: (string | number)[]) => `| ${cells.join(' | ')} |`;
+
+function quantiles(all: (number | null)[]) {
+  const sorted = all.filter((one) => one !== null).sort((a, b) => a - b);
+  const at = (part: number) => sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))];
+  return [0, 0.5, 0.9, 1].map((part) => at(part)?.toFixed(0) ?? '-');
+}
+
+test('dead-man', async () => {
+  test.setTimeout(4 * 3600 * 1000);
+  const rows: string[] = [];
+  for (const one of CASES) {
+    const results: Awaited<ReturnType<typeof run>>[] = [];
+    for (let left = RUNS; left > 0; left -= 1) results.push(await run(one));
+    const left = results.filter(({ still }) => still === null).length;
+    rows.push(
+      row([
+        one.name, results.length, ...quantiles(results.map(({ stop }) => stop)),
+        ...quantiles(results.map(({ still }) => still)), left,
+      ]),
+    );
+    console.log(rows.at(-1));
+  }
+  if (!process.env.MOTORLINK_UPDATE_DOCS) return;
+  const [begin, end] = ['<!-- dead-man -->', '<!-- end of dead-man -->'];
+  const page = readFileSync(PAGE, 'utf8');
+  const [before, rest] = page.split(begin);
+  const after = rest?.split(end)[1];
+  if (after === undefined) throw new Error(`${PAGE} has no place for the table`);
+  const head = row(['event', 'runs', 'STOP min', 'p50', 'p90', 'max', 'still min', 'p50', 'p90', 'max', 'left turning']);
+  const line = row(['---', ...Array<string>(10).fill('--:')]);
+  writeFileSync(PAGE, `${before}${begin}\n\n${[head, line, ...rows].join('\n')}\n\n${end}${after}`);
+});
