@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use motorlink_link::{printable, printable_lines};
 use motorlink_proto::rmd::Settings;
-use motorlink_proto::st::Profile;
+use motorlink_proto::st::{Profile, RegisterId};
 use motorlink_proto::time::Instant;
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
@@ -28,6 +28,8 @@ pub struct BenchConfig {
     pub st: StConfigs,
     /// The motors on the CAN bus.
     pub rmd: RmdConfigs,
+    /// The ST register that reads the time of the drive in ms, for measurements of delays.
+    pub clock_register: Option<RegisterId>,
 }
 
 /// The ST drive's motors, 1 to 7 of them.
@@ -84,6 +86,7 @@ pub enum ConfigError {
 struct File {
     #[serde(default)]
     profile: Profile,
+    clock_register: Option<String>,
     st: Option<Motors>,
     rmd: Option<Motors>,
 }
@@ -128,7 +131,8 @@ impl BenchConfig {
     fn from_file(file: File) -> Result<Self, ConfigError> {
         let st = motors(file.st, "st.motor", st_motor)?.map(StConfigs).unwrap_or_default();
         let rmd = motors(file.rmd, "rmd.motor", rmd_motor)?.map(RmdConfigs).unwrap_or_default();
-        let config = BenchConfig { profile: file.profile, st, rmd };
+        let clock_register = file.clock_register.map(|name| register(&name)).transpose()?;
+        let config = BenchConfig { profile: file.profile, st, rmd, clock_register };
         config.station(Instant(0))?;
         config.bus(Instant(0), RmdConfig::factory_rom)?;
         Ok(config)
@@ -156,6 +160,10 @@ impl BenchConfig {
         let drive = StDrive::new(now, motors).ok_or_else(|| {
             ConfigError::Impossible(format!("a drive has 1 to 7 motors, not {}", self.st.0.len()))
         })?;
+        let drive = match self.clock_register {
+            Some(register) => drive.with_clock(register),
+            None => drive,
+        };
         Ok(StStation::new(self.profile, drive))
     }
 
@@ -191,6 +199,11 @@ impl BenchConfig {
             ConfigError::Impossible(format!("two motors have the same ID {twice}"))
         })
     }
+}
+
+fn register(name: &str) -> Result<RegisterId, ConfigError> {
+    let unknown = || format!("clock_register: `{}` is no register", printable(name));
+    RegisterId::named(name).ok_or_else(|| ConfigError::Text(unknown()))
 }
 
 /// An error of a TOML file with its place, on several lines.
@@ -274,6 +287,8 @@ fn merge(whole: &mut Table, over: Table) {
 
 #[cfg(test)]
 mod tests {
+    use motorlink_proto::st::{Frame, MAX_FRAME, Request};
+
     use super::*;
 
     #[test]
@@ -306,6 +321,21 @@ mod tests {
         assert_eq!((motor.id, motor.plant.machine.gear.ratio), (32, 6.0));
         assert_eq!(motor.plant.machine.pole_pairs, RmdConfig::x8().plant.machine.pole_pairs);
         assert!(motor.plant.supply.chopper.is_some());
+    }
+
+    #[test]
+    fn a_register_reads_the_time_of_the_drive() {
+        let config = BenchConfig::parse("clock_register = \"SPEED_REF\"").unwrap();
+        let mut station = config.station(Instant(0)).unwrap();
+        let mut request = [0; MAX_FRAME];
+        let get = Request::GetRegister(RegisterId::SPEED_REF);
+        let request = Frame::command(2, &get, &mut request).expect("it is short").to_vec();
+        for ms in [1, 70_000] {
+            let mut reply = Vec::new();
+            station.receive(Instant(1000 * ms), &request, |bytes| reply.extend(bytes));
+            let value = i32::from_le_bytes(reply[2..6].try_into().unwrap());
+            assert_eq!(i64::from(value), ms as i64);
+        }
     }
 
     #[test]
@@ -357,6 +387,7 @@ mod tests {
         assert!(why("[st]\nmotor = []").contains("1 to 7"));
         assert!(why("[[st.motor]]\npreset = \"big\"").contains("servo"));
         assert!(why("profile = \"v9\"").contains("v9"));
+        assert!(why("clock_register = \"SPEED\"").contains("`SPEED`"));
         assert!(
             why("[[st.motor]]\nplant.supply.voltage = -1").contains("st.motor 1: plant.supply")
         );

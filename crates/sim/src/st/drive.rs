@@ -13,13 +13,14 @@ use super::{MotorConfig, StMotor};
 pub struct StDrive<M> {
     motors: M,
     now: Instant,
+    clock: Option<RegisterId>,
 }
 
 impl StDrive<[StMotor; 2]> {
     /// The motors of [`MotorConfig::demo`].
     pub fn demo(now: Instant) -> Self {
         let motors = MotorConfig::demo().map(StMotor::new);
-        StDrive { motors, now }
+        StDrive { motors, now, clock: None }
     }
 }
 
@@ -28,7 +29,14 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     pub fn new(now: Instant, motors: M) -> Option<Self> {
         let count = motors.as_ref().len();
         let fits = (1..=usize::from(MotorNumber::MAX)).contains(&count);
-        fits.then(|| StDrive { motors, now })
+        fits.then(|| StDrive { motors, now, clock: None })
+    }
+
+    /// Lets a register of all motors read the time of the drive in ms, to measure how old a value is
+    /// that somebody sees.
+    #[must_use]
+    pub fn with_clock(self, register: RegisterId) -> Self {
+        StDrive { clock: Some(register), ..self }
     }
 
     /// The last motor. Its number is the number of motors.
@@ -75,7 +83,10 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> MotorControl for StDrive<M> {
     }
 
     fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
-        self.motor(motor).read(register)
+        match self.clock == Some(register) {
+            true => (self.now.0 / 1000) as i32,
+            false => self.motor(motor).read(register),
+        }
     }
 
     fn set_register(
