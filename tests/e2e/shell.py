@@ -42,13 +42,15 @@ def serves(words):
         return "--prove" not in words
     if words[:2] == ["motorlink", "share"]:
         return not asks_a_share(words)
-    if words[:2] == ["motorlink", "replay"]:
+    if words[:2] in (["motorlink", "replay"], ["motorlink", "monitor"]):
         return True
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
 
 
 def asks_a_share(words):
     """Whether a command needs a share that runs."""
+    if words[:2] == ["motorlink", "monitor"]:
+        return "--share" in words
     return words[:2] == ["motorlink", "share"] and bool({"stop", "latch", "release"} & set(words))
 
 

@@ -93,7 +93,7 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "spec", "completions", "man", *(word(command) for command in RECORDINGS)}
     assert subcommands(run, "share") == set(SHARE)
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "record", "replay", "conformance", "decode"} | others
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "monitor", "record", "replay", "conformance", "decode"} | others
 
 
 @pytest.mark.parametrize("protocol", DECODE)
@@ -168,6 +168,8 @@ def test_settings_are_told_by_name(checked, run, tmp_path, protocol, setting, co
         ("rmd -p sim: scan 9", 3, {"kind": "link"}),
         ("guard st -p sim:", 2, {"kind": "usage"}),
         ("share -p sim: --at nowhere", 2, {"kind": "usage"}),
+        ("monitor --listen 0.0.0.0:0", 2, {"kind": "usage"}),
+        ("monitor --share unix:./nowhere --listen 127.0.0.1:0", 3, {"kind": "link"}),
         ("sim run /nothing-there.toml", 2, {"kind": "usage"}),
         ("conformance st -p sim: --only no_such_case", 2, {"kind": "usage"}),
     ],
@@ -305,6 +307,21 @@ def test_a_share_tells_what_happens(sim, start, checked, tmp_path):
     share.interrupt()
     share.wait()
     assert len(check("\n".join(share.out))) > 4
+
+
+def test_a_monitor_tells_where_browsers_connect(start, checked, tmp_path):
+    path = tmp_path / "share"
+    monitor = start("monitor", "--listen", "127.0.0.1:0", "--at", f"unix:{path}", "--json")
+    (ready,) = check(monitor.line(0))
+    assert ready["simulated"] and ready["url"] != ready["viewer_url"]
+    shown = start("monitor", "--listen", "127.0.0.1:0", "--share", f"unix:{path}", "--json")
+    (other,) = check(shown.line(0))
+    assert (other["lines"], other["simulated"]) == (ready["lines"], False)
+    checked("monitor", "--listen", ready["url"].split("/")[2], code=3)
+    for process in (shown, monitor):
+        process.interrupt()
+        assert process.wait() == 0
+        check("\n".join(process.out))
 
 
 @pytest.mark.parametrize("command", RECORDINGS)

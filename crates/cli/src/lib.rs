@@ -16,6 +16,8 @@ mod help;
 mod hint;
 mod interrupt;
 mod json;
+#[cfg(feature = "monitor")]
+mod monitor;
 mod output;
 mod outputs;
 mod palette;
@@ -64,6 +66,9 @@ enum Command {
     Guard(guard::Args),
     /// Hold ports, and let several programs use the drives at the same time
     Share(share::Args),
+    /// Show drives in a browser: values, plots, registers, control, stop
+    #[cfg(feature = "monitor")]
+    Monitor(monitor::Args),
     /// List serial devices and CAN interfaces, with their problems
     Ports(ports::Args),
     /// Command and read a drive that speaks ST's Motor Control Protocol
@@ -141,6 +146,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Sim(args) => sim::run(args),
         Command::Guard(args) => guard::run(args, program),
         Command::Share(args) => share::run(&args),
+        #[cfg(feature = "monitor")]
+        Command::Monitor(args) => monitor::run(args),
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),

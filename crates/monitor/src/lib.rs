@@ -2,7 +2,12 @@
 //!
 //! - [`message`] has the texts between a page and the server, besides those of the share.
 //! - [`program`] is a program at a share, without blocking.
+//! - [`alive`] is the dead-man of a page.
+//! - [`server`] serves the page, and connects pages to the share.
 #![forbid(unsafe_code)]
 
+pub mod alive;
 pub mod message;
+mod page;
 pub mod program;
+pub mod server;

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::io;
+use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::frame::{self, Frame, Kind, Reader};
 use motorlink_telemetry::share::message::{self, Answer, Ask, Reason, Request, Text};
+use rustix::net::{Shutdown, shutdown};
 use serde::Deserialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
@@ -38,6 +40,8 @@ pub struct Program {
 
 struct Shared {
     writer: AsyncMutex<OwnedWriteHalf>,
+    /// The same socket. It can be closed while somebody writes.
+    socket: OwnedFd,
     pending: Mutex<Pending>,
 }
 
@@ -68,9 +72,12 @@ impl Program {
     /// # Errors
     /// No share is there, or it refuses.
     pub async fn connect(path: &Path, name: &str) -> io::Result<(Self, Listener, String)> {
-        let (reader, writer) = UnixStream::connect(path).await?.into_split();
+        let stream = UnixStream::connect(path).await?;
+        let socket = stream.as_fd().try_clone_to_owned()?;
+        let (reader, writer) = stream.into_split();
         let shared = Arc::new(Shared {
             writer: AsyncMutex::new(writer),
+            socket,
             pending: Mutex::new(Pending { last: OWN_IDS, ..Pending::default() }),
         });
         let program = Program { shared: Arc::clone(&shared) };
@@ -111,6 +118,18 @@ impl Program {
         answer.await.unwrap_or_else(|_| Err(ended()))
     }
 
+    /// Ends the connection at once: the share stops the motors that it turned.
+    pub fn close(&self) {
+        // It has ended already.
+        let _ = shutdown(&self.shared.socket, Shutdown::Both);
+        self.shared.end();
+    }
+
+    /// Whether both ask through the same connection.
+    pub fn is(&self, other: &Program) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
+    }
+
     /// Sends a request with an id below [`OWN_IDS`]. The [`Listener`] gives its end.
     ///
     /// # Errors
@@ -147,16 +166,21 @@ impl Listener {
 impl Drop for Listener {
     fn drop(&mut self) {
         // Copies of the program keep the socket open.
-        let _ = rustix::net::shutdown(self.reader.as_ref(), rustix::net::Shutdown::Both);
-        let mut pending = self.shared.pending();
-        pending.has_ended = true;
-        pending.answers.clear();
+        let _ = shutdown(&self.shared.socket, Shutdown::Both);
+        self.shared.end();
     }
 }
 
 impl Shared {
     fn pending(&self) -> std::sync::MutexGuard<'_, Pending> {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// No request gets an answer any more.
+    fn end(&self) {
+        let mut pending = self.pending();
+        pending.has_ended = true;
+        pending.answers.clear();
     }
 
     /// Gives a frame back, unless it is an answer to a request of this side.

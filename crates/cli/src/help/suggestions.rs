@@ -26,6 +26,7 @@ const HARMLESS: &[&str] = &[
     "json",
     "man",
     "markdown",
+    "monitor",
     "off",
     "pid",
     "plot",

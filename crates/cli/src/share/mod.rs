@@ -1,31 +1,29 @@
 //! `motorlink share`: holds ports and lets several programs use the drives at the same time.
 
 mod asking;
+mod lines;
 
 use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
-use motorlink::port::PortName;
-use motorlink::st::Profile;
-use motorlink::{rmd, st};
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{Line, RmdLine, StLine, Stopped};
-use motorlink_telemetry::share::hub::Held;
-use motorlink_telemetry::share::message::{Answer, Ask, Event, Protocol};
+use motorlink_telemetry::line::Stopped;
+use motorlink_telemetry::share::message::{self, Answer, Ask, Event};
 use motorlink_telemetry::share::server::{Server, ServerError};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::connection::missing_port;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
-use crate::span::{span_up_to, utc};
-use crate::{advice, hint, output};
+use crate::span::utc;
+use crate::{advice, output};
 
 pub use asking::Connection;
+pub use lines::Lines;
+
+/// The name and version of this program at a share.
+pub const PROGRAM: &str = concat!("motorlink ", env!("CARGO_PKG_VERSION"));
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -45,20 +43,12 @@ Output: a line when programs can connect, then one line per event. Lines that ar
 dropped. SIGINT, SIGTERM and the other signals that end a program stop the motors first. Exit code 0, \
 or 3 if a motor did not confirm that it stops.")]
 pub struct Args {
-    /// A port to hold: /dev/ttyACM0, slcan:DEVICE, socketcan:can0, sim: and more; may be repeated
-    #[arg(short, long = "port", value_name = "PORT", env = "MOTORLINK_PORT",
-        value_hint = clap::ValueHint::AnyPath)]
-    ports: Vec<String>,
+    #[command(flatten)]
+    lines: Lines,
     /// Where programs connect: unix:PATH. Only you can connect
     #[arg(long, value_name = "PORT", default_value = "unix:./share", global = true,
         value_hint = clap::ValueHint::AnyPath)]
     at: String,
-    /// What the ST drives speak: the document, or the firmware of MCSDK 5.4
-    #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", value_parser = hint::profile())]
-    profile: Profile,
-    /// How long to wait for a reply, 1ms to 60s [default: 1s, on a CAN bus 50ms]
-    #[arg(long, value_name = "TIME", value_parser = span_up_to(Duration::from_secs(60)))]
-    timeout: Option<Duration>,
     /// Print JSON, one object per line
     #[arg(long, global = true)]
     json: bool,
@@ -84,22 +74,29 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
-    let lines = open(&args.ports, args.profile, args.timeout)?;
-    let share = format!("motorlink {}", env!("CARGO_PKG_VERSION"));
-    let mut server = Server::open(&path, &share, lines)?;
-    let mut outcome = ready(&server, args);
+    let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
+    let ready = ready(&server, args);
+    serve(server, args.json, ready)
+}
+
+/// Serves a share until a signal comes or it fails, and stops the motors. `outcome` is what came before.
+pub fn serve(
+    mut server: Server,
+    json: bool,
+    mut outcome: Result<(), Failure>,
+) -> Result<(), Failure> {
     while !interrupted() && outcome.is_ok() {
         outcome = server
             .turn()
             .map_err(Failure::from)
-            .and_then(|events| events.iter().try_for_each(|event| tell(event, args.json)));
+            .and_then(|events| events.iter().try_for_each(|event| tell(event, json)));
     }
     let why = match &outcome {
         Ok(()) => "the share was ended".to_owned(),
         Err(_) => "the share has failed".to_owned(),
     };
     let stopped = server.end(&why);
-    stopped.iter().try_for_each(|(line, one)| tell_stopped(line, one, args.json))?;
+    stopped.iter().try_for_each(|(line, one)| tell_stopped(line, one, json))?;
     if stopped.iter().any(|(_, one)| one.result.is_err()) {
         return Err(Failure::link(UNCONFIRMED));
     }
@@ -143,7 +140,8 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
     }
 }
 
-fn path(at: &str) -> Result<PathBuf, Failure> {
+/// The path in unix:PATH.
+pub fn path(at: &str) -> Result<PathBuf, Failure> {
     match at.strip_prefix("unix:") {
         Some(path) if !path.is_empty() => Ok(Path::new(path).to_owned()),
         _ => Err(Failure::usage(format!("`{at}` is not a place for a share"))
@@ -153,67 +151,26 @@ fn path(at: &str) -> Result<PathBuf, Failure> {
 
 const UNCONFIRMED: &str = "motors may still turn: not all confirmed that they stop";
 
-/// Opens each port, once for each protocol that it can have.
-fn open(
-    ports: &[String],
-    profile: Profile,
-    timeout: Option<Duration>,
-) -> Result<Vec<Held>, Failure> {
-    let (mut held, mut st, mut rmd) = (Vec::new(), 0, 0);
-    if ports.iter().all(String::is_empty) {
-        return Err(missing_port());
-    }
-    for text in ports {
-        let port: PortName = text.parse()?;
-        if port.as_line().is_some() {
-            let defaults = st::Options::default();
-            let timeout = timeout.unwrap_or(defaults.timeout);
-            let options = st::Options { profile, timeout, ..defaults };
-            let line = StLine::open(&port, options)?;
-            held.push(start(
-                &format!("{}{st}", Protocol::St.word()),
-                &port,
-                Speaks::St(profile),
-                Box::new(line),
-            )?);
-            st += 1;
-        }
-        if port.as_can().is_some() {
-            let defaults = rmd::Options::default();
-            let timeout = timeout.unwrap_or(defaults.timeout);
-            let line = RmdLine::open(&port, rmd::Options { timeout, ..defaults })?;
-            held.push(start(
-                &format!("{}{rmd}", Protocol::Rmd.word()),
-                &port,
-                Speaks::Rmd,
-                Box::new(line),
-            )?);
-            rmd += 1;
-        }
-    }
-    Ok(held)
-}
-
-fn start(
-    name: &str,
-    port: &PortName,
-    speaks: Speaks,
-    line: Box<dyn Line>,
-) -> Result<Held, Failure> {
-    Ok(Held::start(name, &port.to_string(), speaks, Acquisition::new(line))?)
-}
-
 fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
     let lines = server.lines();
     if args.json {
-        let lines: Vec<_> = lines
-            .iter()
-            .map(|it| json!({"line": it.line, "protocol": it.protocol, "port": it.port}))
-            .collect();
+        let lines = lines_in_json(&lines);
         return output::print_line(&json!({"event": "ready", "at": args.at, "lines": lines}));
     }
+    output::print_line(&lines_in_words(&args.at, &lines))
+}
+
+/// The lines of a share, for programs.
+pub fn lines_in_json(lines: &[message::Line]) -> Value {
+    let line =
+        |it: &message::Line| json!({"line": it.line, "protocol": it.protocol, "port": it.port});
+    lines.iter().map(line).collect()
+}
+
+/// The lines of a share, and where other programs connect.
+pub fn lines_in_words(at: &str, lines: &[message::Line]) -> String {
     let lines: Vec<_> = lines.iter().map(|it| format!("{} ({})", it.line, it.port)).collect();
-    output::print_line(&format!("share at {}: {}", args.at, lines.join(", ")))
+    format!("share at {at}: {}", lines.join(", "))
 }
 
 fn tell(event: &Event, json: bool) -> Result<(), Failure> {

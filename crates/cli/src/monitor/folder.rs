@@ -1,0 +1,30 @@
+//! A folder for the socket of a share that nobody else looks for.
+
+use std::fs::{DirBuilder, remove_dir_all};
+use std::io;
+use std::os::unix::fs::DirBuilderExt;
+use std::path::PathBuf;
+
+use motorlink_monitor::server::random_word;
+
+/// A folder of this user alone. It is removed at the end.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new() -> io::Result<Self> {
+        let path = std::env::temp_dir().join(format!("motorlink-{}", random_word()?));
+        DirBuilder::new().mode(0o700).create(&path)?;
+        Ok(Folder(path))
+    }
+
+    /// The path of the socket.
+    pub fn socket(&self) -> PathBuf {
+        self.0.join("share")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = remove_dir_all(&self.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! Where browsers connect.
+
+use std::io::ErrorKind;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+
+use crate::failure::Failure;
+use crate::output::note;
+
+/// The usual address.
+const USUAL: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8707);
+/// Ports that are tried if the usual one is taken.
+const TRIED: u16 = 100;
+
+#[derive(clap::Args)]
+pub struct Listen {
+    /// Where browsers connect: ADDRESS:PORT [default: 127.0.0.1:8707, or the next free port]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<SocketAddr>,
+    /// A name of this computer that browsers use; may be repeated
+    #[arg(long = "name", value_name = "HOST")]
+    names: Vec<String>,
+    /// Listen on an address of the network without TLS. Anybody there can read the tokens
+    #[arg(long)]
+    insecure: bool,
+}
+
+impl Listen {
+    /// Opens the port.
+    pub fn bind(&self) -> Result<TcpListener, Failure> {
+        let Some(address) = self.listen else { return bind_usual() };
+        if !address.ip().is_loopback() && !self.insecure {
+            return Err(Failure::usage(format!(
+                "--listen {address} is for the network, where anybody can read the tokens"
+            ))
+            .trying("give --insecure if you trust the network"));
+        }
+        TcpListener::bind(address).map_err(|error| refused(address, &error))
+    }
+
+    /// The host in the addresses for browsers.
+    pub fn host(&self) -> String {
+        let ip = self.listen.unwrap_or(USUAL).ip();
+        match self.names.first() {
+            Some(name) => name.clone(),
+            // Browsers on this computer.
+            None if ip.is_unspecified() => USUAL.ip().to_string(),
+            None if ip.is_ipv6() => format!("[{ip}]"),
+            None => ip.to_string(),
+        }
+    }
+
+    pub fn names(&self) -> Vec<String> {
+        self.names.clone()
+    }
+}
+
+fn bind_usual() -> Result<TcpListener, Failure> {
+    let mut address = USUAL;
+    loop {
+        match TcpListener::bind(address) {
+            Ok(listener) => {
+                if address != USUAL {
+                    note(format!(
+                        "port {} is taken; this is port {}",
+                        USUAL.port(),
+                        address.port()
+                    ));
+                }
+                return Ok(listener);
+            }
+            Err(error) if error.kind() == ErrorKind::AddrInUse => {
+                if address.port() >= USUAL.port() + TRIED {
+                    return Err(refused(USUAL, &error));
+                }
+                address.set_port(address.port() + 1);
+            }
+            Err(error) => return Err(refused(address, &error)),
+        }
+    }
+}
+
+fn refused(address: SocketAddr, error: &std::io::Error) -> Failure {
+    Failure::link(format!("cannot listen on {address}: {error}"))
+        .trying("give another --listen, such as --listen 127.0.0.1:0 for any free port")
+}

@@ -1,0 +1,185 @@
+//! `motorlink monitor`: a share with a page for browsers.
+
+mod folder;
+mod listen;
+
+use std::io;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use motorlink_monitor::message::Role;
+use motorlink_monitor::server::{self, Options};
+use motorlink_telemetry::share::message::{Answer, Ask, Line};
+use motorlink_telemetry::share::port::place_of;
+use motorlink_telemetry::share::server::Server;
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output;
+use crate::share::{self, Connection, Lines, PROGRAM};
+use crate::span::span_up_to;
+
+use folder::Folder;
+use listen::Listen;
+
+/// Signs of life come each 100 ms.
+const SHORTEST_DEADLINE: Duration = Duration::from_millis(200);
+/// Simulated drives, without -p.
+const SIMULATED: &str = "sim:";
+/// How long simulated drives may take for a reply: on a busy machine longer than a motor.
+const SIMULATED_TIMEOUT: Duration = Duration::from_millis(500);
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Without -p the drives are simulated. -p and --profile are as for `motorlink share`, and the monitor is \
+a share: other programs use the drives at the same time at --at. With --share, or with -p \
+share:PATH/LINE, it shows a share that runs already.
+
+Who may do what: the first address is for operators. The second one is for viewers, who see everything \
+and can stop, nothing else. Each has a token: who has the address may do that. Only programs of this \
+computer can connect, unless --listen has another address. That needs --tls-cert and --tls-key, or \
+--insecure: without TLS anybody on the network can read the tokens.
+
+Safety: a motor that a page turned stops when the page ends, or gives no sign of life for --deadline: \
+the browser hangs, the tab is hidden, the network fails. The monitor cannot stop a motor if it is \
+killed with SIGKILL, if the cable to the drive is cut, or if the computer stops. `motorlink guard` \
+between monitor and drive stops it after SIGKILL. If people can be hurt, use an emergency stop in \
+hardware.
+
+Output: the addresses, then one line per event. SIGINT, SIGTERM and the other signals that end a program \
+stop the motors first. Exit code 0, or 3 if a motor did not confirm that it stops.")]
+pub struct Args {
+    #[command(flatten)]
+    lines: Lines,
+    /// Where other programs connect: unix:PATH. Only you can connect [default: a new folder]
+    #[arg(long, value_name = "PORT", value_hint = clap::ValueHint::AnyPath)]
+    at: Option<String>,
+    /// Show a share that runs: unix:PATH. Its drives are not opened again
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["at", "timeout"],
+        value_hint = clap::ValueHint::AnyPath)]
+    share: Option<String>,
+    #[command(flatten)]
+    listen: Listen,
+    /// How long a page may give no sign of life until its motors stop, 200ms to 2s
+    #[arg(long, value_name = "TIME", default_value = "300ms",
+        value_parser = span_up_to(Duration::from_secs(2)))]
+    deadline: Duration,
+    /// Print JSON, one object per line
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(mut args: Args) -> Result<(), Failure> {
+    if args.deadline < SHORTEST_DEADLINE {
+        return Err(Failure::usage("--deadline is 200ms to 2s: signs of life come each 100 ms"));
+    }
+    let running = running_share(&args)?;
+    // Before the ports: if no browser can connect, no drive is touched.
+    let listener = args.listen.bind()?;
+    output::never_wait(if args.json { output::missed } else { output::missed_text });
+    interrupt::hold();
+    match running {
+        Some(path) => show(&args, path, listener),
+        None => hold(&mut args, listener),
+    }
+}
+
+/// The share that is shown, if it runs in another program.
+fn running_share(args: &Args) -> Result<Option<PathBuf>, Failure> {
+    if let Some(share) = &args.share {
+        return match args.lines.is_empty() {
+            true => Ok(Some(share::path(share)?)),
+            false => Err(Failure::usage("--share shows a share that has its ports; leave -p out")),
+        };
+    }
+    let places: Vec<_> = args.lines.ports.iter().map(|port| place_of(port)).collect();
+    match places.iter().flatten().next() {
+        None => Ok(None),
+        Some((path, _)) => {
+            let is_same = |place: &Option<(PathBuf, String)>| {
+                place.as_ref().is_some_and(|(other, _)| other == path)
+            };
+            match places.iter().all(is_same) && args.at.is_none() {
+                true => Ok(Some(path.clone())),
+                false => Err(Failure::usage("a running share is shown alone")
+                    .trying("give --share unix:PATH without -p and --at")),
+            }
+        }
+    }
+}
+
+/// Shows a share that runs in another program.
+fn show(args: &Args, path: PathBuf, listener: TcpListener) -> Result<(), Failure> {
+    let failed = |error: io::Error| {
+        Failure::link(format!("the share at unix:{}: {error}", path.display()))
+            .trying("is it that of a running `motorlink share`?")
+    };
+    let mut share = Connection::open(&path, PROGRAM).map_err(failed)?;
+    let Answer::Lines { lines, .. } = share.ask(Ask::Lines).map_err(failed)? else {
+        return Err(failed(io::Error::other("it gives another answer")));
+    };
+    drop(share);
+    let monitor = start(args, path.clone(), listener)?;
+    ready(args, &monitor, &path, &lines, false)?;
+    while interrupt::wait(Duration::from_secs(3600)) {}
+    Ok(())
+}
+
+/// Holds the ports, too.
+fn hold(args: &mut Args, listener: TcpListener) -> Result<(), Failure> {
+    let is_simulated = args.lines.is_empty();
+    if is_simulated {
+        args.lines.ports = vec![SIMULATED.to_owned()];
+        args.lines.timeout.get_or_insert(SIMULATED_TIMEOUT);
+    }
+    let folder;
+    let path = match &args.at {
+        Some(at) => share::path(at)?,
+        None => {
+            folder = Folder::new()?;
+            folder.socket()
+        }
+    };
+    let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
+    let monitor = start(args, path.clone(), listener)?;
+    let ready = ready(args, &monitor, &path, &server.lines(), is_simulated);
+    // The motors stop first, then the pages are closed.
+    let outcome = share::serve(server, args.json, ready);
+    drop(monitor);
+    outcome
+}
+
+fn start(args: &Args, share: PathBuf, listener: TcpListener) -> Result<server::Server, Failure> {
+    let names = args.listen.names();
+    let (deadline, program) = (args.deadline, PROGRAM.to_owned());
+    Ok(server::Server::start(Options { listener, names, share, deadline, program })?)
+}
+
+/// Says where browsers and programs connect.
+fn ready(
+    args: &Args,
+    monitor: &server::Server,
+    path: &Path,
+    lines: &[Line],
+    is_simulated: bool,
+) -> Result<(), Failure> {
+    let host = args.listen.host();
+    let url = monitor.url(&host, Role::Operator);
+    let viewer_url = monitor.url(&host, Role::Viewer);
+    let at = format!("unix:{}", path.display());
+    if args.json {
+        return output::print_line(&json!({
+            "event": "ready", "at": at, "lines": share::lines_in_json(lines),
+            "url": url, "viewer_url": viewer_url, "simulated": is_simulated,
+        }));
+    }
+    output::print_line(&format!("monitor: {url}"))?;
+    output::print_line(&format!("for viewers: {viewer_url}"))?;
+    output::print_line(&share::lines_in_words(&at, lines))?;
+    match is_simulated {
+        true => output::print_line(&"all drives are simulated; -p PORT shows real ones"),
+        false => Ok(()),
+    }
+}

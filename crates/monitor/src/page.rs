@@ -1,0 +1,378 @@
+//! A page: what it may ask for, and the motors that depend on it.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use motorlink::Clock;
+use motorlink_proto::time::Micros;
+use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
+use serde::Deserialize;
+use tokio::sync::{Mutex as AsyncMutex, Notify, Semaphore, mpsc};
+use tokio::task::JoinSet;
+
+use crate::alive::{DeadMan, Lapse, Ticket};
+use crate::message::{Answer, Ask, FromPage, Request, Role, Text};
+use crate::program::{Listener, OWN_IDS, Program, Refusal};
+use crate::server::drives::Motion;
+use crate::server::link::{Link, lost, stop_all};
+
+/// Requests of a page about drives that are under way.
+const REQUESTS: usize = 64;
+
+/// A page that is connected.
+pub struct Page {
+    name: String,
+    role: Role,
+    clock: Clock,
+    link: Arc<Link>,
+    control: Mutex<Control>,
+    /// The deadline of the dead-man may be another one.
+    changed: Notify,
+    /// One session is opened at a time.
+    opening: AsyncMutex<()>,
+    /// The session that sees, while the share is there.
+    view: Mutex<Option<Program>>,
+    requests: Arc<Semaphore>,
+    out: mpsc::Sender<String>,
+}
+
+/// What moves motors.
+struct Control {
+    man: DeadMan,
+    /// The session that turned motors. The share stops them when it ends.
+    drive: Option<Program>,
+}
+
+/// A page broke the rules of its connection: the reason in words.
+pub type Broken = String;
+
+impl Page {
+    /// A page of this name. `out` takes the texts for it.
+    pub fn new(
+        name: String,
+        role: Role,
+        deadline: Micros,
+        link: Arc<Link>,
+        out: mpsc::Sender<String>,
+    ) -> Self {
+        Page {
+            name,
+            role,
+            clock: Clock::running(),
+            link,
+            control: Mutex::new(Control { man: DeadMan::new(deadline), drive: None }),
+            changed: Notify::new(),
+            opening: AsyncMutex::new(()),
+            view: Mutex::new(None),
+            requests: Arc::new(Semaphore::new(REQUESTS)),
+            out,
+        }
+    }
+
+    /// The next beat, which is sent now.
+    pub fn beat(&self) -> Text {
+        let wall = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Text::Beat(self.control().man.beat(self.clock.now(), wall.as_secs_f64()))
+    }
+
+    /// The session that sees; `None`: the share is lost.
+    pub fn set_view(&self, view: Option<Program>) {
+        *self.view.lock().unwrap_or_else(PoisonError::into_inner) = view;
+    }
+
+    /// Stops the motors of the page when it gives no sign of life. Runs until it is dropped.
+    pub async fn watch(&self) {
+        loop {
+            let now = self.clock.now();
+            let due = {
+                let mut control = self.control();
+                if let Some(lapse) = control.man.poll(now) {
+                    self.lapse(&mut control, lapse);
+                }
+                control.man.due()
+            };
+            match due {
+                None => self.changed.notified().await,
+                Some(due) => {
+                    tokio::select! {
+                        () = tokio::time::sleep(Duration::from(due.since(now))) => {}
+                        () = self.changed.notified() => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// The motors that this page turned stop.
+    pub fn end(&self, lapse: Lapse) {
+        let mut control = self.control();
+        if let Some(lapse) = control.man.end(lapse) {
+            self.lapse(&mut control, lapse);
+        }
+    }
+
+    fn lapse(&self, control: &mut Control, lapse: Lapse) {
+        if let Some(drive) = control.drive.take() {
+            drive.close();
+        }
+        // If it takes no texts, it learns from the next beat that it holds no motors.
+        let _ = self.out.try_send(encode(&Text::Lapsed { message: lapse.to_string() }));
+    }
+
+    /// Takes a text of the page. What takes longer goes on in `tasks`.
+    ///
+    /// # Errors
+    /// The page has to be closed.
+    pub async fn receive(
+        self: &Arc<Self>,
+        text: &str,
+        tasks: &mut JoinSet<()>,
+    ) -> Result<(), Broken> {
+        match read(text) {
+            Ok(FromPage::Alive(sign)) => {
+                let now = self.clock.now();
+                let mut control = self.control();
+                if let Some(lapse) = control.man.hear(&sign, now) {
+                    self.lapse(&mut control, lapse);
+                }
+                Ok(())
+            }
+            Ok(FromPage::Request(request)) => {
+                self.carry_out(request, tasks).await;
+                Ok(())
+            }
+            Ok(FromPage::Share(request)) => {
+                let id = request.id;
+                if let Err(refusal) = self.pass(request).await {
+                    self.refuse(id, refusal).await;
+                }
+                Ok(())
+            }
+            Err((Some(id), why)) => {
+                self.refuse(id, usage(why)).await;
+                Ok(())
+            }
+            Err((None, why)) => Err(why),
+        }
+    }
+
+    /// Passes a request on to the share, which answers it.
+    async fn pass(&self, request: share::Request) -> Result<(), Refusal> {
+        use share::Ask;
+        match &request.ask {
+            Ask::Lines
+            | Ask::Signals { .. }
+            | Ask::Subscribe { .. }
+            | Ask::Unsubscribe { .. }
+            | Ask::Rates => {}
+            Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
+            Ask::Latch | Ask::Release => self.check_operator()?,
+            Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
+                let message = "a page may not send this request".to_owned();
+                return Err(Refusal { reason: Reason::Forbidden, message, code: None });
+            }
+        }
+        self.view()?.pass(&request).await.map_err(|error| lost(&error.to_string()))
+    }
+
+    async fn carry_out(self: &Arc<Self>, Request { id, ask }: Request, tasks: &mut JoinSet<()>) {
+        let page = Arc::clone(self);
+        match ask {
+            Ask::LetGo => {
+                self.end(Lapse::LetGo);
+                self.answer(id, Ok(Answer::LetGo)).await;
+            }
+            Ask::StopAll => {
+                self.control().man.stop(None);
+                let view = self.view();
+                tasks.spawn(async move {
+                    let stopped = match view {
+                        Ok(view) => stop_all(&view).await,
+                        Err(_) => page.link.stop_all().await,
+                    };
+                    page.answer(id, stopped.map(|motors| Answer::StopAll { motors })).await;
+                });
+            }
+            ask => {
+                let ready = self.check(&ask).and_then(|()| {
+                    let permit = Arc::clone(&self.requests).try_acquire_owned();
+                    let busy = format!("{REQUESTS} requests are under way, which is the limit");
+                    let permit = permit.map_err(|_| refusal(Reason::Busy, busy))?;
+                    Ok((permit, self.view()?, self.link.drives()?))
+                });
+                let (permit, view, drives) = match ready {
+                    Ok(ready) => ready,
+                    Err(refusal) => return self.refuse(id, refusal).await,
+                };
+                let ticket = self.control().man.ticket(motor_of(&ask));
+                tasks.spawn(async move {
+                    let motion = Permitted { page: Arc::clone(&page), ticket };
+                    let result = drives.answer(ask, &view, &motion).await;
+                    drop(permit);
+                    page.answer(id, result).await;
+                });
+            }
+        }
+    }
+
+    /// Whether this page may ask for that.
+    fn check(&self, ask: &Ask) -> Result<(), Refusal> {
+        match ask {
+            Ask::StopAll
+            | Ask::LetGo
+            | Ask::Motors { .. }
+            | Ask::Describe { .. }
+            | Ask::Read { .. }
+            | Ask::Dump { .. }
+            | Ask::Diff { .. } => Ok(()),
+            Ask::Write { .. }
+            | Ask::Act { .. }
+            | Ask::Run { .. }
+            | Ask::Limit { .. }
+            | Ask::Restore { .. } => self.check_operator(),
+        }
+    }
+
+    fn check_operator(&self) -> Result<(), Refusal> {
+        match self.role {
+            Role::Operator => Ok(()),
+            Role::Viewer => Err(refusal(
+                Reason::Forbidden,
+                "a viewer may see everything and stop, nothing else",
+            )),
+        }
+    }
+
+    async fn answer(&self, id: u32, result: Result<Answer, Refusal>) {
+        match result {
+            // Nobody reads any more.
+            Ok(answer) => drop(self.out.send(encode(&Text::Answer { id, answer })).await),
+            Err(refusal) => self.refuse(id, refusal).await,
+        }
+    }
+
+    async fn refuse(&self, id: u32, Refusal { reason, message, code }: Refusal) {
+        let text = share::Text::Refusal { id, reason, message, code };
+        let _ = self.out.send(encode(&text)).await;
+    }
+
+    fn view(&self) -> Result<Program, Refusal> {
+        let view = self.view.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        view.ok_or_else(|| lost("the server connects again"))
+    }
+
+    fn control(&self) -> MutexGuard<'_, Control> {
+        self.control.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The session that turns motors, if there is one. Motion depends on the page from now on.
+    fn permit(&self, ticket: &Ticket, hold: bool) -> Result<Option<Program>, Refusal> {
+        let mut control = self.control();
+        control.man.permit(ticket, hold, self.clock.now())?;
+        self.changed.notify_one();
+        Ok(control.drive.clone())
+    }
+
+    /// Opens the session that turns motors.
+    async fn open(self: &Arc<Self>, ticket: &Ticket, hold: bool) -> Result<Program, Refusal> {
+        let name = format!("{} (control)", self.name);
+        let connected = self.link.connect(&name).await;
+        let (drive, listener, _) = connected.map_err(|error| lost(&error.to_string()))?;
+        // The page may have lapsed meanwhile.
+        self.permit(ticket, hold)?;
+        self.control().drive = Some(drive.clone());
+        tokio::spawn(drain(Arc::clone(self), drive.clone(), listener));
+        Ok(drive)
+    }
+}
+
+/// Reads what the share sends to the session that turns motors. Nobody needs it.
+async fn drain(page: Arc<Page>, drive: Program, mut listener: Listener) {
+    while listener.next().await.is_ok() {}
+    let mut control = page.control();
+    if control.drive.as_ref().is_some_and(|current| current.is(&drive))
+        && let Some(lapse) = control.man.end(Lapse::Share)
+    {
+        page.lapse(&mut control, lapse);
+    }
+}
+
+/// The permission of one command.
+struct Permitted {
+    page: Arc<Page>,
+    ticket: Ticket,
+}
+
+impl Motion for Permitted {
+    async fn program(&self, hold: bool) -> Result<Program, Refusal> {
+        let _opening = self.page.opening.lock().await;
+        match self.page.permit(&self.ticket, hold)? {
+            Some(drive) => Ok(drive),
+            None => self.page.open(&self.ticket, hold).await,
+        }
+    }
+}
+
+/// Reads a text of a page. An error has the id of the request, if it has one.
+fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
+    #[derive(Deserialize)]
+    struct Head {
+        #[serde(default)]
+        id: Option<u32>,
+        #[serde(default)]
+        ask: Option<String>,
+    }
+    let head: Head = serde_json::from_str(text)
+        .map_err(|error| (None, format!("no message of a page: {error}")))?;
+    let Some(id) = head.id else {
+        let sign = serde_json::from_str(text).map(FromPage::Alive);
+        return sign.map_err(|error| (None, format!("no message of a page: {error}")));
+    };
+    if id >= OWN_IDS {
+        return Err((Some(id), format!("the id of a request is below {OWN_IDS}")));
+    }
+    let own = match serde_json::from_str(text) {
+        Ok(request) => return Ok(FromPage::Request(request)),
+        Err(error) => error.to_string(),
+    };
+    let shares = match serde_json::from_str(text) {
+        Ok(request) => return Ok(FromPage::Share(request)),
+        Err(error) => error.to_string(),
+    };
+    const UNKNOWN: &str = "unknown variant";
+    let why = match (own.starts_with(UNKNOWN), shares.starts_with(UNKNOWN)) {
+        (true, true) => format!("no request `{}`", head.ask.unwrap_or_default()),
+        (true, false) => shares,
+        (false, _) => own,
+    };
+    Err((Some(id), why))
+}
+
+/// The motor that a request is about.
+fn motor_of(ask: &Ask) -> Option<MotorName> {
+    match ask {
+        Ask::StopAll | Ask::LetGo | Ask::Motors { .. } | Ask::Describe { .. } => None,
+        Ask::Read { motor, .. }
+        | Ask::Write { motor, .. }
+        | Ask::Act { motor, .. }
+        | Ask::Run { motor, .. }
+        | Ask::Limit { motor, .. }
+        | Ask::Dump { motor }
+        | Ask::Diff { motor, .. }
+        | Ask::Restore { motor, .. } => Some(motor.clone()),
+    }
+}
+
+/// A text for a page.
+pub fn encode(text: &impl serde::Serialize) -> String {
+    // The messages have string keys and no maps, which is all that could fail.
+    serde_json::to_string(text).unwrap_or_default()
+}
+
+fn usage(why: String) -> Refusal {
+    refusal(Reason::Usage, why)
+}
+
+fn refusal(reason: Reason, message: impl Into<String>) -> Refusal {
+    Refusal { reason, message: message.into(), code: None }
+}

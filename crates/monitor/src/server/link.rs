@@ -1,0 +1,128 @@
+//! The connection of the server itself to the share: it stops all motors when no page can.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use motorlink_telemetry::share::message::{Answer, Ask, Reason, StoppedMotor};
+use tokio::time::{sleep, timeout};
+
+use super::drives::Drives;
+use crate::program::{Listener, Program, Refusal};
+
+/// The name of the server at the share.
+const NAME: &str = "monitor";
+/// The longest time for the hello of a share.
+const HELLO: Duration = Duration::from_secs(5);
+/// The pause between two attempts to connect.
+pub const AGAIN: Duration = Duration::from_millis(250);
+
+/// A share that may go and come back.
+pub struct Link {
+    path: PathBuf,
+    joined: Mutex<Result<Joined, String>>,
+}
+
+/// What there is while the share is there.
+#[derive(Clone)]
+struct Joined {
+    program: Program,
+    drives: Arc<Drives>,
+}
+
+impl Link {
+    /// The share at a path. [`keep`](Self::keep) connects to it.
+    pub fn new(path: PathBuf) -> Self {
+        Link { path, joined: Mutex::new(Err("the server has just begun".to_owned())) }
+    }
+
+    /// Connects a program of this name. Gives the name that events have, too.
+    ///
+    /// # Errors
+    /// No share is there, or it refuses.
+    pub async fn connect(&self, name: &str) -> io::Result<(Program, Listener, String)> {
+        let connected = timeout(HELLO, Program::connect(&self.path, name)).await;
+        connected.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
+    }
+
+    /// Connects again and again.
+    pub async fn keep(&self) {
+        loop {
+            let why = match self.join().await {
+                Ok((joined, mut listener)) => {
+                    *self.joined() = Ok(joined);
+                    loop {
+                        if let Err(error) = listener.next().await {
+                            break error;
+                        }
+                    }
+                }
+                Err(error) => error,
+            };
+            *self.joined() = Err(why.to_string());
+            sleep(AGAIN).await;
+        }
+    }
+
+    async fn join(&self) -> io::Result<(Joined, Listener)> {
+        let (program, mut listener, _) = self.connect(NAME).await?;
+        let lines = tokio::select! {
+            answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
+            // Events come before the answer.
+            error = async { loop { if let Err(error) = listener.next().await { break error } } } => {
+                return Err(error);
+            }
+        };
+        match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
+            Ok(Answer::Lines { lines, .. }) => {
+                Ok((Joined { program, drives: Arc::new(Drives::new(lines)) }, listener))
+            }
+            Ok(_) => Err(io::Error::other("it gives another answer")),
+            Err(refusal) => Err(io::Error::other(refusal.message)),
+        }
+    }
+
+    /// The drives of the share.
+    ///
+    /// # Errors
+    /// It is lost.
+    pub fn drives(&self) -> Result<Arc<Drives>, Refusal> {
+        Ok(self.get()?.drives)
+    }
+
+    /// Latches the share, then stops all motors.
+    ///
+    /// # Errors
+    /// It is lost.
+    pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
+        stop_all(&self.get()?.program).await
+    }
+
+    fn get(&self) -> Result<Joined, Refusal> {
+        self.joined().clone().map_err(|why| lost(&why))
+    }
+
+    fn joined(&self) -> std::sync::MutexGuard<'_, Result<Joined, String>> {
+        self.joined.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Latches the share, then stops all motors.
+///
+/// # Errors
+/// The share has ended.
+pub async fn stop_all(program: &Program) -> Result<Vec<StoppedMotor>, Refusal> {
+    // The stop does not wait for the answer to the latch.
+    let (_, stopped) =
+        tokio::join!(program.ask(Ask::Latch), program.ask(Ask::Stop { motor: None }));
+    match stopped? {
+        Answer::Stop { motors } => Ok(motors),
+        _ => Err(lost("it gives another answer")),
+    }
+}
+
+/// Nothing can be asked of the share.
+pub fn lost(why: &str) -> Refusal {
+    Refusal { reason: Reason::Line, message: format!("the share is lost: {why}"), code: None }
+}

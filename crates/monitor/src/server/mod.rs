@@ -1,0 +1,94 @@
+//! The web server: the page, its files, and a WebSocket for each page.
+//!
+//! [`Server::start`] serves in threads of its own, until it is dropped.
+
+mod door;
+pub mod drives;
+pub mod link;
+mod routes;
+mod site;
+mod socket;
+mod state;
+mod transport;
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::{Builder, Runtime};
+
+pub use door::random_word;
+
+use crate::message::Role;
+use door::Door;
+use link::Link;
+use state::State;
+
+/// The usual deadline of a page that turned motors.
+pub const DEADLINE: Duration = Duration::from_millis(300);
+/// How long the last messages may take.
+const LAST: Duration = Duration::from_millis(500);
+
+/// What to serve.
+pub struct Options {
+    /// Where browsers connect.
+    pub listener: TcpListener,
+    /// Names of this machine that browsers may use, besides its addresses.
+    pub names: Vec<String>,
+    /// The socket of the share.
+    pub share: PathBuf,
+    /// How long a page may give no sign of life until its motors stop.
+    pub deadline: Duration,
+    /// The name and version of this program.
+    pub program: String,
+}
+
+/// A web server that runs.
+pub struct Server {
+    runtime: Option<Runtime>,
+    state: Arc<State>,
+    address: SocketAddr,
+}
+
+impl Server {
+    /// Serves these. The share has to run for what pages ask of it, but not for this.
+    ///
+    /// # Errors
+    /// The system gives no threads, sockets or random numbers.
+    pub fn start(options: Options) -> io::Result<Self> {
+        let Options { listener, names, share, deadline, program } = options;
+        let address = listener.local_addr()?;
+        listener.set_nonblocking(true)?;
+        let door = Door::new(address.port(), false, names)?;
+        let state = Arc::new(State::new(door, Link::new(share), deadline, program)?);
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(2)
+            .thread_name("monitor")
+            .enable_all()
+            .build()?;
+        let listener = {
+            let _inside = runtime.enter();
+            tokio::net::TcpListener::from_std(listener)?
+        };
+        let link = Arc::clone(&state.link);
+        runtime.spawn(async move { link.keep().await });
+        runtime.spawn(transport::serve(listener, routes::router(Arc::clone(&state))));
+        Ok(Server { runtime: Some(runtime), state, address })
+    }
+
+    /// The address that a person of this role opens. `host` is this machine.
+    pub fn url(&self, host: &str, role: Role) -> String {
+        let (port, token) = (self.address.port(), self.state.door.token(role));
+        format!("{}://{host}:{port}/?token={token}", self.state.door.scheme())
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_timeout(LAST);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The WebSocket of a page: texts of the page, and what the share and the server send to it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use futures_util::SinkExt;
+use futures_util::stream::{SplitSink, SplitStream, StreamExt};
+use motorlink_proto::time::Micros;
+use motorlink_telemetry::share::frame::{Frame, Kind};
+use motorlink_telemetry::share::message as share;
+use tokio::sync::mpsc;
+use tokio::task::{AbortHandle, JoinHandle, JoinSet};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+
+use super::link::{AGAIN, Link};
+use super::state::State;
+use crate::alive::Lapse;
+use crate::message::{Role, Text, Welcome};
+use crate::page::{Broken, Page, encode};
+use crate::program::{Listener, Program};
+
+/// The longest text of a page.
+pub const LONGEST_TEXT: usize = 1 << 16;
+/// Time between beats.
+const BEAT: Duration = Duration::from_millis(50);
+/// How long a message may wait for a page that does not read.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Texts of the server that wait for a page.
+const WAITING: usize = 256;
+/// Messages of a page in a second.
+const MESSAGES: u32 = 1000;
+
+type Sink = SplitSink<WebSocket, Message>;
+
+/// Ends a page, however its task ends.
+struct Present<'s> {
+    state: &'s State,
+    page: Arc<Page>,
+    name: String,
+    tasks: Vec<AbortHandle>,
+}
+
+impl Drop for Present<'_> {
+    fn drop(&mut self) {
+        self.page.end(Lapse::LetGo);
+        self.tasks.iter().for_each(AbortHandle::abort);
+        self.state.pages().remove(&self.name);
+    }
+}
+
+/// Serves a page until it ends.
+pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
+    let (mut sink, stream) = socket.split();
+    let Ok(_place) = state.places.try_acquire() else {
+        return close(&mut sink, "the server has as many pages as it can have".to_owned()).await;
+    };
+    let own_name = format!("page {}", state.next_page());
+    let (view, name) = match state.link.connect(&own_name).await {
+        Ok((program, listener, name)) => (Ok((program, listener)), name),
+        Err(error) => (Err(error.to_string()), own_name.clone()),
+    };
+    let (out, outgoing) = mpsc::channel(WAITING);
+    let deadline = Micros::from(state.deadline);
+    let page = Arc::new(Page::new(name.clone(), role, deadline, Arc::clone(&state.link), out));
+    state.pages().insert(name.clone(), Arc::clone(&page));
+    let watched = Arc::clone(&page);
+    let watch = tokio::spawn(async move { watched.watch().await }).abort_handle();
+    let _present =
+        Present { state: &state, page: Arc::clone(&page), name: name.clone(), tasks: vec![watch] };
+    let welcome = Text::Welcome(Welcome {
+        server: state.program.clone(),
+        name,
+        role,
+        deadline: state.deadline.as_secs_f64() * 1e3,
+        run: state.run.clone(),
+    });
+    let view = View::new(Arc::clone(&state.link), own_name, view, &page);
+    let why = tokio::select! {
+        // The page has gone, or does not read.
+        () = write(&page, &mut sink, outgoing, view, &welcome) => return,
+        why = read(&page, stream) => why,
+    };
+    if let Err(why) = why {
+        close(&mut sink, why).await;
+    }
+}
+
+/// Ends a connection with the reason.
+async fn close(sink: &mut Sink, message: String) {
+    let closing = encode(&share::Text::Closing { message });
+    let frame = CloseFrame { code: close_code::POLICY, reason: "".into() };
+    let last = async {
+        sink.send(Message::Text(closing.into())).await?;
+        sink.send(Message::Close(Some(frame))).await
+    };
+    // It may have gone.
+    let _ = timeout(PATIENCE, last).await;
+}
+
+/// Takes what the page sends, until it ends.
+async fn read(page: &Arc<Page>, mut stream: SplitStream<WebSocket>) -> Result<(), Broken> {
+    let mut tasks = JoinSet::new();
+    let (mut since, mut count) = (Instant::now(), 0);
+    loop {
+        let message = tokio::select! {
+            biased;
+            message = stream.next() => message,
+            Some(ended) = tasks.join_next() => match ended {
+                Err(error) if error.is_panic() => return Err("the server has a fault".to_owned()),
+                _ => continue,
+            },
+        };
+        if since.elapsed() >= Duration::from_secs(1) {
+            (since, count) = (Instant::now(), 0);
+        }
+        count += 1;
+        if count > MESSAGES {
+            return Err(format!("more than {MESSAGES} messages in a second"));
+        }
+        match message {
+            Some(Ok(Message::Text(text))) => page.receive(&text, &mut tasks).await?,
+            Some(Ok(Message::Binary(_))) => return Err("a page sends texts only".to_owned()),
+            Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+            Some(Ok(Message::Close(_))) | None => return Ok(()),
+            Some(Err(error)) => return Err(error.to_string()),
+        }
+    }
+}
+
+/// Sends to the page, until it has gone or does not read.
+async fn write(
+    page: &Page,
+    sink: &mut Sink,
+    mut outgoing: mpsc::Receiver<String>,
+    mut view: View,
+    welcome: &Text,
+) {
+    let mut beats = interval(BEAT);
+    beats.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut first = vec![encode(welcome)];
+    if let View::Down { why, .. } = &view {
+        first.push(encode(&Text::Share { lost: Some(why.clone()) }));
+    }
+    let mut first = first.into_iter();
+    loop {
+        let message = match first.next() {
+            Some(text) => Message::Text(text.into()),
+            None => tokio::select! {
+                biased;
+                _ = beats.tick() => Message::Text(encode(&page.beat()).into()),
+                Some(text) = outgoing.recv() => Message::Text(text.into()),
+                message = view.next(page) => message,
+            },
+        };
+        // While this waits, nothing is read from the share: its queues lose what is too old.
+        if !timeout(PATIENCE, sink.send(message)).await.is_ok_and(|sent| sent.is_ok()) {
+            return;
+        }
+    }
+}
+
+/// The session that sees.
+enum View {
+    Up { link: Arc<Link>, name: String, listener: Listener },
+    Down { link: Arc<Link>, name: String, why: String, coming: Coming },
+}
+
+/// Connects again and again, until it is dropped.
+struct Coming(JoinHandle<(Program, Listener)>);
+
+impl Drop for Coming {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+impl View {
+    fn new(
+        link: Arc<Link>,
+        name: String,
+        connected: Result<(Program, Listener), String>,
+        page: &Page,
+    ) -> Self {
+        match connected {
+            Ok((program, listener)) => {
+                page.set_view(Some(program));
+                View::Up { link, name, listener }
+            }
+            Err(why) => View::down(link, name, why),
+        }
+    }
+
+    fn down(link: Arc<Link>, name: String, why: String) -> Self {
+        let (its_link, its_name) = (Arc::clone(&link), name.clone());
+        let coming = tokio::spawn(async move {
+            loop {
+                if let Ok((program, listener, _)) = its_link.connect(&its_name).await {
+                    return (program, listener);
+                }
+                sleep(AGAIN).await;
+            }
+        });
+        View::Down { link, name, why, coming: Coming(coming) }
+    }
+
+    /// The next message for the page. It can be dropped while it waits.
+    async fn next(&mut self, page: &Page) -> Message {
+        match self {
+            View::Up { link, name, listener } => match listener.next().await {
+                Ok(frame) => message(frame),
+                Err(error) => {
+                    page.set_view(None);
+                    let (link, name, why) = (Arc::clone(link), name.clone(), error.to_string());
+                    *self = View::down(link, name, why.clone());
+                    Message::Text(encode(&Text::Share { lost: Some(why) }).into())
+                }
+            },
+            View::Down { link, name, coming, .. } => {
+                let (link, name) = (Arc::clone(link), name.clone());
+                match (&mut coming.0).await {
+                    Ok((program, listener)) => {
+                        page.set_view(Some(program));
+                        *self = View::Up { link, name, listener };
+                        Message::Text(encode(&Text::Share { lost: None }).into())
+                    }
+                    Err(error) => {
+                        let why = error.to_string();
+                        *self = View::down(link, name, why.clone());
+                        Message::Text(encode(&Text::Share { lost: Some(why) }).into())
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A message of the share for a page.
+fn message(Frame { kind, payload }: Frame) -> Message {
+    match kind {
+        Kind::Data => Message::Binary(payload.into()),
+        Kind::Text => Message::Text(String::from_utf8_lossy(&payload).into_owned().into()),
+    }
+}

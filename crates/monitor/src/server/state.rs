@@ -1,0 +1,57 @@
+//! What all requests share.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::Semaphore;
+
+use super::door::{Door, random_word};
+use super::link::Link;
+use crate::page::Page;
+
+/// Pages at the same time.
+const PAGES: usize = 32;
+
+/// A server with its pages.
+pub struct State {
+    pub door: Door,
+    pub link: Arc<Link>,
+    pub deadline: Duration,
+    pub program: String,
+    pub run: String,
+    pages: Mutex<BTreeMap<String, Arc<Page>>>,
+    last_page: AtomicU64,
+    pub places: Semaphore,
+}
+
+impl State {
+    /// A server without pages.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn new(door: Door, link: Link, deadline: Duration, program: String) -> io::Result<Self> {
+        Ok(State {
+            door,
+            link: Arc::new(link),
+            deadline,
+            program,
+            run: random_word()?,
+            pages: Mutex::default(),
+            last_page: AtomicU64::new(0),
+            places: Semaphore::new(PAGES),
+        })
+    }
+
+    /// The number of the next page.
+    pub fn next_page(&self) -> u64 {
+        self.last_page.fetch_add(1, Ordering::Relaxed) + 1
+    }
+
+    /// The pages, by name.
+    pub fn pages(&self) -> MutexGuard<'_, BTreeMap<String, Arc<Page>>> {
+        self.pages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
