@@ -1,8 +1,12 @@
 // The connection to the server: requests, subscriptions, signs of life, and what the server said last.
 import { signal } from '@preact/signals';
+import { ServerClock } from './clock';
+import { type Rows, decode, groupOf } from './rows';
 import type {
-  Beat, Column, Event as DriveEvent, Group, Line, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
+  Beat, Event as DriveEvent, Group, Line, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
 } from './wire';
+
+export type { Rows } from './rows';
 
 type Without<T> = T extends unknown ? Omit<T, 'id'> : never;
 /** A request to the server or, through it, to the share. */
@@ -20,41 +24,29 @@ export class Refused extends Error {
   }
 }
 
-/** Values of signals of a motor that were read together. Views of one buffer: copy what is kept. */
-export interface Rows {
-  line: string;
-  motor: number;
-  columns: Column[];
-  /** The line's clock at `t[0] == 0`, in seconds. */
-  t0: number;
-  t: Float64Array;
-  /** From request to reply, in seconds. */
-  span: Float64Array;
-  /** A column for each of `columns`. NaN is no value. */
-  values: Float64Array[];
-  /** Records that were lost just before, because this page was too slow. */
-  lost: number;
-}
-
 interface Want {
   signals: SignalName[];
   period: number;
   rows: boolean;
   onRows: (rows: Rows) => void;
-  /** The share's number, on this connection. */
-  subscription?: number;
+  /** The share's number, on this connection. `null`: the share was asked for it. */
+  subscription?: number | null;
   /** Why the share gives nothing. */
   onRefused: (why: Refused) => void;
 }
 
-/** `silent`: the socket seems open, and nothing comes through it. */
+/** `silent`: the socket seems open, and what comes through it is late, or nothing comes. */
 export const state = signal<'connecting' | 'open' | 'silent' | 'lost'>('connecting');
 export const welcome = signal<Welcome | null>(null);
+/** What the last welcome said. It stays when the connection is lost. */
+export const lastWelcome = signal<Welcome | null>(null);
 export const lines = signal<Line[]>([]);
 /** Who latched the share: motion is refused. */
 export const latchedBy = signal<string | null>(null);
 /** The motors that were found, by line. */
 export const motors = signal<ReadonlyMap<string, readonly number[]>>(new Map());
+/** Why the last search of a line found nothing, by line. */
+export const searchFailed = signal<ReadonlyMap<string, string>>(new Map());
 /** The newest last. */
 export const events = signal<readonly DriveEvent[]>([]);
 /** Why the page's motors were stopped last. */
@@ -63,7 +55,7 @@ export const lapsed = signal<string | null>(null);
 export const shareLost = signal<string | null>(null);
 /** Whether this page turned motors, so that its end stops them. */
 export const holds = signal(false);
-/** Time to the server and back, in ms. */
+/** Time to the server and back, in ms. It grows while nothing is received. */
 export const delay = signal(0);
 /** Whether the key or the finger of hold-to-run is down. */
 export const held = signal(false);
@@ -71,9 +63,11 @@ export const held = signal(false);
 const RECONNECT = 1000;
 const ALIVE = 100;
 const SILENT = 500;
+/** A connection that gives nothing for so long is given up. The browser may not notice for minutes. */
+const DEAD = 5000;
+/** Clocks of lines drift, and what was refused may be possible later. */
+const LATER = 10_000;
 const MOST_EVENTS = 2000;
-const HEADER = 32;
-const VERSION = 1;
 
 let socket: WebSocket | null = null;
 let lastId = 0;
@@ -81,13 +75,15 @@ const pending = new Map<number, { done: (answer: Text | ShareText) => void; fail
 const wants = new Set<Want>();
 const groups = new Map<number, { want: Want; group: Group }>();
 const clocks = new Map<string, { t: number; wall: number }>();
+const clock = new ServerClock();
 
-let heardAt = 0;
 let beat = 0;
 let drawnBeat = 0;
 let frame = 0;
-let best = Infinity;
-let offset = 0;
+/** For how long no beat was received, without the time in which this page did not run. */
+let quiet = 0;
+let measuredDelay = 0;
+let lookedAt = 0;
 
 /** Sends a request. Rejects with `Refused`. */
 export function ask<A extends Ask>(wanted: A): Promise<AnswerTo<A['ask']>> {
@@ -120,19 +116,23 @@ export function subscribe(
   if (welcome.value) begin(want);
   return () => {
     wants.delete(want);
-    if (want.subscription !== undefined) end(want.subscription);
+    if (want.subscription != null) end(want.subscription);
   };
 }
 
 function begin(want: Want) {
   const { signals, period, rows } = want;
+  want.subscription = null;
   request(
     { ask: 'subscribe', signals, period, queue: 20_000, drop: 'oldest', rows },
     ({ subscription }) => {
       if (wants.has(want)) want.subscription = subscription;
       else end(subscription);
     },
-    want.onRefused,
+    (why) => {
+      delete want.subscription;
+      want.onRefused(why);
+    },
   );
 }
 
@@ -143,18 +143,23 @@ function end(subscription: number) {
   ask({ ask: 'unsubscribe', subscription }).catch(() => {});
 }
 
-/** The wall clock of the server, in seconds since 1970. */
+function forgetSubscriptions() {
+  groups.clear();
+  for (const want of wants) delete want.subscription;
+}
+
+/** The wall clock of the server, in seconds since 1970. NaN until it is known. */
 export function wallNow(): number {
-  return (performance.now() + offset) / 1000;
+  return clock.at(performance.now()) / 1000;
 }
 
-/** The wall clock at a time of a line's clock. */
+/** The wall clock at a time of a line's clock. NaN until it is known. */
 export function wallAt(line: string, t: number): number {
-  const clock = clocks.get(line);
-  return clock ? clock.wall + (t - clock.t) : NaN;
+  const known = clocks.get(line);
+  return known ? known.wall + (t - known.t) : NaN;
 }
 
-/** How old a value of a line is, in seconds. */
+/** How old a value of a line is, in seconds. NaN until it is known: such a value is not live. */
 export function age(line: string, t: number): number {
   return wallNow() - wallAt(line, t);
 }
@@ -168,7 +173,8 @@ function say(text: object): boolean {
 
 /** Gives up the motors that this page turned: they stop. */
 export function letGo() {
-  if (welcome.value) ask({ ask: 'let-go' }).catch(() => {});
+  held.value = false;
+  if (welcome.value?.role === 'operator') ask({ ask: 'let-go' }).catch(() => {});
 }
 
 /** A sign of life. It is true only as long as the browser draws this page. */
@@ -185,58 +191,86 @@ function drawn() {
 /** Connects, and connects again whenever the connection is lost. */
 export function start(url = new URL('ws', location.href)) {
   url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
-  const connect = () => {
-    const opened = new WebSocket(url);
-    opened.binaryType = 'arraybuffer';
-    socket = opened;
-    opened.onmessage = ({ data }) => {
-      heardAt = performance.now();
-      if (typeof data === 'string') heard(JSON.parse(data) as Text | ShareText);
-      else samples(data as ArrayBuffer);
-    };
-    opened.onclose = () => {
-      lost();
-      setTimeout(connect, RECONNECT);
-    };
-  };
-  connect();
+  connect(url);
+  lookedAt = performance.now();
   requestAnimationFrame(drawn);
   setInterval(() => {
     sayAlive();
-    const isSilent = performance.now() - heardAt > SILENT;
-    if (isSilent && state.value === 'open') state.value = 'silent';
-    if (!isSilent && state.value === 'silent') state.value = 'open';
+    look(url);
   }, ALIVE);
-  setInterval(refreshLines, 10_000);
+  setInterval(() => {
+    void refreshLines();
+    // What was refused may be possible now.
+    for (const want of wants) if (want.subscription === undefined && welcome.value) begin(want);
+  }, LATER);
   document.addEventListener('visibilitychange', () => {
-    if (document.hidden && holds.value) letGo();
+    if (document.hidden) letGo();
   });
   addEventListener('pagehide', () => {
+    held.value = false;
     const { run, name } = welcome.value ?? {};
     if (run) navigator.sendBeacon(`api/let-go?${new URLSearchParams({ run, page: name ?? '' })}`);
   });
 }
 
-function lost() {
+function connect(url: URL) {
+  quiet = 0;
+  const opened = new WebSocket(url);
+  opened.binaryType = 'arraybuffer';
+  socket = opened;
+  opened.onmessage = ({ data }) => {
+    if (socket !== opened) return;
+    if (typeof data === 'string') heard(JSON.parse(data) as Text | ShareText);
+    else samples(data as ArrayBuffer);
+  };
+  opened.onclose = () => {
+    if (socket === opened) lost(url);
+  };
+}
+
+/** How late the connection is. */
+function look(url: URL) {
+  const now = performance.now();
+  // A page that did not run has not looked at what was received.
+  quiet += Math.min(now - lookedAt, 2 * ALIVE);
+  lookedAt = now;
+  if (socket && quiet > DEAD) {
+    const silent = socket;
+    lost(url);
+    silent.close();
+    return;
+  }
+  delay.value = Math.max(measuredDelay, quiet > SILENT ? quiet : 0);
+  const isLate = delay.value > SILENT;
+  if (isLate && state.value === 'open') state.value = 'silent';
+  if (!isLate && state.value === 'silent') state.value = 'open';
+}
+
+function lost(url: URL) {
+  socket = null;
   state.value = 'lost';
   welcome.value = null;
   holds.value = false;
   held.value = false;
-  groups.clear();
-  const ended = new Refused('line', 'The connection to the server was lost.');
-  for (const { failed } of pending.values()) failed(ended);
+  forgetSubscriptions();
+  const ended = new Refused('line', 'The connection to the server was lost. It is unknown whether this was done.');
+  const waiting = [...pending.values()];
   pending.clear();
-  for (const want of wants) delete want.subscription;
+  for (const { failed } of waiting) failed(ended);
+  setTimeout(() => connect(url), RECONNECT);
 }
 
 function heard(text: Text | ShareText) {
   switch (text.kind) {
     case 'welcome':
+      if (lastWelcome.value && lastWelcome.value.run !== text.run) motors.value = new Map();
       welcome.value = text;
+      lastWelcome.value = text;
       state.value = 'open';
-      best = Infinity;
-      void refreshLines();
-      wants.forEach(begin);
+      shareLost.value = null;
+      measuredDelay = 0;
+      clock.forget();
+      begunAgain();
       break;
     case 'beat':
       measure(text);
@@ -259,35 +293,50 @@ function heard(text: Text | ShareText) {
       break;
     }
     case 'event':
-      events.value = [...events.value.slice(1 - MOST_EVENTS), text];
-      if (text.event === 'latched') latchedBy.value = text.by ?? 'somebody';
-      if (text.event === 'released') latchedBy.value = null;
-      if (text.event === 'back') void refreshLines();
+      happened(text);
+      break;
+    case 'missed':
+      happened({
+        wall: wallNow(),
+        event: 'later',
+        message: `${text.events} events were not received, because this page was too slow`,
+      });
       break;
     case 'lapsed':
+      held.value = false;
       lapsed.value = text.message;
       break;
-    case 'share':
+    case 'share': {
+      const wasLost = shareLost.value !== null;
       shareLost.value = text.lost;
-      if (text.lost === null) void refreshLines();
+      if (text.lost !== null) forgetSubscriptions();
+      else if (wasLost) begunAgain();
       break;
+    }
     default:
       break;
   }
 }
 
+/** There is a new session at the share: it knows no subscription. */
+function begunAgain() {
+  forgetSubscriptions();
+  void refreshLines();
+  wants.forEach(begin);
+}
+
+function happened(event: DriveEvent) {
+  events.value = [...events.value.slice(1 - MOST_EVENTS), event];
+  if (event.event === 'latched') latchedBy.value = event.by ?? 'another program';
+  if (event.event === 'released') latchedBy.value = null;
+  if (event.event === 'back') void refreshLines();
+}
+
 function measure({ beat: number, wall, at, since, holds: has }: Beat) {
   beat = number;
+  quiet = 0;
   holds.value = has;
-  const now = performance.now();
-  if (at !== null) delay.value = now - at - since;
-  // The least delay says most about the clocks. It is forgotten slowly: clocks drift.
-  best += 0.01;
-  const half = at === null ? 0 : (now - at - since) / 2;
-  if (half <= best) {
-    best = half;
-    offset = wall * 1000 + half - now;
-  }
+  measuredDelay = clock.heard(performance.now(), wall * 1000, at, since) ?? measuredDelay;
 }
 
 async function refreshLines() {
@@ -304,28 +353,32 @@ async function refreshLines() {
   }
 }
 
+/** Lines that are being searched. */
+export const searching = signal<ReadonlySet<string>>(new Set());
+
 /** Searches the motors of a line again. */
 export async function refreshMotors(line: string) {
-  const found = await ask({ ask: 'motors', line });
-  motors.value = new Map(motors.value).set(line, found.motors);
+  if (searching.value.has(line)) return;
+  searching.value = new Set(searching.value).add(line);
+  let failure: string | null = null;
+  try {
+    const found = await ask({ ask: 'motors', line });
+    motors.value = new Map(motors.value).set(line, found.motors);
+  } catch (why) {
+    failure = (why as Error).message;
+  }
+  const failed = new Map(searchFailed.value);
+  if (failure === null) failed.delete(line);
+  else failed.set(line, failure);
+  searchFailed.value = failed;
+  const rest = new Set(searching.value);
+  rest.delete(line);
+  searching.value = rest;
 }
 
 function samples(buffer: ArrayBuffer) {
-  const head = new DataView(buffer);
-  const number = (at: number) => head.getUint32(at, true);
-  const known = groups.get(number(4));
-  if (number(0) !== VERSION || !known) return;
-  const count = number(12);
-  const column = (at: number) => new Float64Array(buffer, HEADER + 8 * count * at, count);
-  const { want, group } = known;
-  want.onRows({
-    line: group.line,
-    motor: group.motor,
-    columns: group.columns,
-    t0: head.getFloat64(24, true),
-    t: column(0),
-    span: column(1),
-    values: group.columns.map((_, at) => column(at + 2)),
-    lost: number(20),
-  });
+  const number = groupOf(buffer);
+  const known = number === null ? undefined : groups.get(number);
+  const rows = known && decode(buffer, known.group);
+  if (rows) known.want.onRows(rows);
 }

@@ -1,5 +1,11 @@
 import { render } from 'preact';
-import { start, state } from './link';
+import { App } from './app';
+import { start } from './link';
+import { stopByKeys } from './stop';
+import './style.css';
+import { followAddress } from './views';
 
+stopByKeys();
+followAddress();
 start();
-render(<h1>Motorlink monitor: {state}</h1>, document.getElementById('app')!);
+render(<App />, document.getElementById('app')!);

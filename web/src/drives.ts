@@ -1,0 +1,95 @@
+// What the page knows of lines and motors: descriptions, events about them, and rates.
+import { computed, signal } from '@preact/signals';
+import { ask, events, lines, motors, welcome } from './link';
+import { nameOf } from './stop';
+import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
+
+export interface MotorId {
+  line: string;
+  motor: number;
+}
+
+/** All motors that were found, in the order of the lines. */
+export const allMotors = computed<MotorId[]>(() =>
+  lines.value.flatMap(({ line }) => (motors.value.get(line) ?? []).map((motor) => ({ line, motor }))),
+);
+
+/** What the drives of a line have, by line. */
+export const descriptions = signal<ReadonlyMap<string, Description>>(new Map());
+
+let describedRun = '';
+
+/** Asks for the descriptions of lines that have none. Returns why that failed. */
+export async function describeLines(): Promise<string | null> {
+  const run = welcome.value?.run;
+  if (run === undefined) return null;
+  if (run !== describedRun) {
+    describedRun = run;
+    descriptions.value = new Map();
+  }
+  let failure: string | null = null;
+  for (const { line } of lines.value) {
+    if (descriptions.value.has(line)) continue;
+    try {
+      const description = await ask({ ask: 'describe', line });
+      descriptions.value = new Map(descriptions.value).set(line, description);
+    } catch (why) {
+      failure = (why as Error).message;
+    }
+  }
+  return failure;
+}
+
+/** The newest event of the given kinds about each line or motor, by name. */
+function newest(all: readonly DriveEvent[], kinds: ReadonlySet<string>, isOfMotor: boolean) {
+  const found = new Map<string, DriveEvent>();
+  for (const event of all) {
+    if (!event.line || !kinds.has(event.event)) continue;
+    if (!isOfMotor) found.set(event.line, event);
+    else if (event.motor != null) found.set(nameOf(event.line, event.motor), event);
+  }
+  return found;
+}
+
+const LINE_KINDS = new Set(['lost', 'back']);
+const MOTOR_KINDS = new Set(['silent', 'answers']);
+
+/** The last loss or return of each line since the page was opened. */
+export const lineEvents = computed(() => newest(events.value, LINE_KINDS, false));
+/** The last time each motor fell silent or answered again. */
+export const motorEvents = computed(() => newest(events.value, MOTOR_KINDS, true));
+
+/** The rates of all signals that are read. */
+export const rates = signal<readonly SignalRate[]>([]);
+
+/** Asks for the rates again and again. Returns what ends it. */
+export function watchRates(period = 1000): () => void {
+  const look = () =>
+    ask({ ask: 'rates' }).then(
+      (answer) => void (rates.value = answer.rates),
+      () => void (rates.value = []),
+    );
+  void look();
+  const timer = setInterval(look, period);
+  return () => clearInterval(timer);
+}
+
+/** The names of the commands that each drive has under another name, as in its table. */
+export const COMMANDS: Readonly<Record<Description['protocol'], { start: string; acknowledge: string }>> = {
+  st: { start: 'START_MOTOR', acknowledge: 'FAULT_ACK' },
+  rmd: { start: 'run', acknowledge: 'clear_errors' },
+};
+
+/** What the user set as the most that may be asked of a motor, by motor and mode. */
+export const limits = signal<ReadonlyMap<string, number>>(new Map());
+
+export const limitName = (line: string, motor: number, mode: Mode) => `${nameOf(line, motor)} ${mode}`;
+
+/** Sets or, with `null`, removes the limit of a mode. It holds for all pages. */
+export async function setLimit(line: string, motor: number, mode: Mode, most: number | null) {
+  await ask({ ask: 'limit', line, motor, mode, most });
+  const changed = new Map(limits.value);
+  if (most === null) changed.delete(limitName(line, motor, mode));
+  else changed.set(limitName(line, motor, mode), most);
+  limits.value = changed;
+}

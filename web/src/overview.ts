@@ -1,0 +1,102 @@
+// The values on the cards: the last of each signal, and a short history of the speed.
+import { type Signal, effect, signal } from '@preact/signals';
+import { allMotors, descriptions } from './drives';
+import { type Refused, type Rows, age, subscribe } from './link';
+import { nameOf } from './stop';
+import type { Overview, SignalName } from './wire';
+
+/** How often the values of the cards are read, in seconds. */
+const FAST = 0.1;
+const SLOW = 0.5;
+/** How often cards are drawn, in ms. */
+const DRAW = 100;
+/** Points of the history of a card: one each `DRAW`. */
+export const HISTORY = 200;
+
+export interface Last {
+  value: number;
+  unit: string;
+  /** The line's clock, in seconds. */
+  t: number;
+}
+
+export class Live {
+  /** The last value of each signal, by name. */
+  readonly values = new Map<string, Last>();
+  readonly history = new Float64Array(HISTORY).fill(NaN);
+  /** Counts the drawings of the card. */
+  readonly tick = signal(0);
+  lost = 0;
+
+  constructor(readonly line: string) {}
+
+  /** How old the value of a signal is, in seconds. */
+  age(name: string): number {
+    const last = this.values.get(name);
+    return last ? age(this.line, last.t) : NaN;
+  }
+}
+
+const lives = new Map<string, Live>();
+
+export function liveOf(line: string, motor: number): Live {
+  const name = nameOf(line, motor);
+  const known = lives.get(name) ?? new Live(line);
+  lives.set(name, known);
+  return known;
+}
+
+/** Why there are no values, or null. */
+export const overviewRefused: Signal<string | null> = signal(null);
+
+function take({ line, motor, columns, t0, t, values, lost }: Rows) {
+  const live = liveOf(line, motor);
+  live.lost += lost;
+  const row = t.length - 1;
+  if (row < 0) return;
+  columns.forEach(({ name, unit }, at) => {
+    live.values.set(name, { value: values[at]![row]!, unit, t: t0 + t[row]! });
+  });
+}
+
+const fastOf = ({ state, faults, speed, current, angle }: Overview) => [state, faults, speed, current, angle];
+const slowOf = ({ temperature, voltage }: Overview) => [temperature, voltage];
+
+/** Reads what the cards show. Returns what ends it. */
+export function watchOverview(): () => void {
+  const stopReading = effect(() => {
+    const all = allMotors.value;
+    const known = descriptions.value;
+    const names = (pick: (overview: Overview) => (string | null)[]): SignalName[] =>
+      all.flatMap(({ line, motor }) => {
+        const overview = known.get(line)?.overview;
+        const wanted = overview ? pick(overview).filter((name) => name !== null) : [];
+        return wanted.map((name) => ({ line, motor, name }));
+      });
+    overviewRefused.value = null;
+    const onRefused = (why: Refused) => void (overviewRefused.value = why.message);
+    const ends = [
+      [names(fastOf), FAST] as const,
+      [names(slowOf), SLOW] as const,
+    ].map(([signals, period]) =>
+      signals.length ? subscribe(signals, period, take, { rows: true, onRefused }) : () => {},
+    );
+    return () => ends.forEach((end) => end());
+  });
+
+  const timer = setInterval(() => {
+    for (const { line, motor } of allMotors.peek()) {
+      const live = liveOf(line, motor);
+      const speed = descriptions.peek().get(line)?.overview.speed;
+      const last = speed === undefined ? undefined : live.values.get(speed);
+      live.history.copyWithin(0, 1);
+      // An old value is a gap in the history.
+      live.history[HISTORY - 1] = last && age(line, last.t) < 1 ? last.value : NaN;
+      live.tick.value += 1;
+    }
+  }, DRAW);
+  return () => {
+    stopReading();
+    clearInterval(timer);
+  };
+}

@@ -1,0 +1,176 @@
+// Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
+import { signal } from '@preact/signals';
+import { Refused, ask, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
+import type { StoppedMotor } from './wire';
+
+export interface StopReport {
+  /** `stopped`: every motor that was found confirmed it. */
+  phase: 'sent' | 'stopped' | 'unconfirmed' | 'unreachable';
+  message: string;
+}
+
+/** What is known of the last stop of all motors. */
+export const stopReport = signal<StopReport | null>(null);
+
+/** For so long the answer over the WebSocket is waited for before HTTP is tried, too. */
+const SECOND_WAY = 150;
+/** A server that is reached latches at once, even if motors take longer to confirm. */
+const UNREACHED = 1000;
+
+let last = 0;
+
+/** Stops all motors, at once. Never asks anything, and can be called as often as wanted. */
+export function stopAll() {
+  last += 1;
+  const number = last;
+  held.value = false;
+  sayAlive();
+  stopReport.value = { phase: 'sent', message: 'Stop sent. No motor has confirmed it yet.' };
+
+  let isAnswered = false;
+  let isTriedByHttp = false;
+  /** Ways that may still bring an answer. */
+  let ways = 0;
+  const tell = (report: StopReport) => {
+    if (number === last) stopReport.value = report;
+  };
+  const answered = (stopped: readonly StoppedMotor[]) => {
+    isAnswered = true;
+    tell(confirmed(stopped));
+  };
+  const failed = (why: Error) => {
+    ways -= 1;
+    if (isAnswered) return;
+    if (!isTriedByHttp) byHttp();
+    else if (ways === 0) tell(why instanceof Refused && why.reason !== 'line' ? refused(why) : unreachable());
+  };
+  const byHttp = () => {
+    if (isTriedByHttp || isAnswered) return;
+    isTriedByHttp = true;
+    ways += 1;
+    postStopAll().then(answered, failed);
+  };
+
+  ways += 1;
+  ask({ ask: 'stop-all' }).then(({ motors: stopped }) => answered(stopped), failed);
+  setTimeout(byHttp, SECOND_WAY);
+  setTimeout(() => {
+    if (!isAnswered && latchedBy.value === null) tell(unreachable());
+  }, UNREACHED);
+}
+
+async function postStopAll(): Promise<StoppedMotor[]> {
+  const response = await fetch('api/stop-all', { method: 'POST', keepalive: true });
+  if (!response.ok) throw new Refused('refused', await response.text());
+  return ((await response.json()) as { motors: StoppedMotor[] }).motors;
+}
+
+function refused(why: Refused): StopReport {
+  return { phase: 'unconfirmed', message: `The server could not stop the motors: ${why.message}. They may still be turning.` };
+}
+
+function unreachable(): StopReport {
+  const deadline = lastWelcome.value?.deadline;
+  const own = deadline === undefined ? 'its own deadline' : `its own deadline of ${deadline} ms`;
+  return {
+    phase: 'unreachable',
+    message:
+      `Not reachable. The server stops the motors that this page turned by ${own}; others turn on. ` +
+      'If the server itself has ended, only a guard or the power switch stops them.',
+  };
+}
+
+/** The name of a motor in texts. */
+export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
+
+function confirmed(stopped: readonly StoppedMotor[]): StopReport {
+  // A search also asks addresses where no motor is. Their stop is sent, too.
+  const isKnown = ({ line, motor }: StoppedMotor) => motors.value.get(line)?.includes(motor) ?? false;
+  const known = stopped.filter((one) => !one.failure || isKnown(one));
+  const failures = known.filter(({ failure }) => failure);
+  const others = stopped.length - known.length;
+  const silent = others
+    ? ` ${others} ${others === 1 ? 'address' : 'addresses'} without a known motor did not answer.`
+    : '';
+  if (failures.length) {
+    const names = failures.map(({ line, motor, failure }) => `${nameOf(line, motor)} (${failure})`);
+    const turning = failures.length === 1 ? 'it may' : 'they may';
+    return {
+      phase: 'unconfirmed',
+      message:
+        `${names.join(', ')} did not confirm: ${turning} still be turning. ` +
+        `${known.length - failures.length} of ${known.length} motors confirmed.${silent}`,
+    };
+  }
+  const count = known.length;
+  const message = count
+    ? `Stopped: ${count} of ${count} motors confirmed.${silent}`
+    : `The server has it. No motor was read or commanded before.${silent}`;
+  return { phase: 'stopped', message };
+}
+
+/** Stops one motor. Without a connection all motors are stopped, because only that has a second way. */
+export async function stopMotor(line: string, motor: number): Promise<string> {
+  if (!welcome.value) {
+    stopAll();
+    return 'There is no connection. Stop all was sent the second way.';
+  }
+  const { motors: stopped } = await ask({ ask: 'stop', motor: { line, motor } });
+  const failure = stopped.find(({ failure }) => failure)?.failure;
+  if (failure) throw new Error(`${failure}. It may still be turning.`);
+  return 'Stopped: the motor confirmed it.';
+}
+
+/** Allows motion again. */
+export async function release() {
+  await ask({ ask: 'release' });
+  stopReport.value = null;
+}
+
+const TEXT_FIELDS = new Set(['text', 'search', 'url', 'email', 'tel', 'password']);
+
+/** Whether a space can be typed here. In a field of numbers it cannot. */
+export function takesSpaces(target: EventTarget | null): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.isContentEditable || target instanceof HTMLTextAreaElement) return true;
+  return (
+    target instanceof HTMLInputElement &&
+    TEXT_FIELDS.has(target.type) &&
+    !['numeric', 'decimal'].includes(target.inputMode)
+  );
+}
+
+const isSpace = ({ code, key }: KeyboardEvent) => code === 'Space' || key === ' ';
+
+/**
+ * Esc always stops, Space unless it is typed into a text field. A focused control is not operated by
+ * that Space: Enter does it, and toggles boxes, too.
+ */
+export function stopByKeys() {
+  const down = (event: KeyboardEvent) => {
+    const isTyped = isSpace(event) && takesSpaces(event.target);
+    if (event.key === 'Escape' || (isSpace(event) && !isTyped)) {
+      event.preventDefault();
+      if (!event.repeat) stopAll();
+    } else if (event.key === 'Enter' && event.target instanceof HTMLInputElement) {
+      if (['checkbox', 'radio'].includes(event.target.type)) event.target.click();
+    }
+  };
+  // Some browsers press a button when Space is released.
+  const up = (event: KeyboardEvent) => {
+    if (isSpace(event) && !takesSpaces(event.target)) event.preventDefault();
+  };
+  addEventListener('keydown', down, { capture: true });
+  addEventListener('keyup', up, { capture: true });
+}
+
+let wasLatched = false;
+latchedBy.subscribe((by) => {
+  const phase = stopReport.peek()?.phase;
+  // The latch comes before the stops, and the report of a stop ends with its latch.
+  if (by !== null && phase === 'sent') {
+    stopReport.value = { phase, message: 'The server has the stop, and waits for the motors to confirm it.' };
+  }
+  if (by === null && wasLatched) stopReport.value = null;
+  wasLatched = by !== null;
+});

@@ -1,0 +1,127 @@
+// All commands of the protocol, with their values.
+import { useSignal } from '@preact/signals';
+import { sentence } from '../format';
+import { ask, lapsed } from '../link';
+import { Said, useSaid } from '../parts';
+import type { Command } from '../wire';
+
+interface Props {
+  line: string;
+  motor: number;
+  commands: readonly Command[];
+  isHold: boolean;
+  mayMove: boolean;
+}
+
+export function Commands({ line, motor, commands, isHold, mayMove }: Props) {
+  const isOpen = useSignal(false);
+  return (
+    <details onToggle={({ currentTarget }) => (isOpen.value = currentTarget.open)}>
+      <summary>More commands</summary>
+      {isOpen.value && (
+        <div class="commands">
+          {commands.map((command) => (
+            <One
+              key={command.name}
+              line={line}
+              motor={motor}
+              command={command}
+              mayMove={mayMove}
+              refused={isHold && command.moves ? 'Hold to run is on: only the held button moves the motor.' : null}
+            />
+          ))}
+        </div>
+      )}
+    </details>
+  );
+}
+
+interface OneProps {
+  line: string;
+  motor: number;
+  command: Command;
+  mayMove: boolean;
+  /** Why it is not possible now. */
+  refused: string | null;
+}
+
+function One({ line, motor, command: { name, doc, fields, moves, wears_rom }, mayMove, refused }: OneProps) {
+  const { said, attempt, isBusy } = useSaid();
+  const values = useSignal<Readonly<Record<string, string>>>({});
+  const isAllowed = useSignal(false);
+
+  const send = async () => {
+    const numbers: Record<string, number> = {};
+    for (const field of fields) {
+      const text = (values.value[field.name] ?? '').trim();
+      const value = Number(text);
+      if (text === '' || !Number.isFinite(value)) throw new Error(`${field.name}: give a number.`);
+      numbers[field.name] = value;
+    }
+    if (moves) lapsed.value = null;
+    const answer = await ask({ ask: 'act', line, motor, command: name, values: numbers, hold: false });
+    isAllowed.value = false;
+    const texts = answer.values.map((value) => `${value.name} ${value.text}`);
+    return texts.length ? texts.join(', ') : 'The drive acknowledged it.';
+  };
+
+  return (
+    <form
+      aria-label={name}
+      onSubmit={(event) => {
+        event.preventDefault();
+        void attempt(send);
+      }}
+    >
+      <div>
+        <h4>
+          <code>{name}</code>
+          {moves && <span class="muted"> may move the motor</span>}
+        </h4>
+        <p class="muted">{sentence(doc)}</p>
+      </div>
+      {fields.length > 0 && (
+        <div class="fields">
+          {fields.map((field) => {
+            const [least, most] = field.range;
+            return (
+              <label key={field.name} title={field.doc}>
+                {field.name}
+                {field.unit && `, ${field.unit}`}: {least} to {most}
+                <input
+                  type="number"
+                  step="any"
+                  value={values.value[field.name] ?? ''}
+                  disabled={!mayMove}
+                  onInput={({ currentTarget }) =>
+                    (values.value = { ...values.value, [field.name]: currentTarget.value })
+                  }
+                />
+              </label>
+            );
+          })}
+        </div>
+      )}
+      {wears_rom && (
+        <label class="switch">
+          <input
+            type="checkbox"
+            checked={isAllowed.value}
+            disabled={!mayMove}
+            onChange={({ currentTarget }) => (isAllowed.value = currentTarget.checked)}
+          />
+          Write to ROM. Each write wears it.
+        </label>
+      )}
+      {refused !== null && <p class="muted">{refused}</p>}
+      <button
+        type="submit"
+        disabled={!mayMove || isBusy || refused !== null || (wears_rom && !isAllowed.value)}
+        aria-label={`Send ${name}`}
+      >
+        Send
+      </button>
+      <Said said={said} />
+    </form>
+  );
+}

@@ -1,0 +1,304 @@
+// The controls of a motor: start, stop, faults, a reference with its ramp and limit, hold-to-run.
+import { useSignal } from '@preact/signals';
+import { useEffect, useRef } from 'preact/hooks';
+import { COMMANDS, limitName, limits, setLimit } from '../drives';
+import { decimalsOf, number } from '../format';
+import { holdToRun } from '../hold';
+import { ask, held, lapsed, welcome } from '../link';
+import { liveOf } from '../overview';
+import { Said, useSaid } from '../parts';
+import { nameOf, stopMotor } from '../stop';
+import type { Controlled, Description, Mode } from '../wire';
+import { Commands } from './commands';
+import { Faults } from './values';
+
+const TITLES: Readonly<Record<Mode, string>> = { speed: 'Speed', torque: 'Torque', position: 'Position' };
+
+/** Where sliders end without a limit, and ramps begin: small, whatever the motor is. By unit. */
+const USUAL: Readonly<Record<string, { span: number; rate: number }>> = {
+  rpm: { span: 3000, rate: 500 },
+  '°/s': { span: 720, rate: 180 },
+  '°': { span: 360, rate: 90 },
+  A: { span: 2, rate: 0.5 },
+  s16A: { span: 4000, rate: 2000 },
+};
+const OTHER = { span: 100, rate: 10 };
+
+const usual = (unit: string) => USUAL[unit] ?? OTHER;
+
+/** A number that a person typed, or an error that says which field has none. */
+function numberOf(text: string, field: string): number {
+  const value = Number(text.replace(',', '.'));
+  if (text.trim() === '' || !Number.isFinite(value)) throw new Error(`${field}: give a number.`);
+  return value;
+}
+
+interface Props {
+  line: string;
+  motor: number;
+  description: Description;
+}
+
+export function Control({ line, motor, description }: Props) {
+  const { said, attempt, isBusy } = useSaid();
+  const role = welcome.value?.role;
+  const isViewer = role === 'viewer';
+  const mayMove = role === 'operator';
+  const chosen = useSignal<Mode>(description.modes[0]?.mode ?? 'speed');
+  const isHold = useSignal(false);
+  const mode = description.modes.find((one) => one.mode === chosen.value);
+  const { start, acknowledge } = COMMANDS[description.protocol];
+  const has = (name: string) => description.commands.some((command) => command.name === name);
+  const why = isViewer ? 'viewer' : undefined;
+
+  const act = (command: string, text: string) =>
+    attempt(async () => {
+      lapsed.value = null;
+      await ask({ ask: 'act', line, motor, command, values: {}, hold: false });
+      return text;
+    });
+
+  return (
+    <div class="control">
+      <div class="buttons">
+        <button
+          type="button"
+          disabled={!mayMove || isHold.value || !has(start)}
+          aria-describedby={why}
+          onClick={() => act(start, 'Started: the drive acknowledged it.')}
+        >
+          Start
+        </button>
+        <button type="button" class="stop" onClick={() => attempt(() => stopMotor(line, motor))}>
+          Stop
+        </button>
+        {has(acknowledge) && (
+          <button
+            type="button"
+            class="wide"
+            disabled={!mayMove}
+            aria-describedby={why}
+            onClick={() => act(acknowledge, 'Faults acknowledged.')}
+          >
+            Acknowledge faults
+          </button>
+        )}
+      </div>
+      <Said said={said} />
+      <Faults line={line} motor={motor} description={description} />
+      <fieldset class="modes" disabled={isBusy}>
+        <legend class="hidden">Mode of {nameOf(line, motor)}</legend>
+        {description.modes.map((one) => (
+          <label key={one.mode}>
+            <input
+              type="radio"
+              name={`mode-${line}-${motor}`}
+              checked={one.mode === chosen.value}
+              onChange={() => (chosen.value = one.mode)}
+            />
+            {TITLES[one.mode]}
+          </label>
+        ))}
+      </fieldset>
+      {mode && (
+        <Reference
+          key={mode.mode}
+          line={line}
+          motor={motor}
+          mode={mode}
+          rateUnit={rateUnit(mode, description)}
+          isHold={isHold.value}
+          mayMove={mayMove}
+          why={why}
+        />
+      )}
+      <label class="switch">
+        <input
+          type="checkbox"
+          role="switch"
+          checked={isHold.value}
+          disabled={!mayMove}
+          aria-describedby={why}
+          onChange={({ currentTarget }) => (isHold.value = currentTarget.checked)}
+        />
+        Hold to run
+      </label>
+      {description.commands.length > 0 && (
+        <Commands line={line} motor={motor} commands={description.commands} isHold={isHold.value} mayMove={mayMove} />
+      )}
+    </div>
+  );
+}
+
+/** The unit of the rate. That of a position is a speed. */
+function rateUnit({ mode, unit }: Controlled, { modes }: Description): string {
+  if (mode === 'position') return modes.find((one) => one.mode === 'speed')?.unit ?? `${unit}/s`;
+  return `${unit}/s`;
+}
+
+interface ReferenceProps {
+  line: string;
+  motor: number;
+  mode: Controlled;
+  rateUnit: string;
+  isHold: boolean;
+  mayMove: boolean;
+  why: string | undefined;
+}
+
+function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit, isHold, mayMove, why }: ReferenceProps) {
+  const { said, attempt, isBusy } = useSaid();
+  const decimals = decimalsOf(unit);
+  const target = useSignal<string | null>(null);
+  const rate = useSignal(String(usual(unit).rate));
+  const limit = limits.value.get(limitName(line, motor, mode));
+  const newLimit = useSignal('');
+  const isHeld = useSignal(false);
+
+  // The reference begins at the measured value: the first motion is none.
+  const live = liveOf(line, motor);
+  const isWaiting = target.value === null;
+  const first = isWaiting ? live.values.get(measured) : undefined;
+  if (isWaiting) void live.tick.value;
+  useEffect(() => {
+    if (target.value === null && first && Number.isFinite(first.value) && live.age(measured) < 1) {
+      target.value = first.value.toFixed(decimals);
+    }
+  }, [first]);
+
+  const span = Math.min(limit ?? usual(unit).span, most);
+  const run = async (hold: boolean) => {
+    lapsed.value = null;
+    const { from } = await ask({
+      ask: 'run',
+      line,
+      motor,
+      mode,
+      target: numberOf(target.value ?? '', 'Target'),
+      rate: numberOf(rate.value, 'Ramp'),
+      hold,
+    });
+    return `Running from ${number(from, decimals)} ${unit}.`;
+  };
+  // The answer may come after the release. What it started then has to stop.
+  const runHeld = async () => {
+    const text = await run(true);
+    if (held.value) return text;
+    return stopMotor(line, motor);
+  };
+
+  const button = useRef<HTMLButtonElement>(null);
+  const latest = useRef({ runHeld, attempt });
+  latest.current = { runHeld, attempt };
+  useEffect(() => {
+    if (!isHold || !mayMove || !button.current) return;
+    return holdToRun(
+      button.current,
+      () => {
+        isHeld.value = true;
+        void latest.current.attempt(latest.current.runHeld);
+      },
+      () => {
+        isHeld.value = false;
+        void latest.current.attempt(() => stopMotor(line, motor));
+      },
+    );
+  }, [isHold, mayMove]);
+
+  const step = 10 ** -decimals;
+  const rateLabel = mode === 'position' ? 'Speed' : 'Ramp';
+  const typed = (signal: { value: string | null }) => (event: { currentTarget: HTMLInputElement }) => {
+    signal.value = event.currentTarget.value;
+  };
+  const saveLimit = (wanted: () => number | null) =>
+    attempt(async () => {
+      const value = wanted();
+      await setLimit(line, motor, mode, value);
+      newLimit.value = '';
+      return value === null ? 'There is no limit now.' : `The limit is ±${value} ${unit}, for all pages.`;
+    });
+  return (
+    <form
+      class="fields"
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (!isHold && mayMove) void attempt(() => run(false));
+      }}
+    >
+      <label class="wide">
+        Target: −{number(span, decimals)} to {number(span, decimals)} {unit}
+        <input
+          type="range"
+          min={-span}
+          max={span}
+          step={step}
+          value={target.value ?? '0'}
+          disabled={!mayMove || isWaiting}
+          aria-describedby={why}
+          aria-label={`Target, slider, ${unit}`}
+          onInput={typed(target)}
+        />
+      </label>
+      <label>
+        Target, {unit}
+        <input
+          type="number"
+          step="any"
+          value={target.value ?? ''}
+          disabled={!mayMove || isWaiting}
+          aria-describedby={why}
+          onInput={typed(target)}
+        />
+      </label>
+      <label>
+        {rateLabel}, {rateUnit}
+        <input type="number" step="any" min="0" value={rate.value} disabled={!mayMove} onInput={typed(rate)} />
+      </label>
+      {isHold ? (
+        <button
+          type="button"
+          ref={button}
+          class="wide primary hold"
+          disabled={!mayMove || isWaiting}
+          data-held={isHeld.value ? '' : undefined}
+          aria-pressed={isHeld.value}
+          aria-keyshortcuts="H Enter"
+        >
+          {isHeld.value ? 'Running: let go to stop' : 'Hold to run'}
+        </button>
+      ) : (
+        <button type="submit" class="wide primary" disabled={!mayMove || isWaiting || isBusy} aria-describedby={why}>
+          Run to target
+        </button>
+      )}
+      <Said said={said} />
+      <div class="wide field">
+        <label for={`limit-${line}-${motor}-${mode}`}>
+          Limit of all pages: {limit === undefined ? 'none set' : `±${number(limit, decimals)} ${unit}`}
+        </label>
+        <span class="with-button">
+          <input
+            id={`limit-${line}-${motor}-${mode}`}
+            type="number"
+            step="any"
+            min="0"
+            placeholder={limit === undefined ? `most, ${unit}` : String(limit)}
+            value={newLimit.value}
+            disabled={!mayMove}
+            onInput={typed(newLimit)}
+          />
+          <button
+            type="button"
+            disabled={!mayMove}
+            onClick={() => saveLimit(() => numberOf(newLimit.value, 'Limit'))}
+          >
+            Set limit
+          </button>
+          <button type="button" disabled={!mayMove || limit === undefined} onClick={() => saveLimit(() => null)}>
+            No limit
+          </button>
+        </span>
+      </div>
+    </form>
+  );
+}

@@ -1,0 +1,75 @@
+// Who did what when.
+import { useSignal } from '@preact/signals';
+import { allMotors } from '../drives';
+import { timeOfDay } from '../format';
+import { events } from '../link';
+import { nameOf } from '../stop';
+import type { Happening } from '../wire';
+import './events.css';
+
+const SHOWN = 200;
+const BAD: ReadonlySet<Happening> = new Set(['stop-failed', 'lost', 'silent', 'doubtful', 'refused']);
+const STOPS: ReadonlySet<Happening> = new Set(['stopping', 'latched']);
+
+const toneOf = (event: Happening) => (BAD.has(event) ? 'bad' : STOPS.has(event) ? 'warn' : 'muted');
+
+export default function Events() {
+  const wanted = useSignal('');
+  const most = useSignal(SHOWN);
+  const motors = allMotors.value.map(({ line, motor }) => nameOf(line, motor));
+  const all = events.value;
+  const chosen = all
+    .filter(({ line, motor }) => wanted.value === '' || (line && motor != null && nameOf(line, motor) === wanted.value))
+    .reverse();
+  return (
+    <>
+      <div class="bar">
+        <h2>Events</h2>
+        <label>
+          Motor{' '}
+          <select value={wanted.value} onChange={({ currentTarget }) => (wanted.value = currentTarget.value)}>
+            <option value="">all</option>
+            {motors.map((name) => (
+              <option key={name} value={name}>
+                {name}
+              </option>
+            ))}
+          </select>
+        </label>
+      </div>
+      {chosen.length === 0 && <p class="muted">Nothing happened since this page was opened.</p>}
+      {chosen.length > 0 && (
+        <table class="events">
+          <caption class="hidden">Events, the newest first</caption>
+          <thead>
+            <tr>
+              <th scope="col">Time</th>
+              <th scope="col">Motor</th>
+              <th scope="col">By</th>
+              <th scope="col">Kind</th>
+              <th scope="col">What</th>
+            </tr>
+          </thead>
+          <tbody>
+            {chosen.slice(0, most.value).map(({ wall, line, motor, by, event, message }, at) => (
+              <tr key={chosen.length - at}>
+                <td class="mono">{timeOfDay(wall)}</td>
+                <td>{line ? (motor == null ? line : nameOf(line, motor)) : ''}</td>
+                <td>{by}</td>
+                <td>
+                  <span class={toneOf(event)}>{event}</span>
+                </td>
+                <td>{message}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+      {chosen.length > most.value && (
+        <button type="button" onClick={() => (most.value += SHOWN)}>
+          Show {Math.min(SHOWN, chosen.length - most.value)} more of {chosen.length}
+        </button>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,91 @@
+// A card a motor: what it does, and the controls that move it.
+import { useEffect } from 'preact/hooks';
+import { allMotors, describeLines, descriptions, motorEvents, watchRates } from '../drives';
+import { lines, refreshMotors, searchFailed, searching, welcome } from '../link';
+import { overviewRefused, watchOverview } from '../overview';
+import { Said, useSaid } from '../parts';
+import { nameOf } from '../stop';
+import { Control } from './control';
+import './motors.css';
+import { Values } from './values';
+
+function Search() {
+  const isBusy = searching.value.size > 0;
+  const search = () => lines.value.forEach(({ line }) => void refreshMotors(line));
+  return (
+    <button type="button" disabled={isBusy || !welcome.value} onClick={search}>
+      {isBusy ? 'Searching …' : 'Search motors'}
+    </button>
+  );
+}
+
+function Card({ line, motor }: { line: string; motor: number }) {
+  const description = descriptions.value.get(line);
+  const name = nameOf(line, motor);
+  const silent = motorEvents.value.get(name);
+  return (
+    <li>
+      <article class="card" aria-label={`Motor ${name}`}>
+        <header>
+          <h3>{name}</h3>
+          {description && <span class="muted">{description.protocol.toUpperCase()}</span>}
+          {silent?.event === 'silent' && <span class="chip bad">✕ silent</span>}
+        </header>
+        {description ? (
+          <>
+            <Values line={line} motor={motor} description={description} />
+            <Control line={line} motor={motor} description={description} />
+          </>
+        ) : (
+          <p class="muted">Waiting for the description of the drive …</p>
+        )}
+      </article>
+    </li>
+  );
+}
+
+export default function Motors() {
+  const { said, attempt } = useSaid();
+  const run = welcome.value?.run;
+  const names = lines.value.map(({ line }) => line).join(' ');
+  useEffect(() => {
+    void attempt(async () => {
+      const failure = await describeLines();
+      if (failure !== null) throw new Error(failure);
+    });
+  }, [run, names]);
+  useEffect(watchOverview, []);
+  useEffect(() => watchRates(), []);
+
+  const all = allMotors.value;
+  return (
+    <>
+      <div class="bar">
+        <h2>Motors</h2>
+        <Search />
+      </div>
+      {welcome.value?.role === 'viewer' && (
+        <p class="note" id="viewer">
+          <span>You are a viewer: you see everything and can stop. Motion and settings need the operator's address.</span>
+        </p>
+      )}
+      <Said said={said} />
+      {overviewRefused.value !== null && <Said said={{ tone: 'bad', text: overviewRefused.value }} />}
+      {[...searchFailed.value].map(([line, why]) => (
+        <p key={line} class="bad">
+          ! {line}: {why}
+        </p>
+      ))}
+      {all.length === 0 && (
+        <p class="muted">
+          {searching.value.size ? 'Searching motors …' : 'No motor was found. Check power and cables, then search again.'}
+        </p>
+      )}
+      <ul class="cards">
+        {all.map(({ line, motor }) => (
+          <Card key={nameOf(line, motor)} line={line} motor={motor} />
+        ))}
+      </ul>
+    </>
+  );
+}

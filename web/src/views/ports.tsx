@@ -1,0 +1,150 @@
+// The lines that the share holds, and how often signals are read from them.
+import { useEffect } from 'preact/hooks';
+import { lineEvents, motorEvents, rates, watchRates } from '../drives';
+import { rate, timeOfDay } from '../format';
+import { events, lines, motors, refreshMotors, searchFailed, searching, welcome } from '../link';
+import { nameOf } from '../stop';
+import type { Line } from '../wire';
+import './ports.css';
+
+/** Events that say that something went wrong on a line. */
+const COUNTED = { lost: 'losses', silent: 'silences', doubtful: 'doubtful replies', refused: 'refusals' } as const;
+
+function counts(line: string): string {
+  const texts = Object.entries(COUNTED).map(([kind, title]) => {
+    const count = events.value.filter((one) => one.line === line && one.event === kind).length;
+    return `${count} ${title}`;
+  });
+  return texts.join(', ');
+}
+
+function LineState({ line }: { line: string }) {
+  const last = lineEvents.value.get(line);
+  const isRead = rates.value.some((one) => one.line === line && one.achieved > 0);
+  if (last?.event === 'lost') {
+    return (
+      <>
+        <span class="chip bad">✕ lost</span> since {timeOfDay(last.wall)}: {last.message}
+      </>
+    );
+  }
+  if (isRead) return <span class="chip ok">● answers</span>;
+  if (last) {
+    return (
+      <>
+        <span class="chip ok">● open</span> again since {timeOfDay(last.wall)}
+      </>
+    );
+  }
+  return <span class="chip">○ open, nothing is read</span>;
+}
+
+function Port({ line: { line, protocol, port, profile, timeout } }: { line: Line }) {
+  const found = motors.value.get(line) ?? [];
+  const isBusy = searching.value.has(line);
+  const failure = searchFailed.value.get(line);
+  return (
+    <li>
+      <article class="card" aria-label={`Line ${line}`}>
+        <div class="bar">
+          <h3>{line}</h3>
+          <button type="button" disabled={isBusy || !welcome.value} onClick={() => void refreshMotors(line)}>
+            {isBusy ? 'Searching …' : 'Search motors again'}
+          </button>
+        </div>
+        <dl class="facts">
+          <dt>State</dt>
+          <dd>
+            <LineState line={line} />
+          </dd>
+          <dt>Port</dt>
+          <dd class="mono">{port}</dd>
+          <dt>Protocol</dt>
+          <dd>
+            {protocol.toUpperCase()}
+            {profile && `, profile ${profile}`}
+          </dd>
+          <dt>Reply timeout</dt>
+          <dd>{Math.round(timeout * 1000)} ms</dd>
+          <dt>Motors</dt>
+          <dd>
+            {found.length === 0 && (isBusy ? 'searching' : 'none found')}
+            {found.map((motor) => {
+              const silent = motorEvents.value.get(nameOf(line, motor))?.event === 'silent';
+              return (
+                <span key={motor} class={silent ? 'motor bad' : 'motor'}>
+                  {motor}
+                  {silent && ' (silent)'}
+                </span>
+              );
+            })}
+          </dd>
+          <dt>Since this page was opened</dt>
+          <dd>{counts(line)}</dd>
+        </dl>
+        <p role="status" class="bad">
+          {failure !== undefined && `! ${failure}`}
+        </p>
+      </article>
+    </li>
+  );
+}
+
+function Rates() {
+  const all = rates.value;
+  if (all.length === 0) return <p class="muted">No signal is read now. Motors and plots read signals while they are open.</p>;
+  return (
+    <div class="scrolled" tabIndex={0} role="region" aria-label="Rates of signals">
+      <table>
+        <thead>
+          <tr>
+            <th scope="col">Signal</th>
+            <th scope="col" class="number">
+              Asked
+            </th>
+            <th scope="col" class="number">
+              Possible
+            </th>
+            <th scope="col" class="number">
+              Achieved
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {all.map(({ line, motor, name, asked, predicted, achieved }) => (
+            <tr key={`${nameOf(line, motor)} ${name}`}>
+              <td>
+                {nameOf(line, motor)} <code>{name}</code>
+              </td>
+              <td class="number">{rate(1 / asked)}</td>
+              <td class="number">{rate(1 / predicted)}</td>
+              <td class="number">
+                {achieved < 0.8 / asked && <span class="warn">▼ </span>}
+                {rate(achieved)}
+              </td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+export default function Ports() {
+  useEffect(() => watchRates(), []);
+  return (
+    <>
+      <div class="bar">
+        <h2>Ports</h2>
+      </div>
+      {lines.value.length === 0 && <p class="muted">The server has not said yet which lines it holds.</p>}
+      <ul class="ports">
+        {lines.value.map((line) => (
+          <Port key={line.line} line={line} />
+        ))}
+      </ul>
+      <h3 class="apart">Rates</h3>
+      <Rates />
+    </>
+  );
+}
