@@ -2,6 +2,7 @@
 import { useSignal } from '@preact/signals';
 import { Component, type ComponentChildren, type ComponentType } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
+import { sentence } from './format';
 import { delay, lapsed, lastWelcome, latchedBy, shareLost, state, welcome } from './link';
 import { Said, useSaid } from './parts';
 import { release, stopAll, stopReport } from './stop';
@@ -54,14 +55,11 @@ function Connection() {
   }
 }
 
-/** What is known of the connection and of the last stop. It has a place of its own, so that nothing moves. */
 function Status() {
-  const report = stopReport.value;
-  const tone = report && PHASES[report.phase];
   const who = welcome.value;
   return (
     <div class="status">
-      <span aria-label="Connection">
+      <span aria-label="Connection" role="group">
         <Connection />
       </span>
       {who && (
@@ -69,10 +67,18 @@ function Status() {
           {who.name}, {who.role}
         </span>
       )}
-      <strong role="status" aria-label="Stop" aria-live="assertive" class={tone ?? undefined}>
-        {report && tone && `${SIGNS[tone]} ${report.message}`}
-      </strong>
     </div>
+  );
+}
+
+/** What is known of the last stop. */
+function Report() {
+  const report = stopReport.value;
+  const tone = report ? PHASES[report.phase] : 'ok';
+  return (
+    <strong role="status" aria-label="Stop" aria-live="assertive" class={`report ${tone}`}>
+      {report && `${SIGNS[tone]} ${report.message}`}
+    </strong>
   );
 }
 
@@ -121,7 +127,7 @@ function Banners() {
       {lapsed.value !== null && (
         <section class="note warn" role="alert" aria-label="Motors stopped">
           <p>
-            <strong>The motors that this page turned were stopped.</strong> {lapsed.value}
+            <strong>The motors that this page turned were stopped.</strong> {sentence(lapsed.value)}
           </p>
           <button type="button" onClick={() => (lapsed.value = null)}>
             Close
@@ -201,7 +207,10 @@ export function App() {
         <header>
           <h1>Motorlink</h1>
           <StopAll />
-          <Status />
+          <div class="line">
+            <Status />
+            <Report />
+          </div>
         </header>
         <Navigation />
       </div>

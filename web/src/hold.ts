@@ -1,5 +1,5 @@
 // Hold-to-run: motion only while a finger or a key is down on a button.
-import { held, sayAlive } from './link';
+import { held, release as sayReleased, sayAlive } from './link';
 
 /** The keys that hold. Space stops all motors. */
 const KEYS = new Set(['h', 'H', 'Enter']);
@@ -21,8 +21,7 @@ export function holdToRun(button: HTMLElement, began: () => void, ended: () => v
     isDown = false;
     key = null;
     // Another button may be held. Both end: a release never leaves anything moving.
-    held.value = false;
-    sayAlive();
+    sayReleased();
     ended();
   };
 

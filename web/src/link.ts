@@ -67,6 +67,7 @@ const SILENT = 500;
 const DEAD = 5000;
 /** Clocks of lines drift, and what was refused may be possible later. */
 const LATER = 10_000;
+const RELEASE = 1000;
 const MOST_EVENTS = 2000;
 
 let socket: WebSocket | null = null;
@@ -84,6 +85,7 @@ let frame = 0;
 let quiet = 0;
 let measuredDelay = 0;
 let lookedAt = 0;
+let releasedAt = -Infinity;
 
 /** Sends a request. Rejects with `Refused`. */
 export function ask<A extends Ask>(wanted: A): Promise<AnswerTo<A['ask']>> {
@@ -175,6 +177,13 @@ function say(text: object): boolean {
 export function letGo() {
   held.value = false;
   if (welcome.value?.role === 'operator') ask({ ask: 'let-go' }).catch(() => {});
+}
+
+/** The key or the finger of hold-to-run is up. The server stops what was held at once. */
+export function release() {
+  held.value = false;
+  releasedAt = performance.now();
+  sayAlive();
 }
 
 /** A sign of life. It is true only as long as the browser draws this page. */
@@ -304,7 +313,8 @@ function heard(text: Text | ShareText) {
       break;
     case 'lapsed':
       held.value = false;
-      lapsed.value = text.message;
+      // The end of what was held is no news to the person who let it go.
+      if (performance.now() - releasedAt > RELEASE) lapsed.value = text.message;
       break;
     case 'share': {
       const wasLost = shareLost.value !== null;

@@ -1,6 +1,7 @@
 // Small parts that views share.
-import { useSignal } from '@preact/signals';
+import { useSignal, useSignalEffect } from '@preact/signals';
 import { useCallback, useRef } from 'preact/hooks';
+import { stopReport } from './stop';
 
 export interface Sentence {
   tone: 'ok' | 'bad';
@@ -30,6 +31,10 @@ export function useSaid() {
       busy.value -= 1;
     }
   }, []);
+  // What was said before a stop is not true any more.
+  useSignalEffect(() => {
+    if (stopReport.value?.phase === 'sent') said.value = null;
+  });
   return { said: said.value, attempt, isBusy: busy.value > 0 };
 }
 

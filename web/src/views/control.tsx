@@ -75,7 +75,6 @@ export function Control({ line, motor, description }: Props) {
         {has(acknowledge) && (
           <button
             type="button"
-            class="wide"
             disabled={!mayMove}
             aria-describedby={why}
             onClick={() => act(acknowledge, 'Faults acknowledged.')}
@@ -86,20 +85,33 @@ export function Control({ line, motor, description }: Props) {
       </div>
       <Said said={said} />
       <Faults line={line} motor={motor} description={description} />
-      <fieldset class="modes" disabled={isBusy}>
-        <legend class="hidden">Mode of {nameOf(line, motor)}</legend>
-        {description.modes.map((one) => (
-          <label key={one.mode}>
-            <input
-              type="radio"
-              name={`mode-${line}-${motor}`}
-              checked={one.mode === chosen.value}
-              onChange={() => (chosen.value = one.mode)}
-            />
-            {TITLES[one.mode]}
-          </label>
-        ))}
-      </fieldset>
+      <div class="modes">
+        <fieldset disabled={isBusy}>
+          <legend class="hidden">Mode of {nameOf(line, motor)}</legend>
+          {description.modes.map((one) => (
+            <label key={one.mode}>
+              <input
+                type="radio"
+                name={`mode-${line}-${motor}`}
+                checked={one.mode === chosen.value}
+                onChange={() => (chosen.value = one.mode)}
+              />
+              {TITLES[one.mode]}
+            </label>
+          ))}
+        </fieldset>
+        <label class="switch">
+          <input
+            type="checkbox"
+            role="switch"
+            checked={isHold.value}
+            disabled={!mayMove}
+            aria-describedby={why}
+            onChange={({ currentTarget }) => (isHold.value = currentTarget.checked)}
+          />
+          Hold to run
+        </label>
+      </div>
       {mode && (
         <Reference
           key={mode.mode}
@@ -112,17 +124,6 @@ export function Control({ line, motor, description }: Props) {
           why={why}
         />
       )}
-      <label class="switch">
-        <input
-          type="checkbox"
-          role="switch"
-          checked={isHold.value}
-          disabled={!mayMove}
-          aria-describedby={why}
-          onChange={({ currentTarget }) => (isHold.value = currentTarget.checked)}
-        />
-        Hold to run
-      </label>
       {description.commands.length > 0 && (
         <Commands line={line} motor={motor} commands={description.commands} isHold={isHold.value} mayMove={mayMove} />
       )}
@@ -133,7 +134,7 @@ export function Control({ line, motor, description }: Props) {
 /** The unit of the rate. That of a position is a speed. */
 function rateUnit({ mode, unit }: Controlled, { modes }: Description): string {
   if (mode === 'position') return modes.find((one) => one.mode === 'speed')?.unit ?? `${unit}/s`;
-  return `${unit}/s`;
+  return unit.endsWith('/s') ? `${unit}²` : `${unit}/s`;
 }
 
 interface ReferenceProps {

@@ -1,0 +1,182 @@
+import { signal } from '@preact/signals';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+
+/** What the test does with a request of the page. */
+interface Asked {
+  ask: { ask: string };
+  done: (answer: object) => void;
+  failed: (why: Error) => void;
+}
+
+let asked: Asked[];
+let connected: boolean;
+let posted: { done: (response: Response) => void; failed: (why: Error) => void }[];
+const latchedBy = signal<string | null>(null);
+const held = signal(false);
+const sayAlive = vi.fn();
+
+class Refused extends Error {
+  constructor(
+    readonly reason: string,
+    message: string,
+  ) {
+    super(message);
+  }
+}
+
+let stop: typeof import('./stop');
+
+beforeEach(async () => {
+  vi.useFakeTimers();
+  asked = [];
+  posted = [];
+  connected = true;
+  latchedBy.value = null;
+  held.value = true;
+  vi.doMock('./link', () => ({
+    Refused,
+    held,
+    latchedBy,
+    sayAlive,
+    welcome: {
+      get value() {
+        return connected ? {} : null;
+      },
+    },
+    lastWelcome: signal({ deadline: 300 }),
+    motors: signal(new Map([['st0', [1, 2]], ['rmd0', [1, 2]]])),
+    ask: (ask: { ask: string }) =>
+      connected
+        ? new Promise((done, failed) => asked.push({ ask, done, failed }))
+        : Promise.reject(new Refused('line', 'There is no connection to the server.')),
+  }));
+  vi.stubGlobal('fetch', (url: string, options: RequestInit) => {
+    expect([url, options]).toEqual(['api/stop-all', { method: 'POST', keepalive: true }]);
+    return new Promise((done, failed) => posted.push({ done, failed }));
+  });
+  vi.resetModules();
+  stop = await import('./stop');
+});
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+const pass = (ms: number) => vi.advanceTimersByTimeAsync(ms);
+const ALL = [
+  { line: 'st0', motor: 1 },
+  { line: 'st0', motor: 2 },
+  { line: 'rmd0', motor: 1 },
+  { line: 'rmd0', motor: 2 },
+];
+const report = () => stop.stopReport.value!;
+
+describe('stop all', () => {
+  it('is sent at once, and says when the server has it and when all motors confirmed', async () => {
+    stop.stopAll();
+    expect(asked.map(({ ask }) => ask.ask)).toEqual(['stop-all']);
+    expect(held.value).toBe(false);
+    expect(report().phase).toBe('sent');
+    latchedBy.value = 'page 1';
+    expect(report().message).toContain('The server has the stop');
+    asked[0]!.done({ motors: ALL });
+    await pass(2000);
+    expect(report()).toEqual({ phase: 'stopped', message: 'Stopped: 4 of 4 motors confirmed.' });
+    expect(posted).toHaveLength(0);
+  });
+
+  it('goes by HTTP, too, if there is no answer within 150 ms', async () => {
+    stop.stopAll();
+    await pass(149);
+    expect(posted).toHaveLength(0);
+    await pass(2);
+    expect(posted).toHaveLength(1);
+    posted[0]!.done(Response.json({ motors: ALL }));
+    await pass(0);
+    expect(report().phase).toBe('stopped');
+  });
+
+  it('goes by HTTP at once without a connection', async () => {
+    connected = false;
+    stop.stopAll();
+    await pass(0);
+    expect(posted).toHaveLength(1);
+  });
+
+  it('says which motors may still be turning', async () => {
+    stop.stopAll();
+    asked[0]!.done({ motors: ALL.map((one) => (one.motor === 1 ? one : { ...one, failure: 'no reply' })) });
+    await pass(0);
+    expect(report()).toEqual({
+      phase: 'unconfirmed',
+      message:
+        'st0/2 (no reply), rmd0/2 (no reply) did not confirm: they may still be turning. 2 of 4 motors confirmed.',
+    });
+  });
+
+  it('does not count addresses where no motor was found', async () => {
+    stop.stopAll();
+    asked[0]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered' }] });
+    await pass(0);
+    expect(report().phase).toBe('stopped');
+    expect(report().message).toContain('4 of 4 motors confirmed. 1 address without a known motor did not answer.');
+  });
+
+  it('says that the server is not reachable, whether that fails or hangs', async () => {
+    for (const fails of [true, false]) {
+      connected = !fails;
+      posted = [];
+      stop.stopAll();
+      await pass(200);
+      if (fails) posted[0]!.failed(new TypeError('no network'));
+      await pass(1000);
+      expect(report().phase).toBe('unreachable');
+      expect(report().message).toContain('its own deadline of 300 ms; others turn on');
+    }
+    // An answer after all is better news.
+    asked[0]!.done({ motors: ALL });
+    await pass(0);
+    expect(report().phase).toBe('stopped');
+  });
+
+  it('gives the reason of a server that cannot stop', async () => {
+    stop.stopAll();
+    asked[0]!.failed(new Refused('line', 'the share is lost'));
+    await pass(0);
+    posted[0]!.done(new Response('the share is lost', { status: 503 }));
+    await pass(0);
+    expect(report()).toMatchObject({ phase: 'unconfirmed', message: expect.stringContaining('the share is lost') });
+  });
+
+  it('reports the newest stop only, and forgets it when its latch is released', async () => {
+    stop.stopAll();
+    stop.stopAll();
+    latchedBy.value = 'page 1';
+    asked[1]!.done({ motors: ALL });
+    await pass(0);
+    asked[0]!.done({ motors: [] });
+    await pass(0);
+    expect(report().message).toContain('4 of 4');
+    latchedBy.value = null;
+    expect(stop.stopReport.value).toBeNull();
+  });
+});
+
+describe('the stop of one motor', () => {
+  it('is an error unless the motor confirmed it', async () => {
+    const stopped = stop.stopMotor('st0', 1);
+    asked[0]!.done({ motors: [{ line: 'st0', motor: 1, failure: 'no reply' }] });
+    await expect(stopped).rejects.toThrow('It may still be turning');
+    const again = stop.stopMotor('st0', 1);
+    asked[1]!.done({ motors: [{ line: 'st0', motor: 1 }] });
+    await expect(again).resolves.toContain('confirmed');
+  });
+
+  it('stops all motors without a connection', async () => {
+    connected = false;
+    await expect(stop.stopMotor('st0', 1)).resolves.toContain('Stop all');
+    await pass(0);
+    expect(posted).toHaveLength(1);
+  });
+});
