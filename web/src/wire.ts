@@ -222,9 +222,13 @@ doc: string,
  */
 unit: string, 
 /**
- * The least and the most value, and the step between values.
+ * The least and the most value, and the step between values; a step of 0 is any.
  */
-range: [number, number, number], };
+range: [number, number, number], 
+/**
+ * The names of the values 0, 1 and so on; empty for a number.
+ */
+words: Array<string>, };
 
 export type FromPage = Alive | Request | ShareRequest;
 
@@ -358,6 +362,11 @@ writable: boolean,
  */
 wears_rom: boolean, 
 /**
+ * Whether a write with `to_rom` makes the value permanent, and wears the ROM. Without it the value holds
+ * until the motor loses its supply.
+ */
+can_keep: boolean, 
+/**
  * The least and the most value, and the step between values.
  */
 range: [number, number, number] | null, };
@@ -419,6 +428,10 @@ values: { [key in string]?: number },
  * Hold-to-run: the motor stops as soon as a sign of life says that nothing is held.
  */
 hold: boolean, 
+/**
+ * Whether it is allowed to wear the ROM of the motor.
+ */
+to_rom?: boolean, 
 /**
  * The line.
  */
@@ -562,7 +575,12 @@ bytes: Array<number>,
 /**
  * The time to live in seconds: it is not sent later.
  */
-time_to_live: number, } | { "ask": "confirm", 
+time_to_live: number, 
+/**
+ * Whether it is sent only if nothing has stopped the motor, and no other program has moved it,
+ * since the program's last command to it without this.
+ */
+continues?: boolean, } | { "ask": "confirm", 
 /**
  * The line.
  */

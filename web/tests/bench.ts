@@ -1,6 +1,7 @@
 // Simulated drives and a monitor for each test, as processes that the test can end, freeze and cut off.
 import { test as base, expect, type Page } from '@playwright/test';
 import { type ChildProcess, spawn } from 'node:child_process';
+import { connect, type Socket } from 'node:net';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
@@ -71,8 +72,10 @@ export class Bench {
   readonly folder = mkdtempSync(join(tmpdir(), 'motorlink-'));
   drives!: Program;
   monitor!: Program;
+  ready!: Record<string, unknown>;
   url!: string;
   viewerUrl!: string;
+  private others: Socket[] = [];
 
   async plug() {
     this.drives = new Program(
@@ -94,9 +97,28 @@ export class Bench {
       ['monitor', ...ports, '--timeout', '1s', '--listen', '127.0.0.1:0', '--json'],
       this.folder,
     );
-    const ready = await this.monitor.line((line) => line['event'] === 'ready');
-    this.url = String(ready['url']);
-    this.viewerUrl = String(ready['viewer_url']);
+    this.ready = await this.monitor.line((line) => line['event'] === 'ready');
+    this.url = String(this.ready['url']);
+    this.viewerUrl = String(this.ready['viewer_url']);
+  }
+
+  /** Turns the first ST motor from another program at the share, which stays until the end of the test. */
+  async start() {
+    const socket = connect(String(this.ready['at']).replace('unix:', ''));
+    this.others.push(socket);
+    const command = (id: number, ...bytes: number[]) => ({ id, ask: 'command', line: 'st0', motor: 1, bytes, time_to_live: 1 });
+    const requests = [
+      { id: 1, ask: 'hello', protocol: 1, name: 'other' },
+      command(2, 7, 232, 3, 0, 0, 244, 1), // SET_RAMP: to 1000 rpm in 500 ms
+      command(3, 3, 1), // EXECUTE_CMD START_MOTOR
+    ];
+    for (const request of requests) {
+      const text = Buffer.from(JSON.stringify(request));
+      const header = Buffer.alloc(8);
+      header.writeUInt32LE(text.length);
+      header[4] = 1;
+      socket.write(Buffer.concat([header, text]));
+    }
   }
 
   /** What a motor does, from outside of its protocol. */
@@ -115,6 +137,7 @@ export class Bench {
   }
 
   async end() {
+    this.others.forEach((socket) => socket.destroy());
     const code = await this.monitor.end();
     await this.drives.end();
     rmSync(this.folder, { recursive: true, force: true });
@@ -138,5 +161,23 @@ export const test = base.extend<{ bench: Bench; live: Page }>({
     await use(page);
   },
 });
+
+/** The card of a motor. */
+export const card = (page: Page, name: string) => page.getByRole('article', { name: `Motor ${name}` });
+
+/** Turns the first ST motor from a page, and waits until the server says that it begins. */
+export async function spin(page: Page, rpm: number) {
+  const motor = card(page, 'st0/1');
+  await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(rpm));
+  await motor.getByRole('spinbutton', { name: 'Ramp' }).fill('2000');
+  await motor.getByRole('button', { name: 'Run to target' }).click();
+  await expect(motor.getByText(/Running from/)).toBeVisible();
+}
+
+/** Opens a view by its name in the navigation. */
+export async function open(page: Page, view: string) {
+  await page.getByRole('navigation').getByRole('link', { name: view, exact: true }).click();
+  await expect(page.getByRole('heading', { name: view, level: 2 })).toBeVisible();
+}
 
 export { expect };

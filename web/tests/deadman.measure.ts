@@ -26,7 +26,7 @@ interface Case {
   /** Whether `motorlink guard` is between the server and the drive. */
   guarded?: boolean;
   /** Prepares the event. What it returns makes it happen. */
-  event: (world: World) => Promise<() => void | Promise<unknown>>;
+  event: (world: World) => Promise<() => unknown>;
   /** From when on the time is measured, if not from the event. */
   from?: (world: World) => Promise<number>;
 }

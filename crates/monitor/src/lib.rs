@@ -1,12 +1,14 @@
 //! The monitor: drives in a browser. A web server between pages and a share.
 //!
 //! - [`message`] has the texts between a page and the server, besides those of the share.
+//! - [`drive`] carries out what pages ask of drives.
 //! - [`program`] is a program at a share, without blocking.
 //! - [`alive`] is the dead-man of a page.
 //! - [`server`] serves the page, and connects pages to the share.
 #![forbid(unsafe_code)]
 
 pub mod alive;
+pub mod drive;
 pub mod message;
 mod page;
 pub mod program;

@@ -99,6 +99,9 @@ pub enum Ask {
         values: BTreeMap<String, f64>,
         /// Hold-to-run: the motor stops as soon as a sign of life says that nothing is held.
         hold: bool,
+        /// Whether it is allowed to wear the ROM of the motor.
+        #[serde(default, skip_serializing_if = "is_false")]
+        to_rom: bool,
     },
     /// Moves the reference of a motor from the measured value to a target, at a rate.
     Run {
@@ -148,6 +151,10 @@ pub enum Ask {
         /// Whether it is allowed to wear the ROM of the motor.
         to_rom: bool,
     },
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// What is controlled.
@@ -255,7 +262,7 @@ pub enum Answer {
         motors: Vec<u8>,
     },
     /// To describe.
-    Describe(Description),
+    Describe(Box<Description>),
     /// To read.
     Read {
         /// In the order of the names.
@@ -359,6 +366,9 @@ pub struct Register {
     pub writable: bool,
     /// Whether a write wears the ROM of the motor.
     pub wears_rom: bool,
+    /// Whether a write with `to_rom` makes the value permanent, and wears the ROM. Without it the value holds
+    /// until the motor loses its supply.
+    pub can_keep: bool,
     /// The least and the most value, and the step between values.
     pub range: Option<[f64; 3]>,
 }
@@ -389,8 +399,10 @@ pub struct Field {
     pub doc: String,
     /// The symbol of the unit; empty without one.
     pub unit: String,
-    /// The least and the most value, and the step between values.
+    /// The least and the most value, and the step between values; a step of 0 is any.
     pub range: [f64; 3],
+    /// The names of the values 0, 1 and so on; empty for a number.
+    pub words: Vec<String>,
 }
 
 /// What can be controlled of a motor.

@@ -13,7 +13,7 @@ use tokio::task::JoinSet;
 use crate::alive::{DeadMan, Lapse, Ticket};
 use crate::message::{Answer, Ask, FromPage, Request, Role, Text};
 use crate::program::{Listener, OWN_IDS, Program, Refusal};
-use crate::server::drives::Motion;
+use crate::drive::Motion;
 use crate::server::link::{Link, lost, stop_all};
 
 /// Requests of a page about drives that are under way.
@@ -165,7 +165,10 @@ impl Page {
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
             | Ask::Rates => {}
-            Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
+            Ask::Stop { motor } => {
+                self.control().man.stop(motor.as_ref());
+                self.link.stopping(motor.as_ref());
+            }
             Ask::Latch | Ask::Release => self.check_operator()?,
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
                 let message = "a page may not send this request".to_owned();
@@ -184,6 +187,7 @@ impl Page {
             }
             Ask::StopAll => {
                 self.control().man.stop(None);
+                self.link.stopping(None);
                 let view = self.view();
                 tasks.spawn(async move {
                     let stopped = match view {

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
-use tokio::sync::{Mutex as AsyncMutex, oneshot};
+use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, oneshot};
 
 /// Ids of requests of this side begin here. Those below belong to whoever passes requests on.
 pub const OWN_IDS: u32 = 1 << 31;
@@ -43,7 +43,11 @@ struct Shared {
     /// The same socket. It can be closed while somebody writes.
     socket: OwnedFd,
     pending: Mutex<Pending>,
+    lanes: Mutex<BTreeMap<Lane, Arc<AsyncMutex<()>>>>,
 }
+
+/// A line, and the motor if replies say which motor they are from.
+pub(crate) type Lane = (String, Option<u8>);
 
 #[derive(Default)]
 struct Pending {
@@ -79,6 +83,7 @@ impl Program {
             writer: AsyncMutex::new(writer),
             socket,
             pending: Mutex::new(Pending { last: OWN_IDS, ..Pending::default() }),
+            lanes: Mutex::default(),
         });
         let program = Program { shared: Arc::clone(&shared) };
         let mut listener = Listener { reader, frames: Reader::default(), shared };
@@ -128,6 +133,21 @@ impl Program {
     /// Whether both ask through the same connection.
     pub fn is(&self, other: &Program) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared)
+    }
+
+    /// Waits until no other exchanges of this lane wait for their confirmation. A confirmation is for all
+    /// answers of a program: those of two sequences must not mix.
+    pub(crate) async fn lane(&self, lane: Lane) -> OwnedMutexGuard<()> {
+        let lock = {
+            let mut lanes = self.shared.lanes.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(lanes.entry(lane).or_default())
+        };
+        lock.lock_owned().await
+    }
+
+    /// Whether the share or the [`Listener`] has ended.
+    pub fn has_ended(&self) -> bool {
+        self.shared.pending().has_ended
     }
 
     /// Sends a request with an id below [`OWN_IDS`]. The [`Listener`] gives its end.

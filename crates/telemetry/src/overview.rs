@@ -21,6 +21,8 @@ pub struct Overview {
     pub temperature: Source,
     /// The supply.
     pub voltage: Source,
+    /// The angle over all turns of an RMD motor.
+    pub angle: Option<Source>,
 }
 
 impl Overview {
@@ -35,6 +37,7 @@ impl Overview {
                 current: register(RegisterId::TORQUE_MEAS),
                 temperature: register(RegisterId::HEATS_TEMP),
                 voltage: register(RegisterId::BUS_VOLTAGE),
+                angle: None,
             },
             Motor::Rmd(_) => Overview {
                 state: None,
@@ -43,6 +46,7 @@ impl Overview {
                 current: quantity("iq_amps"),
                 temperature: quantity("temperature_celsius"),
                 voltage: quantity("voltage_volts"),
+                angle: Some(quantity("multi_turn_angle_degrees")),
             },
         }
     }

@@ -125,7 +125,7 @@ impl Program {
 
     fn command(&mut self, line: &str, motor: u8, bytes: &[u8]) -> Result<Answer, (Reason, String)> {
         let (line, bytes, time_to_live) = (line.to_owned(), bytes.to_vec(), 1.0);
-        self.ask(Ask::Command { line, motor, bytes, time_to_live })
+        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false })
     }
 
     fn turn(&mut self, motor: u8, dps: i32) {
@@ -393,7 +393,13 @@ fn refused_starts_take_a_motor_from_nobody() {
         operator.ask(Ask::Latch).unwrap();
         let start = |program: &mut Program| {
             let (line, bytes) = ("rmd0".to_owned(), vec![0xA2, 0, 0, 0, 1, 1, 0, 0]);
-            program.send(Ask::Command { line, motor: 1, bytes, time_to_live: 1.0 })
+            program.send(Ask::Command {
+                line,
+                motor: 1,
+                bytes,
+                time_to_live: 1.0,
+                continues: false,
+            })
         };
         let sent = [start(&mut one), start(&mut other)];
         for (program, sent) in [&mut one, &mut other].into_iter().zip(sent) {
@@ -457,7 +463,8 @@ fn requests_that_are_not_possible_are_refused_with_words() {
     let (reason, message) = program.command("st0", 1, &[2, 0xEE]).unwrap_err();
     assert_eq!(reason, Reason::Refused, "{message}");
     let (line, bytes, time_to_live) = ("st0".to_owned(), vec![3, 2], f64::NAN);
-    let refused = program.ask(Ask::Command { line, motor: 1, bytes, time_to_live });
+    let refused =
+        program.ask(Ask::Command { line, motor: 1, bytes, time_to_live, continues: false });
     assert_eq!(refused.unwrap_err().0, Reason::Usage);
     let ask = Ask::Unsubscribe { subscription: 4 };
     assert_eq!(program.ask(ask).unwrap_err().0, Reason::Usage);
@@ -588,6 +595,7 @@ fn a_share_that_was_frozen_executes_stops_and_no_old_motion() {
         motor: 2,
         bytes: bytes.to_vec(),
         time_to_live,
+        continues: false,
     };
     let old = program.send(command(&turn, 0.3));
     let release = program.send(Ask::Release);
@@ -621,7 +629,7 @@ fn a_stop_is_read_however_many_requests_are_under_way() {
         // No motor has this ID.
         let (line, motor, time_to_live) = ("rmd0".to_owned(), 20, 60.0);
         let bytes = vec![0x9A, 0, 0, 0, 0, 0, 0, 0];
-        program.send(Ask::Command { line, motor, bytes, time_to_live });
+        program.send(Ask::Command { line, motor, bytes, time_to_live, continues: false });
     }
     let stop = program.send(Ask::Stop { motor: Some(rmd(1)) });
     program.answer(stop);
@@ -656,4 +664,42 @@ fn the_answer_to_a_stop_of_all_does_not_wait_for_a_motor_that_never_answered() {
         assert!(why.contains("never answered"), "{why}");
     }
     share.reaches("rmd1.speed_dps", |dps| dps < 5.0);
+}
+
+#[test]
+fn a_command_that_continues_is_not_sent_after_a_stop_or_a_motion_of_another_program() {
+    let share = Share::new("continues");
+    let (mut program, mut other) = (share.join("program"), share.join("other"));
+    let speed = |motor: u8, continues| Ask::Command {
+        line: "rmd0".to_owned(),
+        motor,
+        bytes: vec![0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0],
+        time_to_live: 1.0,
+        continues,
+    };
+    let is_overtaken =
+        |result: Result<Answer, (Reason, String)>| matches!(result, Err((Reason::Overtaken, _)));
+    assert!(is_overtaken(program.ask(speed(1, true))), "it continues nothing");
+    for interrupt in 0..5 {
+        program.ask(speed(1, false)).unwrap();
+        program.ask(speed(1, true)).unwrap();
+        // Reads and other motors change nothing.
+        other.command("rmd0", 1, &[0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        other.turn(2, 90);
+        program.ask(speed(1, true)).unwrap();
+        match interrupt {
+            0 => drop(other.ask(Ask::Stop { motor: Some(rmd(1)) }).unwrap()),
+            1 => drop(other.ask(Ask::Stop { motor: None }).unwrap()),
+            2 => drop(other.command("rmd0", 1, &[0x81, 0, 0, 0, 0, 0, 0, 0]).unwrap()),
+            3 => other.turn(1, 90),
+            _ => {
+                other.ask(Ask::Latch).unwrap();
+                other.ask(Ask::Release).unwrap();
+            }
+        }
+        assert!(is_overtaken(program.ask(speed(1, true))), "interrupt {interrupt}");
+    }
+    // A read begins a sequence, too.
+    program.command("rmd0", 1, &[0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    program.ask(speed(1, true)).unwrap();
 }

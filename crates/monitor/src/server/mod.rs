@@ -3,7 +3,6 @@
 //! [`Server::start`] serves in threads of its own, until it is dropped.
 
 mod door;
-pub mod drives;
 pub mod link;
 mod routes;
 mod site;

@@ -106,7 +106,7 @@ payload! {
 pub struct Errors(pub u8);
 
 macro_rules! error_bits {
-    ($( $bit:literal $name:ident $text:literal; )+) => {
+    ($( $bit:literal $name:ident $text:literal $advice:literal; )+) => {
         impl Errors {
             $( #[doc = concat!("Bit ", $bit, ": ", $text, ".")]
             pub const $name: Self = Errors(1 << $bit); )+
@@ -115,14 +115,24 @@ macro_rules! error_bits {
             pub const NAMES: &'static [(Errors, &'static str, &'static str)] =
                 &[$( (Errors::$name, stringify!($name), $text), )+];
 
+            /// What to do about a named bit, in short sentences; `None` for other bits.
+            pub const fn advice(self) -> Option<&'static str> {
+                match self {
+                    $( Errors::$name => Some($advice), )+
+                    _ => None,
+                }
+            }
+
             const BITS: &[(u8, &str)] = &[$( (1 << $bit, stringify!($name)), )+];
             const VALID: u8 = $( 1 << $bit )|+;
         }
     };
 }
 error_bits! {
-    0 LOW_VOLTAGE "low voltage protection";
-    3 OVER_TEMPERATURE "over temperature protection";
+    0 LOW_VOLTAGE "low voltage protection"
+        "Check the supply voltage, its current limit and the cables. Then clear the error.";
+    3 OVER_TEMPERATURE "over temperature protection"
+        "Let the motor cool down. Reduce the load, or improve the cooling. Then clear the error.";
 }
 
 impl Errors {

@@ -227,26 +227,45 @@ named_numbers! {
 pub struct Flags(pub u32);
 
 macro_rules! faults {
-    ($( $bit:literal $name:ident $text:literal $doc:literal; )+) => {
+    ($( $bit:literal $name:ident $text:literal $doc:literal $advice:literal; )+) => {
         impl Flags {
             $( #[doc = $doc] pub const $name: u16 = $bit; )+
 
             /// Every named fault: bit, name, meaning.
             pub const NAMES: &'static [(u16, &'static str, &'static str)] =
                 &[$( ($bit, $text, $doc), )+];
+
+            /// What to do about a named fault, in short sentences; `None` for another bit.
+            pub const fn advice(bit: u16) -> Option<&'static str> {
+                match bit {
+                    $( $bit => Some($advice), )+
+                    _ => None,
+                }
+            }
         }
     };
 }
 
 faults! {
-    0x01 FOC_DURATION "FOC_DURATION" "the control loop took longer than its period";
-    0x02 OVER_VOLT "OVER_VOLT" "bus voltage too high";
-    0x04 UNDER_VOLT "UNDER_VOLT" "bus voltage too low";
-    0x08 OVER_TEMP "OVER_TEMP" "heatsink too hot";
-    0x10 START_UP "START_UP" "the motor did not start";
-    0x20 SPEED_FDBK "SPEED_FDBK" "speed feedback lost";
-    0x40 BREAK_IN "BREAK_IN" "over-current";
-    0x80 SW_ERROR "SW_ERROR" "software error";
+    0x01 FOC_DURATION "FOC_DURATION" "the control loop took longer than its period"
+        "Acknowledge the fault. If it occurs again, lower the PWM frequency or the FOC repetition rate of the firmware.";
+    0x02 OVER_VOLT "OVER_VOLT" "bus voltage too high"
+        "Check the supply voltage. Brake more slowly, or add a brake resistor. Then acknowledge the fault.";
+    0x04 UNDER_VOLT "UNDER_VOLT" "bus voltage too low"
+        "Switch the supply on. Check its voltage, its current limit and the cables. Then acknowledge the fault.";
+    0x08 OVER_TEMP "OVER_TEMP" "heatsink too hot"
+        "Let the power stage cool down. Reduce the load, or improve the cooling. Then acknowledge the fault.";
+    0x10 START_UP "START_UP" "the motor did not start"
+        "Check that the rotor turns freely and that all three phases are connected. Check the rev-up currents. \
+        Then acknowledge the fault and start again.";
+    0x20 SPEED_FDBK "SPEED_FDBK" "speed feedback lost"
+        "Check the load, and the cable of the speed sensor. Without a sensor, check the gains of the observer. \
+        Then acknowledge the fault.";
+    0x40 BREAK_IN "BREAK_IN" "over-current"
+        "Check the phases for a short circuit. Reduce the load, the acceleration or the current gains. \
+        Then acknowledge the fault.";
+    0x80 SW_ERROR "SW_ERROR" "software error"
+        "Switch the drive off and on. If the fault occurs again, check the firmware.";
 }
 
 impl Flags {

@@ -293,7 +293,7 @@ impl Poll {
 }
 
 /// Whether a motor may turn after this request. That of an unnamed code is unknown.
-pub(crate) fn may_move(request: &Request) -> bool {
+pub fn may_move(request: &Request) -> bool {
     match request {
         Request::St(_, request) => {
             let request = request.request();

@@ -80,6 +80,10 @@ pub enum Ask {
         bytes: Vec<u8>,
         /// The time to live in seconds: it is not sent later.
         time_to_live: f64,
+        /// Whether it is sent only if nothing has stopped the motor, and no other program has moved it,
+        /// since the program's last command to it without this.
+        #[serde(default, skip_serializing_if = "is_false")]
+        continues: bool,
     },
     /// Asks whether the answers to this program's commands since the last confirmation belong to
     /// them. Replies can come twice or late on a bad line.

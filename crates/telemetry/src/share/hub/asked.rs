@@ -13,7 +13,7 @@ use super::session::Session;
 use super::{Hub, Sent, Work, reason};
 use crate::acquisition::Acquisition;
 use crate::event::CommandError;
-use crate::line::Request;
+use crate::line::{Request, may_move};
 
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
@@ -145,10 +145,11 @@ impl Hub {
                 feed.end(&self.lines);
                 Ok(Some(Answer::Unsubscribe))
             }
-            Ask::Command { line, motor, bytes, time_to_live } => {
+            Ask::Command { line, motor, bytes, time_to_live, continues } => {
                 let time_to_live = span("the time to live", time_to_live, 0.0)?;
                 let left = time_to_live.0.checked_sub(waited.0).map(Micros);
-                self.command(session, name, id, &MotorName { line, motor }, &bytes, left)?;
+                let motor = MotorName { line, motor };
+                self.command(session, name, id, &motor, (&bytes, continues), left)?;
                 Ok(None)
             }
             Ask::Confirm { line, motor } => {
@@ -158,7 +159,8 @@ impl Hub {
             Ask::Stop { motor } => self.stop_asked(session, name, id, motor.as_ref()),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
-                for held in &self.lines {
+                for held in &mut self.lines {
+                    held.sequences.clear();
                     held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
                 Ok(Some(Answer::Latch))
@@ -242,7 +244,7 @@ impl Hub {
         name: &Arc<str>,
         id: u32,
         motor: &MotorName,
-        bytes: &[u8],
+        (bytes, continues): (&[u8], bool),
         time_to_live: Option<Micros>,
     ) -> Result<(), Refused> {
         let line = self.line(&motor.line)?;
@@ -264,6 +266,10 @@ impl Hub {
         };
         let tell = self.teller(session, Some(id), line);
         let held = &mut self.lines[line];
+        if let Some(motor) = motor {
+            held.follow((motor, session), motion, may_move(&request), continues)
+                .map_err(|why| (Reason::Overtaken, why))?;
+        }
         held.known.extend(motor);
         if let (Some(motor), Motion::Starts) = (motor, motion) {
             held.starting.push((motor, session));

@@ -41,6 +41,8 @@ pub struct Held {
     pub(super) owners: BTreeMap<Motor, SessionId>,
     /// Starts that the engine has not finished, and who sent them.
     pub(super) starting: Vec<(Motor, SessionId)>,
+    /// Programs whose commands to a motor nothing has interrupted: no stop, and no motion of another program.
+    pub(super) sequences: BTreeSet<(Motor, SessionId)>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
     /// The motors that have answered.
@@ -89,6 +91,7 @@ impl Held {
             words: Words::default(),
             owners: BTreeMap::new(),
             starting: Vec::new(),
+            sequences: BTreeSet::new(),
             known: BTreeSet::new(),
             heard: BTreeSet::new(),
             unstopped: BTreeMap::new(),
@@ -101,6 +104,37 @@ impl Held {
         self.heard.insert(motor);
         self.owners.remove(&motor);
         self.unstopped.remove(&motor);
+    }
+
+    /// Records a command of a program to a motor.
+    ///
+    /// # Errors
+    /// It continues commands that were interrupted.
+    pub(super) fn follow(
+        &mut self,
+        own: (Motor, SessionId),
+        motion: Motion,
+        moves: bool,
+        continues: bool,
+    ) -> Result<(), String> {
+        if continues && !self.sequences.contains(&own) {
+            let (name, motor) = (&self.name, own.0.number());
+            return Err(format!("{name}: motor {motor} was stopped, or another program moved it"));
+        }
+        if motion == Motion::Stops {
+            self.interrupt(own.0);
+            return Ok(());
+        }
+        if moves {
+            self.sequences.retain(|one| one.0 != own.0);
+        }
+        self.sequences.insert(own);
+        Ok(())
+    }
+
+    /// A stop was asked for: no command continues an earlier one.
+    pub(super) fn interrupt(&mut self, motor: Motor) {
+        self.sequences.retain(|(other, _)| *other != motor);
     }
 
     /// Whether a program turned a motor, or tried to.

@@ -124,6 +124,9 @@ impl Hub {
     /// A program has gone. The motors that it turned last are stopped.
     pub fn leave(&mut self, id: SessionId) {
         let Some(session) = self.sessions.remove(&id) else { return };
+        for held in &mut self.lines {
+            held.sequences.retain(|(_, program)| *program != id);
+        }
         for (_, feed) in session.feeds {
             feed.end(&self.lines);
         }
@@ -430,8 +433,9 @@ impl Hub {
         part: Option<Part>,
         by: &Arc<str>,
     ) {
-        let Some(held) = self.lines.get(line) else { return };
         let tell = self.teller(session, None, line);
+        let Some(held) = self.lines.get_mut(line) else { return };
+        held.interrupt(motor);
         let asker = Arc::clone(by);
         let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
             tell(Work::Stop { part, motor, by: asker, result });

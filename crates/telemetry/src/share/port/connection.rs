@@ -107,7 +107,7 @@ impl Connection {
     pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
         let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
         let line = self.port.line.clone();
-        self.ask(Ask::Command { line, motor, bytes, time_to_live })
+        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false })
     }
 
     /// Sends a request; gives its id.

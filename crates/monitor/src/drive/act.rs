@@ -1,0 +1,155 @@
+//! Commands of pages.
+
+use std::collections::BTreeMap;
+
+use motorlink_proto::rmd::Code;
+use motorlink_proto::st::{Command as StCommand, Effect, Request as StRequest, Starting};
+use motorlink_telemetry::line::{Request, may_move};
+use motorlink_telemetry::share::message::Reason;
+
+use super::commands::Command;
+use super::control::{Control, Motion};
+use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
+use super::target::{Target, refusal, usage};
+use crate::message::Value;
+use crate::program::{Program, Refusal};
+
+/// A command of a page.
+pub(super) struct Act {
+    pub(super) target: Target,
+    pub(super) command: Command,
+    pub(super) values: BTreeMap<String, f64>,
+    pub(super) hold: bool,
+    pub(super) to_rom: bool,
+}
+
+impl Act {
+    /// Sends it; gives the values of the reply.
+    pub(super) async fn carry_out(
+        self,
+        control: &Control,
+        view: &Program,
+        drive: &impl Motion,
+    ) -> Result<Vec<Value>, Refusal> {
+        let request = self.command.request(&self.target, &self.values)?;
+        if self.command.wears_rom() && !self.to_rom {
+            return Err(usage("this command wears the ROM of the motor; nothing was sent"));
+        }
+        if may_move(&request) {
+            return self.move_motor(control, drive, &request).await;
+        }
+        let exchanges = Exchanges::new(view, &self.target);
+        if ends_motion(&request) {
+            control.stopping(Some(&self.target.name));
+            let reply = exchanges.request(&request).await?;
+            return self.values(&exchanges, &reply);
+        }
+        control.limited(&self.target, |limited| limited.check(&request))?;
+        let _lane = exchanges.lane().await;
+        let mut attempt = 1;
+        loop {
+            let reply = exchanges.request(&request).await?;
+            let values = self.values(&exchanges, &reply)?;
+            match exchanges.confirm().await {
+                Ok(()) => return Ok(values),
+                Err(why) if !is_worth_repeating(&why) => return Err(why),
+                Err(_) if request.is_read() && attempt < ATTEMPTS => attempt += 1,
+                Err(_) => return Err(unconfirmed(&exchanges)),
+            }
+        }
+    }
+
+    async fn move_motor(
+        &self,
+        control: &Control,
+        drive: &impl Motion,
+        request: &Request,
+    ) -> Result<Vec<Value>, Refusal> {
+        let stops = control.stops(&self.target);
+        let _turn = control.turn(&self.target).await;
+        control.limited(&self.target, |limited| limited.check(request))?;
+        let program = drive.program(self.hold).await?;
+        stops.check()?;
+        let exchanges = Exchanges::new(&program, &self.target).motion();
+        let _lane = exchanges.lane().await;
+        let reply = send(control, &exchanges, request).await?;
+        let values = self.values(&exchanges, &reply)?;
+        if is_start(request) {
+            started(&exchanges).await?;
+        } else {
+            exchanges.confirm().await.map_err(|why| match is_worth_repeating(&why) {
+                true => unconfirmed(&exchanges),
+                false => why,
+            })?;
+        }
+        Ok(values)
+    }
+
+    fn values(&self, exchanges: &Exchanges<'_>, reply: &[u8]) -> Result<Vec<Value>, Refusal> {
+        self.command.values(reply).ok_or_else(|| exchanges.unfit())
+    }
+}
+
+/// Sends a request that may move the motor, if the limits permit it.
+pub(super) async fn send(
+    control: &Control,
+    exchanges: &Exchanges<'_>,
+    request: &Request,
+) -> Result<Vec<u8>, Refusal> {
+    control.limited(exchanges.target, |limited| {
+        let effect = limited.check(request)?;
+        limited.sent(request, effect);
+        Ok::<(), Refusal>(())
+    })?;
+    let reply = exchanges.request(request).await;
+    control.limited(exchanges.target, |limited| limited.ended(reply.is_ok()));
+    reply
+}
+
+/// Checks that a START_MOTOR had an effect: a drive acknowledges it in any case.
+pub(super) async fn started(exchanges: &Exchanges<'_>) -> Result<(), Refusal> {
+    let mut starting = Starting::default();
+    let _ = starting.replied(0);
+    let reads = Exchanges::new(exchanges.program, exchanges.target);
+    let Some((motor, profile)) = reads.of_st() else { return Ok(()) };
+    loop {
+        let StRequest::GetRegister(register) = starting.request() else { return Ok(()) };
+        let reply = reads.st(motor.number(), &starting.request()).await?;
+        let bits = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
+        let Some(result) = starting.replied(bits) else { continue };
+        reads.confirm().await.map_err(|why| match is_worth_repeating(&why) {
+            true => unconfirmed(&reads),
+            false => why,
+        })?;
+        return match result {
+            Ok(_) => Ok(()),
+            Err(why) => {
+                let message = format!("{}: the motor did not start: {why}", reads.place());
+                Err(refusal(Reason::Refused, message))
+            }
+        };
+    }
+}
+
+fn ends_motion(request: &Request) -> bool {
+    match request {
+        Request::St(_, request) => Effect::of(&request.request()) == Effect::Stops,
+        Request::Rmd(_, [code, ..]) => Code::from(*code).ends_motion(),
+        _ => false,
+    }
+}
+
+fn is_start(request: &Request) -> bool {
+    matches!(request, Request::St(_, request)
+        if request.request() == StRequest::ExecuteCommand(StCommand::StartMotor))
+}
+
+/// What was sent may have been carried out.
+pub(super) fn unconfirmed(exchanges: &Exchanges<'_>) -> Refusal {
+    let place = exchanges.place();
+    let message = format!(
+        "{place}: the command was sent, and its reply may be one to another request: the line failed, or a \
+         reply came twice or late; check the motor"
+    );
+    refusal(Reason::Unconfirmed, message)
+}

@@ -1,0 +1,119 @@
+//! Exchanges with a motor through a share.
+
+use motorlink_proto::rmd::MotorId;
+use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, Request};
+use motorlink_telemetry::line::Request as LineRequest;
+use motorlink_telemetry::share::message::{Answer, Ask, Reason};
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::signal::Motor;
+use tokio::sync::OwnedMutexGuard;
+
+use super::target::{Target, refusal, usage};
+use crate::program::{Program, Refusal};
+
+/// How long a request that moves nothing may wait until it is sent, in seconds.
+const TIME_TO_LIVE: f64 = 2.0;
+/// The same for a command that may move a motor.
+const MOTION_TIME_TO_LIVE: f64 = 0.3;
+
+/// What may be sent again if its reply cannot be confirmed is sent this often.
+pub(super) const ATTEMPTS: u8 = motorlink_proto::st::VERIFY_ATTEMPTS;
+
+/// Exchanges of one session with a motor.
+#[derive(Clone, Copy)]
+pub(super) struct Exchanges<'a> {
+    pub(super) program: &'a Program,
+    pub(super) target: &'a Target,
+    time_to_live: f64,
+}
+
+impl<'a> Exchanges<'a> {
+    /// Exchanges that move nothing.
+    pub(super) fn new(program: &'a Program, target: &'a Target) -> Self {
+        Exchanges { program, target, time_to_live: TIME_TO_LIVE }
+    }
+
+    /// Commands that may move the motor.
+    pub(super) fn motion(self) -> Self {
+        Exchanges { time_to_live: MOTION_TIME_TO_LIVE, ..self }
+    }
+
+    /// Waits until no other request of the session waits for its confirmation.
+    pub(super) async fn lane(&self) -> OwnedMutexGuard<()> {
+        let motor = match self.target.speaks {
+            Speaks::St(_) => None,
+            Speaks::Rmd => Some(self.target.name.motor),
+        };
+        self.program.lane((self.target.name.line.clone(), motor)).await
+    }
+
+    /// Sends a request; gives the payload of the acknowledge of an ST drive, or the eight bytes of an RMD
+    /// motor.
+    pub(super) async fn request(&self, request: &LineRequest) -> Result<Vec<u8>, Refusal> {
+        match request {
+            LineRequest::St(motor, request) => self.st(*motor, &request.request()).await,
+            LineRequest::Rmd(_, data) => self.rmd(*data).await.map(Vec::from),
+            _ => Err(usage("pages send no such request")),
+        }
+    }
+
+    /// Sends a message to a motor of an ST drive; gives the payload of the acknowledge.
+    pub(super) async fn st(&self, motor: u8, request: &Request<'_>) -> Result<Vec<u8>, Refusal> {
+        let mut payload = [0; MAX_PAYLOAD];
+        let payload = request.payload(&mut payload).ok_or_else(|| self.unfit())?;
+        let bytes = [&[request.code().number()], payload].concat();
+        self.send(motor, bytes).await
+    }
+
+    /// Sends eight bytes to an RMD motor; gives the eight bytes of the reply.
+    pub(super) async fn rmd(&self, data: [u8; 8]) -> Result<[u8; 8], Refusal> {
+        let reply = self.send(self.target.name.motor, data.to_vec()).await?;
+        reply.try_into().map_err(|_| self.unfit())
+    }
+
+    async fn send(&self, motor: u8, bytes: Vec<u8>) -> Result<Vec<u8>, Refusal> {
+        let (line, time_to_live) = (self.target.name.line.clone(), self.time_to_live);
+        let ask = Ask::Command { line, motor, bytes, time_to_live, continues: false };
+        match self.program.ask(ask).await? {
+            Answer::Command { bytes } => Ok(bytes),
+            _ => Err(self.unfit()),
+        }
+    }
+
+    /// Checks that the answers so far belong to their requests.
+    pub(super) async fn confirm(&self) -> Result<(), Refusal> {
+        let (line, motor) = (self.target.name.line.clone(), self.target.name.motor);
+        self.program.ask(Ask::Confirm { line, motor }).await.map(drop)
+    }
+
+    /// The motor of an ST drive, and the profile.
+    pub(super) fn of_st(&self) -> Option<(MotorNumber, Profile)> {
+        match (self.target.motor, self.target.speaks) {
+            (Motor::St(motor), Speaks::St(profile)) => Some((motor, profile)),
+            _ => None,
+        }
+    }
+
+    /// The ID of an RMD motor.
+    pub(super) fn of_rmd(&self) -> Option<MotorId> {
+        match self.target.motor {
+            Motor::Rmd(id) => Some(id),
+            Motor::St(_) => None,
+        }
+    }
+
+    /// The reply is none of those of the request.
+    pub(super) fn unfit(&self) -> Refusal {
+        refusal(Reason::Line, format!("{}: the reply does not fit the request", self.place()))
+    }
+
+    /// The motor, for messages.
+    pub(super) fn place(&self) -> String {
+        format!("{}, motor {}", self.target.name.line, self.target.name.motor)
+    }
+}
+
+/// Whether asking again may help: the line failed, or answers were not confirmed.
+pub(super) fn is_worth_repeating(refusal: &Refusal) -> bool {
+    refusal.reason == Reason::Unconfirmed
+}

@@ -1,0 +1,108 @@
+//! What pages ask of drives: registers, commands, motion, limits and settings.
+//!
+//! - `exchange` sends a request to a motor and gives its reply.
+//! - `describe` says what the drives of a line have. `commands` and `registers` are its parts that are also
+//!   used to carry out requests.
+//! - `limits` has what all pages may ask of a motor at most.
+
+mod act;
+mod commands;
+mod control;
+mod describe;
+mod exchange;
+mod limits;
+mod registers;
+mod search;
+mod target;
+mod value;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use motorlink_telemetry::share::message::{Line, MotorName, Protocol};
+use motorlink_telemetry::share::words::Speaks;
+
+use crate::message::{Answer, Ask};
+use crate::program::{Program, Refusal};
+use control::Control;
+use exchange::Exchanges;
+use target::{Target, usage};
+
+pub use control::Motion;
+
+/// Carries out the requests of pages about drives. Copies are the same drives.
+#[derive(Clone)]
+pub struct Drives {
+    lines: Arc<BTreeMap<String, Speaks>>,
+    control: Arc<Control>,
+}
+
+impl Drives {
+    /// The drives of these lines.
+    pub fn new(lines: Vec<Line>) -> Self {
+        let speaks = |line: &Line| match line.protocol {
+            Protocol::Rmd => Some(Speaks::Rmd),
+            Protocol::St => Some(Speaks::St(line.profile.as_ref()?.parse().ok()?)),
+        };
+        let lines = lines.iter().filter_map(|line| Some((line.line.clone(), speaks(line)?)));
+        Drives { lines: Arc::new(lines.collect()), control: Arc::default() }
+    }
+
+    /// Carries out a request. `view` is used for what moves nothing. `drive` is asked for a session when a
+    /// command may move a motor.
+    ///
+    /// # Errors
+    /// The request is not possible, or the share or a drive refuses it.
+    pub async fn answer(
+        &self,
+        ask: Ask,
+        view: &Program,
+        drive: &impl Motion,
+    ) -> Result<Answer, Refusal> {
+        match ask {
+            Ask::StopAll | Ask::LetGo => Err(usage("the server carries this out without drives")),
+            Ask::Motors { line } => {
+                let speaks = self.speaks(&line)?;
+                Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
+            }
+            Ask::Describe { line } => {
+                Ok(Answer::Describe(Box::new(describe::describe(&line, self.speaks(&line)?))))
+            }
+            Ask::Read { motor, names } => {
+                let target = self.target(motor)?;
+                let values = registers::read(&Exchanges::new(view, &target), &names).await?;
+                Ok(Answer::Read { values })
+            }
+            Ask::Act { motor, command, values, hold, to_rom } => {
+                let target = self.target(motor)?;
+                let command = commands::Command::named(&target, &command)?;
+                let request = act::Act { target, command, values, hold, to_rom };
+                Ok(Answer::Act { values: request.carry_out(&self.control, view, drive).await? })
+            }
+            Ask::Limit { motor, mode, most } => {
+                let target = self.target(motor)?;
+                self.control.limited(&target, |limited| limited.set(target.motor, mode, most))?;
+                Ok(Answer::Limit)
+            }
+            _ => Err(usage("this is not possible yet")),
+        }
+    }
+
+    /// A stop of this motor, or of all motors, was asked for. Call it before the stop is passed to the share:
+    /// commands that pages have sent before it, and that wait for their session, are not sent any more.
+    pub fn stopping(&self, motor: Option<&MotorName>) {
+        self.control.stopping(motor);
+    }
+
+    fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {
+        self.lines.get(line).copied().ok_or_else(|| {
+            let names: Vec<&str> = self.lines.keys().map(String::as_str).collect();
+            usage(format!("no line `{line}`; the lines are {}", names.join(", ")))
+        })
+    }
+
+    fn target(&self, name: MotorName) -> Result<Target, Refusal> {
+        let speaks = self.speaks(&name.line)?;
+        Target::new(&name.line, name.motor, speaks)
+    }
+}

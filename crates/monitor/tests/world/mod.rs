@@ -1,0 +1,303 @@
+//! A share of simulated drives on ptys, what is on its wires, and a page.
+#![allow(dead_code, reason = "each test uses a part")]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use motorlink::port::{Direction, EventBytes, TapBytes, TapCan};
+use motorlink::{rmd, st};
+use motorlink_monitor::drive::{Drives, Motion};
+use motorlink_monitor::message::{Answer, Ask};
+use motorlink_monitor::program::{Program, Refusal};
+use motorlink_proto::st::{Frame, Parse, Profile};
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{RmdLine, StLine};
+use motorlink_telemetry::share::hub::Held;
+use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
+use motorlink_telemetry::share::server::Server;
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_testbench::{Bench, BenchConfig, Serving};
+
+pub const LIMIT: Duration = Duration::from_secs(30);
+/// A busy machine may be late with a reply.
+const PATIENT: Duration = Duration::from_secs(2);
+
+/// A request on a wire: the motor, and the frame code with the payload, or eight bytes.
+pub type Sent = (u8, Vec<u8>);
+
+/// A share with the line st0 and the line rmd0.
+pub struct World {
+    pub bench: Bench,
+    pub path: PathBuf,
+    pub st: Arc<Mutex<Vec<Sent>>>,
+    pub rmd: Arc<Mutex<Vec<Sent>>>,
+    ends: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+    _serving: Serving,
+}
+
+/// A page at the share, and the drives of its server.
+pub struct Page {
+    pub drives: Drives,
+    pub view: Program,
+    pub drive: Drive,
+    pub viewing: Mutex<Option<tokio::task::JoinHandle<()>>>,
+}
+
+/// The session of a page that moves motors.
+pub struct Drive {
+    path: PathBuf,
+    pub lapsed: AtomicBool,
+    pub opened: AtomicBool,
+    session: tokio::sync::Mutex<Option<Program>>,
+    listening: Mutex<Option<tokio::task::JoinHandle<()>>>,
+}
+
+pub fn st(motor: u8) -> MotorName {
+    MotorName { line: "st0".to_owned(), motor }
+}
+
+pub fn rmd(motor: u8) -> MotorName {
+    MotorName { line: "rmd0".to_owned(), motor }
+}
+
+pub fn path(name: &str, kind: &str) -> PathBuf {
+    let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
+    folder.join(format!("{name}-{kind}-{}", std::process::id()))
+}
+
+impl World {
+    pub fn new(name: &str, profile: Profile) -> Self {
+        Self::with(name, profile, |link| link)
+    }
+
+    /// With something around the serial line, behind the tap.
+    pub fn with(
+        name: &str,
+        profile: Profile,
+        mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+    ) -> Self {
+        let config = BenchConfig { profile, ..BenchConfig::default() };
+        let bench = Bench::new(&config).unwrap();
+        let [st_path, rmd_path] = ["st", "rmd"].map(|it| path(name, it).display().to_string());
+        let port = |name: String| Some(name.parse().unwrap());
+        let serving =
+            bench.serve(port(format!("pty:{st_path}")), port(format!("slcan-pty:{rmd_path}")));
+        let serving = serving.unwrap();
+
+        let st_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
+        let wire = Arc::clone(&st_sent);
+        let wrap = move |link| {
+            let wire = Arc::clone(&wire);
+            let mut stream = Vec::new();
+            let observer = move |direction, _, bytes: &[u8]| {
+                if direction == Direction::Received {
+                    return;
+                }
+                stream.extend(bytes);
+                while let Parse::Frame(frame, size) = Frame::parse(&stream) {
+                    let bytes = [&[frame.code()], frame.payload].concat();
+                    wire.lock().unwrap().push((frame.motor(), bytes));
+                    stream.drain(..size);
+                }
+            };
+            Box::new(TapBytes::new(around(link), observer)) as Box<dyn EventBytes>
+        };
+        let options = st::Options { profile, ..st::Options::default() };
+        let client = st::EventClient::open_wrapped(&st_path.parse().unwrap(), wrap, options);
+        let line = StLine::new(client.unwrap());
+        let engine = Acquisition::new(Box::new(line));
+        let st_held = Held::start("st0", &st_path, Speaks::St(profile), engine).unwrap();
+
+        let rmd_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
+        let wire = Arc::clone(&rmd_sent);
+        let wrap = move |link| {
+            let wire = Arc::clone(&wire);
+            let observer = move |direction, _, frame: &motorlink_proto::can::CanFrame| {
+                if direction == Direction::Sent {
+                    let motor = (frame.id() - 0x140) as u8;
+                    wire.lock().unwrap().push((motor, frame.data().to_vec()));
+                }
+            };
+            Box::new(TapCan::new(link, observer)) as _
+        };
+        let options = rmd::Options { timeout: PATIENT, ..Default::default() };
+        let port = format!("slcan:{rmd_path}").parse().unwrap();
+        let client = rmd::EventClient::open_wrapped(&port, wrap, options).unwrap();
+        let engine = Acquisition::new(Box::new(RmdLine::new(client)));
+        let rmd_held = Held::start("rmd0", &rmd_path, Speaks::Rmd, engine).unwrap();
+
+        let socket = path(name, "socket");
+        let mut server = Server::open(&socket, "test", vec![st_held, rmd_held]).unwrap();
+        let ends = Arc::new(AtomicBool::new(false));
+        let has_ended = Arc::clone(&ends);
+        let thread = std::thread::spawn(move || {
+            while !has_ended.load(Ordering::SeqCst) {
+                server.turn().unwrap();
+            }
+            server.end("the test is over");
+        });
+        World {
+            bench,
+            path: socket,
+            st: st_sent,
+            rmd: rmd_sent,
+            ends,
+            thread: Some(thread),
+            _serving: serving,
+        }
+    }
+
+    /// A page, with the drives of a server of its own.
+    pub async fn page(&self) -> Page {
+        let (view, listening) = connect(&self.path, "page").await;
+        let Ok(share::Answer::Lines { lines, .. }) = view.ask(share::Ask::Lines).await else {
+            panic!("no lines")
+        };
+        let drives = Drives::new(lines);
+        Page { drives, view, drive: Drive::new(&self.path), viewing: Mutex::new(Some(listening)) }
+    }
+
+    /// Another page of the same server.
+    pub async fn other(&self, page: &Page) -> Page {
+        Page { drives: page.drives.clone(), ..self.page().await }
+    }
+
+    pub fn signal(&self, signal: &str) -> f64 {
+        let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
+        self.bench.values()[at]
+    }
+
+    pub async fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
+        let end = Instant::now() + LIMIT;
+        while !what(self.signal(signal)) {
+            assert!(Instant::now() < end, "{signal} is {}", self.signal(signal));
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
+    /// Requests to the ST drive that write or command.
+    pub fn st_writes(&self) -> Vec<Sent> {
+        let read = |(_, bytes): &&Sent| !matches!(bytes[0], 0x02 | 0x06 | 0x08 | 0x0C | 0x0D);
+        self.st.lock().unwrap().iter().filter(read).cloned().collect()
+    }
+
+    /// Motion commands to an RMD motor, in the order of the wire.
+    pub fn rmd_motion(&self, motor: u8) -> Vec<Vec<u8>> {
+        let moves = |(to, bytes): &&Sent| *to == motor && (0x80..0xB0).contains(&bytes[0]);
+        let sent = self.rmd.lock().unwrap();
+        let reads = [0x90, 0x92, 0x94, 0x9A, 0x9B, 0x9C, 0x9D];
+        sent.iter()
+            .filter(moves)
+            .filter(|(_, bytes)| !reads.contains(&bytes[0]))
+            .map(|(_, bytes)| bytes.clone())
+            .collect()
+    }
+
+    /// Executes a command of the bench, as JSON.
+    pub fn execute(&self, json: &str) {
+        let command = motorlink_testbench::Command::read(json).unwrap();
+        self.bench.execute(&command).unwrap();
+    }
+}
+
+impl Drop for World {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::SeqCst);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+pub async fn connect(path: &Path, name: &str) -> (Program, tokio::task::JoinHandle<()>) {
+    let (program, mut listener, _) = Program::connect(path, name).await.unwrap();
+    let listening = tokio::spawn(async move { while listener.next().await.is_ok() {} });
+    (program, listening)
+}
+
+impl Page {
+    pub async fn ask(&self, ask: Ask) -> Result<Answer, Refusal> {
+        let answer = self.drives.answer(ask, &self.view, &self.drive);
+        tokio::time::timeout(LIMIT, answer).await.expect("no answer in time")
+    }
+
+    pub async fn refused(&self, ask: Ask) -> (Reason, String) {
+        match self.ask(ask.clone()).await {
+            Err(refusal) => (refusal.reason, refusal.message),
+            Ok(answer) => panic!("{ask:?}: {answer:?}"),
+        }
+    }
+
+    pub async fn read(&self, motor: MotorName, names: &[&str]) -> Vec<(Option<f64>, String)> {
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        match self.ask(Ask::Read { motor, names }).await {
+            Ok(Answer::Read { values }) => {
+                values.into_iter().map(|value| (value.value, value.text)).collect()
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub async fn act(
+        &self,
+        motor: MotorName,
+        command: &str,
+        values: &[(&str, f64)],
+    ) -> Result<Answer, Refusal> {
+        self.ask(act(motor, command, values)).await
+    }
+
+    /// A stop of this page, as the server passes it to the share.
+    pub async fn stop(&self, motor: MotorName) {
+        self.drives.stopping(Some(&motor));
+        let answer = self.view.ask(share::Ask::Stop { motor: Some(motor) }).await.unwrap();
+        let share::Answer::Stop { motors } = answer else { panic!("{answer:?}") };
+        assert_eq!(motors[0].failure, None);
+    }
+}
+
+pub fn act(motor: MotorName, command: &str, values: &[(&str, f64)]) -> Ask {
+    let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+    Ask::Act { motor, command: command.to_owned(), values, hold: false, to_rom: false }
+}
+
+impl Drive {
+    fn new(path: &Path) -> Self {
+        Drive {
+            path: path.to_owned(),
+            lapsed: AtomicBool::new(false),
+            opened: AtomicBool::new(false),
+            session: tokio::sync::Mutex::default(),
+            listening: Mutex::default(),
+        }
+    }
+
+    /// The page gives no sign of life any more: its session ends.
+    pub async fn lapse(&self) {
+        self.lapsed.store(true, Ordering::SeqCst);
+        *self.session.lock().await = None;
+        if let Some(listening) = self.listening.lock().unwrap().take() {
+            listening.abort();
+        }
+    }
+}
+
+impl Motion for Drive {
+    async fn program(&self, _: bool) -> Result<Program, Refusal> {
+        if self.lapsed.load(Ordering::SeqCst) {
+            let message = "the page gives no sign of life".to_owned();
+            return Err(Refusal { reason: Reason::Lapsed, message, code: None });
+        }
+        let mut session = self.session.lock().await;
+        if session.is_none() {
+            let (program, listening) = connect(&self.path, "page (control)").await;
+            *self.listening.lock().unwrap() = Some(listening);
+            *session = Some(program);
+        }
+        self.opened.store(true, Ordering::SeqCst);
+        Ok(session.clone().expect("it was set"))
+    }
+}

@@ -1,0 +1,106 @@
+// A motor that a page turned stops when the page is gone.
+import { Chromium } from './chromium';
+import { card, expect, spin, test } from './bench';
+import { Network } from './network';
+
+const TURNS = 300;
+const STILL = 5;
+
+/** A real tab with a motor that it turned. */
+const turning = test.extend<{ world: { chromium: Chromium; network: Network; page: Awaited<ReturnType<Chromium['tab']>> } }>({
+  world: async ({ bench }, use) => {
+    const network = await Network.open();
+    const chromium = await Chromium.open({ proxy: network.proxy });
+    const page = await chromium.tab();
+    await page.goto(bench.url);
+    await spin(page, 1000);
+    await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+    await use({ chromium, network, page });
+    await chromium.close();
+    await network.close();
+  },
+});
+
+turning('its process is killed', async ({ bench, world }) => {
+  (await world.chromium.signals('SIGKILL'))();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+turning('its process is frozen', async ({ bench, world }) => {
+  (await world.chromium.signals('SIGSTOP'))();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+turning('its tab is hidden, and it may turn motors again later', async ({ bench, world }) => {
+  await world.chromium.tab();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+  await world.page.bringToFront();
+  await spin(world.page, 800);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+});
+
+turning('its tab is closed', async ({ bench, world }) => {
+  await world.page.close();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+turning('it is reloaded', async ({ bench, world }) => {
+  await world.page.reload();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+turning('its main thread hangs', async ({ bench, world }) => {
+  void world.page.evaluate(() => {
+    const end = performance.now() + 3000;
+    while (performance.now() < end);
+  });
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+for (const cut of ['both', 'to-server', 'to-browser'] as const) {
+  turning(`the network is cut (${cut})`, async ({ bench, world }) => {
+    world.network.set({ cut });
+    await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+    // What the page shows is marked as old.
+    await expect(card(world.page, 'st0/1').getByText(/\d+ s old/).first()).toBeVisible();
+    world.network.set({});
+    await expect(world.page.getByText(/Connected/)).toBeVisible();
+    expect(await bench.speed('st', 1)).toBeLessThan(STILL);
+  });
+}
+
+turning('the network is slower than the deadline', async ({ bench, world }) => {
+  world.network.set({ delay: 400 });
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
+
+turning('a viewer that leaves stops nothing', async ({ bench, world }) => {
+  const viewer = await world.chromium.tab();
+  await viewer.goto(bench.viewerUrl);
+  await world.page.bringToFront();
+  await spin(world.page, 1000);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+  await viewer.close();
+  await expect(world.page.getByText(/Connected/)).toBeVisible();
+  await new Promise((done) => setTimeout(done, 1000));
+  expect(await bench.speed('st', 1)).toBeGreaterThan(TURNS);
+});
+
+turning('hold-to-run: motion needs the held button', async ({ bench, world: { page } }) => {
+  const motor = card(page, 'st0/1');
+  await motor.getByRole('button', { name: 'Stop', exact: true }).click();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+  await motor.getByRole('switch', { name: 'Hold to run' }).check();
+  await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill('1000');
+  const hold = motor.getByRole('button', { name: 'Hold to run' });
+  await hold.hover();
+  await page.mouse.down();
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+  await page.mouse.up();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+  await hold.focus();
+  await page.keyboard.down('Enter');
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+  await page.keyboard.up('Enter');
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+});
