@@ -11,9 +11,9 @@ use tokio::sync::{Mutex as AsyncMutex, Notify, Semaphore, mpsc};
 use tokio::task::JoinSet;
 
 use crate::alive::{DeadMan, Lapse, Ticket};
+use crate::drive::Motion;
 use crate::message::{Answer, Ask, FromPage, Request, Role, Text};
 use crate::program::{Listener, OWN_IDS, Program, Refusal};
-use crate::drive::Motion;
 use crate::server::link::{Link, lost, stop_all};
 
 /// Requests of a page about drives that are under way.
