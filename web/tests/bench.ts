@@ -162,6 +162,9 @@ export const test = base.extend<{ bench: Bench; live: Page }>({
   },
 });
 
+/** The views, as the navigation calls them. */
+export const VIEWS = ['Motors', 'Plots', 'Registers', 'Step response', 'Wire', 'Recordings', 'Events', 'Ports'];
+
 /** The card of a motor. */
 export const card = (page: Page, name: string) => page.getByRole('article', { name: `Motor ${name}` });
 

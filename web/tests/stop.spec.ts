@@ -1,7 +1,5 @@
 // Stop all: from every view, by button and by key, with and without the WebSocket.
-import { card, expect, open, spin, test } from './bench';
-
-const VIEWS = ['Motors', 'Plots', 'Registers', 'Step response', 'Wire', 'Recordings', 'Events', 'Ports'];
+import { card, expect, open, spin, test, VIEWS } from './bench';
 
 /** A motor that turns, faster than what it does at rest. */
 const TURNS = 300;
