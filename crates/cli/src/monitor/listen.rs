@@ -1,13 +1,16 @@
 //! Where browsers connect.
 
 use std::io::ErrorKind;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::path::PathBuf;
+
+use motorlink_monitor::server::Tls;
 
 use crate::failure::Failure;
 use crate::output::note;
 
 /// The usual address.
-const USUAL: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8707);
+const USUAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8707);
 /// Ports that are tried if the usual one is taken.
 const TRIED: u16 = 100;
 
@@ -19,6 +22,12 @@ pub struct Listen {
     /// A name of this computer that browsers use; may be repeated
     #[arg(long = "name", value_name = "HOST")]
     names: Vec<String>,
+    /// The certificates for TLS, as PEM: that of this computer first
+    #[arg(long, value_name = "FILE", requires = "tls_key", value_hint = clap::ValueHint::FilePath)]
+    tls_cert: Option<PathBuf>,
+    /// The private key of the first certificate, as PEM
+    #[arg(long, value_name = "FILE", requires = "tls_cert", value_hint = clap::ValueHint::FilePath)]
+    tls_key: Option<PathBuf>,
     /// Listen on an address of the network without TLS. Anybody there can read the tokens
     #[arg(long)]
     insecure: bool,
@@ -28,13 +37,23 @@ impl Listen {
     /// Opens the port.
     pub fn bind(&self) -> Result<TcpListener, Failure> {
         let Some(address) = self.listen else { return bind_usual() };
-        if !address.ip().is_loopback() && !self.insecure {
+        let is_private = address.ip().is_loopback() || self.tls_cert.is_some() || self.insecure;
+        if !is_private {
             return Err(Failure::usage(format!(
                 "--listen {address} is for the network, where anybody can read the tokens"
             ))
-            .trying("give --insecure if you trust the network"));
+            .trying("give --tls-cert and --tls-key, or --insecure if you trust the network"));
         }
         TcpListener::bind(address).map_err(|error| refused(address, &error))
+    }
+
+    /// The certificate, if there is one.
+    pub fn tls(&self) -> Result<Option<Tls>, Failure> {
+        let Some((cert, key)) = self.tls_cert.as_ref().zip(self.tls_key.as_ref()) else {
+            return Ok(None);
+        };
+        let tls = Tls::read(cert, key);
+        tls.map(Some).map_err(|error| Failure::usage(error.to_string()))
     }
 
     /// The host in the addresses for browsers.

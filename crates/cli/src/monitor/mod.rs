@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use motorlink_monitor::message::Role;
-use motorlink_monitor::server::{self, Options};
+use motorlink_monitor::server::{self, Options, Tls};
 use motorlink_telemetry::share::message::{Answer, Ask, Line};
 use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::server::Server;
@@ -71,18 +71,24 @@ pub struct Args {
     json: bool,
 }
 
+/// Where browsers connect, and how.
+struct Web {
+    listener: TcpListener,
+    tls: Option<Tls>,
+}
+
 pub fn run(mut args: Args) -> Result<(), Failure> {
     if args.deadline < SHORTEST_DEADLINE {
         return Err(Failure::usage("--deadline is 200ms to 2s: signs of life come each 100 ms"));
     }
     let running = running_share(&args)?;
     // Before the ports: if no browser can connect, no drive is touched.
-    let listener = args.listen.bind()?;
+    let web = Web { tls: args.listen.tls()?, listener: args.listen.bind()? };
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     match running {
-        Some(path) => show(&args, path, listener),
-        None => hold(&mut args, listener),
+        Some(path) => show(&args, path, web),
+        None => hold(&mut args, web),
     }
 }
 
@@ -111,7 +117,7 @@ fn running_share(args: &Args) -> Result<Option<PathBuf>, Failure> {
 }
 
 /// Shows a share that runs in another program.
-fn show(args: &Args, path: PathBuf, listener: TcpListener) -> Result<(), Failure> {
+fn show(args: &Args, path: PathBuf, web: Web) -> Result<(), Failure> {
     let failed = |error: io::Error| {
         Failure::link(format!("the share at unix:{}: {error}", path.display()))
             .trying("is it that of a running `motorlink share`?")
@@ -121,14 +127,14 @@ fn show(args: &Args, path: PathBuf, listener: TcpListener) -> Result<(), Failure
         return Err(failed(io::Error::other("it gives another answer")));
     };
     drop(share);
-    let monitor = start(args, path.clone(), listener)?;
+    let monitor = start(args, path.clone(), web)?;
     ready(args, &monitor, &path, &lines, false)?;
     while interrupt::wait(Duration::from_secs(3600)) {}
     Ok(())
 }
 
 /// Holds the ports, too.
-fn hold(args: &mut Args, listener: TcpListener) -> Result<(), Failure> {
+fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
     let is_simulated = args.lines.is_empty();
     if is_simulated {
         args.lines.ports = vec![SIMULATED.to_owned()];
@@ -143,7 +149,7 @@ fn hold(args: &mut Args, listener: TcpListener) -> Result<(), Failure> {
         }
     };
     let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
-    let monitor = start(args, path.clone(), listener)?;
+    let monitor = start(args, path.clone(), web)?;
     let ready = ready(args, &monitor, &path, &server.lines(), is_simulated);
     // The motors stop first, then the pages are closed.
     let outcome = share::serve(server, args.json, ready);
@@ -151,10 +157,11 @@ fn hold(args: &mut Args, listener: TcpListener) -> Result<(), Failure> {
     outcome
 }
 
-fn start(args: &Args, share: PathBuf, listener: TcpListener) -> Result<server::Server, Failure> {
+fn start(args: &Args, share: PathBuf, web: Web) -> Result<server::Server, Failure> {
     let names = args.listen.names();
     let (deadline, program) = (args.deadline, PROGRAM.to_owned());
-    Ok(server::Server::start(Options { listener, names, share, deadline, program })?)
+    let Web { listener, tls } = web;
+    Ok(server::Server::start(Options { listener, tls, names, share, deadline, program })?)
 }
 
 /// Says where browsers and programs connect.

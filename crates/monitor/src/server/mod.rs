@@ -8,6 +8,7 @@ mod routes;
 mod site;
 mod socket;
 mod state;
+mod tls;
 mod transport;
 
 use std::io;
@@ -19,6 +20,7 @@ use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 
 pub use door::random_word;
+pub use tls::{Tls, TlsError};
 
 use crate::message::Role;
 use door::Door;
@@ -34,6 +36,8 @@ const LAST: Duration = Duration::from_millis(500);
 pub struct Options {
     /// Where browsers connect.
     pub listener: TcpListener,
+    /// Without it, requests are not encrypted.
+    pub tls: Option<Tls>,
     /// Names of this machine that browsers may use, besides its addresses.
     pub names: Vec<String>,
     /// The socket of the share.
@@ -57,10 +61,10 @@ impl Server {
     /// # Errors
     /// The system gives no threads, sockets or random numbers.
     pub fn start(options: Options) -> io::Result<Self> {
-        let Options { listener, names, share, deadline, program } = options;
+        let Options { listener, tls, names, share, deadline, program } = options;
         let address = listener.local_addr()?;
         listener.set_nonblocking(true)?;
-        let door = Door::new(address.port(), false, names)?;
+        let door = Door::new(address.port(), tls.is_some(), names)?;
         let state = Arc::new(State::new(door, Link::new(share), deadline, program)?);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
@@ -71,9 +75,10 @@ impl Server {
             let _inside = runtime.enter();
             tokio::net::TcpListener::from_std(listener)?
         };
+        let tls = tls.as_ref().map(Tls::acceptor);
         let link = Arc::clone(&state.link);
         runtime.spawn(async move { link.keep().await });
-        runtime.spawn(transport::serve(listener, routes::router(Arc::clone(&state))));
+        runtime.spawn(transport::serve(listener, tls, routes::router(Arc::clone(&state))));
         Ok(Server { runtime: Some(runtime), state, address })
     }
 
