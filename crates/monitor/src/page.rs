@@ -5,7 +5,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
 use motorlink_proto::time::Micros;
-use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
+use motorlink_telemetry::share::message::{self as share, Happening, MotorName, Reason};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, Semaphore, mpsc};
 use tokio::task::JoinSet;
@@ -165,10 +165,7 @@ impl Page {
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
             | Ask::Rates => {}
-            Ask::Stop { motor } => {
-                self.control().man.stop(motor.as_ref());
-                self.link.stopping(motor.as_ref());
-            }
+            Ask::Stop { motor } => self.stopping(motor.as_ref()),
             Ask::Latch | Ask::Release => self.check_operator()?,
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
                 let message = "a page may not send this request".to_owned();
@@ -186,8 +183,7 @@ impl Page {
                 self.answer(id, Ok(Answer::LetGo)).await;
             }
             Ask::StopAll => {
-                self.control().man.stop(None);
-                self.link.stopping(None);
+                self.stopping(None);
                 let view = self.view();
                 tasks.spawn(async move {
                     let stopped = match view {
@@ -217,6 +213,12 @@ impl Page {
                 });
             }
         }
+    }
+
+    /// A stop was asked for: commands from before it move the motor no more.
+    fn stopping(&self, motor: Option<&MotorName>) {
+        self.control().man.stop(motor);
+        self.link.stopping(motor);
     }
 
     /// Whether this page may ask for that.
@@ -285,14 +287,22 @@ impl Page {
         // The page may have lapsed meanwhile.
         self.permit(ticket, hold)?;
         self.control().drive = Some(drive.clone());
-        tokio::spawn(drain(Arc::clone(self), drive.clone(), listener));
+        tokio::spawn(follow(Arc::clone(self), drive.clone(), listener));
         Ok(drive)
     }
 }
 
-/// Reads what the share sends to the session that turns motors. Nobody needs it.
-async fn drain(page: Arc<Page>, drive: Program, mut listener: Listener) {
-    while listener.next().await.is_ok() {}
+/// Reads what the share sends to the session that turns motors: who else stops them.
+async fn follow(page: Arc<Page>, drive: Program, mut listener: Listener) {
+    while let Ok(frame) = listener.next().await {
+        if let Ok(share::Text::Event(event)) = share::decode(&frame.payload)
+            && event.event == Happening::Stopping
+            && event.by.as_ref() != Some(&page.name)
+        {
+            let motor = event.line.zip(event.motor);
+            page.stopping(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
+        }
+    }
     let mut control = page.control();
     if control.drive.as_ref().is_some_and(|current| current.is(&drive))
         && let Some(lapse) = control.man.end(Lapse::Share)
@@ -324,7 +334,7 @@ fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
         #[serde(default)]
         id: Option<u32>,
         #[serde(default)]
-        ask: Option<String>,
+        ask: serde_json::Value,
     }
     let head: Head = serde_json::from_str(text)
         .map_err(|error| (None, format!("no message of a page: {error}")))?;
@@ -345,7 +355,7 @@ fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
     };
     const UNKNOWN: &str = "unknown variant";
     let why = match (own.starts_with(UNKNOWN), shares.starts_with(UNKNOWN)) {
-        (true, true) => format!("no request `{}`", head.ask.unwrap_or_default()),
+        (true, true) => format!("no request {}", head.ask),
         (true, false) => shares,
         (false, _) => own,
     };

@@ -1,0 +1,307 @@
+"""What tries to reach motors, or to harm the server of `motorlink monitor`, and does not succeed."""
+
+import json
+import os
+import socket
+import struct
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from monitoring import Site, frame, is_kind, upgraded
+from program import eventually
+from sharing import Client
+
+OTHERS = ["http://evil.example", "http://127.0.0.1:3000", "https://{own}", "null", "http://localhost.evil.example"]
+NAMES = ["evil.example", "evil.example:{port}", "127.0.0.1.evil.example:{port}", "a@127.0.0.1", ""]
+
+
+@pytest.fixture
+def monitor(start):
+    """A monitor of simulated drives."""
+    return start("monitor", "--listen", "127.0.0.1:0", "--json")
+
+
+@pytest.fixture
+def site(monitor):
+    return Site(json.loads(monitor.line(0)))
+
+
+def is_well(site):
+    """A page works as usual."""
+    with site.page() as page:
+        assert page.ask("lines")["kind"] == "answer"
+
+
+def refused(site, status, **options):
+    """The handshake of a WebSocket is refused."""
+    with pytest.raises(InvalidStatus) as error:
+        site.open(**options).close()
+    assert error.value.response.status_code == status
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_that_another_site_gave_this_address_is_refused(site, name):
+    host = name.format(port=site.port)
+    for headers in (site.operator, {**site.operator, "Origin": f"http://{host}"}):
+        for method, path in (("GET", "/"), ("GET", f"/?token={site.tokens['url']}"), ("POST", "/api/stop-all")):
+            status, answer, body = site.request(method, path, {**headers, "Host": host})
+            assert status in (400, 403), (method, path, headers)
+            assert "Set-Cookie" not in answer and site.tokens["url"].encode() not in body
+
+
+@pytest.mark.parametrize("origin", OTHERS)
+def test_a_page_of_another_site_opens_no_connection_and_posts_nothing(site, origin):
+    origin = origin.format(own=site.authority)
+    refused(site, 403, origin=origin)
+    for path in ("/api/stop-all", "/api/let-go?run=x&page=page%201"):
+        assert site.request("POST", path, {**site.operator, "Origin": origin})[0] == 403
+    assert site.request("GET", "/", {**site.operator, "Origin": origin})[0] == 403
+
+
+def test_what_does_not_say_where_it_comes_from_is_refused_where_that_matters(site):
+    refused(site, 403, origin=None)
+    assert site.request("POST", "/api/stop-all", site.operator)[0] == 403
+
+
+def test_nothing_is_given_without_a_token(site):
+    other = "0" * 32
+    cookies = [
+        {}, {"Cookie": f"motorlink-{site.port}={other}"}, {"Cookie": f"motorlink={site.tokens['url']}"},
+        {"Cookie": f"motorlink-{site.port}="}, {"Cookie": f"motorlink-{site.port}={site.tokens['url'][:-1]}"},
+    ]
+    for headers in cookies:
+        for path in ("/", "/assets/index.js", "/ws", f"/?token={other}", "/?token=", "/no-such-path"):
+            assert site.request("GET", path, {**headers, "Origin": site.origin})[0] == 401, (headers, path)
+        assert site.post("/api/stop-all", headers)[0] == 401
+        refused(site, 401, headers=headers)
+
+
+def test_a_token_becomes_a_cookie_that_scripts_and_other_sites_do_not_get(site):
+    for name, headers in (("url", site.operator), ("viewer_url", site.viewer)):
+        status, answer, _ = site.request("GET", f"/?token={site.tokens[name]}")
+        assert (status, answer["Location"]) == (303, "/")
+        cookie, *attributes = answer["Set-Cookie"].split("; ")
+        assert {"Cookie": cookie} == headers
+        assert set(attributes) == {"HttpOnly", "SameSite=Strict", "Path=/"}
+
+
+def test_each_answer_says_what_browsers_may_do_with_it(site):
+    for path, headers in (("/", site.operator), ("/", {}), ("/x", site.operator), ("/", {"Host": "evil.example"})):
+        _, answer, _ = site.request("GET", path, headers)
+        policy = answer["Content-Security-Policy"]
+        assert policy.startswith("default-src 'none'; script-src 'self'; ") and "unsafe" not in policy
+        assert "frame-ancestors 'none'" in policy
+        assert answer["X-Content-Type-Options"] == "nosniff" and answer["Referrer-Policy"] == "no-referrer"
+        assert answer["Cache-Control"] == "no-store" and "Access-Control-Allow-Origin" not in answer
+
+
+def test_files_outside_of_the_page_are_not_given(site):
+    paths = ["/../Cargo.toml", "/assets/../../Cargo.toml", "/%2e%2e/Cargo.toml", "//etc/passwd", "/..%2fCargo.toml"]
+    for path in paths:
+        status, _, body = site.request("GET", path, site.operator)
+        assert status == 404 and b"workspace" not in body and b"root:" not in body, path
+
+
+def test_a_viewer_sees_and_stops_and_does_nothing_else(site):
+    motor = {"line": "st0", "motor": 1}
+    forbidden = [
+        ("write", {**motor, "name": "SPEED_KP", "value": 1.0, "to_rom": False}),
+        ("act", {**motor, "command": "START_MOTOR", "values": {}, "hold": False}),
+        ("run", {**motor, "mode": "speed", "target": 1.0, "rate": 1.0, "hold": True}),
+        ("limit", {**motor, "mode": "speed", "most": None}),
+        ("restore", {**motor, "text": "", "to_rom": False}),
+        ("latch", {}), ("release", {}),
+        ("command", {**motor, "bytes": [3, 1], "time_to_live": 1.0}),
+        ("confirm", motor), ("hello", {"protocol": 1, "name": "x"}),
+    ]
+    with site.page(site.viewer) as page:
+        assert page.welcome["role"] == "viewer"
+        for ask, members in forbidden:
+            answer = page.ask(ask, **members)
+            assert (answer["kind"], answer["reason"]) == ("refusal", "forbidden"), ask
+        signals = [{**motor, "name": "SPEED_MEAS"}]
+        for ask, members in (
+            ("lines", {}), ("signals", {"line": "st0"}), ("rates", {}), ("stop", {"motor": motor}),
+            ("subscribe", {"signals": signals, "period": 0.1, "queue": 9, "drop": "oldest"}), ("stop-all", {}),
+        ):
+            assert page.ask(ask, **members)["kind"] == "answer", ask
+        assert site.post("/api/stop-all", site.viewer)[0] == 200
+        # The latch of its stop is not the viewer's to release.
+        assert page.ask("release")["reason"] == "forbidden"
+    with site.page() as page:
+        assert page.ask("release")["kind"] == "answer"
+
+
+def test_a_page_may_not_speak_past_the_server(site):
+    with site.page() as page:
+        for ask, members in (("command", {"line": "st0", "motor": 1, "bytes": [3, 1], "time_to_live": 1.0}),
+                             ("confirm", {"line": "st0", "motor": 1}), ("hello", {"protocol": 1, "name": "x"})):
+            assert page.ask(ask, **members)["reason"] == "forbidden"
+
+
+def test_requests_that_are_wrong_are_refused_and_the_connection_goes_on(site):
+    wrong = [
+        {"id": 101, "ask": "fly"}, {"id": 102, "ask": "stop", "motor": 7}, {"id": 103, "ask": "read", "line": "st0"},
+        {"id": 104, "ask": 5}, {"id": 105}, {"id": 1 << 31, "ask": "lines"}, {"id": 106, "ask": "stop-all", "id2": {}},
+        {"id": 107, "ask": "subscribe", "signals": [], "period": -1, "queue": 0, "drop": "oldest"},
+        {"id": 108, "ask": "run", "line": "st0", "motor": 300, "mode": "speed", "target": 1, "rate": 1, "hold": 0},
+    ]
+    with site.page() as page:
+        for text in wrong:
+            page.socket.send(json.dumps(text))
+            answer = page.until(lambda it: isinstance(it, dict) and it.get("id") == text["id"])
+            expected = ("answer", None) if text.get("ask") == "stop-all" else ("refusal", "usage")
+            assert (answer["kind"], answer.get("reason")) == expected, (text, answer)
+        assert page.ask("lines")["kind"] == "answer"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "null", "7", '"x"', '{"ask":"stop-all"}', '{"id":-1,"ask":"lines"}', '{"id":4294967296}',
+     '{"beat":-1}', '{"beat":1,"frame":1e999,"held":true,"at":0}', "[" * 10000, b"\0\1\2", '{"id":"1"}'],
+)
+def test_what_is_no_message_ends_the_connection_with_a_reason(site, text):
+    with site.page(lives=False) as page:
+        page.socket.send(text)
+        assert page.closed()
+    is_well(site)
+
+
+def test_a_text_that_is_too_long_ends_the_connection(site):
+    with site.page(lives=False) as page:
+        page.socket.send(json.dumps({"id": 1, "ask": "x" * (1 << 16)}))
+        page.closed()
+    with upgraded(site) as stream:
+        # It announces a gigabyte, and sends none of it.
+        stream.sendall(b"\x81\xff" + (1 << 30).to_bytes(8) + bytes(4))
+        ended(stream)
+    with upgraded(site) as stream:
+        # Parts of one text, each short enough.
+        with pytest.raises(OSError):
+            for _ in range(1000):
+                stream.sendall(frame(b"x" * 1000, 1 if _ == 0 else 0, final=False))
+                time.sleep(0)
+            ended(stream)
+            raise ConnectionError
+    is_well(site)
+
+
+def ended(stream, within=20):
+    """Waits until the server closes a connection; gives what it sent."""
+    stream.settimeout(within)
+    received = b""
+    try:
+        while more := stream.recv(65536):
+            received += more
+    except ConnectionError:
+        pass
+    return received
+
+
+@pytest.mark.parametrize(
+    "bytes_",
+    [b"\xff" * 100, frame(b"\xff\xfe\xfd"), b"\x81\x05hello", frame(b"x", opcode=3), frame(b"", opcode=9) * 2000],
+    ids=["noise", "no-utf8", "unmasked", "reserved", "pings"],
+)
+def test_what_no_browser_sends_ends_the_connection(site, bytes_):
+    with upgraded(site) as stream:
+        stream.sendall(bytes_)
+        ended(stream)
+    is_well(site)
+
+
+def test_more_than_a_thousand_messages_in_a_second_end_the_connection(site):
+    with site.page(lives=False) as page:
+        with pytest.raises(ConnectionClosed):
+            for number in range(20_000):
+                page.socket.send(json.dumps({"id": number, "ask": "lines"}))
+        page.closed()
+    is_well(site)
+
+
+def test_pages_beyond_the_limit_are_told_so_and_the_others_go_on(site):
+    with ExitStack() as stack:
+        pages = [stack.enter_context(site.page()) for _ in range(32)]
+        for _ in range(8):
+            with site.open() as extra:
+                assert "as many pages" in json.loads(extra.recv(10))["message"]
+                with pytest.raises(ConnectionClosed):
+                    extra.recv(10)
+        for page in pages:
+            assert page.ask("lines")["kind"] == "answer"
+        assert len({page.welcome["name"] for page in pages}) == 32
+        # A stop needs no place.
+        assert site.post("/api/stop-all")[0] == 200
+    eventually(lambda: tries(site), "a place for a page")
+
+
+def tries(site):
+    with site.open() as opened:
+        return is_kind(json.loads(opened.recv(10)), "welcome")
+
+
+def test_requests_that_never_end_are_ended(site):
+    halves = [b"", b"GET / HTTP/1.1\r\n", b"POST /api/stop-all HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nx",
+              b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: "]
+    began = time.monotonic()
+    streams = [socket.create_connection((site.host, site.port), timeout=40) for _ in range(10) for _ in halves]
+    for number, stream in enumerate(streams):
+        stream.sendall(halves[number % len(halves)])
+    # They take no place of those who ask properly.
+    is_well(site)
+    with ThreadPoolExecutor(len(streams)) as pool:
+        list(pool.map(lambda stream: ended(stream, 40), streams))
+    assert time.monotonic() - began < 35
+    for stream in streams:
+        stream.close()
+
+
+def test_requests_that_are_too_big_are_refused(site):
+    for head in ([("X", "y" * 20_000)], [(f"X-{number}", "y") for number in range(2000)]):
+        status, _, _ = site.request("GET", "/", {**site.operator, **dict(head)})
+        assert status == 431
+    assert site.request("GET", "/" + "x" * 100_000, site.operator)[0] in (414, 431)
+    is_well(site)
+
+
+def test_noise_on_the_port_ends_that_connection_only(site):
+    for _ in range(50):
+        with socket.create_connection((site.host, site.port), timeout=20) as stream:
+            stream.sendall(os.urandom(500) + b"\r\n\r\n")
+            ended(stream)
+    is_well(site)
+
+
+def test_a_page_that_does_not_read_slows_nobody_and_is_closed(site):
+    signals = [{"line": "st0", "motor": motor, "name": "SPEED_MEAS"} for motor in (1, 2)]
+    members = {"signals": signals, "period": 0.01, "queue": 10_000, "drop": "oldest"}
+    with upgraded(site) as deaf, site.page() as page:
+        for number in range(16):
+            text = {"id": number + 1, "ask": "subscribe", **members, "period": 0.001}
+            deaf.sendall(frame(json.dumps(text).encode()))
+        assert page.ask("subscribe", **members)["kind"] == "answer"
+        page.until(lambda it: is_kind(it, "event") and (it["event"], it.get("by")) == ("left", "page 1"), 60)
+        rows, sequences, lost = 0, {}, 0
+        for message in list(page.heard):
+            if isinstance(message, bytes):
+                _, group, sequence, count, _, missing = struct.unpack_from("<6I", message)
+                assert sequence == sequences.get(group, -1) + 1
+                sequences[group], lost, rows = sequence, lost + missing, rows + count
+        assert lost == 0 and rows > 1000
+        assert page.ask("stop-all")["kind"] == "answer"
+
+
+def test_the_socket_of_the_share_is_this_users_alone(site):
+    assert os.stat(site.path).st_mode & 0o077 == 0
+    assert os.stat(os.path.dirname(site.path)).st_mode & 0o077 == 0
+    assert Client(site.path, "program").ask("lines")["kind"] == "answer"
+
+
+def test_the_folder_of_the_share_is_removed_at_the_end(monitor, site):
+    monitor.interrupt()
+    assert monitor.wait() == 0
+    assert not os.path.exists(os.path.dirname(site.path))
