@@ -3,7 +3,7 @@ import { useSignal } from '@preact/signals';
 import { Component, type ComponentChildren, type ComponentType } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { sentence } from './format';
-import { delay, lapsed, lastWelcome, latchedBy, shareLost, state, welcome } from './link';
+import { closedWhy, delay, lapsed, lastWelcome, latchedBy, shareLost, state, welcome } from './link';
 import { Said, useSaid } from './parts';
 import { release, stopAll, stopReport } from './stop';
 import { VIEWS, load, view } from './views';
@@ -110,17 +110,17 @@ function Banners() {
       {isLost && (
         <section class="note bad" aria-label="Connection lost">
           <p>
-            <strong>Values are old.</strong> The server stops the motors that this page turned when it hears nothing
-            for {lastWelcome.value?.deadline ?? 300} ms. Motors of other programs turn on. If the server itself has
-            ended, only a guard or the power switch stops them. Was it started again? Then open the address that it
-            printed.
+            <strong>Values are old.</strong> {closedWhy.value && `${sentence(closedWhy.value)} `}The server stops the
+            motors that this page turned when it hears nothing for {lastWelcome.value?.deadline ?? 300} ms. Motors of
+            other programs turn on. If the server itself has ended, only a guard or the power switch stops them. Was it
+            started again? Then open the address that it printed.
           </p>
         </section>
       )}
       {shareLost.value !== null && (
         <section class="note bad" role="alert" aria-label="Share lost">
           <p>
-            <strong>The share is lost.</strong> {shareLost.value}
+            <strong>The share is lost.</strong> {sentence(shareLost.value)}
           </p>
         </section>
       )}

@@ -1,5 +1,5 @@
 // What the page knows of lines and motors: descriptions, events about them, and rates.
-import { computed, signal } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
 import { ask, events, lines, motors, welcome } from './link';
 import { nameOf } from './stop';
 import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
@@ -17,28 +17,36 @@ export const allMotors = computed<MotorId[]>(() =>
 /** What the drives of a line have, by line. */
 export const descriptions = signal<ReadonlyMap<string, Description>>(new Map());
 
+/** Why a line could not be described. */
+export const describeFailed = signal<string | null>(null);
+
 let describedRun = '';
 
 /** Asks for the descriptions of lines that have none. Returns why that failed. */
 export async function describeLines(): Promise<string | null> {
   const run = welcome.value?.run;
+  const names = lines.value.map(({ line }) => line);
   if (run === undefined) return null;
   if (run !== describedRun) {
     describedRun = run;
     descriptions.value = new Map();
   }
   let failure: string | null = null;
-  for (const { line } of lines.value) {
-    if (descriptions.value.has(line)) continue;
+  for (const line of names) {
+    if (descriptions.peek().has(line)) continue;
     try {
       const description = await ask({ ask: 'describe', line });
-      descriptions.value = new Map(descriptions.value).set(line, description);
+      descriptions.value = new Map(descriptions.peek()).set(line, description);
     } catch (why) {
       failure = (why as Error).message;
     }
   }
+  describeFailed.value = failure;
   return failure;
 }
+
+/** Describes lines, again with each connection and each answer to `lines`. Returns what ends it. */
+export const watchDescriptions = (): (() => void) => effect(() => void describeLines());
 
 /** The newest event of the given kinds about each line or motor, by name. */
 function newest(all: readonly DriveEvent[], kinds: ReadonlySet<string>, isOfMotor: boolean) {

@@ -120,6 +120,16 @@ describe('requests', () => {
     await expect(answer).rejects.toThrow('unknown whether');
   });
 
+  it('to the share reject when it is lost; the server still answers its own', async () => {
+    Socket.last.welcome();
+    const stop = link.ask({ ask: 'stop', motor: { line: 'st0', motor: 1 } });
+    const all = link.ask({ ask: 'stop-all' });
+    Socket.last.give({ kind: 'share', lost: 'it has ended' });
+    await expect(stop).rejects.toThrow('The share was lost');
+    Socket.last.give({ kind: 'answer', id: Socket.last.asked('stop-all')[0]!.id, to: 'stop-all', motors: [] });
+    await expect(all).resolves.toMatchObject({ motors: [] });
+  });
+
   it('give the sentence of the server', async () => {
     Socket.last.welcome();
     const answer = link.ask({ ask: 'release' });

@@ -51,6 +51,8 @@ export const searchFailed = signal<ReadonlyMap<string, string>>(new Map());
 export const events = signal<readonly DriveEvent[]>([]);
 /** Why the page's motors were stopped last. */
 export const lapsed = signal<string | null>(null);
+/** Why the server closed the last connection. */
+export const closedWhy = signal<string | null>(null);
 /** Why the share is lost. */
 export const shareLost = signal<string | null>(null);
 /** Whether this page turned motors, so that its end stops them. */
@@ -72,7 +74,18 @@ const MOST_EVENTS = 2000;
 
 let socket: WebSocket | null = null;
 let lastId = 0;
-const pending = new Map<number, { done: (answer: Text | ShareText) => void; failed: (why: Refused) => void }>();
+interface Pending {
+  /** Whether the share answers it, not the server. */
+  isOfShare: boolean;
+  done: (answer: Text | ShareText) => void;
+  failed: (why: Refused) => void;
+}
+
+const SHARE_ASKS: ReadonlySet<string> = new Set<ShareRequest['ask']>([
+  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'stop', 'latch', 'release',
+]);
+
+const pending = new Map<number, Pending>();
 const wants = new Set<Want>();
 const groups = new Map<number, { want: Want; group: Group }>();
 const clocks = new Map<string, { t: number; wall: number }>();
@@ -103,7 +116,8 @@ function request<A extends Ask>(
     failed(new Refused('line', 'There is no connection to the server.'));
     return;
   }
-  pending.set(lastId, { done: done as (answer: Text | ShareText) => void, failed });
+  const isOfShare = SHARE_ASKS.has(wanted.ask);
+  pending.set(lastId, { isOfShare, done: done as (answer: Text | ShareText) => void, failed });
 }
 
 /** Receives signals each `period` seconds, on this connection and later ones. Returns what ends it. */
@@ -262,11 +276,21 @@ function lost(url: URL) {
   holds.value = false;
   held.value = false;
   forgetSubscriptions();
-  const ended = new Refused('line', 'The connection to the server was lost. It is unknown whether this was done.');
-  const waiting = [...pending.values()];
-  pending.clear();
-  for (const { failed } of waiting) failed(ended);
+  fail(() => true, 'The connection to the server was lost. It is unknown whether this was done.');
   setTimeout(() => connect(url), RECONNECT);
+}
+
+/** Nobody answers these requests any more. */
+function fail(which: (request: Pending) => boolean, why: string) {
+  const ended = new Refused('line', why);
+  const lost = [...pending].filter(([, request]) => which(request));
+  for (const [id] of lost) pending.delete(id);
+  for (const [, { failed }] of lost) failed(ended);
+}
+
+function shareEnded() {
+  forgetSubscriptions();
+  fail(({ isOfShare }) => isOfShare, 'The share was lost. It is unknown whether this was done.');
 }
 
 function heard(text: Text | ShareText) {
@@ -277,6 +301,7 @@ function heard(text: Text | ShareText) {
       lastWelcome.value = text;
       state.value = 'open';
       shareLost.value = null;
+      closedWhy.value = null;
       measuredDelay = 0;
       clock.forget();
       begunAgain();
@@ -316,10 +341,13 @@ function heard(text: Text | ShareText) {
       // The end of what was held is no news to the person who let it go.
       if (performance.now() - releasedAt > RELEASE) lapsed.value = text.message;
       break;
+    case 'closing':
+      closedWhy.value = text.message;
+      break;
     case 'share': {
       const wasLost = shareLost.value !== null;
       shareLost.value = text.lost;
-      if (text.lost !== null) forgetSubscriptions();
+      if (text.lost !== null) shareEnded();
       else if (wasLost) begunAgain();
       break;
     }

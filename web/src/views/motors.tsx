@@ -1,9 +1,9 @@
 // A card a motor: what it does, and the controls that move it.
 import { useEffect } from 'preact/hooks';
-import { allMotors, describeLines, descriptions, motorEvents, watchRates } from '../drives';
+import { allMotors, describeFailed, descriptions, motorEvents, watchDescriptions, watchRates } from '../drives';
 import { lines, refreshMotors, searchFailed, searching, welcome } from '../link';
 import { overviewRefused, watchOverview } from '../overview';
-import { Said, useSaid } from '../parts';
+import { Said } from '../parts';
 import { nameOf } from '../stop';
 import { Control } from './control';
 import './motors.css';
@@ -45,15 +45,7 @@ function Card({ line, motor }: { line: string; motor: number }) {
 }
 
 export default function Motors() {
-  const { said, attempt } = useSaid();
-  const run = welcome.value?.run;
-  const names = lines.value.map(({ line }) => line).join(' ');
-  useEffect(() => {
-    void attempt(async () => {
-      const failure = await describeLines();
-      if (failure !== null) throw new Error(failure);
-    });
-  }, [run, names]);
+  useEffect(watchDescriptions, []);
   useEffect(watchOverview, []);
   useEffect(() => watchRates(), []);
 
@@ -69,7 +61,7 @@ export default function Motors() {
           <span>You are a viewer: you see everything and can stop. Motion and settings need the operator's address.</span>
         </p>
       )}
-      <Said said={said} />
+      {describeFailed.value !== null && <Said said={{ tone: 'bad', text: describeFailed.value }} />}
       {overviewRefused.value !== null && <Said said={{ tone: 'bad', text: overviewRefused.value }} />}
       {[...searchFailed.value].map(([line, why]) => (
         <p key={line} class="bad">
