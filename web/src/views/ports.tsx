@@ -8,14 +8,14 @@ import type { Line } from '../wire';
 import './ports.css';
 
 /** Events that say that something went wrong on a line. */
-const COUNTED = { lost: 'losses', silent: 'silences', doubtful: 'doubtful replies', refused: 'refusals' } as const;
+const COUNTED = { lost: 'lost', silent: 'silent', doubtful: 'doubtful replies', refused: 'refused' } as const;
 
 function counts(line: string): string {
-  const texts = Object.entries(COUNTED).map(([kind, title]) => {
+  const texts = Object.entries(COUNTED).flatMap(([kind, title]) => {
     const count = events.value.filter((one) => one.line === line && one.event === kind).length;
-    return `${count} ${title}`;
+    return count ? [`${count} × ${title}`] : [];
   });
-  return texts.join(', ');
+  return `${texts.join(', ') || 'none'} since this page was opened`;
 }
 
 function LineState({ line }: { line: string }) {
@@ -36,7 +36,11 @@ function LineState({ line }: { line: string }) {
       </>
     );
   }
-  return <span class="chip">○ open, nothing is read</span>;
+  return (
+    <>
+      <span class="chip">○ open</span> nothing is read
+    </>
+  );
 }
 
 function Port({ line: { line, protocol, port, profile, timeout } }: { line: Line }) {
@@ -79,7 +83,7 @@ function Port({ line: { line, protocol, port, profile, timeout } }: { line: Line
               );
             })}
           </dd>
-          <dt>Since this page was opened</dt>
+          <dt>Incidents</dt>
           <dd>{counts(line)}</dd>
         </dl>
         <p role="status" class="bad">
