@@ -2,6 +2,7 @@
 import { useEffect, useRef } from 'preact/hooks';
 import { rates } from '../drives';
 import { decimalsOf, number, rate, sentence, tooOld } from '../format';
+import { state } from '../link';
 import { HISTORY, type Live, liveOf } from '../overview';
 import type { Description, Fault } from '../wire';
 
@@ -126,8 +127,8 @@ export function Values({ line, motor, description }: Props) {
   const last = (name: string) => live.values.get(name);
   const old = (name: string) => tooOld(live.age(name));
 
-  const state = overview.state === null ? undefined : last(overview.state);
-  const known = states.find(({ value }) => value === state?.value);
+  const status = overview.state === null ? undefined : last(overview.state);
+  const known = states.find(({ value }) => value === status?.value);
   const stateOld = overview.state === null ? null : old(overview.state);
   const speedRate = rates.value.find(
     (one) => one.line === line && one.motor === motor && one.name === overview.speed,
@@ -148,9 +149,9 @@ export function Values({ line, motor, description }: Props) {
           <span class={stateOld ? 'old' : undefined}>
             State{' '}
             <strong title={known?.doc}>
-              {known?.name ?? (state && !Number.isNaN(state.value) ? `unknown (${state.value})` : 'no value')}
+              {known?.name ?? (status && !Number.isNaN(status.value) ? `unknown (${status.value})` : 'no value')}
             </strong>
-            {stateOld && state && ` (${stateOld})`}
+            {stateOld && status && ` (${stateOld})`}
           </span>
         )}
         <FaultCount line={line} motor={motor} description={description} />
@@ -175,7 +176,7 @@ export function Values({ line, motor, description }: Props) {
       <Spark live={live} />
       <p class="muted rates">
         <span>{Number.isNaN(age) ? 'no value yet' : age > 1 ? 'not live' : 'live'}</span>
-        {speedRate && (
+        {speedRate && state.value === 'open' && (
           <span>
             asked {rate(1 / speedRate.asked)}, achieved {rate(speedRate.achieved)}
           </span>
