@@ -1,0 +1,391 @@
+// What a recorded step response says: rise, delay, overshoot, settling, steady error.
+// A number that the data do not carry is refused, with the reason.
+
+/** A recorded response. */
+export interface Recording {
+  /** Times of the samples, in seconds, ascending. The spacing may vary. */
+  t: ArrayLike<number>;
+  /** The measured values. NaN is no value. */
+  y: ArrayLike<number>;
+  /** When the reference changed: the earliest and the latest possible time. */
+  at: [number, number];
+  /** The reference before and after the step. */
+  from: number;
+  to: number;
+  /** The step between two measured values of the drive; 0 if it is not known. */
+  resolution: number;
+}
+
+/** A number with its uncertainty, an upper bound, or the reason why there is neither. */
+export type Figure =
+  | { kind: 'value'; value: number; error: number }
+  | { kind: 'below'; bound: number; why: string }
+  | { kind: 'none'; why: string };
+
+export type FigureName = 'delay' | 'rise' | 'overshoot' | 'settling5' | 'settling2' | 'steadyError';
+
+export interface Analysis {
+  figures: Record<FigureName, Figure>;
+  /** The measured value before the step and at the end of the record. NaN: too few samples. */
+  initial: number;
+  final: number;
+  /** Standard deviation of the noise. */
+  noise: number;
+  /** The step between two measured values: that of the drive, or the smallest that was seen. */
+  resolution: number;
+  /** Samples after the step, and the median and longest time between two samples, in seconds. */
+  samples: number;
+  interval: number;
+  longest: number;
+  /** Time between two new values, in seconds: a drive may repeat a value. */
+  update: number;
+  /** What makes the numbers mean something else than usual. */
+  remarks: string[];
+}
+
+/** The definitions that are used, for the page and for exports. */
+export const DEFINITIONS: Record<FigureName, { name: string; unit: string; doc: string }> = {
+  delay: { name: 'Delay', unit: 's', doc: 'From the step until the value has gone 50 % of its way.' },
+  rise: { name: 'Rise time', unit: 's', doc: 'From 10 % to 90 % of the way.' },
+  overshoot: { name: 'Overshoot', unit: '%', doc: 'Highest value beyond the final value, in % of the way.' },
+  settling5: {
+    name: 'Settling time, 5 %', unit: 's',
+    doc: 'From the step until the value stays within 5 % of the way around the final value.',
+  },
+  settling2: {
+    name: 'Settling time, 2 %', unit: 's',
+    doc: 'From the step until the value stays within 2 % of the way around the final value.',
+  },
+  steadyError: { name: 'Steady-state error', unit: '', doc: 'Reference minus final value.' },
+};
+export const WAY =
+  'The way is from the mean before the step to the final value. The final value is the mean of the last fifth of the record.';
+
+/** The part of the record after the step that gives the final value. */
+const END = 0.2;
+const LEAST_BEFORE = 5;
+const LEAST_END = 8;
+/** Below this many standard deviations, a difference is noise. */
+const SIGMAS = 4;
+/** A smaller overshoot, as a part of the way, is not told from none. */
+const LEAST_OVERSHOOT = 0.001;
+
+export function analyse(recording: Recording): Analysis {
+  const { t, y } = valid(recording);
+  const [earliest, latest] = recording.at;
+  const first = t.findIndex((time) => time > latest);
+  const before = y.filter((_, index) => t[index]! < earliest);
+  const times = first < 0 ? [] : t.slice(first);
+  const values = first < 0 ? [] : y.slice(first);
+  const gaps = differences(times);
+  const resolution = recording.resolution || smallestStep(y);
+  const analysis: Analysis = {
+    figures: none('There are too few samples.'),
+    initial: mean(before),
+    final: NaN,
+    noise: NaN,
+    resolution,
+    samples: times.length,
+    interval: median(gaps),
+    longest: gaps.length ? Math.max(...gaps) : NaN,
+    update: NaN,
+    remarks: [],
+  };
+  if (before.length < LEAST_BEFORE) {
+    const had = `There are ${before.length} samples before the step; ${LEAST_BEFORE} are needed.`;
+    return { ...analysis, figures: none(had) };
+  }
+  const end = times.at(-1) ?? latest;
+  const endFrom = end - END * (end - latest);
+  const tail = values.filter((_, index) => times[index]! >= endFrom);
+  if (tail.length < LEAST_END) {
+    const had = `There are ${tail.length} samples in the last fifth of the record; ${LEAST_END} are needed.`;
+    return { ...analysis, figures: none(had) };
+  }
+  const final = mean(tail);
+  const noise = Math.max(deviation(before), scatter(tail));
+  Object.assign(analysis, { final, noise, update: updateInterval(times, values) });
+
+  const way = final - analysis.initial;
+  const commanded = recording.to - recording.from;
+  const blur = SIGMAS * noise + resolution;
+  if (Math.abs(way) <= blur) {
+    const why =
+      Math.abs(commanded) <= blur
+        ? `The step of ${plain(Math.abs(commanded))} is smaller than noise and resolution (${plain(blur)}).`
+        : `The value did not follow: it changed by ${plain(way)}, which is less than noise and resolution (${plain(blur)}).`;
+    return { ...analysis, figures: none(why) };
+  }
+  if (way * commanded < 0) {
+    return { ...analysis, figures: none('The value went in the opposite direction.') };
+  }
+  const unsettled = whyUnsettled(tail, Math.abs(way), noise, resolution);
+  if (unsettled) return { ...analysis, figures: none(unsettled) };
+
+  const scaled: Scaled = {
+    t: times,
+    x: values.map((value) => (value - analysis.initial) / way),
+    at: (earliest + latest) / 2,
+    doubt: (latest - earliest) / 2,
+    endFrom,
+    blur: blur / Math.abs(way),
+    noise: noise / Math.abs(way),
+    resolution: resolution / Math.abs(way),
+    update: analysis.update,
+    median: analysis.interval,
+  };
+  // The last sample before the step is where the response begins.
+  scaled.t = [Math.min(t[first - 1]!, latest), ...times];
+  scaled.x = [(y[first - 1]! - analysis.initial) / way, ...scaled.x];
+  const error = recording.to - final;
+  analysis.figures = {
+    delay: delay(scaled),
+    rise: rise(scaled),
+    overshoot: overshoot(scaled),
+    settling5: settling(scaled, 0.05),
+    settling2: settling(scaled, 0.02),
+    steadyError: {
+      kind: 'value',
+      value: error,
+      error: (2 * noise) / Math.sqrt(tail.length) + resolution / 2,
+    },
+  };
+  const gap = latest - earliest;
+  if (Math.abs(error) > 0.05 * Math.abs(commanded) + blur) {
+    analysis.remarks.push(
+      'The value does not reach the reference. Something limits it (current, voltage, load), or the regulator has no integral part.',
+    );
+  }
+  if (Math.abs(analysis.initial - recording.from) > 0.05 * Math.abs(commanded) + blur) {
+    analysis.remarks.push('The value was not at the start of the step when the step began.');
+  }
+  if (isStraight(scaled)) {
+    analysis.remarks.push(
+      'The value rises in a straight line. A ramp or a limit of the current sets the rise time, not the gains.',
+    );
+  }
+  if (analysis.longest > 5 * analysis.interval) {
+    analysis.remarks.push(`A gap of ${milliseconds(analysis.longest)} is in the record.`);
+  }
+  if (gap > 2 * analysis.interval) {
+    analysis.remarks.push(`The time of the step is known to ±${milliseconds(gap / 2)} only.`);
+  }
+  return analysis;
+}
+
+/** The response from 0 (before the step) to 1 (final value). */
+interface Scaled {
+  t: number[];
+  x: number[];
+  at: number;
+  doubt: number;
+  endFrom: number;
+  blur: number;
+  noise: number;
+  resolution: number;
+  update: number;
+  median: number;
+}
+
+/** When the response has reached a level, between two samples. */
+interface Crossing {
+  t: number;
+  /** Index of the first sample behind it. */
+  index: number;
+  error: number;
+}
+
+function crossing(scaled: Scaled, index: number, level: number): Crossing {
+  const { t, x } = scaled;
+  const [t0, t1, x0, x1] = [t[index - 1]!, t[index]!, x[index - 1]!, x[index]!];
+  const gap = t1 - t0;
+  const at = x1 === x0 ? t1 : t0 + (gap * (level - x0)) / (x1 - x0);
+  // Noise and quantisation move a crossing the more, the slower the value changes.
+  const slope = slopeAround(scaled, index);
+  const blurred = slope > 0 ? (scaled.noise + scaled.resolution) / slope : 0;
+  return { t: at, index, error: Math.max(gap, scaled.update || 0) / 2 + blurred };
+}
+
+/** Mean slope over the samples around an index, over at least the blur. */
+function slopeAround({ t, x, blur }: Scaled, index: number): number {
+  let [low, high] = [index - 1, index];
+  while (Math.abs(x[high]! - x[low]!) < blur && (low > 0 || high < x.length - 1)) {
+    low = Math.max(0, low - 1);
+    high = Math.min(x.length - 1, high + 1);
+  }
+  return Math.abs(x[high]! - x[low]!) / (t[high]! - t[low]!);
+}
+
+/** The 90 % crossing is the first; that of a lower level is the last before it: noise may cross it early. */
+function up(scaled: Scaled, level: number): Crossing | null {
+  const top = scaled.x.findIndex((value, index) => index > 0 && value >= 0.9);
+  if (top < 0) return null;
+  if (level >= 0.9) return crossing(scaled, top, level);
+  for (let index = top; index > 0; index -= 1) {
+    if (scaled.x[index - 1]! < level) return crossing(scaled, index, level);
+  }
+  return null;
+}
+
+function delay(scaled: Scaled): Figure {
+  const half = up(scaled, 0.5);
+  if (!half) return { kind: 'none', why: 'The value was beyond 50 % before the step.' };
+  const value = half.t - scaled.at;
+  const error = half.error + scaled.doubt;
+  if (value <= error) {
+    return { kind: 'below', bound: value + error, why: 'It is shorter than the time between two samples.' };
+  }
+  return { kind: 'value', value, error };
+}
+
+function rise(scaled: Scaled): Figure {
+  if (scaled.blur > 0.2) {
+    return { kind: 'none', why: `The noise (${percent(scaled.noise)} of the way) hides 10 % and 90 %.` };
+  }
+  const [low, high] = [up(scaled, 0.1), up(scaled, 0.9)];
+  if (!low || !high) return { kind: 'none', why: 'The value was beyond 10 % before the step.' };
+  const value = high.t - low.t;
+  const between = high.index - low.index;
+  const error = Math.hypot(low.error, high.error);
+  if (between < 2) {
+    const bound = scaled.t[high.index]! - scaled.t[low.index - 1]!;
+    return { kind: 'below', bound, why: 'Fewer than two samples are between 10 % and 90 %.' };
+  }
+  if (value <= error) {
+    return { kind: 'below', bound: value + error, why: 'It is shorter than its uncertainty.' };
+  }
+  return { kind: 'value', value, error };
+}
+
+function overshoot({ x, noise, resolution }: Scaled): Figure {
+  const index = x.reduce((best, value, at) => (value > x[best]! ? at : best), 0);
+  const over = x[index]! - 1;
+  // The highest of many samples is too high by noise.
+  const bound = Math.max((SIGMAS - 1) * noise + resolution, LEAST_OVERSHOOT);
+  if (over <= bound) {
+    return {
+      kind: 'below', bound: 100 * bound,
+      why: 'None is larger than noise and resolution.',
+    };
+  }
+  const [left, right] = [x[index - 1] ?? x[index]!, x[index + 1] ?? x[index]!];
+  const curvature = Math.abs(left - 2 * x[index]! + right) / 8;
+  return { kind: 'value', value: 100 * over, error: 100 * (2 * noise + resolution + curvature) };
+}
+
+function settling(scaled: Scaled, band: number): Figure {
+  const { t, x, noise, resolution } = scaled;
+  if (band < 3 * noise + resolution / 2) {
+    const blur = 3 * noise + resolution / 2;
+    return { kind: 'none', why: `Noise and resolution (±${percent(blur)} of the way) are larger than the band.` };
+  }
+  const last = x.findLastIndex((value) => Math.abs(value - 1) > band);
+  const outside = x[last];
+  if (outside === undefined || last + 1 >= x.length || t[last + 1]! >= scaled.endFrom) {
+    return { kind: 'none', why: 'It has not settled before the last fifth of the record. Record longer.' };
+  }
+  const settled = crossing(scaled, last + 1, outside > 1 ? 1 + band : 1 - band);
+  const value = settled.t - scaled.at;
+  const error = settled.error + scaled.doubt;
+  if (value <= error) {
+    return { kind: 'below', bound: value + error, why: 'It is shorter than the time between two samples.' };
+  }
+  return { kind: 'value', value, error };
+}
+
+/** Why the end of the record is not steady; `null` if it is. */
+function whyUnsettled(tail: number[], way: number, noise: number, resolution: number): string | null {
+  const half = Math.floor(tail.length / 2);
+  const drift = mean(tail.slice(half)) - mean(tail.slice(0, half));
+  const blurred = (SIGMAS * noise) / Math.sqrt(half) + resolution;
+  if (Math.abs(drift) > 0.01 * way + blurred) {
+    return `It has not settled: the value still changes by ${percent(Math.abs(drift) / way)} of the way in the last fifth. Record longer.`;
+  }
+  const swing = (Math.max(...tail) - Math.min(...tail)) / 2;
+  if (swing > 0.02 * way + SIGMAS * noise + resolution) {
+    return `It has not settled: the value still swings by ±${percent(swing / way)} of the way in the last fifth.`;
+  }
+  return null;
+}
+
+/** Whether the response between 10 % and 90 % is a straight line with sharp ends, as a limited rate gives. */
+function isStraight(scaled: Scaled): boolean {
+  const [low, high] = [up(scaled, 0.1), up(scaled, 0.9)];
+  if (!low || !high || high.index - low.index < 6) return false;
+  const slope = 0.8 / (high.t - low.t);
+  const tolerance = 0.01 + scaled.blur / 2;
+  for (let index = low.index; index < high.index; index += 1) {
+    const line = 0.1 + slope * (scaled.t[index]! - low.t);
+    if (Math.abs(scaled.x[index]! - line) > tolerance) return false;
+  }
+  // A second-order response bends on both sides; a limited rate does not before 2 %.
+  const foot = up(scaled, 0.02 + scaled.blur / 2);
+  if (!foot) return false;
+  const expected = low.t - (0.08 - scaled.blur / 2) / slope;
+  return Math.abs(foot.t - expected) <= foot.error + low.error + 0.02 / slope;
+}
+
+function valid({ t, y }: Recording): { t: number[]; y: number[] } {
+  const kept = Array.from(y, (_, index) => index).filter((index) => !Number.isNaN(y[index]));
+  return { t: kept.map((index) => t[index]!), y: kept.map((index) => y[index]!) };
+}
+
+function none(why: string): Record<FigureName, Figure> {
+  const figure: Figure = { kind: 'none', why };
+  return {
+    delay: figure, rise: figure, overshoot: figure, settling5: figure, settling2: figure, steadyError: figure,
+  };
+}
+
+/** Noise from the differences of neighbours, which a slow swing does not enlarge. */
+function scatter(values: number[]): number {
+  const steps = differences(values);
+  return steps.length ? Math.sqrt(mean(steps.map((step) => step * step)) / 2) : 0;
+}
+
+/** The smallest difference between two values: the resolution, if the drive gives none. */
+function smallestStep(values: number[]): number {
+  const sorted = [...new Set(values)].sort((a, b) => a - b);
+  // Values of a continuous kind have no common step.
+  if (sorted.length * 3 > values.length) return 0;
+  return sorted.length > 1 ? Math.min(...differences(sorted)) : 0;
+}
+
+/** Time between two new values while the response moves. */
+function updateInterval(t: number[], y: number[]): number {
+  const top = Math.max(...y) - Math.min(...y);
+  const changes = t.filter((_, index) => index > 0 && Math.abs(y[index]! - y[index - 1]!) > top / 100);
+  return changes.length > 3 ? median(differences(changes)) : NaN;
+}
+
+export function median(values: number[]): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  const middle = sorted.length >> 1;
+  if (!sorted.length) return NaN;
+  return sorted.length % 2 ? sorted[middle]! : (sorted[middle - 1]! + sorted[middle]!) / 2;
+}
+
+export function mean(values: readonly number[]): number {
+  return values.reduce((sum, value) => sum + value, 0) / values.length;
+}
+
+export function deviation(values: readonly number[]): number {
+  const middle = mean(values);
+  return Math.sqrt(mean(values.map((value) => (value - middle) ** 2)));
+}
+
+function differences(values: readonly number[]): number[] {
+  return values.slice(1).map((value, index) => value - values[index]!);
+}
+
+function plain(value: number): string {
+  return String(Number(value.toPrecision(3)));
+}
+
+function percent(share: number): string {
+  return `${plain(100 * share)} %`;
+}
+
+function milliseconds(seconds: number): string {
+  return `${plain(1000 * seconds)} ms`;
+}
