@@ -31,7 +31,7 @@ export interface Analysis {
   final: number;
   /** Standard deviation of the noise. */
   noise: number;
-  /** The step between two measured values: that of the drive, or the smallest that was seen. */
+  /** The step between two measured values: that of the drive, or a larger one that was seen. */
   resolution: number;
   /** Samples after the step, and the median and longest time between two samples, in seconds. */
   samples: number;
@@ -67,6 +67,10 @@ const LEAST_BEFORE = 5;
 const LEAST_END = 8;
 /** Below this many standard deviations, a difference is noise. */
 const SIGMAS = 4;
+/** Fewer different values may have a common step by chance. */
+const LEAST_STEPS = 8;
+/** A straight line is met to this part of the rise time. */
+const STRAIGHT = 0.03;
 /** A smaller overshoot, as a part of the way, is not told from none. */
 const LEAST_OVERSHOOT = 0.001;
 
@@ -78,7 +82,7 @@ export function analyse(recording: Recording): Analysis {
   const times = first < 0 ? [] : t.slice(first);
   const values = first < 0 ? [] : y.slice(first);
   const gaps = differences(times);
-  const resolution = recording.resolution || smallestStep(y);
+  const resolution = Math.max(recording.resolution, commonStep(y));
   const analysis: Analysis = {
     figures: none('There are too few samples.'),
     initial: mean(before),
@@ -274,10 +278,10 @@ function overshoot({ x, noise, resolution }: Scaled): Figure {
 }
 
 function settling(scaled: Scaled, band: number): Figure {
-  const { t, x, noise, resolution } = scaled;
-  if (band < 3 * noise + resolution / 2) {
-    const blur = 3 * noise + resolution / 2;
-    return { kind: 'none', why: `Noise and resolution (±${percent(blur)} of the way) are larger than the band.` };
+  const { t, x } = scaled;
+  const swing = Math.max(...x.filter((_, index) => t[index]! >= scaled.endFrom).map((value) => Math.abs(value - 1)));
+  if (swing > 0.8 * band) {
+    return { kind: 'none', why: `The value varies by ±${percent(swing)} of the way in the last fifth, which fills the band.` };
   }
   const last = x.findLastIndex((value) => Math.abs(value - 1) > band);
   const outside = x[last];
@@ -308,21 +312,19 @@ function whyUnsettled(tail: number[], way: number, noise: number, resolution: nu
   return null;
 }
 
-/** Whether the response between 10 % and 90 % is a straight line with sharp ends, as a limited rate gives. */
+/**
+ * Whether the response is a straight line with a sharp beginning, as a limited rate gives. A response of
+ * second order is nearly straight between 10 % and 90 %, but begins slowly.
+ */
 function isStraight(scaled: Scaled): boolean {
-  const [low, high] = [up(scaled, 0.1), up(scaled, 0.9)];
-  if (!low || !high || high.index - low.index < 6) return false;
-  const slope = 0.8 / (high.t - low.t);
-  const tolerance = 0.01 + scaled.blur / 2;
-  for (let index = low.index; index < high.index; index += 1) {
-    const line = 0.1 + slope * (scaled.t[index]! - low.t);
-    if (Math.abs(scaled.x[index]! - line) > tolerance) return false;
-  }
-  // A second-order response bends on both sides; a limited rate does not before 2 %.
-  const foot = up(scaled, 0.02 + scaled.blur / 2);
-  if (!foot) return false;
-  const expected = low.t - (0.08 - scaled.blur / 2) / slope;
-  return Math.abs(foot.t - expected) <= foot.error + low.error + 0.02 / slope;
+  const levels = [0.03, 0.1, 0.3, 0.5, 0.7, 0.9].map((level) => ({ level, at: up(scaled, level) }));
+  const [foot, low, high] = [levels[0]!.at, levels[1]!.at, levels.at(-1)!.at];
+  if (!foot || !low || !high) return false;
+  const rise = high.t - low.t;
+  return levels.every(({ level, at }) => {
+    const line = low.t + (rise * (level - 0.1)) / 0.8;
+    return at !== null && at.error < STRAIGHT * rise && Math.abs(at.t - line) < STRAIGHT * rise;
+  });
 }
 
 function valid({ t, y }: Recording): { t: number[]; y: number[] } {
@@ -343,12 +345,14 @@ function scatter(values: number[]): number {
   return steps.length ? Math.sqrt(mean(steps.map((step) => step * step)) / 2) : 0;
 }
 
-/** The smallest difference between two values: the resolution, if the drive gives none. */
-function smallestStep(values: number[]): number {
+/** A step of which all differences of values are multiples: a drive may round more than its register. */
+function commonStep(values: number[]): number {
   const sorted = [...new Set(values)].sort((a, b) => a - b);
-  // Values of a continuous kind have no common step.
-  if (sorted.length * 3 > values.length) return 0;
-  return sorted.length > 1 ? Math.min(...differences(sorted)) : 0;
+  const steps = differences(sorted);
+  if (steps.length < LEAST_STEPS) return 0;
+  const least = Math.min(...steps);
+  const isMultiple = (step: number) => Math.abs(step / least - Math.round(step / least)) < 0.02;
+  return steps.every(isMultiple) ? least : 0;
 }
 
 /** Time between two new values while the response moves. */
