@@ -1,0 +1,299 @@
+// A step that is applied to a motor: go to the start, wait until it is steady, step, record, end.
+import type { AnswerTo, Ask, Rows } from '../link';
+import type { Controlled, Description, Event as DriveEvent, MotorName, Register, SignalName } from '../wire';
+import { deviation, mean, median } from './analysis';
+import type { Gain, Run } from './run';
+
+export interface Plan {
+  motor: MotorName;
+  description: Description;
+  controlled: Controlled;
+  from: number;
+  to: number;
+  /** How long the response is recorded, in seconds. */
+  duration: number;
+  /** How fast the motor goes to `from`, in units a second. Of a position: the speed of all moves. */
+  approach: number;
+  /** What happens at the end. */
+  after: 'stop' | 'from';
+}
+
+/** What an experiment needs of the page. Times are in seconds. */
+export interface Rig {
+  ask<A extends Ask>(ask: A): Promise<AnswerTo<A['ask']>>;
+  subscribe(signals: SignalName[], period: number, onRows: (rows: Rows) => void, onRefused: (why: Error) => void): () => void;
+  /** Stops the motor. Rejects if that is not confirmed. */
+  stop(motor: MotorName): Promise<string>;
+  /** Events since the page was opened. */
+  events(): readonly DriveEvent[];
+  /** The name of this page in events. */
+  name(): string;
+  wait(seconds: number): Promise<void>;
+}
+
+/** The highest rate that a share takes. The line carries less; the share says how much. */
+const PERIOD = 1e-4;
+/** A reference that changes so fast, in steps a second, is there within one message. */
+const AT_ONCE = 1e6;
+/** Kept before the step. */
+const BEFORE = 0.3;
+/** A value is steady if it is over this time. */
+const STEADY = 0.5;
+const STEADY_SAMPLES = 20;
+/** It has to be steady within this time after the reference is there. */
+const PATIENCE = 15;
+/** Rows come in batches, after they are confirmed. */
+const LATE = 0.3;
+const LOOK = 0.05;
+
+export class Aborted extends Error {}
+
+interface Sample {
+  t: number;
+  span: number;
+  y: number;
+  reference: number;
+}
+
+/** Gains of all regulators of a motor, and the ramp that it adds itself. */
+export function gainsOf({ registers }: Description): Register[] {
+  return registers.filter(
+    ({ name, readable }) => readable && /^((speed|torque|flux|position)_k[pid](_div)?|acceleration)$/i.test(name),
+  );
+}
+
+/** The register with the reference of a measured signal, if the drive has one. */
+export function referenceOf({ registers }: Description, { measured }: Controlled): string | null {
+  const name = measured.replace(/_MEAS$/, '_REF');
+  return name !== measured && registers.some((one) => one.name === name && one.readable) ? name : null;
+}
+
+export class Experiment {
+  private samples: Sample[] = [];
+  private lost = 0;
+  private refused: Error | null = null;
+  private aborted: Aborted | null = null;
+  private onAbort: (why: Aborted) => void = () => {};
+  /** Whether the motor may turn because of this experiment. */
+  isMoving = false;
+
+  constructor(
+    readonly plan: Plan,
+    private readonly rig: Rig,
+    private readonly onProgress: (text: string) => void,
+  ) {}
+
+  /** How many samples were received, and the last value. */
+  get count(): number {
+    return this.samples.length;
+  }
+
+  /** Ends the experiment. `run` rejects once the motor is stopped. */
+  abort(why: string) {
+    if (this.aborted) return;
+    this.aborted = new Aborted(why);
+    this.onAbort(this.aborted);
+  }
+
+  /** Applies the step. Whatever fails, the motor is stopped before this rejects. */
+  async run(): Promise<Omit<Run, 'number' | 'analysis' | 'isThinned'>> {
+    const { motor, description, controlled } = this.plan;
+    const reference = referenceOf(description, controlled);
+    const signals = [controlled.measured, ...(reference ? [reference] : [])];
+    let end = () => {};
+    try {
+      this.onProgress('Reading the gains.');
+      const gains = await this.gains();
+      end = this.rig.subscribe(
+        signals.map((name) => ({ ...motor, name })), PERIOD, (rows) => this.take(rows, reference),
+        (why) => (this.refused = why),
+      );
+      await this.approach();
+      const step = await this.step();
+      this.onProgress(`Recording for ${this.plan.duration} s.`);
+      await this.until(() => (this.last?.t ?? 0) >= step.latest + this.plan.duration, this.plan.duration + 5, 'The motor gives no more values.');
+      end();
+      await this.end();
+      return this.recorded(step, gains, reference);
+    } catch (why) {
+      end();
+      throw await this.fail(why);
+    }
+  }
+
+  private async gains(): Promise<Gain[]> {
+    const registers = gainsOf(this.plan.description);
+    const names = registers.map(({ name }) => name);
+    if (!names.length) return [];
+    const { values } = await this.unlessAborted(this.rig.ask({ ask: 'read', ...this.plan.motor, names }));
+    return values
+      .filter(({ value }) => value !== null)
+      .map(({ name, text }) => ({ name, text, unit: registers.find((one) => one.name === name)?.unit ?? '' }));
+  }
+
+  private take({ columns, t0, t, span, values, lost }: Rows, reference: string | null) {
+    this.lost += lost;
+    const column = (name: string | null) => values[columns.findIndex((one) => one.name === name)];
+    const [y, ref] = [column(this.plan.controlled.measured), column(reference)];
+    if (!y) return;
+    for (let row = 0; row < t.length; row += 1) {
+      this.samples.push({ t: t0 + t[row]!, span: span[row]!, y: y[row]!, reference: ref?.[row] ?? NaN });
+    }
+  }
+
+  private get last(): Sample | undefined {
+    return this.samples.at(-1);
+  }
+
+  private async approach() {
+    const { from, to, approach } = this.plan;
+    await this.until(() => this.samples.length > 2, 5, 'The motor gives no values.');
+    let duration = 0;
+    // A motor at rest is at 0 without a command. Starting it for that may need a rev-up.
+    const isAtRest = from === 0 && this.plan.controlled.mode !== 'position' && this.samples.every(({ y }) => y === 0);
+    if (!isAtRest) {
+      this.onProgress(`Going to ${from} ${this.plan.controlled.unit}.`);
+      const began = await this.command(from, approach);
+      duration = Math.abs(from - began) / approach;
+      await this.pause(duration);
+    }
+    this.onProgress('Waiting until the value is steady.');
+    const since = this.last?.t ?? 0;
+    const tolerance = 0.02 * Math.abs(to - from);
+    const isSteady = () => {
+      const now = this.last?.t ?? 0;
+      if (now - since < STEADY) return false;
+      const all = this.samples.filter(({ t, y }) => t > now - STEADY && !Number.isNaN(y)).map(({ y }) => y);
+      if (all.length < STEADY_SAMPLES) return false;
+      const half = all.length >> 1;
+      const noise = deviation(all);
+      const drift = Math.abs(mean(all.slice(half)) - mean(all.slice(0, half)));
+      return drift <= tolerance + (3 * noise) / Math.sqrt(half) && noise <= Math.abs(to - from);
+    };
+    await this.until(isSteady, PATIENCE, `The value is not steady ${PATIENCE} s after the motor went to ${from}.`);
+  }
+
+  /** Changes the reference at once. Returns when that was, by the clock of the line. */
+  private async step(): Promise<{ earliest: number; latest: number }> {
+    const { to, from, approach, controlled, motor } = this.plan;
+    // Enough for the record before the step.
+    await this.pause(BEFORE);
+    this.onProgress('Applying the step.');
+    const known = new Set(this.rig.events());
+    const before = this.last!;
+    await this.command(to, controlled.mode === 'position' ? approach : Math.abs(to - from) * AT_ONCE);
+    const span = median(this.samples.slice(-50).map((one) => one.span));
+    await this.until(() => this.last!.t > before.t, 5, 'The motor gives no more values.');
+    const sent = this.rig
+      .events()
+      .filter(
+        (event) =>
+          !known.has(event) && event.event === 'commanded' && event.line === motor.line &&
+          event.motor === motor.motor && typeof event.t === 'number' && !!event.by?.startsWith(`${this.rig.name()} (`),
+      )
+      .map(({ t }) => t!);
+    if (sent.length) return { earliest: Math.min(...sent), latest: Math.max(...sent) + span };
+    return { earliest: before.t, latest: this.last!.t };
+  }
+
+  private async end() {
+    const { after, from, approach, motor, controlled } = this.plan;
+    if (after === 'stop') {
+      this.onProgress('Stopping.');
+      await this.rig.stop(motor);
+      this.isMoving = false;
+      return;
+    }
+    this.onProgress(`Going back to ${from} ${controlled.unit}.`);
+    await this.command(from, approach);
+  }
+
+  private recorded(
+    step: { earliest: number; latest: number }, gains: Gain[], reference: string | null,
+  ): Omit<Run, 'number' | 'analysis' | 'isThinned'> {
+    const { motor, controlled, from, to, duration, description } = this.plan;
+    const { earliest, latest } = narrowed(step, this.samples, from, to);
+    const at = (earliest + latest) / 2;
+    const kept = this.samples.filter(({ t }) => t > earliest - BEFORE - STEADY && t < latest + duration);
+    const orNull = (value: number) => (Number.isNaN(value) ? null : value);
+    return {
+      when: Date.now(), motor, mode: controlled.mode, unit: controlled.unit, measured: controlled.measured, from, to,
+      t: kept.map(({ t }) => Number((t - at).toFixed(7))),
+      y: kept.map(({ y }) => orNull(y)),
+      reference: reference ? kept.map((one) => orNull(one.reference)) : null,
+      doubt: (latest - earliest) / 2,
+      resolution: description.registers.find(({ name }) => name === controlled.measured)?.range?.[2] ?? 0,
+      gains,
+      lost: this.lost,
+      ramp: rampText(this.plan, gains),
+    };
+  }
+
+  /** Moves the reference. Returns the measured value that it began with. */
+  private async command(target: number, rate: number): Promise<number> {
+    const { motor, controlled } = this.plan;
+    this.isMoving = true;
+    const run = this.rig.ask({ ask: 'run', ...motor, mode: controlled.mode, target, rate, hold: false });
+    return (await this.unlessAborted(run)).from;
+  }
+
+  /** Stops the motor, and gives the reason with what is known of the stop. */
+  private async fail(why: unknown): Promise<Error> {
+    const message = why instanceof Error ? why.message : String(why);
+    let stopped = 'Nothing was moved.';
+    if (this.isMoving) {
+      try {
+        stopped = await this.rig.stop(this.plan.motor);
+        this.isMoving = false;
+      } catch (failure) {
+        stopped = `The stop is not confirmed: ${failure instanceof Error ? failure.message : String(failure)}`;
+      }
+    }
+    const text = `${/[.!?]$/.test(message) ? message : `${message}.`} ${stopped}`;
+    return why instanceof Aborted ? new Aborted(`Aborted. ${text}`) : new Error(text);
+  }
+
+  private async until(is: () => boolean, patience: number, why: string) {
+    for (let waited = 0; !is(); waited += LOOK) {
+      if (this.refused) throw this.refused;
+      if (waited > patience) throw new Error(why);
+      await this.pause(LOOK);
+    }
+  }
+
+  private pause(seconds: number): Promise<void> {
+    return this.unlessAborted(this.rig.wait(seconds));
+  }
+
+  private unlessAborted<T>(what: Promise<T>): Promise<T> {
+    return new Promise((done, failed) => {
+      this.onAbort = failed;
+      if (this.aborted) failed(this.aborted);
+      what.then(done, failed);
+    });
+  }
+}
+
+/** The reference that the drive reports narrows down when it changed. */
+function narrowed(step: { earliest: number; latest: number }, samples: readonly Sample[], from: number, to: number) {
+  const changed = samples.findIndex(
+    ({ t, reference }) => t >= step.earliest - LATE && Math.abs(reference - to) < Math.abs(reference - from),
+  );
+  const [old, young] = [samples[changed - 1], samples[changed]];
+  if (!old || !young) return step;
+  const earliest = Math.max(step.earliest, old.t - old.span / 2);
+  const latest = Math.min(step.latest, young.t + young.span / 2);
+  return earliest <= latest ? { earliest, latest } : step;
+}
+
+/** What the drive itself does with a reference that changes at once. */
+export function rampText({ controlled, approach }: Plan, gains: readonly Gain[]): string {
+  if (controlled.mode === 'position') return `The drive plans the move, at most ${approach} ${controlled.unit}/s fast.`;
+  const limit = gains.find(({ name }) => /^acceleration$/i.test(name));
+  if (!limit) return 'The reference changes at once. No ramp of the drive is known.';
+  return Number.parseFloat(limit.text) === 0
+    ? 'The reference changes at once. The acceleration of the drive has no limit.'
+    : `The drive limits the acceleration to ${limit.text} ${limit.unit}.`;
+}
+
+export { PERIOD, STEADY };
