@@ -340,7 +340,7 @@ function none(why: string): Record<FigureName, Figure> {
 }
 
 /** Noise from the differences of neighbours, which a slow swing does not enlarge. */
-function scatter(values: number[]): number {
+export function scatter(values: readonly number[]): number {
   const steps = differences(values);
   return steps.length ? Math.sqrt(mean(steps.map((step) => step * step)) / 2) : 0;
 }

@@ -1,7 +1,7 @@
 // A step that is applied to a motor: go to the start, wait until it is steady, step, record, end.
 import type { AnswerTo, Ask, Rows } from '../link';
 import type { Controlled, Description, Event as DriveEvent, MotorName, Register, SignalName } from '../wire';
-import { deviation, mean, median } from './analysis';
+import { deviation, mean, median, scatter } from './analysis';
 import type { Gain, Run } from './run';
 
 export interface Plan {
@@ -83,7 +83,7 @@ export class Experiment {
     private readonly onProgress: (text: string) => void,
   ) {}
 
-  /** How many samples were received, and the last value. */
+  /** How many samples were received. */
   get count(): number {
     return this.samples.length;
   }
@@ -111,10 +111,11 @@ export class Experiment {
       await this.approach();
       const step = await this.step();
       this.onProgress(`Recording for ${this.plan.duration} s.`);
+      const carried = await this.carried();
       await this.until(() => (this.last?.t ?? 0) >= step.latest + this.plan.duration, this.plan.duration + 5, 'The motor gives no more values.');
       end();
       await this.end();
-      return this.recorded(step, gains, reference);
+      return this.recorded(step, gains, reference, carried);
     } catch (why) {
       end();
       throw await this.fail(why);
@@ -166,9 +167,9 @@ export class Experiment {
       const all = this.samples.filter(({ t, y }) => t > now - STEADY && !Number.isNaN(y)).map(({ y }) => y);
       if (all.length < STEADY_SAMPLES) return false;
       const half = all.length >> 1;
-      const noise = deviation(all);
+      const noise = scatter(all);
       const drift = Math.abs(mean(all.slice(half)) - mean(all.slice(0, half)));
-      return drift <= tolerance + (3 * noise) / Math.sqrt(half) && noise <= Math.abs(to - from);
+      return drift <= tolerance + (3 * noise) / Math.sqrt(half) && deviation(all) <= tolerance + 2 * noise;
     };
     await this.until(isSteady, PATIENCE, `The value is not steady ${PATIENCE} s after the motor went to ${from}.`);
   }
@@ -196,6 +197,16 @@ export class Experiment {
     return { earliest: before.t, latest: this.last!.t };
   }
 
+  /** The time between two values that the line carries, as the share says. */
+  private async carried(): Promise<number | null> {
+    const { motor, controlled } = this.plan;
+    const { rates } = await this.unlessAborted(this.rig.ask({ ask: 'rates' }));
+    const rate = rates.find(
+      ({ line, motor: number, name }) => line === motor.line && number === motor.motor && name === controlled.measured,
+    );
+    return rate?.predicted ?? null;
+  }
+
   private async end() {
     const { after, from, approach, motor, controlled } = this.plan;
     if (after === 'stop') {
@@ -209,7 +220,7 @@ export class Experiment {
   }
 
   private recorded(
-    step: { earliest: number; latest: number }, gains: Gain[], reference: string | null,
+    step: { earliest: number; latest: number }, gains: Gain[], reference: string | null, carried: number | null,
   ): Omit<Run, 'number' | 'analysis' | 'isThinned'> {
     const { motor, controlled, from, to, duration, description } = this.plan;
     const { earliest, latest } = narrowed(step, this.samples, from, to);
@@ -224,6 +235,7 @@ export class Experiment {
       doubt: (latest - earliest) / 2,
       resolution: description.registers.find(({ name }) => name === controlled.measured)?.range?.[2] ?? 0,
       gains,
+      carried,
       lost: this.lost,
       ramp: rampText(this.plan, gains),
     };
@@ -254,8 +266,9 @@ export class Experiment {
   }
 
   private async until(is: () => boolean, patience: number, why: string) {
-    for (let waited = 0; !is(); waited += LOOK) {
+    for (let waited = 0; ; waited += LOOK) {
       if (this.refused) throw this.refused;
+      if (is()) return;
       if (waited > patience) throw new Error(why);
       await this.pause(LOOK);
     }
@@ -295,5 +308,3 @@ export function rampText({ controlled, approach }: Plan, gains: readonly Gain[])
     ? 'The reference changes at once. The acceleration of the drive has no limit.'
     : `The drive limits the acceleration to ${limit.text} ${limit.unit}.`;
 }
-
-export { PERIOD, STEADY };

@@ -29,7 +29,9 @@ export interface Run {
   doubt: number;
   resolution: number;
   gains: Gain[];
-  /** How long a row took at most to be read, and rows that were lost. */
+  /** The time between two values that the line carried, in seconds, if the share said it. */
+  carried: number | null;
+  /** Rows that were lost because this page was too slow. */
   lost: number;
   /** What the drive does with the step itself, in words. */
   ramp: string;

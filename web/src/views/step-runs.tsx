@@ -179,9 +179,10 @@ function GainRow({ name, shown }: { name: string; shown: readonly Run[] }) {
 
 const rounded = (value: number) => String(Number(value.toPrecision(3)));
 
-function measuredText({ analysis, unit, doubt, lost }: Run): string {
+function measuredText({ analysis, unit, doubt, lost, carried }: Run): string {
   const parts = [
     `${analysis.samples} samples after the step, one each ${rounded(1000 * analysis.interval)} ms`,
+    ...(carried && carried < 0.9 * analysis.interval ? [`the line carries one each ${rounded(1000 * carried)} ms`] : []),
     ...(analysis.update > 1.5 * analysis.interval ? [`a new value each ${rounded(1000 * analysis.update)} ms`] : []),
     ...(analysis.resolution > 0 ? [`resolution ${rounded(analysis.resolution)} ${unit}`] : []),
     ...(analysis.noise >= 0 ? [`noise ${rounded(analysis.noise)} ${unit} (standard deviation)`] : []),
