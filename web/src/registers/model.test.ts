@@ -3,7 +3,7 @@ import type { Register } from '../wire';
 import { access, found, groups, isSame, numberOf, rangeText } from './model';
 
 const register = (name: string, more: Partial<Register> = {}): Register => ({
-  name, group: 'any drive', doc: '', unit: '', readable: true, writable: true, wears_rom: false, range: null, ...more,
+  name, group: 'any drive', doc: '', unit: '', readable: true, writable: true, wears_rom: false, can_keep: false, range: null, ...more,
 });
 
 describe('search', () => {
