@@ -82,7 +82,7 @@ async fn a_description_has_the_tables_of_the_protocol() {
     let page = world.page().await;
     let describe = async |line: &str| match page.ask(Ask::Describe { line: line.to_owned() }).await
     {
-        Ok(Answer::Describe(description)) => *description,
+        Ok(Answer::Describe(description)) => description,
         other => panic!("{other:?}"),
     };
     let drive = describe("st0").await;

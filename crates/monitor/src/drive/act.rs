@@ -8,7 +8,7 @@ use motorlink_telemetry::line::{Request, may_move};
 use motorlink_telemetry::share::message::Reason;
 
 use super::commands::Command;
-use super::control::{Control, Motion};
+use super::control::{Control, Motion, permitted};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::Value;
@@ -40,7 +40,7 @@ impl Act {
         }
         let exchanges = Exchanges::new(view, &self.target);
         if ends_motion(&request) {
-            control.stopping(Some(&self.target.name));
+            control.stopping(&self.target);
             let reply = exchanges.request(&request).await?;
             return self.values(&exchanges, &reply);
         }
@@ -68,10 +68,9 @@ impl Act {
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.limited(&self.target, |limited| limited.check(request))?;
-        let program = drive.program(self.hold).await?;
+        let (program, _lane) = permitted(drive, self.hold, &self.target).await?;
         stops.check()?;
         let exchanges = Exchanges::new(&program, &self.target).motion();
-        let _lane = exchanges.lane().await;
         let reply = send(control, &exchanges, request).await?;
         let values = self.values(&exchanges, &reply)?;
         if is_start(request) {

@@ -1,7 +1,7 @@
 //! Who may move a motor, and how far.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::share::message::{MotorName, Reason};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
@@ -19,20 +19,13 @@ pub trait Motion: Send + Sync {
 
 /// What all pages share of the motors.
 #[derive(Default)]
-pub(super) struct Control(Mutex<Motors>);
-
-#[derive(Default)]
-struct Motors {
-    known: BTreeMap<MotorName, Known>,
-    /// How many stops of all motors were asked for.
-    stops: u64,
-}
+pub(super) struct Control(Mutex<BTreeMap<MotorName, Known>>);
 
 /// What is known of a motor.
 #[derive(Default)]
 struct Known {
     limited: Limited,
-    /// How many stops were asked for.
+    /// How many commands of pages have stopped it.
     stops: u64,
     /// One page commands it at a time.
     commands: Arc<AsyncMutex<()>>,
@@ -46,13 +39,9 @@ pub(super) struct Stops<'a> {
 }
 
 impl Control {
-    /// A stop of this motor, or of all motors, was asked for.
-    pub(super) fn stopping(&self, motor: Option<&MotorName>) {
-        let mut motors = self.motors();
-        match motor {
-            None => motors.stops += 1,
-            Some(name) => motors.known.entry(name.clone()).or_default().stops += 1,
-        }
+    /// A page stops the motor with a command. Commands that are not sent yet are given up.
+    pub(super) fn stopping(&self, target: &Target) {
+        self.known(target, |known| known.stops += 1);
     }
 
     /// The stops until now.
@@ -61,26 +50,39 @@ impl Control {
     }
 
     fn count(&self, target: &Target) -> u64 {
-        let motors = self.motors();
-        motors.stops + motors.known.get(&target.name).map_or(0, |known| known.stops)
+        self.known(target, |known| known.stops)
     }
 
     /// The limits of a motor.
     pub(super) fn limited<T>(&self, target: &Target, with: impl FnOnce(&mut Limited) -> T) -> T {
-        with(&mut self.motors().known.entry(target.name.clone()).or_default().limited)
+        self.known(target, |known| with(&mut known.limited))
     }
 
     /// Waits until no other page commands the motor.
     pub(super) async fn turn(&self, target: &Target) -> OwnedMutexGuard<()> {
-        let lock = {
-            let mut motors = self.motors();
-            Arc::clone(&motors.known.entry(target.name.clone()).or_default().commands)
-        };
+        let lock = self.known(target, |known| Arc::clone(&known.commands));
         lock.lock_owned().await
     }
 
-    fn motors(&self) -> MutexGuard<'_, Motors> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    fn known<T>(&self, target: &Target, with: impl FnOnce(&mut Known) -> T) -> T {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        with(all.entry(target.name.clone()).or_default())
+    }
+}
+
+/// Waits until the session may send commands to the motor, whose replies it confirms.
+pub(super) async fn permitted(
+    drive: &impl Motion,
+    hold: bool,
+    target: &Target,
+) -> Result<(Program, OwnedMutexGuard<()>), Refusal> {
+    loop {
+        let program = drive.program(hold).await?;
+        let lane = program.lane(target.lane()).await;
+        // The page may have lapsed or stopped the motor meanwhile.
+        if drive.program(hold).await?.is(&program) {
+            return Ok((program, lane));
+        }
     }
 }
 

@@ -40,11 +40,7 @@ impl<'a> Exchanges<'a> {
 
     /// Waits until no other request of the session waits for its confirmation.
     pub(super) async fn lane(&self) -> OwnedMutexGuard<()> {
-        let motor = match self.target.speaks {
-            Speaks::St(_) => None,
-            Speaks::Rmd => Some(self.target.name.motor),
-        };
-        self.program.lane((self.target.name.line.clone(), motor)).await
+        self.program.lane(self.target.lane()).await
     }
 
     /// Sends a request; gives the payload of the acknowledge of an ST drive, or the eight bytes of an RMD

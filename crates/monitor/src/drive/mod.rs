@@ -66,7 +66,7 @@ impl Drives {
                 Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
             }
             Ask::Describe { line } => {
-                Ok(Answer::Describe(Box::new(describe::describe(&line, self.speaks(&line)?))))
+                Ok(Answer::Describe(describe::describe(&line, self.speaks(&line)?)))
             }
             Ask::Read { motor, names } => {
                 let target = self.target(motor)?;
@@ -86,12 +86,6 @@ impl Drives {
             }
             _ => Err(usage("this is not possible yet")),
         }
-    }
-
-    /// A stop of this motor, or of all motors, was asked for. Call it before the stop is passed to the share:
-    /// commands that pages have sent before it, and that wait for their session, are not sent any more.
-    pub fn stopping(&self, motor: Option<&MotorName>) {
-        self.control.stopping(motor);
     }
 
     fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {

@@ -4,7 +4,7 @@ use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
-use crate::program::Refusal;
+use crate::program::{Lane, Refusal};
 
 /// A motor of a line.
 #[derive(Debug, Clone)]
@@ -21,6 +21,15 @@ impl Target {
             .motor(number)
             .ok_or_else(|| usage(format!("{line}: no motor can have the number {number}")))?;
         Ok(Target { name: MotorName { line: line.to_owned(), motor: number }, motor, speaks })
+    }
+
+    /// Whose replies a confirmation is about: all of the line, or those of the motor.
+    pub(super) fn lane(&self) -> Lane {
+        let motor = match self.speaks {
+            Speaks::St(_) => None,
+            Speaks::Rmd => Some(self.name.motor),
+        };
+        (self.name.line.clone(), motor)
     }
 }
 

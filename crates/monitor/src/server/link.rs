@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::message::{Answer, Ask, MotorName, Reason, StoppedMotor};
@@ -28,7 +28,7 @@ pub struct Link {
 #[derive(Clone)]
 struct Joined {
     program: Program,
-    drives: Arc<Drives>,
+    drives: Drives,
 }
 
 impl Link {
@@ -76,7 +76,7 @@ impl Link {
         };
         match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
             Ok(Answer::Lines { lines, .. }) => {
-                Ok((Joined { program, drives: Arc::new(Drives::new(lines)) }, listener))
+                Ok((Joined { program, drives: Drives::new(lines) }, listener))
             }
             Ok(_) => Err(io::Error::other("it gives another answer")),
             Err(refusal) => Err(io::Error::other(refusal.message)),
@@ -87,7 +87,7 @@ impl Link {
     ///
     /// # Errors
     /// It is lost.
-    pub fn drives(&self) -> Result<Arc<Drives>, Refusal> {
+    pub fn drives(&self) -> Result<Drives, Refusal> {
         Ok(self.get()?.drives)
     }
 

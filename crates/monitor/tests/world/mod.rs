@@ -250,9 +250,8 @@ impl Page {
         self.ask(act(motor, command, values)).await
     }
 
-    /// A stop of this page, as the server passes it to the share.
+    /// A stop of this page.
     pub async fn stop(&self, motor: MotorName) {
-        self.drives.stopping(Some(&motor));
         let answer = self.view.ask(share::Ask::Stop { motor: Some(motor) }).await.unwrap();
         let share::Answer::Stop { motors } = answer else { panic!("{answer:?}") };
         assert_eq!(motors[0].failure, None);
