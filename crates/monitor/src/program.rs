@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::share::VERSION;
@@ -44,6 +44,8 @@ struct Shared {
     socket: OwnedFd,
     pending: Mutex<Pending>,
     lanes: Mutex<BTreeMap<Lane, Arc<AsyncMutex<()>>>>,
+    path: PathBuf,
+    name: String,
 }
 
 /// A line, and the motor if replies say which motor they are from.
@@ -84,6 +86,8 @@ impl Program {
             socket,
             pending: Mutex::new(Pending { last: OWN_IDS, ..Pending::default() }),
             lanes: Mutex::default(),
+            path: path.to_owned(),
+            name: name.to_owned(),
         });
         let program = Program { shared: Arc::clone(&shared) };
         let mut listener = Listener { reader, frames: Reader::default(), shared };
@@ -98,6 +102,21 @@ impl Program {
                 Err(io::Error::other(message))
             }
             _ => Err(io::Error::other("this is no share")),
+        }
+    }
+
+    /// Connects another program to the same share. Its name says what it does for this one.
+    ///
+    /// # Errors
+    /// The share is gone, or refuses.
+    pub(crate) async fn again(&self, what: &str) -> Result<(Self, Listener), Refusal> {
+        let Shared { path, name, .. } = &*self.shared;
+        match Self::connect(path, &format!("{name} ({what})")).await {
+            Ok((program, listener, _)) => Ok((program, listener)),
+            Err(error) => {
+                let message = format!("the share is lost: {error}; nothing was sent");
+                Err(Refusal { reason: Reason::Line, message, code: None })
+            }
         }
     }
 

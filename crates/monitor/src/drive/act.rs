@@ -9,7 +9,7 @@ use motorlink_telemetry::share::message::Reason;
 
 use super::commands::Command;
 use super::control::{Control, Motion, permitted};
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
+use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating, unconfirmed};
 use super::target::{Target, refusal, usage};
 use crate::message::Value;
 use crate::program::{Program, Refusal};
@@ -141,14 +141,4 @@ fn ends_motion(request: &Request) -> bool {
 fn is_start(request: &Request) -> bool {
     matches!(request, Request::St(_, request)
         if request.request() == StRequest::ExecuteCommand(StCommand::StartMotor))
-}
-
-/// What was sent may have been carried out.
-pub(super) fn unconfirmed(exchanges: &Exchanges<'_>) -> Refusal {
-    let place = exchanges.place();
-    let message = format!(
-        "{place}: the command was sent, and its reply may be one to another request: the line failed, or a \
-         reply came twice or late; check the motor"
-    );
-    refusal(Reason::Unconfirmed, message)
 }

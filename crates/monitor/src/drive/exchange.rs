@@ -113,3 +113,13 @@ impl<'a> Exchanges<'a> {
 pub(super) fn is_worth_repeating(refusal: &Refusal) -> bool {
     refusal.reason == Reason::Unconfirmed
 }
+
+/// What was sent may have been carried out.
+pub(super) fn unconfirmed(exchanges: &Exchanges<'_>) -> Refusal {
+    let place = exchanges.place();
+    let message = format!(
+        "{place}: the command was sent, and its reply may be one to another request: the line failed, or a \
+         reply came twice or late; check the motor"
+    );
+    refusal(Reason::Unconfirmed, message)
+}

@@ -13,8 +13,10 @@ mod exchange;
 mod limits;
 mod registers;
 mod search;
+mod settings;
 mod target;
 mod value;
+mod write;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -84,7 +86,23 @@ impl Drives {
                 self.control.limited(&target, |limited| limited.set(target.motor, mode, most))?;
                 Ok(Answer::Limit)
             }
-            _ => Err(usage("this is not possible yet")),
+            Ask::Write { motor, name, value, to_rom } => {
+                let target = self.target(motor)?;
+                let write = write::Write { target, name, value, to_rom };
+                Ok(Answer::Write { values: write.carry_out(&self.control, view, drive).await? })
+            }
+            Ask::Dump { motor } => {
+                let target = self.target(motor)?;
+                settings::dump(&self.control, &Exchanges::new(view, &target)).await
+            }
+            Ask::Diff { motor, text } => {
+                let target = self.target(motor)?;
+                settings::diff(&self.control, &Exchanges::new(view, &target), &text).await
+            }
+            Ask::Restore { motor, text, to_rom } => {
+                settings::restore(&self.control, view, self.target(motor)?, text, to_rom).await
+            }
+            Ask::Run { .. } => Err(usage("this is not possible yet")),
         }
     }
 

@@ -192,7 +192,7 @@ fn is_readable(shape: &Shape, profile: Profile) -> bool {
     shape.read_size(profile, Features::NONE.with(shape.feature)).is_some()
 }
 
-fn is_writable(shape: &Shape, profile: Profile) -> bool {
+pub(super) fn is_writable(shape: &Shape, profile: Profile) -> bool {
     matches!(shape.writing(profile, Features::NONE.with(shape.feature)), Access::Takes(_))
 }
 

@@ -176,6 +176,18 @@ impl SettingsFile {
         Text { text }.settings(&tuning.kind(), &names)
     }
 
+    /// One setting, as if a file had it.
+    ///
+    /// # Errors
+    /// The motor has no such setting, or it cannot have the value.
+    pub fn one<T: Tuning>(tuning: &T, name: &str, value: f64) -> Result<Self, Problem> {
+        let settings = tuning.blocks().into_iter().flat_map(|block| block.settings).collect();
+        let names = Names { settings, not_a_setting: &|name| tuning.not_a_setting(name) };
+        let setting = names.setting(name)?;
+        let values = [(setting.name.clone(), digits(setting, value)?)].into();
+        Ok(SettingsFile { values })
+    }
+
     /// The digits of a setting, if the file has it.
     pub(super) fn digits(&self, setting: &Setting) -> Option<i64> {
         self.values.get(&setting.name).copied()
@@ -333,19 +345,13 @@ impl Text<'_> {
     }
 
     fn digits(&self, setting: &Setting, value: &Spanned<DeValue<'_>>) -> Result<i64, Problem> {
-        let Setting { name, scale, .. } = setting;
-        let name = name.clone();
-        let Some(given) = number(value.get_ref()) else {
-            let text = printable(self.text.get(value.span()).unwrap_or_default());
-            return Err(Problem::NotANumber { name, text, unit: scale.symbol });
-        };
-        match scale.wanted(given) {
-            Err(why) => Err(Problem::Unfit { name, why }),
-            Ok(digits) if (scale.value(digits) - given).abs() > TOLERANCE * scale.digit => {
-                let step = format!("{} {}", scale.digit, scale.symbol).trim_end().to_owned();
-                Err(Problem::Between { name, value: given, step })
+        match number(value.get_ref()) {
+            Some(given) => digits(setting, given),
+            None => {
+                let (name, unit) = (setting.name.clone(), setting.scale.symbol);
+                let text = printable(self.text.get(value.span()).unwrap_or_default());
+                Err(Problem::NotANumber { name, text, unit })
             }
-            Ok(digits) => Ok(digits),
         }
     }
 
@@ -354,6 +360,19 @@ impl Text<'_> {
         let before = &self.text.as_bytes()[..place.start.min(self.text.len())];
         let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
         FileError { line, problem }
+    }
+}
+
+/// The digits of a value of a setting.
+fn digits(Setting { name, scale, .. }: &Setting, given: f64) -> Result<i64, Problem> {
+    let name = name.clone();
+    match scale.wanted(given) {
+        Err(why) => Err(Problem::Unfit { name, why }),
+        Ok(digits) if (scale.value(digits) - given).abs() > TOLERANCE * scale.digit => {
+            let step = format!("{} {}", scale.digit, scale.symbol).trim_end().to_owned();
+            Err(Problem::Between { name, value: given, step })
+        }
+        Ok(digits) => Ok(digits),
     }
 }
 

@@ -1,0 +1,122 @@
+//! Writes of registers. Each is read back.
+
+use motorlink_proto::st::{
+    NotASetting, Profile, Ramp, RegisterId, Request as StRequest, Unverified, VerifiedWrite,
+    parse_value,
+};
+use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::message::Reason;
+
+use super::act::send;
+use super::control::{Control, Motion, permitted};
+use super::exchange::{Exchanges, is_worth_repeating, unconfirmed};
+use super::registers::{self, Place};
+use super::settings;
+use super::target::{Target, refusal, usage};
+use super::value;
+use crate::message::Value;
+use crate::program::{Program, Refusal};
+
+/// A write of a page.
+pub(super) struct Write {
+    pub(super) target: Target,
+    pub(super) name: String,
+    pub(super) value: f64,
+    pub(super) to_rom: bool,
+}
+
+impl Write {
+    /// Writes the value; gives what was read back.
+    pub(super) async fn carry_out(
+        self,
+        control: &Control,
+        view: &Program,
+        drive: &impl Motion,
+    ) -> Result<Vec<Value>, Refusal> {
+        let exchanges = Exchanges::new(view, &self.target);
+        let place = Place::named(&self.target, &self.name)?;
+        let register = match (place, exchanges.of_st()) {
+            (Place::Register(register), Some((_, profile))) => {
+                register.not_a_setting(profile).map(|why| (register, profile, why))
+            }
+            (Place::Measured(..), _) => {
+                return Err(usage(format!("{} is measured and cannot be written", self.name)));
+            }
+            _ => None,
+        };
+        let Some((register, profile, why)) = register else {
+            let (name, to_rom) = (&self.name, self.to_rom);
+            let names = settings::write(control, &exchanges, name, self.value, to_rom).await?;
+            return registers::read(&exchanges, &names).await;
+        };
+        let bits = digits(register, self.value, profile)?;
+        let bytes = bits.to_le_bytes();
+        let bytes = &bytes[..usize::from(register.write_size(profile)).min(bytes.len())];
+        let request = StRequest::SetRegister { register, value: bytes };
+        let request = Request::st(self.target.name.motor, request);
+        control.limited(&self.target, |limited| limited.check(&request))?;
+        if why == NotASetting::OneMeasurement {
+            let _lane = exchanges.lane().await;
+            return written(control, &exchanges, &request, (register, profile, bits)).await;
+        }
+        // A reference or a mode: it may move the motor.
+        let stops = control.stops(&self.target);
+        let _turn = control.turn(&self.target).await;
+        let (program, _lane) = permitted(drive, false, &self.target).await?;
+        stops.check()?;
+        let exchanges = Exchanges::new(&program, &self.target).motion();
+        written(control, &exchanges, &request, (register, profile, bits)).await
+    }
+}
+
+/// Writes a register once and reads it back: a library must not repeat a write that makes the motor act.
+async fn written(
+    control: &Control,
+    exchanges: &Exchanges<'_>,
+    request: &Request,
+    (register, profile, bits): (RegisterId, Profile, i32),
+) -> Result<Vec<Value>, Refusal> {
+    send(control, exchanges, request).await?;
+    let reads = Exchanges::new(exchanges.program, exchanges.target);
+    let values = match VerifiedWrite::new::<()>(profile, register, bits) {
+        Err(Unverified::NotReadable) => {
+            vec![value::text(&register.to_string(), "written; it cannot be read back")]
+        }
+        write => {
+            let motor = exchanges.target.name.motor;
+            let reply = reads.st(motor, &StRequest::GetRegister(register)).await?;
+            let read = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
+            // The drive changes references and modes itself.
+            if let Ok(write) = write
+                && write.expected() != read
+            {
+                let place = exchanges.place();
+                let message = format!("{place}: the drive did not take the value of {register}");
+                return Err(refusal(Reason::Refused, message));
+            }
+            let reading = motorlink_proto::st::Reading { register, bits: read, profile };
+            vec![value::of_register(&register.to_string(), reading)]
+        }
+    };
+    match exchanges.confirm().await {
+        Ok(()) => Ok(values),
+        Err(why) if is_worth_repeating(&why) => Err(unconfirmed(exchanges)),
+        Err(why) => Err(why),
+    }
+}
+
+fn digits(register: RegisterId, value: f64, profile: Profile) -> Result<i32, Refusal> {
+    let is_writable = register.shape().is_some_and(|shape| registers::is_writable(&shape, profile));
+    if !is_writable {
+        return Err(usage(format!("{register} cannot be written; nothing was sent")));
+    }
+    let bits = parse_value(register, &value.to_string(), profile, false)
+        .map_err(|why| usage(format!("{why}; nothing was sent")))?;
+    let ramp = Ramp { speed_rpm: bits, duration_ms: 0 };
+    if register == RegisterId::RAMP_FINAL_SPEED && !ramp.is_possible() {
+        let most = Ramp::MAX_SPEED_RPM;
+        let message = format!("{register}: {value} rpm is beyond ±{most} rpm; nothing was sent");
+        return Err(usage(message));
+    }
+    Ok(bits)
+}
