@@ -1,0 +1,66 @@
+// Numbers and times as texts of nearly constant width.
+
+/** A value with about six digits. */
+export function value(number: number): string {
+  if (!isFinite(number)) return '–';
+  if (Number.isInteger(number) && Math.abs(number) < 1e9) return String(number).replace('-', '−');
+  const size = Math.abs(number);
+  if (size !== 0 && (size >= 1e7 || size < 1e-4)) return number.toExponential(4).replace('-', '−');
+  const decimals = Math.min(Math.max(5 - Math.floor(Math.log10(size || 1)), 0), 6);
+  return number.toFixed(Math.min(decimals, 4)).replace('-', '−');
+}
+
+/** A value and its unit. */
+export function withUnit(number: number, unit: string): string {
+  return isFinite(number) && unit ? `${value(number)} ${unit}` : value(number);
+}
+
+/** A length of time. */
+export function duration(seconds: number): string {
+  const size = Math.abs(seconds);
+  if (!isFinite(size)) return '–';
+  const sign = seconds < 0 ? '−' : '';
+  if (size < 1e-3) return `${sign}${(size * 1e6).toFixed(0)} µs`;
+  if (size < 1) return `${sign}${(size * 1e3).toFixed(2)} ms`;
+  if (size < 120) return `${sign}${size.toFixed(3)} s`;
+  return `${sign}${Math.floor(size / 60)} min ${(size % 60).toFixed(1)} s`;
+}
+
+/** How old something is. */
+export function age(seconds: number): string {
+  if (!isFinite(seconds)) return 'no value yet';
+  return seconds < 120 ? `${Math.floor(seconds)} s old` : `${Math.floor(seconds / 60)} min old`;
+}
+
+/** What a plot writes at its time axis, beside its cursors and into its table. */
+export interface Clock {
+  /** At the axis, whose ticks are `step` seconds apart. */
+  tick: (x: number, step: number) => string;
+  /** To the resolution of samples. */
+  full: (x: number) => string;
+}
+
+const two = (number: number) => String(number).padStart(2, '0');
+
+/** Decimals that a step of time needs. */
+function decimalsOf(step: number): number {
+  return step >= 1 ? 0 : Math.min(6, Math.ceil(-Math.log10(step) - 1e-9));
+}
+
+/** The time of day at `origin + x` seconds since 1970. */
+export function dayClock(origin: number): Clock {
+  const text = (x: number, decimals: number) => {
+    const unit = 10 ** decimals;
+    const rounded = Math.round((x + origin) * unit) / unit;
+    const date = new Date(Math.floor(rounded) * 1000);
+    const fraction = decimals ? (rounded - Math.floor(rounded)).toFixed(decimals).slice(1) : '';
+    return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}${fraction}`;
+  };
+  return { tick: (x, step) => text(x, decimalsOf(step)), full: (x) => text(x, 4) };
+}
+
+/** Seconds from the zero of the data. */
+export const secondsClock: Clock = {
+  tick: (x, step) => `${x.toFixed(decimalsOf(step)).replace('-', '−')} s`,
+  full: (x) => `${x.toFixed(4).replace('-', '−')} s`,
+};

@@ -1,0 +1,80 @@
+// When plots are drawn: in frames of the browser, only if something changed, and never so often that
+// drawing takes more than half of the main thread. Signs of life need the rest.
+import type { Window } from './window';
+
+/** What is drawn together. */
+export interface Panel {
+  /** Whether it is on the screen. */
+  visible: boolean;
+  draw: () => void;
+  /** Writes the numbers beside the curves. */
+  write: () => void;
+}
+
+const NUMBERS = 125;
+const STALE = 250;
+
+export class Scheduler {
+  private readonly panels = new Set<Panel>();
+  private handle = 0;
+  private timer: ReturnType<typeof setInterval> | undefined;
+  private earliest = 0;
+  private written = -Infinity;
+  private dirty = false;
+
+  /** `now` is the right end of live plots. */
+  constructor(
+    readonly window: Window,
+    private readonly now: () => number = () => NaN,
+  ) {}
+
+  add(panel: Panel): () => void {
+    this.panels.add(panel);
+    // Without new samples plots scroll on slowly, and values become old.
+    this.timer ??= setInterval(() => this.window.live && this.request(), STALE);
+    this.request();
+    return () => {
+      this.panels.delete(panel);
+      if (this.panels.size > 0) return;
+      clearInterval(this.timer);
+      this.timer = undefined;
+      cancelAnimationFrame(this.handle);
+      this.handle = 0;
+    };
+  }
+
+  /** Something changed: draw. */
+  request = () => {
+    this.dirty = true;
+    this.wake();
+  };
+
+  /** New samples. A plot that stands still shows them as numbers only. */
+  sampled = () => {
+    if (this.window.live) this.dirty = true;
+    this.wake();
+  };
+
+  private wake() {
+    if (this.handle === 0 && this.panels.size > 0) this.handle = requestAnimationFrame(this.frame);
+  }
+
+  private readonly frame = (time: number) => {
+    this.handle = 0;
+    if (time < this.earliest) {
+      this.wake();
+      return;
+    }
+    const start = performance.now();
+    const write = time - this.written >= NUMBERS || (this.dirty && !this.window.live);
+    if (this.dirty) this.window.follow(this.now());
+    for (const panel of this.panels) {
+      if (!panel.visible) continue;
+      if (this.dirty) panel.draw();
+      if (write) panel.write();
+    }
+    if (write) this.written = time;
+    this.dirty = false;
+    this.earliest = time + 2 * (performance.now() - start);
+  };
+}
