@@ -182,6 +182,13 @@ export function Figure(props: FigureProps) {
     }, ANNOUNCE);
   };
 
+  const moveCursors = (a: number | null, b: number | null) => {
+    window.a = a;
+    window.b = b;
+    scheduler.request();
+    announce();
+  };
+
   const onKeyDown = (event: KeyboardEvent) => {
     if (!press(event, window, actions)) return;
     event.preventDefault();
@@ -220,6 +227,8 @@ export function Figure(props: FigureProps) {
                 {pickLabel} at A
               </button>
             )}
+            <button type="button" onClick={() => moveCursors(window.b, window.a)}>Swap A and B</button>
+            <button type="button" onClick={() => moveCursors(null, null)}>Remove cursors</button>
             {children}
           </div>
           {hidden.length > 0 && (
