@@ -165,7 +165,7 @@ impl Page {
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
             | Ask::Rates => {}
-            Ask::Stop { motor } => self.stopping(motor.as_ref()),
+            Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
             Ask::Latch | Ask::Release => self.check_operator()?,
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
                 let message = "a page may not send this request".to_owned();
@@ -183,7 +183,7 @@ impl Page {
                 self.answer(id, Ok(Answer::LetGo)).await;
             }
             Ask::StopAll => {
-                self.stopping(None);
+                self.control().man.stop(None);
                 let view = self.view();
                 tasks.spawn(async move {
                     let stopped = match view {
@@ -213,12 +213,6 @@ impl Page {
                 });
             }
         }
-    }
-
-    /// A stop was asked for: commands from before it move the motor no more.
-    fn stopping(&self, motor: Option<&MotorName>) {
-        self.control().man.stop(motor);
-        self.link.stopping(motor);
     }
 
     /// Whether this page may ask for that.
@@ -300,7 +294,7 @@ async fn follow(page: Arc<Page>, drive: Program, mut listener: Listener) {
             && event.by.as_ref() != Some(&page.name)
         {
             let motor = event.line.zip(event.motor);
-            page.stopping(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
+            page.control().man.stop(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
         }
     }
     let mut control = page.control();

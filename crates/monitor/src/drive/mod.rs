@@ -68,7 +68,7 @@ impl Drives {
                 Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
             }
             Ask::Describe { line } => {
-                Ok(Answer::Describe(describe::describe(&line, self.speaks(&line)?)))
+                Ok(Answer::Describe(Box::new(describe::describe(&line, self.speaks(&line)?))))
             }
             Ask::Read { motor, names } => {
                 let target = self.target(motor)?;

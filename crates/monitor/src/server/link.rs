@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use motorlink_telemetry::share::message::{Answer, Ask, MotorName, Reason, StoppedMotor};
+use motorlink_telemetry::share::message::{Answer, Ask, Reason, StoppedMotor};
 use tokio::time::{sleep, timeout};
 
 use crate::drive::Drives;
@@ -96,15 +96,7 @@ impl Link {
     /// # Errors
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
-        self.stopping(None);
         stop_all(&self.get()?.program).await
-    }
-
-    /// A stop of this motor, or of all, is about to be sent: commands that wait are not sent any more.
-    pub fn stopping(&self, motor: Option<&MotorName>) {
-        if let Ok(drives) = self.drives() {
-            drives.stopping(motor);
-        }
     }
 
     fn get(&self) -> Result<Joined, Refusal> {
