@@ -41,7 +41,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor
 .PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -52,7 +52,10 @@ demo: toolchain ## 1 min: simulated drives, driven through real ports
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
-test: toolchain $(if $(SUDO),packages) ## 18 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+monitor: toolchain web ## simulated drives in a browser
+	$(CARGO) run --release --locked -p motorlink-cli -- monitor --open
+
+test: toolchain $(if $(SUDO),packages) ## 22 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 

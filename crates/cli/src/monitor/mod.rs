@@ -66,6 +66,9 @@ pub struct Args {
     #[arg(long, value_name = "TIME", default_value = "300ms",
         value_parser = span_up_to(Duration::from_secs(2)))]
     deadline: Duration,
+    /// Open the address of operators in the browser of this desktop
+    #[arg(long)]
+    open: bool,
     /// Print JSON, one object per line
     #[arg(long)]
     json: bool,
@@ -176,6 +179,9 @@ fn ready(
     let url = monitor.url(&host, Role::Operator);
     let viewer_url = monitor.url(&host, Role::Viewer);
     let at = format!("unix:{}", path.display());
+    if args.open && let Err(error) = open::that_detached(&url) {
+        output::note(format!("no browser can be opened: {error}; open the first address yourself"));
+    }
     if args.json {
         return output::print_line(&json!({
             "event": "ready", "at": at, "lines": share::lines_in_json(lines),
