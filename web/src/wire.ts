@@ -774,7 +774,7 @@ values: Array<Value>, } | { "to": "act",
  */
 values: Array<Value>, } | { "to": "run", 
 /**
- * The measured value that it began with.
+ * The first reference: the measured value, or the limit if that is less.
  */
 from: number, } | { "to": "limit" } | { "to": "dump", 
 /**

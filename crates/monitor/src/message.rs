@@ -278,7 +278,7 @@ pub enum Answer {
     },
     /// To run: the drive acknowledged the first reference.
     Run {
-        /// The measured value that it began with.
+        /// The first reference: the measured value, or the limit if that is less.
         from: f64,
     },
     /// To limit.

@@ -65,9 +65,10 @@ impl Act {
         drive: &impl Motion,
         request: &Request,
     ) -> Result<Vec<Value>, Refusal> {
+        control.limited(&self.target, |limited| limited.check(request))?;
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
-        control.limited(&self.target, |limited| limited.check(request))?;
+        control.end_run(&self.target).await;
         let (program, _lane) = permitted(drive, self.hold, &self.target).await?;
         stops.check()?;
         let exchanges = Exchanges::new(&program, &self.target).motion();

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::share::message::{MotorName, Reason};
-use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
+use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
+use tokio::task::JoinHandle;
 
 use super::limits::Limited;
 use super::target::{Target, refusal};
@@ -29,6 +30,15 @@ struct Known {
     stops: u64,
     /// One page commands it at a time.
     commands: Arc<AsyncMutex<()>>,
+    /// The last run that sends references again and again.
+    run: Option<Running>,
+}
+
+/// A task that sends references.
+pub(super) struct Running {
+    /// Ends it.
+    pub(super) ends: watch::Sender<bool>,
+    pub(super) task: JoinHandle<()>,
 }
 
 /// The stops of a motor up to a moment.
@@ -41,7 +51,27 @@ pub(super) struct Stops<'a> {
 impl Control {
     /// A page stops the motor with a command. Commands that are not sent yet are given up.
     pub(super) fn stopping(&self, target: &Target) {
-        self.known(target, |known| known.stops += 1);
+        self.known(target, |known| {
+            known.stops += 1;
+            if let Some(run) = &known.run {
+                run.ends.send_replace(true);
+            }
+        });
+    }
+
+    /// References of this run follow.
+    pub(super) fn set_run(&self, target: &Target, run: Running) {
+        self.known(target, |known| known.run = Some(run));
+    }
+
+    /// Waits until no references of an earlier run follow.
+    pub(super) async fn end_run(&self, target: &Target) {
+        let run = self.known(target, |known| known.run.take());
+        if let Some(Running { ends, task }) = run {
+            ends.send_replace(true);
+            // A task that panicked sends nothing, either.
+            let _ = task.await;
+        }
     }
 
     /// The stops until now.

@@ -25,17 +25,23 @@ pub(super) struct Exchanges<'a> {
     pub(super) program: &'a Program,
     pub(super) target: &'a Target,
     time_to_live: f64,
+    continues: bool,
 }
 
 impl<'a> Exchanges<'a> {
     /// Exchanges that move nothing.
     pub(super) fn new(program: &'a Program, target: &'a Target) -> Self {
-        Exchanges { program, target, time_to_live: TIME_TO_LIVE }
+        Exchanges { program, target, time_to_live: TIME_TO_LIVE, continues: false }
     }
 
     /// Commands that may move the motor.
     pub(super) fn motion(self) -> Self {
         Exchanges { time_to_live: MOTION_TIME_TO_LIVE, ..self }
+    }
+
+    /// Commands that are not sent if the motor was stopped since the last one without this.
+    pub(super) fn continues(self) -> Self {
+        Exchanges { continues: true, ..self }
     }
 
     /// Waits until no other request of the session waits for its confirmation.
@@ -69,7 +75,8 @@ impl<'a> Exchanges<'a> {
 
     async fn send(&self, motor: u8, bytes: Vec<u8>) -> Result<Vec<u8>, Refusal> {
         let (line, time_to_live) = (self.target.name.line.clone(), self.time_to_live);
-        let ask = Ask::Command { line, motor, bytes, time_to_live, continues: false };
+        let continues = self.continues;
+        let ask = Ask::Command { line, motor, bytes, time_to_live, continues };
         match self.program.ask(ask).await? {
             Answer::Command { bytes } => Ok(bytes),
             _ => Err(self.unfit()),

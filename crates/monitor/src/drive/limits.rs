@@ -69,6 +69,18 @@ impl Limited {
         Ok(())
     }
 
+    /// A limit, in the unit of the mode.
+    pub(super) fn most(&self, motor: Motor, mode: Mode) -> Option<f64> {
+        match (motor, mode) {
+            (Motor::St(_), Mode::Speed) => self.st.speed_rpm.map(f64::from),
+            (Motor::St(_), Mode::Torque) => self.st.current_s16a.map(f64::from),
+            (Motor::St(_), Mode::Position) => None,
+            (Motor::Rmd(_), Mode::Speed) => self.rmd.speed.map(SpeedLimit::dps),
+            (Motor::Rmd(_), Mode::Torque) => self.rmd.current.map(IqCommand::amps),
+            (Motor::Rmd(_), Mode::Position) => self.rmd.angle.map(CentiDegrees::degrees),
+        }
+    }
+
     /// Checks a request. The error says why it is not sent.
     pub(super) fn check(&mut self, request: &Request) -> Result<Effect, Refusal> {
         match request {

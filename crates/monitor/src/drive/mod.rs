@@ -12,6 +12,7 @@ mod describe;
 mod exchange;
 mod limits;
 mod registers;
+mod run;
 mod search;
 mod settings;
 mod target;
@@ -102,7 +103,10 @@ impl Drives {
             Ask::Restore { motor, text, to_rom } => {
                 settings::restore(&self.control, view, self.target(motor)?, text, to_rom).await
             }
-            Ask::Run { .. } => Err(usage("this is not possible yet")),
+            Ask::Run { motor, mode, target: to, rate, hold } => {
+                let run = run::Run { target: self.target(motor)?, mode, to, rate, hold };
+                Ok(Answer::Run { from: run.carry_out(&self.control, drive).await? })
+            }
         }
     }
 

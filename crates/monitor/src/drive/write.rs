@@ -62,6 +62,7 @@ impl Write {
         // A reference or a mode: it may move the motor.
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
+        control.end_run(&self.target).await;
         let (program, _lane) = permitted(drive, false, &self.target).await?;
         stops.check()?;
         let exchanges = Exchanges::new(&program, &self.target).motion();

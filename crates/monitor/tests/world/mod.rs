@@ -180,7 +180,7 @@ impl World {
 
     /// Requests to the ST drive that write or command.
     pub fn st_writes(&self) -> Vec<Sent> {
-        let read = |(_, bytes): &&Sent| !matches!(bytes[0], 0x02 | 0x06 | 0x08 | 0x0C | 0x0D);
+        let read = |(_, bytes): &&Sent| !matches!(bytes[0], 0x02 | 0x06 | 0x08 | 0x0C);
         self.st.lock().unwrap().iter().filter(read).cloned().collect()
     }
 

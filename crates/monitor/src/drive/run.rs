@@ -1,0 +1,377 @@
+//! Motion of pages: the reference goes from the measured value to a target, at a rate.
+//!
+//! All commands of a run but the first, which reads, continue it (`continues` of a share's command): none of
+//! them is sent after a stop.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink_proto::rmd::{
+    Command as _, MotionStatus, MotorId, MultiTurnAngle, Payload, ReadMotionStatus,
+    ReadMultiTurnAngle, SetPositionLimited, SetSpeed, SetTorque,
+};
+use motorlink_proto::st::{
+    Command, CurrentReference, Flags, MotorNumber, NotStarted, Profile, Ramp, RegisterId,
+    Request as StRequest, Status, TorqueRamp,
+};
+use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
+use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::signal::Motor;
+use tokio::sync::watch;
+use tokio::time::{Instant, MissedTickBehavior, interval_at};
+
+use super::act::{send, started};
+use super::control::{Control, Motion, Running, permitted};
+use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
+use super::target::{Target, refusal, usage};
+use crate::message::Mode;
+use crate::program::{Program, Refusal};
+
+/// The time between two references.
+const PERIOD: Duration = Duration::from_millis(20);
+
+/// A motion of a page.
+pub(super) struct Run {
+    pub(super) target: Target,
+    pub(super) mode: Mode,
+    pub(super) to: f64,
+    pub(super) rate: f64,
+    pub(super) hold: bool,
+}
+
+/// References that are sent again and again.
+#[derive(Clone, Copy)]
+enum Stream {
+    /// The speed of an RMD motor.
+    Speed(MotorId),
+    /// The torque current of an RMD motor.
+    Torque(MotorId),
+    /// Iq of an ST motor, with this Id.
+    Current(MotorNumber, i16),
+}
+
+impl Stream {
+    /// The command of this reference.
+    fn request(self, value: f64) -> Result<Request, Refusal> {
+        Ok(match self {
+            Stream::Speed(id) => Request::rmd(id, &SetSpeed { speed: wanted::<CentiDps>(value)? }),
+            Stream::Torque(id) => Request::rmd(id, &SetTorque { iq: wanted::<IqCommand>(value)? }),
+            Stream::Current(motor, id_s16a) => {
+                let iq_s16a = current(value)?;
+                let reference = CurrentReference { iq_s16a, id_s16a };
+                Request::st(motor.number(), StRequest::SetCurrentReference(reference))
+            }
+        })
+    }
+}
+
+impl Run {
+    /// Begins it; gives the first reference.
+    pub(super) async fn carry_out(
+        self,
+        control: &Arc<Control>,
+        drive: &impl Motion,
+    ) -> Result<f64, Refusal> {
+        if !(self.rate.is_finite() && self.rate > 0.0) {
+            let message =
+                format!("the rate {} is not a positive number; nothing was sent", self.rate);
+            return Err(usage(message));
+        }
+        self.check(control)?;
+        let stops = control.stops(&self.target);
+        let _turn = control.turn(&self.target).await;
+        control.end_run(&self.target).await;
+        let (program, _lane) = permitted(drive, self.hold, &self.target).await?;
+        stops.check()?;
+        let begun = Begun { run: &self, control, program: &program };
+        match (self.target.motor, self.target.speaks, self.mode) {
+            (Motor::Rmd(id), _, Mode::Speed) => {
+                let measured = begun.motion_status().await?.speed.dps();
+                begun.stream(Stream::Speed(id), measured).await
+            }
+            (Motor::Rmd(id), _, Mode::Torque) => {
+                let measured = begun.motion_status().await?.iq.amps();
+                begun.stream(Stream::Torque(id), measured).await
+            }
+            (Motor::Rmd(id), _, Mode::Position) => begun.position(id).await,
+            (Motor::St(motor), _, Mode::Speed) => begun.st_speed(motor).await,
+            (Motor::St(motor), Speaks::St(Profile::Mcsdk54), Mode::Torque) => {
+                begun.st_torque_ramp(motor).await
+            }
+            (Motor::St(motor), Speaks::St(Profile::Spec), Mode::Torque) => {
+                begun.st_current(motor).await
+            }
+            (Motor::St(_), ..) => Err(no_position()),
+        }
+    }
+
+    /// Checks the last command before anything is sent.
+    fn check(&self, control: &Control) -> Result<(), Refusal> {
+        let last = match (self.target.motor, self.mode) {
+            (Motor::Rmd(id), Mode::Speed) => Stream::Speed(id).request(self.to)?,
+            (Motor::Rmd(id), Mode::Torque) => Stream::Torque(id).request(self.to)?,
+            (Motor::Rmd(id), Mode::Position) => self.position(id)?,
+            (Motor::St(motor), Mode::Speed) => {
+                let ramp = Ramp { speed_rpm: speed(self.to)?, duration_ms: 0 };
+                Request::st(motor.number(), StRequest::SetRamp(ramp))
+            }
+            (Motor::St(motor), Mode::Torque) => {
+                if let Some(limit) = control
+                    .limited(&self.target, |limited| limited.most(self.target.motor, Mode::Speed))
+                {
+                    return Err(usage(format!(
+                        "the motor of a torque command turns as fast as its load allows, and its speed is \
+                         limited to {limit} rpm; nothing was sent"
+                    )));
+                }
+                Stream::Current(motor, 0).request(self.to)?
+            }
+            (Motor::St(_), Mode::Position) => return Err(no_position()),
+        };
+        control.limited(&self.target, |limited| limited.check(&last)).map(drop)
+    }
+
+    fn position(&self, id: MotorId) -> Result<Request, Refusal> {
+        let angle = wanted::<CentiDegrees>(self.to)?;
+        let max_speed = wanted::<SpeedLimit>(self.rate)?;
+        Ok(Request::rmd(id, &SetPositionLimited { max_speed, angle }))
+    }
+
+    /// How long a ramp of the drive takes, in ms: never faster than the rate.
+    fn duration(&self, from: f64) -> Result<u16, Refusal> {
+        let way = (self.to - from).abs();
+        let duration = (1000.0 * way / self.rate).ceil();
+        let most = f64::from(u16::MAX);
+        if duration > most {
+            let least = 1000.0 * way / most;
+            return Err(usage(format!(
+                "a ramp of the drive lasts up to {} s: the rate is {least:.1} or more; nothing was sent",
+                most / 1000.0
+            )));
+        }
+        Ok(duration as u16)
+    }
+}
+
+/// A run that its page may carry out.
+struct Begun<'a> {
+    run: &'a Run,
+    control: &'a Arc<Control>,
+    program: &'a Program,
+}
+
+impl Begun<'_> {
+    fn target(&self) -> &Target {
+        &self.run.target
+    }
+
+    fn reads(&self) -> Exchanges<'_> {
+        Exchanges::new(self.program, self.target())
+    }
+
+    async fn command(&self, request: &Request) -> Result<(), Refusal> {
+        let exchanges = self.reads().motion().continues();
+        send(self.control, &exchanges, request).await.map(drop)
+    }
+
+    async fn motion_status(&self) -> Result<MotionStatus, Refusal> {
+        let request = Request::Rmd(self.id()?, ReadMotionStatus.encode());
+        let reply = self.measure(&[request]).await?;
+        Ok(MotionStatus::decode(&self.eight(&reply)?))
+    }
+
+    fn id(&self) -> Result<MotorId, Refusal> {
+        self.reads().of_rmd().ok_or_else(|| usage("not an RMD motor"))
+    }
+
+    fn eight(&self, replies: &[Vec<u8>]) -> Result<[u8; 8], Refusal> {
+        let reply = replies.first().and_then(|reply| reply.as_slice().try_into().ok());
+        reply.ok_or_else(|| self.reads().unfit())
+    }
+
+    /// Reads what a run begins with. Its replies are confirmed.
+    async fn measure(&self, requests: &[Request]) -> Result<Vec<Vec<u8>>, Refusal> {
+        let reads = self.reads();
+        let mut attempt = 1;
+        loop {
+            let mut replies = Vec::new();
+            for request in requests {
+                replies.push(reads.request(request).await?);
+            }
+            match reads.confirm().await {
+                Ok(()) => return Ok(replies),
+                Err(why) if is_worth_repeating(&why) && attempt < ATTEMPTS => attempt += 1,
+                Err(why) => return Err(why),
+            }
+        }
+    }
+
+    /// Registers of an ST motor.
+    async fn registers(&self, registers: &[RegisterId]) -> Result<Vec<i32>, Refusal> {
+        let Some((motor, profile)) = self.reads().of_st() else {
+            return Err(usage("not an ST motor"));
+        };
+        let read =
+            |register: &RegisterId| Request::st(motor.number(), StRequest::GetRegister(*register));
+        let requests: Vec<_> = registers.iter().map(read).collect();
+        let replies = self.measure(&requests).await?;
+        let bits = registers.iter().zip(replies).map(|(register, reply)| {
+            register.decode(profile, &reply).ok_or_else(|| self.reads().unfit())
+        });
+        bits.collect()
+    }
+
+    /// The measured value, or the limit if that is less.
+    fn first(&self, measured: f64) -> f64 {
+        let most = self
+            .control
+            .limited(self.target(), |limited| limited.most(self.target().motor, self.run.mode));
+        most.map_or(measured, |most| measured.clamp(-most, most))
+    }
+
+    /// Sends references at the rate until the target is reached.
+    async fn stream(&self, stream: Stream, measured: f64) -> Result<f64, Refusal> {
+        let from = self.first(measured);
+        self.command(&stream.request(from)?).await?;
+        self.go_on(stream, from);
+        Ok(from)
+    }
+
+    /// Sends the next references in a task of their own.
+    fn go_on(&self, stream: Stream, from: f64) {
+        let (ends, ended) = watch::channel(false);
+        let references = References {
+            control: Arc::clone(self.control),
+            program: self.program.clone(),
+            target: self.target().clone(),
+            stream,
+            to: self.run.to,
+            rate: self.run.rate,
+        };
+        let task = tokio::spawn(references.send(from, ended));
+        self.control.set_run(self.target(), Running { ends, task });
+    }
+
+    /// The drive's own move. It begins at the angle of the motor.
+    async fn position(&self, id: MotorId) -> Result<f64, Refusal> {
+        let reply = self.measure(&[Request::Rmd(id, ReadMultiTurnAngle.encode())]).await?;
+        let from = MultiTurnAngle::decode(&self.eight(&reply)?).angle.degrees();
+        self.command(&self.run.position(id)?).await?;
+        Ok(from)
+    }
+
+    /// A ramp of the drive. START_MOTOR also makes the page responsible for a motor that turns already.
+    async fn st_speed(&self, motor: MotorNumber) -> Result<f64, Refusal> {
+        let read = self.state(&[RegisterId::SPEED_MEAS]).await?;
+        let from = f64::from(read[0]);
+        let ramp = Ramp { speed_rpm: speed(self.run.to)?, duration_ms: self.run.duration(from)? };
+        self.command(&Request::st(motor.number(), StRequest::SetRamp(ramp))).await?;
+        self.start(motor).await?;
+        Ok(from)
+    }
+
+    /// A ramp of the drive.
+    async fn st_torque_ramp(&self, motor: MotorNumber) -> Result<f64, Refusal> {
+        let read = self.state(&[RegisterId::TORQUE_MEAS]).await?;
+        let from = f64::from(read[0]);
+        let torque_s16a = current(self.run.to)?.into();
+        let ramp = TorqueRamp { torque_s16a, duration_ms: self.run.duration(from)? };
+        self.command(&Request::st(motor.number(), StRequest::SetTorqueRamp(ramp))).await?;
+        self.start(motor).await?;
+        Ok(from)
+    }
+
+    /// The document has no torque ramp: references are sent one by one.
+    async fn st_current(&self, motor: MotorNumber) -> Result<f64, Refusal> {
+        let read = self.state(&[RegisterId::TORQUE_MEAS, RegisterId::FLUX_REF]).await?;
+        let from = self.first(f64::from(read[0]));
+        let stream = Stream::Current(motor, read[1] as i16);
+        self.command(&stream.request(from)?).await?;
+        self.start(motor).await?;
+        self.go_on(stream, from);
+        Ok(from)
+    }
+
+    /// Registers of a motor that can be started.
+    async fn state(&self, registers: &[RegisterId]) -> Result<Vec<i32>, Refusal> {
+        let always = [RegisterId::STATUS, RegisterId::FLAGS];
+        let mut read = self.registers(&[&always, registers].concat()).await?;
+        let rest = read.split_off(always.len());
+        let (status, flags) = (Status::from(read[0] as u8), Flags(read[1] as u32));
+        let why = match status {
+            Status::FaultNow | Status::FaultOver => NotStarted::Faults { status, flags },
+            Status::AnyStop | Status::Stop | Status::StopIdle | Status::WaitStopMotor => {
+                NotStarted::Stopping { status }
+            }
+            _ => return Ok(rest),
+        };
+        let message = format!("{}: the motor does not start: {why}", self.reads().place());
+        Err(refusal(Reason::Refused, message))
+    }
+
+    async fn start(&self, motor: MotorNumber) -> Result<(), Refusal> {
+        let start = StRequest::ExecuteCommand(Command::StartMotor);
+        self.command(&Request::st(motor.number(), start)).await?;
+        started(&self.reads()).await
+    }
+}
+
+/// The references of a run after the first one.
+struct References {
+    control: Arc<Control>,
+    program: Program,
+    target: Target,
+    stream: Stream,
+    to: f64,
+    rate: f64,
+}
+
+impl References {
+    /// Sends them until the target is reached, one is refused, or `ended` says so.
+    async fn send(self, from: f64, mut ended: watch::Receiver<bool>) {
+        let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
+        let mut ticks = interval_at(Instant::now() + PERIOD, PERIOD);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut value = from;
+        while value != self.to {
+            tokio::select! {
+                biased;
+                _ = ended.changed() => return,
+                _ = ticks.tick() => {}
+            }
+            // After a pause of the server the reference goes on where it was, and does not jump.
+            let step = self.rate * PERIOD.as_secs_f64();
+            let left = self.to - value;
+            value = if left.abs() <= step { self.to } else { value + step.copysign(left) };
+            let Ok(request) = self.stream.request(value) else { return };
+            if send(&self.control, &exchanges, &request).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+fn wanted<Q: Quantity>(value: f64) -> Result<Q, Refusal> {
+    Q::wanted(value).map_err(|why| usage(format!("{why}; nothing was sent")))
+}
+
+/// A speed of an ST motor, rpm.
+fn speed(value: f64) -> Result<i32, Refusal> {
+    let most = i64::from(Ramp::MAX_SPEED_RPM);
+    whole(value, Scale::plain(-most, most)).map(|digits| digits as i32)
+}
+
+/// A current of an ST motor in its digits.
+fn current(value: f64) -> Result<i16, Refusal> {
+    whole(value, Scale::plain(i16::MIN.into(), i16::MAX.into())).map(|digits| digits as i16)
+}
+
+fn whole(value: f64, scale: Scale) -> Result<i64, Refusal> {
+    scale.wanted(value).map_err(|why| usage(format!("{why}; nothing was sent")))
+}
+
+fn no_position() -> Refusal {
+    usage("the position of an ST motor cannot be controlled like this; nothing was sent")
+}
