@@ -10,6 +10,7 @@ import time
 from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
+from program import eventually
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -104,7 +105,7 @@ class Page:
 
     def _live(self):
         while not self.has_ended:
-            if self.lives:
+            if self.lives and self.beats:
                 self.sign()
             time.sleep(ALIVE)
 
@@ -141,6 +142,42 @@ class Page:
             ended = self.news.wait_for(look, within)
         assert found, f"{'closed' if ended else 'waited'}; heard {self.heard[-5:]}"
         return found[0]
+
+    def alive(self):
+        """Waits until the server counts it as alive, and gives it."""
+        self.until(lambda it: is_kind(it, "beat") and it["at"] is not None)
+        return self
+
+    def act(self, line, motor, command, hold=False, **values):
+        """The answer to a command of the protocol."""
+        return self.ask("act", line=line, motor=motor, command=command, values=values, hold=hold)
+
+    def turn(self, hold=False):
+        """Turns ST motor 1 and RMD motor 2."""
+        answer = self.act("st0", 1, "SET_RAMP", hold, speed_rpm=1500, duration_ms=100)
+        assert answer["kind"] == "answer", answer
+        self.start(hold)
+        answer = self.act("rmd0", 2, "set_speed", hold, speed_dps=360)
+        assert answer["kind"] == "answer", answer
+
+    def start(self, hold=False):
+        """Starts ST motor 1, as soon as it has stopped."""
+
+        def started():
+            answer = self.act("st0", 1, "START_MOTOR", hold)
+            assert answer["kind"] == "answer" or answer["reason"] == "refused", answer
+            return answer["kind"] == "answer"
+
+        eventually(started, "a start")
+
+    def lapsed(self, within=15):
+        """Waits until the server stops the motors of the page; gives the reason."""
+        return self.until(kind("lapsed"), within)["message"]
+
+    def forget(self):
+        """Forgets what was heard."""
+        with self.news:
+            self.heard.clear()
 
     def closed(self, within=20):
         """Waits until the server closes the connection; gives its last text that says why."""

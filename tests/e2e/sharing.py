@@ -80,3 +80,16 @@ def event(name, **members):
     """Whether a message is this event."""
     wanted = {"kind": "event", "event": name, **members}
     return lambda it: isinstance(it, dict) and wanted.items() <= it.items()
+
+
+def speeds(client):
+    """The speeds of ST motor 1 and RMD motor 2, by the drives themselves."""
+    rpm = client.command("st0", 1, 2, 30)["bytes"]
+    dps = client.command("rmd0", 2, 0x9C, *7 * [0])["bytes"]
+    return struct.unpack("<i", bytes(rpm))[0], struct.unpack_from("<h", bytes(dps), 4)[0]
+
+
+def are_still(client):
+    """Whether both motors rest."""
+    rpm, dps = speeds(client)
+    return abs(rpm) < 30 and abs(dps) < 5

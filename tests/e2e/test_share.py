@@ -17,7 +17,7 @@ import pytest
 from badline import BadLine, slcan_messages
 from peers import Plug
 from program import eventually
-from sharing import Client, event
+from sharing import Client, are_still, event, speeds
 
 #: Programs that are killed. ROUNDS=50 for more.
 ROUNDS = int(os.environ.get("ROUNDS", "5"))
@@ -68,19 +68,6 @@ def share(start, drives, tmp_path):
     assert [line["line"] for line in ready["lines"]] == ["st0", "rmd0"]
     running.path = path
     return running
-
-
-def speeds(client):
-    """The motors' speeds, by the drives themselves."""
-    rpm = client.command("st0", 1, 2, 30)["bytes"]
-    dps = client.command("rmd0", 2, 0x9C, *7 * [0])["bytes"]
-    return struct.unpack("<i", bytes(rpm))[0], struct.unpack_from("<h", bytes(dps), 4)[0]
-
-
-def are_still(client):
-    """Whether the motors rest."""
-    rpm, dps = speeds(client)
-    return abs(rpm) < 30 and abs(dps) < 5
 
 
 def program(code, share, said):

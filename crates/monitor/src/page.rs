@@ -198,16 +198,19 @@ impl Page {
                     let permit = Arc::clone(&self.requests).try_acquire_owned();
                     let busy = format!("{REQUESTS} requests are under way, which is the limit");
                     let permit = permit.map_err(|_| refusal(Reason::Busy, busy))?;
-                    Ok((permit, self.view()?, self.link.drives()?))
+                    Ok((permit, self.view()?))
                 });
-                let (permit, view, drives) = match ready {
+                let (permit, view) = match ready {
                     Ok(ready) => ready,
                     Err(refusal) => return self.refuse(id, refusal).await,
                 };
                 let ticket = self.control().man.ticket(motor_of(&ask));
                 tasks.spawn(async move {
                     let motion = Permitted { page: Arc::clone(&page), ticket };
-                    let result = drives.answer(ask, &view, &motion).await;
+                    let result = match page.link.drives().await {
+                        Ok(drives) => drives.answer(ask, &view, &motion).await,
+                        Err(refusal) => Err(refusal),
+                    };
                     drop(permit);
                     page.answer(id, result).await;
                 });

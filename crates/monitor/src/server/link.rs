@@ -2,10 +2,10 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use motorlink_telemetry::share::message::{Answer, Ask, Reason, StoppedMotor};
+use motorlink_telemetry::share::message::{Answer, Ask, Line, Reason, StoppedMotor};
+use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
 use crate::drive::Drives;
@@ -21,7 +21,8 @@ pub const AGAIN: Duration = Duration::from_millis(250);
 /// A share that may go and come back.
 pub struct Link {
     path: PathBuf,
-    joined: Mutex<Result<Joined, String>>,
+    /// `None` until the first attempt to connect has ended.
+    joined: watch::Sender<Option<Result<Joined, String>>>,
 }
 
 /// What there is while the share is there.
@@ -34,7 +35,7 @@ struct Joined {
 impl Link {
     /// The share at a path. [`keep`](Self::keep) connects to it.
     pub fn new(path: PathBuf) -> Self {
-        Link { path, joined: Mutex::new(Err("the server has just begun".to_owned())) }
+        Link { path, joined: watch::Sender::new(None) }
     }
 
     /// Connects a program of this name. Gives the name that events have, too.
@@ -48,10 +49,17 @@ impl Link {
 
     /// Connects again and again.
     pub async fn keep(&self) {
+        let mut known: Option<(Vec<Line>, Drives)> = None;
         loop {
             let why = match self.join().await {
-                Ok((joined, mut listener)) => {
-                    *self.joined() = Ok(joined);
+                Ok((program, lines, mut listener)) => {
+                    // The limits that pages have set stay.
+                    let drives = match &known {
+                        Some((before, drives)) if is_same(before, &lines) => drives.clone(),
+                        _ => Drives::new(lines.clone()),
+                    };
+                    known = Some((lines, drives.clone()));
+                    self.joined.send_replace(Some(Ok(Joined { program, drives })));
                     loop {
                         if let Err(error) = listener.next().await {
                             break error;
@@ -60,12 +68,12 @@ impl Link {
                 }
                 Err(error) => error,
             };
-            *self.joined() = Err(why.to_string());
+            self.joined.send_replace(Some(Err(why.to_string())));
             sleep(AGAIN).await;
         }
     }
 
-    async fn join(&self) -> io::Result<(Joined, Listener)> {
+    async fn join(&self) -> io::Result<(Program, Vec<Line>, Listener)> {
         let (program, mut listener, _) = self.connect(NAME).await?;
         let lines = tokio::select! {
             answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
@@ -75,9 +83,7 @@ impl Link {
             }
         };
         match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
-            Ok(Answer::Lines { lines, .. }) => {
-                Ok((Joined { program, drives: Drives::new(lines) }, listener))
-            }
+            Ok(Answer::Lines { lines, .. }) => Ok((program, lines, listener)),
             Ok(_) => Err(io::Error::other("it gives another answer")),
             Err(refusal) => Err(io::Error::other(refusal.message)),
         }
@@ -87,8 +93,8 @@ impl Link {
     ///
     /// # Errors
     /// It is lost.
-    pub fn drives(&self) -> Result<Drives, Refusal> {
-        Ok(self.get()?.drives)
+    pub async fn drives(&self) -> Result<Drives, Refusal> {
+        Ok(self.get().await?.drives)
     }
 
     /// Latches the share, then stops all motors.
@@ -96,16 +102,23 @@ impl Link {
     /// # Errors
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
-        stop_all(&self.get()?.program).await
+        stop_all(&self.get().await?.program).await
     }
 
-    fn get(&self) -> Result<Joined, Refusal> {
-        self.joined().clone().map_err(|why| lost(&why))
+    /// What there is of the share, after the first attempt to connect.
+    async fn get(&self) -> Result<Joined, Refusal> {
+        let mut changes = self.joined.subscribe();
+        let joined = changes.wait_for(Option::is_some).await;
+        // This side keeps the sender.
+        let joined = joined.ok().and_then(|joined| joined.clone());
+        joined.unwrap_or_else(|| Err("the server ends".to_owned())).map_err(|why| lost(&why))
     }
+}
 
-    fn joined(&self) -> std::sync::MutexGuard<'_, Result<Joined, String>> {
-        self.joined.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// Whether the lines are the same, besides their clocks.
+fn is_same(before: &[Line], now: &[Line]) -> bool {
+    let key = |line: &Line| (line.line.clone(), line.protocol, line.profile.clone());
+    before.iter().map(key).eq(now.iter().map(key))
 }
 
 /// Latches the share, then stops all motors.

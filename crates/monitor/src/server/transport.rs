@@ -23,7 +23,7 @@ const ARRIVAL: Duration = Duration::from_secs(5);
 /// How long an exchange may take. The connection of a page has begun then.
 const EXCHANGE: Duration = Duration::from_secs(30);
 /// What the system stores for a browser that does not read, in bytes: beats wait behind it.
-const STORED: usize = 1 << 17;
+const STORED: usize = 1 << 15;
 /// The pause after a connection that could not be taken.
 const PAUSE: Duration = Duration::from_millis(50);
 

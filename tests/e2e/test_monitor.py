@@ -1,0 +1,386 @@
+"""Pages of `motorlink monitor`: what they turn stops when they end, freeze or say so, and nothing else does."""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+from contextlib import ExitStack
+
+import pytest
+
+from monitoring import Site, is_kind, kind, trusting
+from program import eventually
+from sharing import Client, are_still, event, speeds
+
+#: Pages that are killed. ROUNDS=20 for more.
+ROUNDS = int(os.environ.get("ROUNDS", "3"))
+#: A deadline that a live page keeps on a busy machine.
+DEADLINE = ("--deadline", "1s")
+#: A busy machine may be late with a reply.
+PATIENT = ("--timeout", "60s")
+SET_SPEED = 0xA2
+
+
+@pytest.fixture
+def drives(sim):
+    """Simulated drives on a port of each kind."""
+    return sim()
+
+
+@pytest.fixture
+def serve(start):
+    """`serve(words)`: a monitor, and its site."""
+
+    def serve(*words):
+        monitor = start("monitor", "--listen", "127.0.0.1:0", "--json", *DEADLINE, *words)
+        return monitor, Site(json.loads(monitor.line(0)))
+
+    return serve
+
+
+@pytest.fixture
+def monitor(serve, drives):
+    return serve("-p", drives.st, "-p", f"slcan:{drives.can}", *PATIENT)
+
+
+@pytest.fixture
+def site(monitor):
+    return monitor[1]
+
+
+@pytest.fixture
+def watcher(site):
+    """A program beside the pages."""
+    return Client(site.path, "watcher")
+
+
+def turns(watcher):
+    """Waits until the motors of a page turn."""
+    eventually(lambda: is_turning(watcher), "motors that turn")
+
+
+def is_turning(watcher):
+    """Whether the motors have the speeds of a page."""
+    rpm, dps = speeds(watcher)
+    return rpm > 1200 and dps > 300
+
+
+def rests(watcher):
+    """Waits until the motors of a page rest."""
+    eventually(lambda: are_still(watcher), "motors that rest")
+
+
+def turns_too(watcher):
+    """Turns RMD motor 1 by another program; gives what checks that it turns on."""
+    watcher.command("rmd0", 1, SET_SPEED, 0, 0, 0, *struct.pack("<i", 9000))
+
+    def turns_still():
+        status = bytes(watcher.command("rmd0", 1, 0x9C, *7 * [0])["bytes"])
+        return struct.unpack_from("<h", status, 4)[0] > 60
+
+    def check():
+        assert turns_still()
+
+    eventually(turns_still, "a motor that turns")
+    return check
+
+
+def test_the_motors_of_killed_pages_stop_and_those_of_others_turn_on(site, watcher):
+    turns_on = turns_too(watcher)
+    with site.page() as bystander:
+        for _ in range(ROUNDS):
+            with site.page() as page:
+                page.alive().turn()
+                turns(watcher)
+                page.vanish()
+                rests(watcher)
+            turns_on()
+        assert bystander.ask("lines")["kind"] == "answer"
+    turns_on()
+
+
+@pytest.mark.parametrize("ends", ["frozen", "not drawn", "late"])
+def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(site, watcher, ends):
+    turns_on = turns_too(watcher)
+    with site.page() as page:
+        page.alive().turn()
+        turns(watcher)
+        assert page.beat["holds"]
+        if ends == "frozen":
+            page.lives = False
+        elif ends == "not drawn":
+            page.draws = False
+        else:
+            page.late = 1.5
+        assert page.lapsed() == "the page gave no sign of life for 1000 ms"
+        rests(watcher)
+        turns_on()
+        answer = page.act("st0", 1, "START_MOTOR")
+        assert (answer["kind"], answer["reason"]) == ("refusal", "lapsed")
+        page.forget()
+        page.lives, page.draws, page.late = True, True, 0.0
+        eventually(lambda: page.act("st0", 1, "START_MOTOR")["kind"] == "answer", "a page that is alive again")
+        assert page.act("rmd0", 2, "set_speed", speed_dps=360)["kind"] == "answer"
+        turns(watcher)
+        page.leave()
+        rests(watcher)
+
+
+def test_hold_to_run_ends_with_the_key(site, watcher):
+    with site.page() as page:
+        page.held = True
+        page.alive().turn(hold=True)
+        turns(watcher)
+        page.held = False
+        assert page.lapsed() == "the key or the finger of hold-to-run is up"
+        rests(watcher)
+        # Without the key it ends at once, whatever the command says.
+        page.forget()
+        page.turn()
+        assert page.act("st0", 1, "START_MOTOR", hold=True)["kind"] in ("answer", "refusal")
+        assert "hold-to-run" in page.lapsed()
+        rests(watcher)
+
+
+@pytest.mark.parametrize("way", ["socket", "beacon"])
+def test_a_page_lets_its_motors_go(site, watcher, way):
+    turns_on = turns_too(watcher)
+    with site.page() as page, site.page() as other:
+        page.alive().turn()
+        turns(watcher)
+        run, name = page.welcome["run"], page.welcome["name"].replace(" ", "%20")
+        # Another page, another run of the server, a viewer.
+        other.ask("let-go")
+        for query, headers in ((f"run=0&page={name}", None), (f"run={run}&page=page%2099", None),
+                               (f"run={run}&page={name}", site.viewer)):
+            assert site.post(f"/api/let-go?{query}", headers)[0] == 204
+        assert site.post("/api/let-go")[0] == 400
+        assert page.beat["holds"] and is_turning(watcher)
+        if way == "socket":
+            assert page.ask("let-go")["to"] == "let-go"
+        else:
+            assert site.post(f"/api/let-go?run={run}&page={name}")[0] == 204
+        assert page.lapsed() == "the page has let its motors go"
+        rests(watcher)
+        turns_on()
+
+
+@pytest.mark.parametrize("way", ["socket", "post", "viewer", "viewer post"])
+def test_stop_all_stops_all_motors_and_latches(site, watcher, way):
+    turns_too(watcher)
+    with site.page() as page, site.page(site.viewer) as viewer:
+        page.alive().turn()
+        turns(watcher)
+        if "post" in way:
+            status, body = site.post("/api/stop-all", site.viewer if "viewer" in way else None)
+            assert status == 200
+            motors = json.loads(body)["motors"]
+        else:
+            motors = (viewer if way == "viewer" else page).ask("stop-all")["motors"]
+        stopped = {(it["line"], it["motor"]): it.get("failure") for it in motors}
+        assert stopped.items() >= {("st0", 1): None, ("rmd0", 2): None, ("rmd0", 1): None}.items()
+        rests(watcher)
+        watcher.until(event("latched"))
+        for it in (page.act("st0", 1, "START_MOTOR"), watcher.command("st0", 1, 3, 1)):
+            assert (it["kind"], it["reason"]) == ("refusal", "latched")
+        assert page.ask("release")["kind"] == "answer"
+        page.turn()
+        turns(watcher)
+
+
+def test_a_stop_of_one_motor_leaves_the_others(site, watcher):
+    with site.page() as page:
+        page.alive().turn()
+        turns(watcher)
+        (stopped,) = page.ask("stop", motor={"line": "st0", "motor": 1})["motors"]
+        assert stopped == {"line": "st0", "motor": 1}
+        eventually(lambda: abs(speeds(watcher)[0]) < 30, "a motor that rests")
+        assert speeds(watcher)[1] > 300
+        page.start()
+        turns(watcher)
+
+
+def test_a_page_and_a_viewer_that_turned_nothing_leave_without_a_trace(site, watcher):
+    with site.page() as page:
+        page.alive().turn()
+        turns(watcher)
+        for headers in (site.operator, site.viewer):
+            with site.page(headers) as other:
+                other.alive()
+            watcher.until(event("left", by=other.welcome["name"]))
+        assert is_turning(watcher)
+        assert page.beat["holds"]
+
+
+def test_a_terminated_server_stops_all_motors_first(monitor, watcher):
+    server, site = monitor
+    with site.page() as page:
+        page.alive().turn()
+        turns(watcher)
+        server.process.terminate()
+        assert server.wait(60) == 0
+        assert page.closed() is not None
+    stopped = [json.loads(line) for line in server.out if '"stopped"' in line]
+    assert {("st0", 1), ("rmd0", 2)} <= {(it["line"], it["motor"]) for it in stopped}
+
+
+def test_a_server_that_was_suspended_counts_the_time(monitor, watcher):
+    server, site = monitor
+    with site.page() as page:
+        page.alive().turn()
+        turns(watcher)
+        os.kill(server.process.pid, signal.SIGSTOP)
+        try:
+            # The page goes on, and what it says waits.
+            sent = page.frame
+            eventually(lambda: page.frame > sent + 15, "signs of life")
+        finally:
+            os.kill(server.process.pid, signal.SIGCONT)
+        assert "no sign of life" in page.lapsed()
+        # The share counts requests as old that may have waited.
+        watcher.ask("lines")
+        rests(watcher)
+
+
+def test_a_guard_stops_the_motor_when_the_server_is_killed(start, serve, drives, tmp_path):
+    drive = tmp_path / "drive"
+    guard = start("guard", "st", "-p", drives.st, "--serve", f"pty:{drive}", "--json")
+    guard.line(0)
+    server, site = serve("-p", drive, *PATIENT)
+    with site.page() as page:
+        page.alive()
+        for command, values in (("SET_RAMP", {"speed_rpm": 1500, "duration_ms": 100}), ("START_MOTOR", {})):
+            assert page.act("st0", 1, command, **values)["kind"] == "answer"
+        eventually(lambda: drives.motor(1, drives.ports[0]["port"])["speed_rpm"] > 1000, "a motor that turns")
+        server.kill()
+        eventually(lambda: abs(drives.motor(1, drives.ports[0]["port"])["speed_rpm"]) < 30, "a motor that rests")
+
+
+@pytest.fixture
+def share(start, drives, tmp_path):
+    """`share()`: a share of these drives, again and again at the same place."""
+    path = tmp_path / "share"
+
+    def share():
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", *PATIENT]
+        running = start("share", *words, "--json")
+        running.line(0)
+        return running
+
+    share.path = path
+    return share
+
+
+def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share):
+    share()
+    watcher = Client(share.path, "watcher")
+    turns_on = turns_too(watcher)
+    for words in (("--share", f"unix:{share.path}"), ("-p", f"share:{share.path}/st0")) * ROUNDS:
+        server, site = serve(*words)
+        with site.page() as page:
+            page.alive().turn()
+            turns(watcher)
+            server.kill()
+            rests(watcher)
+        turns_on()
+
+
+def test_pages_are_told_that_the_share_is_lost_and_back(serve, share):
+    running = share()
+    _, site = serve("--share", f"unix:{share.path}")
+    with site.page() as page:
+        page.alive().turn()
+        # An orderly end, which stops the motors.
+        running.interrupt()
+        assert running.wait(60) == 0
+        page.until(lambda it: is_kind(it, "share") and it["lost"])
+        page.until(kind("lapsed"))
+        for ask in ("lines", "stop-all"):
+            answer = page.ask(ask)
+            assert (answer["kind"], answer["reason"]) == ("refusal", "line"), answer
+        assert site.post("/api/stop-all")[0] == 503
+        with site.page() as late:
+            late.until(lambda it: is_kind(it, "share") and it["lost"])
+            share()
+            for one in (page, late):
+                one.until(lambda it: is_kind(it, "share") and it["lost"] is None)
+                assert one.ask("lines")["kind"] == "answer"
+        watcher = Client(share.path, "watcher")
+        eventually(lambda: page.act("st0", 1, "START_MOTOR")["kind"] == "answer", "drives of the new share")
+        page.turn()
+        turns(watcher)
+        assert site.post("/api/stop-all")[0] == 200
+        rests(watcher)
+
+
+def test_several_pages_have_names_and_sessions_of_their_own(site, watcher):
+    with ExitStack() as stack:
+        pages = [stack.enter_context(site.page()) for _ in range(3)]
+        assert [page.welcome["name"] for page in pages] == ["page 1", "page 2", "page 3"]
+        one, two, _ = [page.alive() for page in pages]
+        one.turn()
+        turns(watcher)
+        # The last who moves a motor has it.
+        assert two.act("rmd0", 2, "set_speed", speed_dps=340)["kind"] == "answer"
+        one.leave()
+        eventually(lambda: abs(speeds(watcher)[0]) < 30, "the motor of the page that left")
+        assert speeds(watcher)[1] > 300
+        two.leave()
+        rests(watcher)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory):
+    """A certificate of this machine and its key."""
+    folder = tmp_path_factory.mktemp("tls")
+    words = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+             "-days", "2", "-subj", "/CN=bench", "-addext", "subjectAltName=IP:127.0.0.1,DNS:localhost",
+             "-keyout", folder / "key.pem", "-out", folder / "cert.pem"]
+    subprocess.run(words, check=True, capture_output=True)
+    return folder / "cert.pem", folder / "key.pem"
+
+
+def test_pages_come_through_tls(start, certificate):
+    cert, key = certificate
+    words = ["--listen", "127.0.0.1:0", "--tls-cert", cert, "--tls-key", key, "--json", *DEADLINE]
+    monitor = start("monitor", *words)
+    site = Site(json.loads(monitor.line(0)), trusting(cert))
+    assert site.scheme == "https"
+    _, answer, _ = site.request("GET", f"/?token={site.tokens['url']}")
+    assert "Secure" in answer["Set-Cookie"].split("; ")
+    with site.page() as page:
+        assert page.alive().ask("stop-all")["kind"] == "answer"
+    assert site.post("/api/stop-all")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        (["--listen", "0.0.0.0:0"], "anybody can read the tokens"),
+        (["--listen", "127.0.0.1:0", "--tls-cert", "CERT"], "--tls-key"),
+        (["--listen", "127.0.0.1:0", "--tls-cert", "CERT", "--tls-key", "CERT"], "CERT"),
+        (["--listen", "127.0.0.1:0", "--tls-cert", "/nowhere", "--tls-key", "KEY"], "/nowhere"),
+        (["--deadline", "100ms"], "--deadline is 200ms"),
+        (["--share", "unix:x", "-p", "sim:"], "leave -p out"),
+        (["-p", "share:./x/st0", "-p", "sim:"], "shown alone"),
+    ],
+)
+def test_what_cannot_be_served_is_refused(run, certificate, words, said):
+    files = {"CERT": str(certificate[0]), "KEY": str(certificate[1])}
+    done = run("monitor", *(files.get(word, word) for word in words)).ended(2)
+    assert files.get(said, said) in done.err
+
+
+def test_an_address_of_the_network_needs_a_word(start):
+    monitor = start("monitor", "--listen", "0.0.0.0:0", "--insecure", "--json")
+    site = Site(json.loads(monitor.line(0)))
+    with site.page() as page:
+        assert page.ask("lines")["kind"] == "answer"
+
+
+def test_the_usual_port_may_be_taken(start):
+    first, second = (start("monitor", "--json") for _ in range(2))
+    ports = {Site(json.loads(one.line(0))).port for one in (first, second)}
+    assert len(ports) == 2 and min(ports) >= 8707
+    eventually(lambda: any("is taken" in line for one in (first, second) for line in one.err), "a note")
