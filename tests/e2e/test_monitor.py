@@ -201,6 +201,20 @@ def test_a_stop_of_one_motor_leaves_the_others(site, watcher):
         turns(watcher)
 
 
+def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, watcher):
+    turns_too(watcher)
+    with site.page() as page:
+        # Nobody has this ID, and the share waits long for a reply.
+        motor = {"line": "rmd0", "motor": 20}
+        for _ in range(70):
+            page.send("read", **motor, names=["temperature_celsius"])
+        busy = page.until(kind("refusal"))
+        assert (busy["reason"], busy["id"]) == ("busy", 65)
+        assert page.ask("lines")["kind"] == "answer"
+        stopped = {it["motor"]: it.get("failure") for it in page.ask("stop-all")["motors"]}
+        assert stopped[1] is None and "never answered" in stopped[20]
+
+
 def test_a_page_and_a_viewer_that_turned_nothing_leave_without_a_trace(site, watcher):
     with site.page() as page:
         page.alive().turn()

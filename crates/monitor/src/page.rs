@@ -5,6 +5,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
 use motorlink_proto::time::Micros;
+use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{self as share, Happening, MotorName, Reason};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, Semaphore, mpsc};
@@ -218,6 +219,25 @@ impl Page {
         }
     }
 
+    /// Takes a message of the share: if somebody else stops a motor, commands from before do not move it.
+    /// The session that sees is read only while the browser reads, the other one always.
+    pub fn notice_stop_in_view(&self, frame: &Frame) {
+        if self.control().drive.is_none() {
+            self.notice_stop(frame);
+        }
+    }
+
+    fn notice_stop(&self, frame: &Frame) {
+        if frame.kind == Kind::Text
+            && let Ok(share::Text::Event(event)) = share::decode(&frame.payload)
+            && event.event == Happening::Stopping
+            && event.by.as_ref() != Some(&self.name)
+        {
+            let motor = event.line.zip(event.motor);
+            self.control().man.stop(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
+        }
+    }
+
     /// Whether this page may ask for that.
     fn check(&self, ask: &Ask) -> Result<(), Refusal> {
         match ask {
@@ -289,16 +309,10 @@ impl Page {
     }
 }
 
-/// Reads what the share sends to the session that turns motors: who else stops them.
+/// Reads what the share sends to the session that turns motors.
 async fn follow(page: Arc<Page>, drive: Program, mut listener: Listener) {
     while let Ok(frame) = listener.next().await {
-        if let Ok(share::Text::Event(event)) = share::decode(&frame.payload)
-            && event.event == Happening::Stopping
-            && event.by.as_ref() != Some(&page.name)
-        {
-            let motor = event.line.zip(event.motor);
-            page.control().man.stop(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
-        }
+        page.notice_stop(&frame);
     }
     let mut control = page.control();
     if control.drive.as_ref().is_some_and(|current| current.is(&drive))

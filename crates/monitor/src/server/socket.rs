@@ -208,7 +208,10 @@ impl View {
     async fn next(&mut self, page: &Page) -> Message {
         match self {
             View::Up { link, name, listener } => match listener.next().await {
-                Ok(frame) => message(frame),
+                Ok(frame) => {
+                    page.notice_stop_in_view(&frame);
+                    message(frame)
+                }
                 Err(error) => {
                     page.set_view(None);
                     let (link, name, why) = (Arc::clone(link), name.clone(), error.to_string());
