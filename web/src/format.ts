@@ -7,6 +7,9 @@ const DECIMALS: Readonly<Record<string, number>> = { A: 2, V: 1, VA: 1, W: 1, 'Â
 
 export const decimalsOf = (unit: string): number => DECIMALS[unit] ?? 0;
 
+/** The decimals of values that are whole numbers of a step. */
+export const decimalsOfStep = (step: number): number => Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+
 /** A number with a fixed number of decimals. NaN is a dash. */
 export function number(value: number, decimals: number): string {
   if (!Number.isFinite(value)) return 'â€“';

@@ -3,6 +3,7 @@ import { useSignal } from '@preact/signals';
 import { sentence } from '../format';
 import { ask, lapsed } from '../link';
 import { Said, useSaid } from '../parts';
+import { REVUP, RevUp } from './revup';
 import type { Command } from '../wire';
 
 interface Props {
@@ -15,11 +16,14 @@ interface Props {
 
 export function Commands({ line, motor, commands, isHold, mayMove }: Props) {
   const isOpen = useSignal(false);
+  const named = (wanted: string) => commands.find(({ name }) => name === wanted);
+  const revUp = named(REVUP.read) && named(REVUP.write);
   return (
     <details onToggle={({ currentTarget }) => (isOpen.value = currentTarget.open)}>
       <summary>More commands</summary>
       {isOpen.value && (
         <div class="commands">
+          {revUp && <RevUp line={line} motor={motor} write={revUp} mayMove={mayMove} />}
           {commands.map((command) => (
             <One
               key={command.name}

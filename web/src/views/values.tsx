@@ -1,7 +1,7 @@
 // The values of a card. Only these are drawn again with each tick.
 import { useEffect, useRef } from 'preact/hooks';
 import { rates } from '../drives';
-import { decimalsOf, number, rate, sentence, tooOld } from '../format';
+import { decimalsOf, decimalsOfStep, number, rate, sentence, tooOld } from '../format';
 import { state } from '../link';
 import { HISTORY, type Live, liveOf } from '../overview';
 import type { Description, Fault } from '../wire';
@@ -134,6 +134,11 @@ export function Values({ line, motor, description }: Props) {
     (one) => one.line === line && one.motor === motor && one.name === overview.speed,
   );
 
+  const decimals = (name: string, unit: string) => {
+    const step = description.registers.find((register) => register.name === name)?.range?.[2];
+    return step ? decimalsOfStep(step) : decimalsOf(unit);
+  };
+
   const shown: [string, string | null][] = [
     ['Speed', overview.speed],
     ['Current', overview.current],
@@ -166,7 +171,7 @@ export function Values({ line, motor, description }: Props) {
               <dt>{label}</dt>
               <dd>
                 <span class="age">{isOld}</span>
-                <span class="digits">{number(value?.value ?? NaN, decimalsOf(value?.unit ?? ''))}</span>{' '}
+                <span class="digits">{number(value?.value ?? NaN, decimals(name, value?.unit ?? ''))}</span>{' '}
                 <span class="unit">{value?.unit}</span>
               </dd>
             </div>
