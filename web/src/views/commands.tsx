@@ -40,6 +40,9 @@ export function Commands({ line, motor, commands, isHold, mayMove }: Props) {
   );
 }
 
+/** A bound of a range, short. */
+const bound = (value: number) => (Math.abs(value) < 1e6 ? String(value) : value.toExponential(1).replace('-', '−'));
+
 interface OneProps {
   line: string;
   motor: number;
@@ -59,11 +62,13 @@ function One({ line, motor, command: { name, doc, fields, moves, wears_rom }, ma
     for (const field of fields) {
       const text = (values.value[field.name] ?? '').trim();
       const value = Number(text);
-      if (text === '' || !Number.isFinite(value)) throw new Error(`${field.name}: give a number.`);
+      if (text === '' || !Number.isFinite(value)) {
+        throw new Error(`${field.name}: ${field.words.length ? 'choose one' : 'give a number'}.`);
+      }
       numbers[field.name] = value;
     }
     if (moves) lapsed.value = null;
-    const answer = await ask({ ask: 'act', line, motor, command: name, values: numbers, hold: false });
+    const answer = await ask({ ask: 'act', line, motor, command: name, values: numbers, hold: false, to_rom: wears_rom });
     isAllowed.value = false;
     const texts = answer.values.map((value) => `${value.name} ${value.text}`);
     return texts.length ? texts.join(', ') : 'The drive acknowledged it.';
@@ -88,18 +93,33 @@ function One({ line, motor, command: { name, doc, fields, moves, wears_rom }, ma
         <div class="fields">
           {fields.map((field) => {
             const [least, most] = field.range;
+            const set = (text: string) => void (values.value = { ...values.value, [field.name]: text });
+            const text = values.value[field.name] ?? '';
+            if (field.words.length) {
+              return (
+                <label key={field.name} title={field.doc}>
+                  {field.name}
+                  <select value={text} disabled={!mayMove} onChange={({ currentTarget }) => set(currentTarget.value)}>
+                    <option value="">choose</option>
+                    {field.words.map((word, value) => (
+                      <option key={word} value={value}>
+                        {word}
+                      </option>
+                    ))}
+                  </select>
+                </label>
+              );
+            }
             return (
               <label key={field.name} title={field.doc}>
                 {field.name}
-                {field.unit && `, ${field.unit}`}: {least} to {most}
+                {field.unit && `, ${field.unit}`}: {bound(least)} to {bound(most)}
                 <input
                   type="number"
                   step="any"
-                  value={values.value[field.name] ?? ''}
+                  value={text}
                   disabled={!mayMove}
-                  onInput={({ currentTarget }) =>
-                    (values.value = { ...values.value, [field.name]: currentTarget.value })
-                  }
+                  onInput={({ currentTarget }) => set(currentTarget.value)}
                 />
               </label>
             );
