@@ -13,6 +13,7 @@ let connected: boolean;
 let posted: { done: (response: Response) => void; failed: (why: Error) => void }[];
 const latchedBy = signal<string | null>(null);
 const held = signal(false);
+const events = signal<object[]>([]);
 const sayAlive = vi.fn();
 
 class Refused extends Error {
@@ -32,9 +33,11 @@ beforeEach(async () => {
   posted = [];
   connected = true;
   latchedBy.value = null;
+  events.value = [{ event: 'stopped', line: 'st0', motor: 1 }];
   held.value = true;
   vi.doMock('./link', () => ({
     Refused,
+    events,
     held,
     latchedBy,
     sayAlive,
@@ -80,6 +83,8 @@ describe('stop all', () => {
     expect(report().phase).toBe('sent');
     latchedBy.value = 'page 1';
     expect(report().message).toContain('The server has the stop');
+    events.value = [...events.value, { event: 'stopped', line: 'rmd0', motor: 2 }];
+    expect(report()).toMatchObject({ phase: 'sent', message: expect.stringContaining('1 of 4 did') });
     asked[0]!.done({ motors: ALL });
     await pass(2000);
     expect(report()).toEqual({ phase: 'stopped', message: 'Stopped: 4 of 4 motors confirmed.' });
@@ -120,7 +125,7 @@ describe('stop all', () => {
     asked[0]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered' }] });
     await pass(0);
     expect(report().phase).toBe('stopped');
-    expect(report().message).toContain('4 of 4 motors confirmed. 1 address without a known motor did not answer.');
+    expect(report().message).toContain('4 of 4 motors confirmed. The stop also went to 1 address where no motor was found.');
   });
 
   it('says that the server is not reachable, whether that fails or hangs', async () => {

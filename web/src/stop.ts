@@ -1,7 +1,7 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
-import { Refused, ask, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
-import type { StoppedMotor } from './wire';
+import { Refused, ask, events, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
+import type { Event as DriveEvent, StoppedMotor } from './wire';
 
 export interface StopReport {
   /** `stopped`: every motor that was found confirmed it. */
@@ -17,12 +17,17 @@ const SECOND_WAY = 150;
 /** A server that is reached latches at once, even if motors take longer to confirm. */
 const UNREACHED = 1000;
 
+const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
+
 let last = 0;
+/** The newest event when all motors were stopped last. */
+let before: DriveEvent | undefined;
 
 /** Stops all motors, at once. Never asks anything, and can be called as often as wanted. */
 export function stopAll() {
   last += 1;
   const number = last;
+  before = events.value.at(-1);
   held.value = false;
   sayAlive();
   stopReport.value = { phase: 'sent', message: 'Stop sent. No motor has confirmed it yet.' };
@@ -90,7 +95,7 @@ function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   const failures = known.filter(({ failure }) => failure);
   const others = stopped.length - known.length;
   const silent = others
-    ? ` ${others} ${others === 1 ? 'address' : 'addresses'} without a known motor did not answer.`
+    ? ` The stop also went to ${others} ${others === 1 ? 'address' : 'addresses'} where no motor was found.`
     : '';
   if (failures.length) {
     const names = failures.map(({ line, motor, failure }) => `${nameOf(line, motor)} (${failure})`);
@@ -164,13 +169,31 @@ export function stopByKeys() {
   addEventListener('keyup', up, { capture: true });
 }
 
+/** The motors that confirmed since the event `before`, while the server waits for others. */
+function confirmedSince(before: DriveEvent | undefined): Set<string> {
+  const names = new Set<string>();
+  const all = events.value;
+  for (let at = all.length - 1; at >= 0 && all[at] !== before; at -= 1) {
+    const { event, line, motor } = all[at]!;
+    if (event === 'stopped' && line && motor != null) names.add(nameOf(line, motor));
+  }
+  return names;
+}
+
 let wasLatched = false;
 latchedBy.subscribe((by) => {
   const phase = stopReport.peek()?.phase;
   // The latch comes before the stops, and the report of a stop ends with its latch.
   if (by !== null && phase === 'sent') {
-    stopReport.value = { phase, message: 'The server has the stop, and waits for the motors to confirm it.' };
+    stopReport.value = { phase, message: WAITING };
   }
   if (by === null && wasLatched) stopReport.value = null;
   wasLatched = by !== null;
+});
+events.subscribe(() => {
+  if (stopReport.peek()?.phase !== 'sent') return;
+  const count = confirmedSince(before).size;
+  if (!count) return;
+  const found = [...motors.peek().values()].reduce((sum, one) => sum + one.length, 0);
+  stopReport.value = { phase: 'sent', message: `${WAITING} ${count} of ${found} did.` };
 });
