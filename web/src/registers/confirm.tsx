@@ -1,6 +1,7 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useId, useRef } from 'preact/hooks';
-import { stopAll } from '../stop';
+import { nameOf, stopAll } from '../stop';
+import type { MotorName } from '../wire';
 
 /**
  * Asks before something that cannot be undone. A modal dialog covers the button that stops all motors,
@@ -52,5 +53,15 @@ export function Confirm({
         </button>
       </div>
     </dialog>
+  );
+}
+
+/** What a write to the ROM wears out. */
+export function RomWear({ motor: { line, motor } }: { motor: MotorName }) {
+  return (
+    <p>
+      This writes the ROM of motor {nameOf(line, motor)}. Each write wears the ROM, which lasts for a limited number of
+      writes. What is written stays after power-off.
+    </p>
   );
 }

@@ -2,10 +2,10 @@
 import { useSignal } from '@preact/signals';
 import { ask } from '../link';
 import { Said, useSaid } from '../parts';
-import { Confirm } from '../registers/confirm';
+import { Confirm, RomWear } from '../registers/confirm';
 import { numberOf, rangeText } from '../registers/model';
 import { type Sheet, reasonOf } from '../registers/values';
-import type { Command, Description } from '../wire';
+import type { Command, Description, Field } from '../wire';
 
 export function RomCommands({ sheet, description }: { sheet: Sheet; description: Description }) {
   const commands = description.commands.filter(({ wears_rom: wearsRom, moves }) => wearsRom && !moves);
@@ -25,6 +25,7 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
   const confirming = useSignal<Record<string, number> | null>(null);
   const { said, attempt, isBusy } = useSaid();
 
+  const set = ({ name }: Field, text: string) => (texts.value = { ...texts.value, [name]: text });
   const check = () =>
     attempt(async () => {
       const values: Record<string, number> = {};
@@ -38,7 +39,7 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
   const send = (values: Record<string, number>) =>
     attempt(async () => {
       const answer = await ask({
-        ask: 'act', ...sheet.motor, command: command.name, values, hold: false,
+        ask: 'act', ...sheet.motor, command: command.name, values, hold: false, to_rom: true,
       }).catch((why: unknown) => {
         throw new Error(reasonOf(why));
       });
@@ -59,18 +60,26 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
       </p>
       {command.fields.map((field) => (
         <label class="field" key={field.name}>
-          <span>
-            {field.name}
-            {field.unit && ` (${field.unit})`}
-          </span>
-          <input
-            inputMode="decimal"
-            autocomplete="off"
-            title={field.doc}
-            placeholder={rangeText(field.range)}
-            value={texts.value[field.name] ?? ''}
-            onInput={({ currentTarget }) => (texts.value = { ...texts.value, [field.name]: currentTarget.value })}
-          />
+          <span>{field.name}</span>
+          {field.words.length > 0 ? (
+            <select value={texts.value[field.name] ?? ''} onChange={({ currentTarget }) => set(field, currentTarget.value)}>
+              <option value="">choose</option>
+              {field.words.map((word, index) => (
+                <option key={word} value={String(index)}>
+                  {word}
+                </option>
+              ))}
+            </select>
+          ) : (
+            <input
+              inputMode="decimal"
+              autocomplete="off"
+              title={field.doc}
+              placeholder={rangeText(field.range)}
+              value={texts.value[field.name] ?? ''}
+              onInput={({ currentTarget }) => set(field, currentTarget.value)}
+            />
+          )}
         </label>
       ))}
       <button type="submit" disabled={isBusy}>
@@ -93,10 +102,7 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
               {name}: {value}
             </p>
           ))}
-          <p>
-            It writes the ROM of motor {sheet.motor.motor} of {sheet.motor.line}. Each write wears the ROM, which lasts
-            for a limited number of writes. What it writes stays after power-off.
-          </p>
+          <RomWear motor={sheet.motor} />
         </Confirm>
       )}
     </form>

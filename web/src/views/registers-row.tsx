@@ -1,7 +1,7 @@
 // A register: its value, and its change in place.
 import { Component, createRef } from 'preact';
 import { duration } from '../format';
-import { Confirm } from '../registers/confirm';
+import { Confirm, RomWear } from '../registers/confirm';
 import { access, isSame, numberOf, rangeText, withUnit } from '../registers/model';
 import { type Cell, type Note, type Sheet, draft, note, read, reasonOf, write } from '../registers/values';
 import type { Register } from '../wire';
@@ -63,13 +63,13 @@ export class RegisterRow extends Component<Props, State> {
     draft(sheet, register.name, null);
   };
 
-  private submit = () => {
+  private submit = (toRom: boolean) => {
     const { sheet, register, draft: text } = this.props;
     const checked = numberOf(text ?? '', register);
     if ('why' in checked) {
       note(sheet, register.name, { isBad: true, text: `Not sent. ${checked.why}` });
       this.input.current?.focus();
-    } else if (register.wears_rom) this.setState({ toRom: checked.value });
+    } else if (toRom) this.setState({ toRom: checked.value });
     else void this.write(checked.value, false);
   };
 
@@ -91,7 +91,7 @@ export class RegisterRow extends Component<Props, State> {
 
   render() {
     const { sheet, register, cell, draft: text, note: remark, inFile, age, isOperator } = this.props;
-    const { name, doc, unit, writable, wears_rom: wearsRom } = register;
+    const { name, doc, unit, writable, wears_rom: wearsRom, can_keep: canKeep } = register;
     const { isWriting, toRom } = this.state;
     const range = rangeText(register.range, unit);
     const hint = `${name}-hint`;
@@ -122,7 +122,7 @@ export class RegisterRow extends Component<Props, State> {
               aria-label={`Change ${name}`}
               onSubmit={(event) => {
                 event.preventDefault();
-                this.submit();
+                this.submit(wearsRom);
               }}
             >
               <input
@@ -142,12 +142,18 @@ export class RegisterRow extends Component<Props, State> {
               <button type="submit" class="primary" disabled={isWriting}>
                 {isWriting ? 'Writing' : 'Write'}
               </button>
+              {canKeep && (
+                <button type="button" disabled={isWriting} onClick={() => this.submit(true)}>
+                  Write to ROM …
+                </button>
+              )}
               <button type="button" onClick={this.cancel}>
                 Cancel
               </button>
               <small id={hint}>
                 <span class="chip warn">not written</span> now {cell?.now.text ?? 'not read'}
-                {range && `; ${range}`}
+                <span class="narrow">{range}</span>
+                {canKeep && <span class="keep">Without the ROM it holds until power-off.</span>}
               </small>
             </form>
           )}
@@ -166,10 +172,7 @@ export class RegisterRow extends Component<Props, State> {
               <p>
                 {doc}: {cell?.now.text ?? 'not read'} becomes {withUnit(toRom, unit)}.
               </p>
-              <p>
-                The register is in the ROM of motor {sheet.motor.motor} of {sheet.motor.line}. Each write wears the
-                ROM, which lasts for a limited number of writes. The value stays after power-off.
-              </p>
+              <RomWear motor={sheet.motor} />
             </Confirm>
           )}
         </td>

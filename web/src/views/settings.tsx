@@ -2,7 +2,7 @@
 import { useSignal } from '@preact/signals';
 import { Refused, ask } from '../link';
 import { Said, useSaid } from '../parts';
-import { Confirm } from '../registers/confirm';
+import { Confirm, RomWear } from '../registers/confirm';
 import { type Sheet, compare, read, reasonOf } from '../registers/values';
 import { download } from '../registers/download';
 import { nameOf } from '../stop';
@@ -25,7 +25,7 @@ export function Settings({
   const toRom = useSignal(false);
   const file = sheet.file.value;
   const differences = file ? [...file.differences.values()] : [];
-  const hasRom = description.registers.some(({ wears_rom: wearsRom }) => wearsRom);
+  const hasRom = description.registers.some(({ wears_rom: wearsRom, can_keep: canKeep }) => wearsRom || canKeep);
   const needRom = differences.filter((one) => one.wears_rom && one.fixed === null);
   const possible = differences.filter((one) => one.fixed === null && (toRom.value || !one.wears_rom));
   const motor = nameOf(sheet.motor.line, sheet.motor.motor);
@@ -141,11 +141,8 @@ export function Settings({
             if (isConfirmed) void restore();
           }}
         >
-          <p>
-            The settings are written to the ROM of motor {motor}{needRom.length > 0 && `, among them ${names(needRom)}`}.
-            They stay after power-off.
-          </p>
-          <p>Each write wears the ROM, which lasts for a limited number of writes.</p>
+          {needRom.length > 0 && <p>In the ROM only: {names(needRom)}.</p>}
+          <RomWear motor={sheet.motor} />
         </Confirm>
       )}
     </details>
