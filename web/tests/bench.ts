@@ -18,6 +18,8 @@ export class Program {
 
   constructor(args: string[], cwd: string) {
     this.process = spawn(PROGRAM, args, { cwd, stdio: ['pipe', 'pipe', 'pipe'] });
+    // Also if a test is given up.
+    process.on('exit', () => this.process.kill('SIGKILL'));
     this.process.stderr!.on('data', (bytes: Buffer) => (this.stderr += bytes.toString()));
     createInterface({ input: this.process.stdout! }).on('line', (line) => {
       this.lines.push(JSON.parse(line) as Record<string, unknown>);
@@ -63,7 +65,6 @@ export class Program {
 }
 
 interface Port {
-  protocol: string;
   motors: Record<string, unknown>[];
 }
 
@@ -92,9 +93,10 @@ export class Bench {
     return Number(String(ready['path']).split(':').at(-1));
   }
 
-  async serve(ports = ['-p', `${this.folder}/st0`, '-p', `slcan:${this.folder}/can0`]) {
+  /** The deadline is long, because a loaded machine pauses browsers. */
+  async serve(ports = ['-p', `${this.folder}/st0`, '-p', `slcan:${this.folder}/can0`], deadline = '1s') {
     this.monitor = new Program(
-      ['monitor', ...ports, '--timeout', '1s', '--listen', '127.0.0.1:0', '--json'],
+      ['monitor', ...ports, '--timeout', '1s', '--deadline', deadline, '--listen', '127.0.0.1:0', '--json'],
       this.folder,
     );
     this.ready = await this.monitor.line((line) => line['event'] === 'ready');
@@ -124,9 +126,10 @@ export class Bench {
   /** What a motor does, from outside of its protocol. */
   async truth(line: 'st' | 'rmd', motor: number) {
     const { state } = (await this.drives.tell({ command: 'state' })) as { state: Port[] };
-    const port = state.find((one) => one.protocol === line);
-    const found = port?.motors.find((one) => one['motor'] === motor);
-    if (!found) throw new Error(`no motor ${motor} in ${JSON.stringify(state)}`);
+    const kind = line === 'st' ? 'status' : 'mode';
+    const motors = state.flatMap((port) => port.motors);
+    const found = motors.find((one) => one['motor'] === motor && kind in one);
+    if (!found) throw new Error(`the drives have no motor ${motor}`);
     return found;
   }
 
@@ -138,8 +141,8 @@ export class Bench {
 
   async end() {
     this.others.forEach((socket) => socket.destroy());
-    const code = await this.monitor.end();
-    await this.drives.end();
+    const code = await this.monitor?.end();
+    await this.drives?.end();
     rmSync(this.folder, { recursive: true, force: true });
     return code;
   }
@@ -149,10 +152,13 @@ export const test = base.extend<{ bench: Bench; live: Page }>({
   bench: async ({}, use) => {
     if (!existsSync(PROGRAM)) throw new Error(`${PROGRAM} is not there: run \`make browser\``);
     const bench = new Bench();
-    await bench.plug();
-    await bench.serve();
-    await use(bench);
-    await bench.end();
+    try {
+      await bench.plug();
+      await bench.serve();
+      await use(bench);
+    } finally {
+      await bench.end();
+    }
   },
   /** The page of an operator, connected, with all motors found. */
   live: async ({ bench, page }, use) => {

@@ -28,6 +28,8 @@ export class Chromium {
       [...ARGUMENTS, ...through, '--headless', '--remote-debugging-port=0', `--user-data-dir=${folder}`, 'about:blank'],
       { stdio: 'ignore' },
     );
+    // Also if a test is given up.
+    process.on('exit', () => started.kill('SIGKILL'));
     const file = join(folder, 'DevToolsActivePort');
     while (!existsSync(file) || !readFileSync(file, 'utf8').includes('\n')) {
       if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);

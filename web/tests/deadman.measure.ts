@@ -76,7 +76,7 @@ async function world(guarded: boolean): Promise<World> {
     await guard.line(() => true);
     serial = at;
   }
-  await bench.serve(['-p', serial]);
+  await bench.serve(['-p', serial], '300ms');
   const network = await Network.open();
   const chromium = await Chromium.open({ proxy: network.proxy });
   return { bench, wire, network, chromium, guard };

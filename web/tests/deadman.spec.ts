@@ -1,4 +1,5 @@
 // A motor that a page turned stops when the page is gone.
+import type { Page } from '@playwright/test';
 import { Chromium } from './chromium';
 import { card, expect, spin, test } from './bench';
 import { Network } from './network';
@@ -6,18 +7,27 @@ import { Network } from './network';
 const TURNS = 300;
 const STILL = 5;
 
+interface World {
+  chromium: Chromium;
+  network: Network;
+  page: Page;
+}
+
 /** A real tab with a motor that it turned. */
-const turning = test.extend<{ world: { chromium: Chromium; network: Network; page: Awaited<ReturnType<Chromium['tab']>> } }>({
+const turning = test.extend<{ world: World }>({
   world: async ({ bench }, use) => {
     const network = await Network.open();
     const chromium = await Chromium.open({ proxy: network.proxy });
-    const page = await chromium.tab();
-    await page.goto(bench.url);
-    await spin(page, 1000);
-    await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
-    await use({ chromium, network, page });
-    await chromium.close();
-    await network.close();
+    try {
+      const page = await chromium.tab();
+      await page.goto(bench.url);
+      await spin(page, 1000);
+      await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+      await use({ chromium, network, page });
+    } finally {
+      await chromium.close();
+      await network.close();
+    }
   },
 });
 
@@ -70,7 +80,7 @@ for (const cut of ['both', 'to-server', 'to-browser'] as const) {
 }
 
 turning('the network is slower than the deadline', async ({ bench, world }) => {
-  world.network.set({ delay: 400 });
+  world.network.set({ delay: 1200 });
   await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
 });
 
