@@ -189,16 +189,27 @@ impl Listener {
     pub async fn next(&mut self) -> io::Result<Frame> {
         let mut bytes = [0; 1 << 14];
         loop {
-            while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
-                if let Some(frame) = self.shared.deliver(frame) {
-                    return Ok(frame);
-                }
+            if let Some(frame) = self.received()? {
+                return Ok(frame);
             }
             match self.reader.read(&mut bytes).await? {
                 0 => return Err(io::ErrorKind::UnexpectedEof.into()),
                 size => self.frames.push(&bytes[..size]),
             }
         }
+    }
+
+    /// As [`next`](Self::next), of what has been received already.
+    ///
+    /// # Errors
+    /// It does not come from a share.
+    pub fn received(&mut self) -> io::Result<Option<Frame>> {
+        while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
+            if let Some(frame) = self.shared.deliver(frame) {
+                return Ok(Some(frame));
+            }
+        }
+        Ok(None)
     }
 }
 

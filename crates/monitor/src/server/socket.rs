@@ -56,9 +56,9 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
         return close(&mut sink, "the server has as many pages as it can have".to_owned()).await;
     };
     let own_name = format!("page {}", state.next_page());
-    let (view, name) = match state.link.connect(&own_name).await {
-        Ok((program, listener, name)) => (Ok((program, listener)), name),
-        Err(error) => (Err(error.to_string()), own_name.clone()),
+    let (view, name, lost) = match state.link.connect(&own_name).await {
+        Ok((program, listener, name)) => (Some((program, listener)), name, None),
+        Err(error) => (None, own_name.clone(), Some(error.to_string())),
     };
     let (out, outgoing) = mpsc::channel(WAITING);
     let deadline = Micros::from(state.deadline);
@@ -68,17 +68,22 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     let watch = tokio::spawn(async move { watched.watch().await }).abort_handle();
     let _present =
         Present { state: &state, page: Arc::clone(&page), name: name.clone(), tasks: vec![watch] };
-    let welcome = Text::Welcome(Welcome {
+    let mut first = vec![encode(&Text::Welcome(Welcome {
         server: state.program.clone(),
         name,
         role,
         deadline: state.deadline.as_secs_f64() * 1e3,
         run: state.run.clone(),
-    });
-    let view = View::new(Arc::clone(&state.link), own_name, view, &page);
+    }))];
+    if lost.is_some() {
+        first.push(encode(&Text::Share { lost }));
+    }
+    let (program, listener) = view.unzip();
+    page.set_view(program);
+    let view = View::new(Arc::clone(&state.link), own_name, listener);
     let why = tokio::select! {
         // The page has gone, or does not read.
-        () = write(&page, &mut sink, outgoing, view, &welcome) => return,
+        () = write(&page, &mut sink, first, outgoing, view) => return,
         why = read(&page, stream) => why,
     };
     if let Err(why) = why {
@@ -132,16 +137,12 @@ async fn read(page: &Arc<Page>, mut stream: SplitStream<WebSocket>) -> Result<()
 async fn write(
     page: &Page,
     sink: &mut Sink,
+    first: Vec<String>,
     mut outgoing: mpsc::Receiver<String>,
     mut view: View,
-    welcome: &Text,
 ) {
     let mut beats = interval(BEAT);
     beats.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut first = vec![encode(welcome)];
-    if let View::Down { why, .. } = &view {
-        first.push(encode(&Text::Share { lost: Some(why.clone()) }));
-    }
     let mut first = first.into_iter();
     loop {
         let message = match first.next() {
@@ -153,17 +154,30 @@ async fn write(
                 message = view.next(page) => message,
             },
         };
+        let sent = async {
+            sink.feed(message).await?;
+            while let Some(message) = view.received(page) {
+                sink.feed(message).await?;
+            }
+            sink.flush().await
+        };
         // While this waits, nothing is read from the share: its queues lose what is too old.
-        if !timeout(PATIENCE, sink.send(message)).await.is_ok_and(|sent| sent.is_ok()) {
+        if !timeout(PATIENCE, sent).await.is_ok_and(|sent| sent.is_ok()) {
             return;
         }
     }
 }
 
 /// The session that sees.
-enum View {
-    Up { link: Arc<Link>, name: String, listener: Listener },
-    Down { link: Arc<Link>, name: String, why: String, coming: Coming },
+struct View {
+    link: Arc<Link>,
+    name: String,
+    state: Seen,
+}
+
+enum Seen {
+    Up(Listener),
+    Down(Coming),
 }
 
 /// Connects again and again, until it is dropped.
@@ -175,71 +189,66 @@ impl Drop for Coming {
     }
 }
 
-impl View {
-    fn new(
-        link: Arc<Link>,
-        name: String,
-        connected: Result<(Program, Listener), String>,
-        page: &Page,
-    ) -> Self {
-        match connected {
-            Ok((program, listener)) => {
-                page.set_view(Some(program));
-                View::Up { link, name, listener }
-            }
-            Err(why) => View::down(link, name, why),
-        }
-    }
-
-    fn down(link: Arc<Link>, name: String, why: String) -> Self {
-        let (its_link, its_name) = (Arc::clone(&link), name.clone());
-        let coming = tokio::spawn(async move {
+impl Coming {
+    fn new(link: Arc<Link>, name: String) -> Self {
+        Coming(tokio::spawn(async move {
             loop {
-                if let Ok((program, listener, _)) = its_link.connect(&its_name).await {
+                if let Ok((program, listener, _)) = link.connect(&name).await {
                     return (program, listener);
                 }
                 sleep(AGAIN).await;
             }
-        });
-        View::Down { link, name, why, coming: Coming(coming) }
+        }))
+    }
+}
+
+impl View {
+    /// `listener` is `None` if the share is lost.
+    fn new(link: Arc<Link>, name: String, listener: Option<Listener>) -> Self {
+        let state = match listener {
+            Some(listener) => Seen::Up(listener),
+            None => Seen::Down(Coming::new(Arc::clone(&link), name.clone())),
+        };
+        View { link, name, state }
+    }
+
+    /// A message for the page that has been received already.
+    fn received(&mut self, page: &Page) -> Option<Message> {
+        match &mut self.state {
+            // What is wrong is found again by the next read.
+            Seen::Up(listener) => Some(message(page, listener.received().ok()??)),
+            Seen::Down(_) => None,
+        }
     }
 
     /// The next message for the page. It can be dropped while it waits.
     async fn next(&mut self, page: &Page) -> Message {
-        match self {
-            View::Up { link, name, listener } => match listener.next().await {
-                Ok(frame) => {
-                    page.notice_stop_in_view(&frame);
-                    message(frame)
-                }
-                Err(error) => {
-                    page.set_view(None);
-                    let (link, name, why) = (Arc::clone(link), name.clone(), error.to_string());
-                    *self = View::down(link, name, why.clone());
-                    Message::Text(encode(&Text::Share { lost: Some(why) }).into())
-                }
+        let lost = match &mut self.state {
+            Seen::Up(listener) => match listener.next().await {
+                Ok(frame) => return message(page, frame),
+                Err(error) => Some(error.to_string()),
             },
-            View::Down { link, name, coming, .. } => {
-                let (link, name) = (Arc::clone(link), name.clone());
-                match (&mut coming.0).await {
-                    Ok((program, listener)) => {
-                        page.set_view(Some(program));
-                        *self = View::Up { link, name, listener };
-                        Message::Text(encode(&Text::Share { lost: None }).into())
-                    }
-                    Err(error) => {
-                        let why = error.to_string();
-                        *self = View::down(link, name, why.clone());
-                        Message::Text(encode(&Text::Share { lost: Some(why) }).into())
-                    }
+            Seen::Down(coming) => match (&mut coming.0).await {
+                Ok((program, listener)) => {
+                    page.set_view(Some(program));
+                    self.state = Seen::Up(listener);
+                    None
                 }
-            }
+                Err(error) => Some(error.to_string()),
+            },
+        };
+        if lost.is_some() {
+            page.set_view(None);
+            self.state = Seen::Down(Coming::new(Arc::clone(&self.link), self.name.clone()));
         }
+        Message::Text(encode(&Text::Share { lost }).into())
     }
 }
 
 /// A message of the share for a page.
-fn message(Frame { kind, payload }: Frame) -> Message {
+fn message(page: &Page, frame: Frame) -> Message {
+    page.notice_stop_in_view(&frame);
+    let Frame { kind, payload } = frame;
     match kind {
         Kind::Data => Message::Binary(payload.into()),
         Kind::Text => Message::Text(String::from_utf8_lossy(&payload).into_owned().into()),
