@@ -221,7 +221,7 @@ def frame(payload, opcode=1, final=True):
 
 
 def upgraded(site, headers=None):
-    """A socket behind the handshake of a WebSocket. Nobody reads from it."""
+    """A socket behind the handshake of a WebSocket. Nothing reads from it."""
     stream = socket.create_connection((site.host, site.port), timeout=20)
     lines = [
         "GET /ws HTTP/1.1", f"Host: {site.authority}", f"Origin: {site.origin}", "Upgrade: websocket",

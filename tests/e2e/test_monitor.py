@@ -1,4 +1,4 @@
-"""Pages of `motorlink monitor`: what they turn stops when they end, freeze or say so, and nothing else does."""
+"""Pages of `motorlink monitor`: their motors stop when they end, freeze or say so, and no other motors do."""
 
 import json
 import os
@@ -201,10 +201,36 @@ def test_a_stop_of_one_motor_leaves_the_others(site, watcher):
         turns(watcher)
 
 
+@pytest.mark.parametrize("way", ["page", "other page", "program", "share", "stop-all", "vanished", "frozen"])
+def test_what_stops_a_motor_also_ends_its_run(site, watcher, run, way):
+    with site.page() as page, site.page() as other:
+        motor = {"line": "rmd0", "motor": 2}
+        answer = page.alive().ask("run", **motor, mode="speed", target=360, rate=60, hold=False)
+        assert answer["kind"] == "answer", answer
+        eventually(lambda: speeds(watcher)[1] > 30, "a motor that turns")
+        if way in ("page", "other page"):
+            {"page": page, "other page": other}[way].ask("stop", motor=motor)
+        elif way == "program":
+            watcher.ask("stop", motor=motor)
+        elif way == "share":
+            run("share", "stop", "--at", f"unix:{site.path}").ended(0)
+        elif way == "stop-all":
+            assert site.post("/api/stop-all")[0] == 200
+        elif way == "vanished":
+            page.vanish()
+        else:
+            page.lives = False
+        rests(watcher)
+        # Its next references would come each 20 ms.
+        began, beats = len(other.beats), 20
+        while len(other.beats) < began + beats:
+            assert are_still(watcher)
+
+
 def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, watcher):
     turns_too(watcher)
     with site.page() as page:
-        # Nobody has this ID, and the share waits long for a reply.
+        # No motor has this ID, and the share waits long for a reply.
         motor = {"line": "rmd0", "motor": 20}
         for _ in range(70):
             page.send("read", **motor, names=["temperature_celsius"])

@@ -113,7 +113,7 @@ impl DeadMan {
         lapse
     }
 
-    /// Gives why the motors of the page have to stop, if the time says so.
+    /// Gives why the motors of the page have to stop, if the deadline has passed.
     pub fn poll(&mut self, now: Instant) -> Option<Lapse> {
         if self.motion.is_none() || self.is_alive(now) {
             return None;

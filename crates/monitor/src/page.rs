@@ -44,7 +44,7 @@ struct Control {
     drive: Option<Program>,
 }
 
-/// A page broke the rules of its connection: the reason in words.
+/// Why a page has to be closed, in words.
 pub type Broken = String;
 
 impl Page {

@@ -1,4 +1,4 @@
-//! A folder for the socket of a share that nobody else looks for.
+//! A folder for the socket of a share without `--at`.
 
 use std::fs::{DirBuilder, remove_dir_all};
 use std::io;

@@ -179,7 +179,9 @@ fn ready(
     let url = monitor.url(&host, Role::Operator);
     let viewer_url = monitor.url(&host, Role::Viewer);
     let at = format!("unix:{}", path.display());
-    if args.open && let Err(error) = open::that_detached(&url) {
+    if args.open
+        && let Err(error) = open::that_detached(&url)
+    {
         output::note(format!("no browser can be opened: {error}; open the first address yourself"));
     }
     if args.json {

@@ -79,7 +79,7 @@ const SILENT: Option<Lapse> = Some(Lapse::Silent(DEADLINE));
 fn a_live_page_never_lapses() {
     let mut bench = Bench::turning(true);
     assert_eq!(bench.live(10_000), None);
-    assert!(bench.man.beats.len() < 10, "beats that nobody may name are forgotten");
+    assert!(bench.man.beats.len() < 10, "beats that are too old are forgotten");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn a_burst_after_a_delay_does_not_revive() {
 fn after_a_pause_of_the_server_the_deadline_goes_first() {
     let mut bench = Bench::turning(false);
     bench.send_beat();
-    // SIGSTOP: the page went on, its signs of life wait, and nobody called poll.
+    // SIGSTOP: the page went on, its signs of life wait, and poll was not called.
     bench.now += Micros::from_millis(2000);
     let sign = bench.sign(bench.beat, bench.frame + 1, true);
     assert_eq!(bench.hear(sign), SILENT);

@@ -18,7 +18,7 @@ const HELLO: Duration = Duration::from_secs(5);
 /// The pause between two attempts to connect.
 pub const AGAIN: Duration = Duration::from_millis(250);
 
-/// A share that may go and come back.
+/// A share that may end and be started again.
 pub struct Link {
     path: PathBuf,
     /// `None` until the first attempt to connect has ended.

@@ -131,7 +131,7 @@ struct Leaving {
     page: String,
 }
 
-/// A page that is being left says so, after its connection has been closed or while it still is open.
+/// A browser that leaves a page says so. The connection of the page may be open or closed.
 async fn let_go(
     Shared(state): Shared<Arc<State>>,
     Extension(role): Extension<Role>,
