@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{Direction, EventBytes, TapBytes, TapCan};
+use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
 use motorlink::{rmd, st};
 use motorlink_monitor::drive::{Drives, Motion};
 use motorlink_monitor::message::{Answer, Ask};
@@ -22,7 +22,7 @@ use motorlink_testbench::{Bench, BenchConfig, Serving};
 
 pub const LIMIT: Duration = Duration::from_secs(30);
 /// A busy machine may be late with a reply.
-const PATIENT: Duration = Duration::from_secs(2);
+pub const PATIENT: Duration = Duration::from_secs(2);
 
 /// A request on a wire: the motor, and the frame code with the payload, or eight bytes.
 pub type Sent = (u8, Vec<u8>);
@@ -70,14 +70,16 @@ pub fn path(name: &str, kind: &str) -> PathBuf {
 
 impl World {
     pub fn new(name: &str, profile: Profile) -> Self {
-        Self::with(name, profile, |link| link)
+        Self::with(name, (profile, PATIENT), |link| link, |link| link)
     }
 
-    /// With something around the serial line, behind the tap.
+    /// With something around the serial line and around the bus, behind the taps. A reply of the ST drive may
+    /// take `timeout`.
     pub fn with(
         name: &str,
-        profile: Profile,
+        (profile, timeout): (Profile, Duration),
         mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+        mut around_bus: impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
     ) -> Self {
         let config = BenchConfig { profile, ..BenchConfig::default() };
         let bench = Bench::new(&config).unwrap();
@@ -105,7 +107,7 @@ impl World {
             };
             Box::new(TapBytes::new(around(link), observer)) as Box<dyn EventBytes>
         };
-        let options = st::Options { profile, ..st::Options::default() };
+        let options = st::Options { profile, timeout, ..st::Options::default() };
         let client = st::EventClient::open_wrapped(&st_path.parse().unwrap(), wrap, options);
         let line = StLine::new(client.unwrap());
         let engine = Acquisition::new(Box::new(line));
@@ -121,7 +123,7 @@ impl World {
                     wire.lock().unwrap().push((motor, frame.data().to_vec()));
                 }
             };
-            Box::new(TapCan::new(link, observer)) as _
+            Box::new(TapCan::new(around_bus(link), observer)) as Box<dyn EventCan>
         };
         let options = rmd::Options { timeout: PATIENT, ..Default::default() };
         let port = format!("slcan:{rmd_path}").parse().unwrap();
@@ -196,6 +198,11 @@ impl World {
             .collect()
     }
 
+    /// Ends the share.
+    pub fn end(&self) {
+        self.ends.store(true, Ordering::SeqCst);
+    }
+
     /// Executes a command of the bench, as JSON.
     pub fn execute(&self, json: &str) {
         let command = motorlink_testbench::Command::read(json).unwrap();
@@ -205,7 +212,7 @@ impl World {
 
 impl Drop for World {
     fn drop(&mut self) {
-        self.ends.store(true, Ordering::SeqCst);
+        self.end();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
