@@ -82,7 +82,7 @@ interface Pending {
 }
 
 const SHARE_ASKS: ReadonlySet<string> = new Set<ShareRequest['ask']>([
-  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'stop', 'latch', 'release',
+  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'frames', 'stop', 'latch', 'release',
 ]);
 
 const pending = new Map<number, Pending>();

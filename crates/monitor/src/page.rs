@@ -165,7 +165,8 @@ impl Page {
             | Ask::Signals { .. }
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
-            | Ask::Rates => {}
+            | Ask::Rates
+            | Ask::Frames { .. } => {}
             Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
             Ask::Latch | Ask::Release => self.check_operator()?,
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {

@@ -69,6 +69,12 @@ impl CanFrame {
         self.data.get(..len).unwrap_or(&self.data)
     }
 
+    /// The bits on the bus, from the start of the frame to the pause behind it, without stuffed bits.
+    pub const fn bits(&self) -> u32 {
+        let data = if self.remote { 0 } else { 8 * self.len as u32 };
+        data + if self.extended { 67 } else { 47 }
+    }
+
     /// All eight bytes; those beyond the length are 0.
     pub const fn padded_data(&self) -> [u8; 8] {
         self.data

@@ -1,5 +1,6 @@
 //! The bytes of a line of ST's protocol in a capture: their frames, and what those mean.
 
+mod duplex;
 mod message;
 mod split;
 mod transcript;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 use motorlink_proto::st::Profile;
 
 use crate::captured::{Captured, Direction, Wire};
+pub use duplex::Duplex;
 pub use message::{Answer, Message, Value};
 pub use split::{Broken, Piece, Splitter};
 pub use transcript::Transcript;

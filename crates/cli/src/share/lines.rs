@@ -6,9 +6,10 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink::{rmd, st};
 use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{Line, RmdLine, StLine};
+use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
 
 use crate::connection::missing_port;
@@ -48,25 +49,25 @@ impl Lines {
                 let defaults = st::Options::default();
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
                 let options = st::Options { profile: self.profile, timeout, ..defaults };
-                let line = StLine::open(&port, options)?;
-                held.push(start(
-                    &format!("{}{st}", Protocol::St.word()),
-                    &port,
-                    Speaks::St(self.profile),
-                    Box::new(line),
-                )?);
+                let (tap, around) = taps();
+                let wrap = move |link| around.around_line(link);
+                let client = st::EventClient::open_wrapped(&port, wrap, options)?;
+                let engine = Acquisition::new(Box::new(StLine::new(client)));
+                let name = format!("{}{st}", Protocol::St.word());
+                let speaks = Speaks::St(self.profile);
+                held.push(Held::start(&name, &port.to_string(), speaks, engine, tap)?);
                 st += 1;
             }
             if port.as_can().is_some() {
                 let defaults = rmd::Options::default();
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
-                let line = RmdLine::open(&port, rmd::Options { timeout, ..defaults })?;
-                held.push(start(
-                    &format!("{}{rmd}", Protocol::Rmd.word()),
-                    &port,
-                    Speaks::Rmd,
-                    Box::new(line),
-                )?);
+                let options = rmd::Options { timeout, ..defaults };
+                let (tap, around) = taps();
+                let wrap = move |link| around.around_bus(link);
+                let client = rmd::EventClient::open_wrapped(&port, wrap, options)?;
+                let engine = Acquisition::new(Box::new(RmdLine::new(client)));
+                let name = format!("{}{rmd}", Protocol::Rmd.word());
+                held.push(Held::start(&name, &port.to_string(), Speaks::Rmd, engine, tap)?);
                 rmd += 1;
             }
         }
@@ -74,11 +75,8 @@ impl Lines {
     }
 }
 
-fn start(
-    name: &str,
-    port: &PortName,
-    speaks: Speaks,
-    line: Box<dyn Line>,
-) -> Result<Held, Failure> {
-    Ok(Held::start(name, &port.to_string(), speaks, Acquisition::new(line))?)
+/// A tap, for the line and to put around its port.
+fn taps() -> (Tap, Tap) {
+    let tap = Tap::default();
+    (tap.clone(), tap)
 }

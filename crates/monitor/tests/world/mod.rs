@@ -17,6 +17,7 @@ use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
 use motorlink_telemetry::share::server::Server;
+use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_testbench::{Bench, BenchConfig, Serving};
 
@@ -89,6 +90,8 @@ impl World {
             bench.serve(port(format!("pty:{st_path}")), port(format!("slcan-pty:{rmd_path}")));
         let serving = serving.unwrap();
 
+        let (st_tap, rmd_tap) = (Tap::default(), Tap::default());
+        let (st_around, rmd_around) = (st_tap.clone(), rmd_tap.clone());
         let st_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
         let wire = Arc::clone(&st_sent);
         let wrap = move |link| {
@@ -105,13 +108,13 @@ impl World {
                     stream.drain(..size);
                 }
             };
-            Box::new(TapBytes::new(around(link), observer)) as Box<dyn EventBytes>
+            st_around.around_line(Box::new(TapBytes::new(around(link), observer)))
         };
         let options = st::Options { profile, timeout, ..st::Options::default() };
         let client = st::EventClient::open_wrapped(&st_path.parse().unwrap(), wrap, options);
         let line = StLine::new(client.unwrap());
         let engine = Acquisition::new(Box::new(line));
-        let st_held = Held::start("st0", &st_path, Speaks::St(profile), engine).unwrap();
+        let st_held = Held::start("st0", &st_path, Speaks::St(profile), engine, st_tap).unwrap();
 
         let rmd_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
         let wire = Arc::clone(&rmd_sent);
@@ -123,13 +126,13 @@ impl World {
                     wire.lock().unwrap().push((motor, frame.data().to_vec()));
                 }
             };
-            Box::new(TapCan::new(around_bus(link), observer)) as Box<dyn EventCan>
+            rmd_around.around_bus(Box::new(TapCan::new(around_bus(link), observer)))
         };
         let options = rmd::Options { timeout: PATIENT, ..Default::default() };
         let port = format!("slcan:{rmd_path}").parse().unwrap();
         let client = rmd::EventClient::open_wrapped(&port, wrap, options).unwrap();
         let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-        let rmd_held = Held::start("rmd0", &rmd_path, Speaks::Rmd, engine).unwrap();
+        let rmd_held = Held::start("rmd0", &rmd_path, Speaks::Rmd, engine, rmd_tap).unwrap();
 
         let socket = path(name, "socket");
         let mut server = Server::open(&socket, "test", vec![st_held, rmd_held]).unwrap();

@@ -7,6 +7,7 @@ use motorlink::can::CanFrame;
 use motorlink::port::{
     ByteLink, CanLink, Direction as Way, EventBytes, EventCan, TapBytes, TapCan,
 };
+use motorlink_capture as captured;
 use motorlink_capture::st::{self, Piece};
 use motorlink_proto::st::HEADER_NACK;
 
@@ -167,12 +168,7 @@ impl Seen {
 
 /// Makes frames of what a tap has seen.
 #[derive(Debug, Default)]
-pub struct Splitter {
-    received: st::Splitter,
-    sent: st::Splitter,
-    /// When the last bytes came.
-    time: Time,
-}
+pub struct Splitter(st::Duplex<Time>);
 
 impl Splitter {
     /// Takes the next thing that was seen. `put` receives the frames.
@@ -180,29 +176,29 @@ impl Splitter {
         let Seen { time, direction, what } = seen;
         match what {
             Wire::Can(frame) => put(Frame::of_can(time, direction, &frame)),
-            Wire::Bytes(bytes) if direction == Direction::Sent => {
-                // The reply to the last request is over, or incomplete for good.
-                self.end(put);
-                // A request is written at once.
-                self.sent.push(&bytes);
-                self.sent.end(|bytes, piece| put(frame(time, direction, bytes, &piece)));
-            }
             Wire::Bytes(bytes) => {
-                self.time = time;
-                self.received.push(&bytes);
-                self.received.pieces(|bytes, piece| put(frame(time, direction, bytes, &piece)));
+                let way = match direction {
+                    Direction::Sent => captured::Direction::Sent,
+                    Direction::Received => captured::Direction::Received,
+                };
+                self.0.take(time, way, &bytes, |time, way, bytes, piece| {
+                    put(frame(time, way, bytes, &piece));
+                });
             }
         }
     }
 
     /// Nothing more comes.
     pub fn end(&mut self, put: &mut dyn FnMut(Frame)) {
-        let (time, direction) = (self.time, Direction::Received);
-        self.received.end(|bytes, piece| put(frame(time, direction, bytes, &piece)));
+        self.0.end(|time, way, bytes, piece| put(frame(time, way, bytes, &piece)));
     }
 }
 
-fn frame(stamp: Time, direction: Direction, bytes: &[u8], piece: &Piece<'_>) -> Frame {
+fn frame(stamp: Time, way: captured::Direction, bytes: &[u8], piece: &Piece<'_>) -> Frame {
+    let direction = match way {
+        captured::Direction::Sent => Direction::Sent,
+        captured::Direction::Received => Direction::Received,
+    };
     let result = match piece {
         Piece::Frame(frame) if direction == Direction::Received && frame.header == HEADER_NACK => {
             FrameResult::Nack

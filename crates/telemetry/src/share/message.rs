@@ -105,6 +105,23 @@ pub enum Ask {
     Release,
     /// The rates of all signals that are read.
     Rates,
+    /// Frames on the wire: the first ones of a time or after a frame, otherwise the newest.
+    Frames {
+        /// The line.
+        line: String,
+        /// Not before this time of the line's clock, in seconds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        from: Option<f64>,
+        /// Not after this time of the line's clock, in seconds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        to: Option<f64>,
+        /// Only those after the frame with this number.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[cfg_attr(feature = "typescript", ts(type = "number | null"))]
+        after: Option<u64>,
+        /// How many at most.
+        most: u32,
+    },
 }
 
 /// A motor of a share.
@@ -252,6 +269,105 @@ pub enum Answer {
         /// Those of all signals that are read.
         rates: Vec<SignalRate>,
     },
+    /// To frames.
+    Frames {
+        /// In the order in which they were seen.
+        frames: Vec<WireFrame>,
+        /// More such frames are kept: those after the last one of these.
+        more: bool,
+        /// Frames after the one that was named are forgotten.
+        missed: bool,
+        /// When the oldest frame that is kept was seen, by the clock of the line, in seconds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        kept_since: Option<f64>,
+        /// What the line carried from the first one of these frames to the last.
+        load: WireLoad,
+    },
+}
+
+/// A frame on the wire, or bytes that are none.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct WireFrame {
+    /// Its number on this line. Later frames have greater ones.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub number: u64,
+    /// When it was sent, or its last byte came: by the clock of the line, in seconds.
+    pub t: f64,
+    /// Its direction.
+    pub direction: WireWay,
+    /// What it is.
+    pub result: WireResult,
+    /// The identifier of a CAN frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<u32>,
+    /// The bytes on a serial line, or the data of a CAN frame, in hexadecimal.
+    pub bytes: String,
+    /// What it means, or why it is no frame.
+    pub words: String,
+    /// The motor, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<u8>,
+    /// Whether it repeats a request that got no reply.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub retry: bool,
+    /// Whether it is a request that got no reply.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub unanswered: bool,
+}
+
+/// The direction of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum WireWay {
+    /// From the share.
+    ToDrive,
+    /// To the share.
+    FromDrive,
+}
+
+/// What a frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum WireResult {
+    /// A frame of the protocol.
+    Ok,
+    /// A frame in which the drive refuses a request.
+    Nack,
+    /// Bytes that are no frame.
+    Damaged,
+    /// A CAN frame that is not of this protocol.
+    Foreign,
+    /// A result of a later version.
+    #[serde(other)]
+    Later,
+}
+
+/// What a line carried in some time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct WireLoad {
+    /// When it begins, by the clock of the line, in seconds. Missing without frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// When it ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<f64>,
+    /// Bits on the wire: 10 a byte on a serial line. On a CAN bus without stuffed bits.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub bits: u64,
+    /// The part of the time in which a reply was awaited, 0 to 1.
+    pub busy: f64,
+    /// Requests that the drive refused.
+    pub nacks: u32,
+    /// Bytes that are no frame.
+    pub damaged: u32,
+    /// Requests that were sent again.
+    pub retries: u32,
+    /// Requests without a reply.
+    pub unanswered: u32,
 }
 
 /// A line of a share.

@@ -4,7 +4,7 @@
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port.
-//! [`words`] makes sentences of the events of an engine.
+//! [`words`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
 
 pub mod data;
 pub mod dialogue;
@@ -14,6 +14,7 @@ pub mod message;
 pub mod port;
 pub mod server;
 pub mod stream;
+pub mod wire;
 pub mod words;
 
 /// The version of the messages.

@@ -14,6 +14,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::server::Server;
+use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_testbench::{Bench, Serving};
 
@@ -44,17 +45,28 @@ impl Share {
     pub fn with(
         name: &str,
         timeout: Duration,
-        around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+        mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
     ) -> Self {
         let (bench, serving, st, rmd) = served(&format!("share-{name}"));
-        let client = EventClient::open_wrapped(&st.parse().unwrap(), around, Options::default());
+        let tap = Tap::default();
+        let wrap = {
+            let tap = tap.clone();
+            move |link| tap.around_line(around(link))
+        };
+        let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, Options::default());
         let line = StLine::new(client.unwrap());
         let speaks = Speaks::St(Profile::Spec);
-        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line))).unwrap();
+        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line)), tap).unwrap();
         let options = motorlink::rmd::Options { timeout, ..Default::default() };
-        let line = RmdLine::open(&format!("slcan:{rmd}").parse().unwrap(), options);
-        let engine = Acquisition::new(Box::new(line.unwrap()));
-        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine).unwrap();
+        let tap = Tap::default();
+        let wrap = {
+            let tap = tap.clone();
+            move |link| tap.around_bus(link)
+        };
+        let port = format!("slcan:{rmd}").parse().unwrap();
+        let client = motorlink::rmd::EventClient::open_wrapped(&port, wrap, options);
+        let engine = Acquisition::new(Box::new(RmdLine::new(client.unwrap())));
+        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine, tap).unwrap();
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         let ends = Arc::new(AtomicBool::new(false));

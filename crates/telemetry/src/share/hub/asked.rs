@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use motorlink_proto::time::Micros;
+use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::feed::Feed;
@@ -21,6 +21,7 @@ use crate::share::message::{
     self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
     MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
 };
+use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
 use crate::subscription::Full;
 
@@ -176,6 +177,14 @@ impl Hub {
                 Ok(Some(Answer::Release))
             }
             Ask::Rates => self.rates(session, id),
+            Ask::Frames { line, from, to, after, most } => {
+                let line = self.line(&line)?;
+                if !(1..=MOST_FRAMES).contains(&most) {
+                    return Err(usage(format!("`most` is 1 to {MOST_FRAMES} frames")));
+                }
+                let (from, to) = (from.map(instant).transpose()?, to.map(instant).transpose()?);
+                Ok(Some(self.lines[line].frames(Part { from, to, after, most })))
+            }
         }
     }
 
@@ -368,6 +377,14 @@ fn id_of(payload: &[u8]) -> Option<u32> {
         id: u32,
     }
     message::decode::<Numbered>(payload).ok().map(|numbered| numbered.id)
+}
+
+/// A time of a line's clock. One before its start is its start.
+fn instant(seconds: f64) -> Result<Instant, Refused> {
+    match seconds.is_finite() {
+        true => Ok(Instant((seconds * 1e6).round() as u64)),
+        false => Err(usage("a time is a number of seconds")),
+    }
 }
 
 fn span(what: &str, seconds: f64, least: f64) -> Result<Micros, Refused> {

@@ -17,7 +17,8 @@ use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
-use crate::share::message::{Event, Happening, Line};
+use crate::share::message::{Answer, Event, Happening, Line};
+use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
@@ -33,6 +34,7 @@ pub struct Held {
     timeout: Duration,
     runner: Runner,
     clock: Clock,
+    tap: Tap,
     /// One moment by both clocks.
     anchor: (Instant, f64),
     events: Subscription,
@@ -67,7 +69,7 @@ pub(super) enum Motion {
 }
 
 impl Held {
-    /// Starts the engine of an open line.
+    /// Starts the engine of an open line. `tap` is around its port.
     ///
     /// # Errors
     /// The system gives no thread.
@@ -76,8 +78,10 @@ impl Held {
         port: &str,
         speaks: Speaks,
         mut acquisition: Acquisition,
+        tap: Tap,
     ) -> io::Result<Self> {
         let clock = acquisition.clock().clone();
+        tap.follow(&clock);
         let events = Subscription::new(EVENTS, Full::DropOldest);
         acquisition.subscribe(events.clone(), Wants::new());
         Ok(Held {
@@ -87,6 +91,7 @@ impl Held {
             timeout: acquisition.timeout(),
             anchor: (clock.now(), wall_now()),
             clock,
+            tap,
             events,
             words: Words::default(),
             owners: BTreeMap::new(),
@@ -160,6 +165,11 @@ impl Held {
     fn wall(&self, at: Instant) -> f64 {
         let (from, wall) = self.anchor;
         wall + seconds(at) - seconds(from)
+    }
+
+    /// The frames of a part of the last time.
+    pub(super) fn frames(&self, part: Part) -> Answer {
+        wire::read(&self.tap, self.speaks, self.timeout.into(), self.clock.now(), part)
     }
 
     /// What happened since the last call; `None` after the end of the engine. `retry` receives the

@@ -27,6 +27,7 @@ use session::{Part, Session};
 
 pub use line::Held;
 pub use place::SessionId;
+pub(super) use place::seconds;
 
 /// The engine of a line has ended: its thread is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -8,7 +8,7 @@ use motorlink_proto::time::Instant;
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub(super) u64);
 
-pub(super) fn seconds(at: Instant) -> f64 {
+pub(in crate::share) fn seconds(at: Instant) -> f64 {
     at.0 as f64 / 1e6
 }
 
