@@ -1,6 +1,6 @@
 // What the page knows of lines and motors: descriptions, events about them, and rates.
 import { computed, effect, signal } from '@preact/signals';
-import { ask, events, lines, motors, welcome } from './link';
+import { ask, entries, lines, motors, welcome } from './link';
 import { nameOf } from './stop';
 import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
 
@@ -63,9 +63,9 @@ const LINE_KINDS = new Set(['lost', 'back']);
 const MOTOR_KINDS = new Set(['silent', 'answers']);
 
 /** The last loss or return of each line since the page was opened. */
-export const lineEvents = computed(() => newest(events.value, LINE_KINDS, false));
+export const lineEvents = computed(() => newest(entries.value, LINE_KINDS, false));
 /** The last time each motor fell silent or answered again. */
-export const motorEvents = computed(() => newest(events.value, MOTOR_KINDS, true));
+export const motorEvents = computed(() => newest(entries.value, MOTOR_KINDS, true));
 
 /** The rates of all signals that are read. */
 export const rates = signal<readonly SignalRate[]>([]);

@@ -290,6 +290,27 @@ describe('the connection', () => {
     expect(Socket.all.length).toBe(2);
   });
 
+  it('takes the commands of a ramp as one entry, and counts them', () => {
+    Socket.last.welcome();
+    const give = (wall: number, motor: number, more: object = {}) =>
+      Socket.last.give({ kind: 'event', wall, event: 'commanded', line: 'rmd0', motor, by: 'p', message: `${wall}`, ...more });
+    for (let step = 0; step < 10; step += 1) {
+      give(step / 50, 1);
+      give(step / 50, 2);
+    }
+    give(2, 1);
+    give(2, 1, { by: 'other' });
+    give(2, 1, { by: 'other', event: 'stopped' });
+    expect(link.events.value).toHaveLength(23);
+    expect(link.entries.value).toMatchObject([
+      { number: 1, motor: 1, times: 10, wall: 0, until: 0.18, message: '0.18' },
+      { number: 2, motor: 2, times: 10 },
+      { number: 3, motor: 1, times: 1 },
+      { number: 4, by: 'other', times: 1 },
+      { number: 5, event: 'stopped', times: 1 },
+    ]);
+  });
+
   it('knows the latch from events, and the motors of a new server from a new search', async () => {
     Socket.last.welcome();
     Socket.last.give({ kind: 'event', wall: 1, event: 'latched', by: 'page 2', message: 'page 2 latched' });

@@ -47,7 +47,19 @@ export const latchedBy = signal<string | null>(null);
 export const motors = signal<ReadonlyMap<string, readonly number[]>>(new Map());
 /** Why the last search of a line found nothing, by line. */
 export const searchFailed = signal<ReadonlyMap<string, string>>(new Map());
-/** The newest last. */
+/** An event, or several commands of a program to a motor in a row. */
+export interface Entry extends DriveEvent {
+  /** Counts the entries. */
+  number: number;
+  /** How many events this is. The message is that of the last. */
+  times: number;
+  /** When the last of them happened. */
+  until: number;
+}
+
+/** All that happened, the newest last. */
+export const entries = signal<readonly Entry[]>([]);
+/** The last events, each as it came, the newest last. */
 export const events = signal<readonly DriveEvent[]>([]);
 /** Why the page's motors were stopped last. */
 export const lapsed = signal<string | null>(null);
@@ -71,9 +83,13 @@ const DEAD = 5000;
 const LATER = 10_000;
 const RELEASE = 1000;
 const MOST_EVENTS = 2000;
+/** Commands that are so near to each other, in entries and seconds, are one entry. */
+const NEAR = 40;
+const PAUSE = 0.5;
 
 let socket: WebSocket | null = null;
 let lastId = 0;
+let lastEntry = 0;
 interface Pending {
   /** Whether the share answers it, not the server. */
   isOfShare: boolean;
@@ -363,8 +379,28 @@ function begunAgain() {
   wants.forEach(begin);
 }
 
+/** Whether an event is one more command of a row: a ramp is many of them. */
+function continues(entry: Entry, { event, line, motor, by, wall }: DriveEvent): boolean {
+  return (
+    event === 'commanded' && entry.event === event && entry.line === line && entry.motor === motor &&
+    entry.by === by && wall - entry.until < PAUSE
+  );
+}
+
 function happened(event: DriveEvent) {
   events.value = [...events.value.slice(1 - MOST_EVENTS), event];
+  const all = entries.value;
+  const first = Math.max(0, all.length - NEAR);
+  const at = all.findLastIndex((one, index) => index >= first && continues(one, event));
+  const earlier = all[at];
+  if (earlier) {
+    const joined = { ...earlier, message: event.message, times: earlier.times + 1, until: event.wall };
+    entries.value = all.with(at, joined);
+  } else {
+    lastEntry += 1;
+    const entry = { ...event, number: lastEntry, times: 1, until: event.wall };
+    entries.value = [...all.slice(1 - MOST_EVENTS), entry];
+  }
   if (event.event === 'latched') latchedBy.value = event.by ?? 'another program';
   if (event.event === 'released') latchedBy.value = null;
   if (event.event === 'back') void refreshLines();

@@ -13,7 +13,7 @@ let connected: boolean;
 let posted: { done: (response: Response) => void; failed: (why: Error) => void }[];
 const latchedBy = signal<string | null>(null);
 const held = signal(false);
-const events = signal<object[]>([]);
+const entries = signal<object[]>([]);
 const sayAlive = vi.fn();
 
 class Refused extends Error {
@@ -33,11 +33,11 @@ beforeEach(async () => {
   posted = [];
   connected = true;
   latchedBy.value = null;
-  events.value = [{ event: 'stopped', line: 'st0', motor: 1 }];
+  entries.value = [{ number: 1, event: 'stopped', line: 'st0', motor: 1 }];
   held.value = true;
   vi.doMock('./link', () => ({
     Refused,
-    events,
+    entries,
     held,
     latchedBy,
     sayAlive,
@@ -73,6 +73,8 @@ const ALL = [
   { line: 'rmd0', motor: 1 },
   { line: 'rmd0', motor: 2 },
 ];
+const happened = (event: string, line?: string, motor?: number) =>
+  void (entries.value = [...entries.value, { number: entries.value.length + 1, event, line, motor }]);
 const report = () => stop.stopReport.value!;
 
 describe('stop all', () => {
@@ -83,7 +85,7 @@ describe('stop all', () => {
     expect(report().phase).toBe('sent');
     latchedBy.value = 'page 1';
     expect(report().message).toContain('The server has the stop');
-    events.value = [...events.value, { event: 'stopped', line: 'rmd0', motor: 2 }];
+    happened('stopped', 'rmd0', 2);
     expect(report()).toMatchObject({ phase: 'sent', message: expect.stringContaining('1 of 4 did') });
     asked[0]!.done({ motors: ALL });
     await pass(2000);
@@ -120,9 +122,22 @@ describe('stop all', () => {
     });
   });
 
-  it('does not count addresses where no motor was found', async () => {
+  it('does not wait for addresses where no motor was found, and needs no second way then', async () => {
     stop.stopAll();
-    asked[0]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered' }] });
+    happened('latched');
+    for (const { line, motor } of ALL) happened('stopped', line, motor);
+    expect(report()).toEqual({ phase: 'stopped', message: 'Stopped: 4 of 4 motors confirmed.' });
+    await pass(1500);
+    expect(posted).toHaveLength(0);
+  });
+
+  it('does not count addresses where no motor was found, but motors that may turn', async () => {
+    stop.stopAll();
+    asked[0]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'no reply' }] });
+    await pass(0);
+    expect(report().message).toContain('rmd0/9 (no reply) did not confirm: it may still be turning');
+    stop.stopAll();
+    asked[1]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered; it is' }] });
     await pass(0);
     expect(report().phase).toBe('stopped');
     expect(report().message).toContain('4 of 4 motors confirmed. The stop also went to 1 address where no motor was found.');

@@ -1,7 +1,7 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
-import { Refused, ask, events, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
-import type { Event as DriveEvent, StoppedMotor } from './wire';
+import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
+import type { StoppedMotor } from './wire';
 
 export interface StopReport {
   /** `stopped`: every motor that was found confirmed it. */
@@ -17,17 +17,19 @@ const SECOND_WAY = 150;
 /** A server that is reached latches at once, even if motors take longer to confirm. */
 const UNREACHED = 1000;
 
+/** Why a stop fails where no motor is. Anything else may be a motor that turns. */
+const NO_MOTOR = /has never answered|BAD_MOTOR_SELECTED/;
 const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
 
 let last = 0;
 /** The newest event when all motors were stopped last. */
-let before: DriveEvent | undefined;
+let before = 0;
 
 /** Stops all motors, at once. Never asks anything, and can be called as often as wanted. */
 export function stopAll() {
   last += 1;
   const number = last;
-  before = events.value.at(-1);
+  before = entries.value.at(-1)?.number ?? 0;
   held.value = false;
   sayAlive();
   stopReport.value = { phase: 'sent', message: 'Stop sent. No motor has confirmed it yet.' };
@@ -58,9 +60,13 @@ export function stopAll() {
 
   ways += 1;
   ask({ ask: 'stop-all' }).then(({ motors: stopped }) => answered(stopped), failed);
-  setTimeout(byHttp, SECOND_WAY);
   setTimeout(() => {
-    if (!isAnswered && latchedBy.value === null) tell(unreachable());
+    if (!isLatchedSince()) byHttp();
+  }, SECOND_WAY);
+  setTimeout(() => {
+    if (isAnswered || isLatchedSince()) return;
+    byHttp();
+    tell(unreachable());
   }, UNREACHED);
 }
 
@@ -90,8 +96,9 @@ export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
 
 function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   // A search also asks addresses where no motor is. Their stop is sent, too.
-  const isKnown = ({ line, motor }: StoppedMotor) => motors.value.get(line)?.includes(motor) ?? false;
-  const known = stopped.filter((one) => !one.failure || isKnown(one));
+  const isMotor = ({ line, motor, failure }: StoppedMotor) =>
+    !failure || !NO_MOTOR.test(failure) || motors.value.get(line)?.includes(motor);
+  const known = stopped.filter(isMotor);
   const failures = known.filter(({ failure }) => failure);
   const others = stopped.length - known.length;
   const silent = others
@@ -169,16 +176,16 @@ export function stopByKeys() {
   addEventListener('keyup', up, { capture: true });
 }
 
-/** The motors that confirmed since the event `before`, while the server waits for others. */
-function confirmedSince(before: DriveEvent | undefined): Set<string> {
-  const names = new Set<string>();
-  const all = events.value;
-  for (let at = all.length - 1; at >= 0 && all[at] !== before; at -= 1) {
-    const { event, line, motor } = all[at]!;
-    if (event === 'stopped' && line && motor != null) names.add(nameOf(line, motor));
-  }
-  return names;
-}
+/** Whether the server has the last stop. */
+const isLatchedSince = () => entries.value.some(({ number, event }) => number > before && event === 'latched');
+
+/** The motors that confirmed the last stop, while the server waits for others. */
+const confirmedSince = () =>
+  new Set(
+    entries.value.flatMap(({ number, event, line, motor }) =>
+      number > before && event === 'stopped' && line && motor != null ? [nameOf(line, motor)] : [],
+    ),
+  );
 
 let wasLatched = false;
 latchedBy.subscribe((by) => {
@@ -190,10 +197,15 @@ latchedBy.subscribe((by) => {
   if (by === null && wasLatched) stopReport.value = null;
   wasLatched = by !== null;
 });
-events.subscribe(() => {
+entries.subscribe(() => {
   if (stopReport.peek()?.phase !== 'sent') return;
-  const count = confirmedSince(before).size;
-  if (!count) return;
-  const found = [...motors.peek().values()].reduce((sum, one) => sum + one.length, 0);
-  stopReport.value = { phase: 'sent', message: `${WAITING} ${count} of ${found} did.` };
+  const names = confirmedSince();
+  if (!names.size) return;
+  const found = [...motors.peek()].flatMap(([line, all]) => all.map((motor) => nameOf(line, motor)));
+  const count = found.filter((name) => names.has(name)).length;
+  // The server still asks addresses where no motor was found.
+  stopReport.value =
+    count === found.length
+      ? { phase: 'stopped', message: `Stopped: ${count} of ${count} motors confirmed.` }
+      : { phase: 'sent', message: `${WAITING} ${count} of ${found.length} did.` };
 });

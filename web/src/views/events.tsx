@@ -1,13 +1,16 @@
 // Who did what when.
 import { useSignal } from '@preact/signals';
+import { useEffect } from 'preact/hooks';
 import { allMotors } from '../drives';
 import { timeOfDay } from '../format';
-import { events } from '../link';
+import { entries } from '../link';
 import { nameOf } from '../stop';
 import type { Happening } from '../wire';
 import './events.css';
 
 const SHOWN = 200;
+/** Time between drawings, ms. */
+const DRAW = 200;
 const BAD: ReadonlySet<Happening> = new Set(['stop-failed', 'lost', 'silent', 'doubtful', 'refused']);
 const STOPS: ReadonlySet<Happening> = new Set(['stopping', 'latched']);
 
@@ -17,7 +20,13 @@ export default function Events() {
   const wanted = useSignal('');
   const most = useSignal(SHOWN);
   const motors = allMotors.value.map(({ line, motor }) => nameOf(line, motor));
-  const all = events.value;
+  // A ramp is many events.
+  const shown = useSignal(entries.peek());
+  useEffect(() => {
+    const timer = setInterval(() => (shown.value = entries.peek()), DRAW);
+    return () => clearInterval(timer);
+  }, []);
+  const all = shown.value;
   const chosen = all
     .filter(({ line, motor }) => wanted.value === '' || (line && motor != null && nameOf(line, motor) === wanted.value))
     .reverse();
@@ -51,15 +60,18 @@ export default function Events() {
             </tr>
           </thead>
           <tbody>
-            {chosen.slice(0, most.value).map(({ wall, line, motor, by, event, message }, at) => (
-              <tr key={chosen.length - at}>
+            {chosen.slice(0, most.value).map(({ number, wall, line, motor, by, event, message, times }) => (
+              <tr key={number}>
                 <td class="mono">{timeOfDay(wall)}</td>
                 <td>{line ? (motor == null ? line : nameOf(line, motor)) : ''}</td>
                 <td>{by}</td>
                 <td>
                   <span class={toneOf(event)}>{event}</span>
                 </td>
-                <td>{message}</td>
+                <td>
+                  {message}
+                  {times > 1 && <span class="muted"> (the last of {times})</span>}
+                </td>
               </tr>
             ))}
           </tbody>

@@ -2,7 +2,7 @@
 import { useEffect } from 'preact/hooks';
 import { lineEvents, motorEvents, rates, watchRates } from '../drives';
 import { rate, timeOfDay } from '../format';
-import { events, lines, motors, refreshMotors, searchFailed, searching, welcome } from '../link';
+import { entries, lines, motors, refreshMotors, searchFailed, searching, welcome } from '../link';
 import { nameOf } from '../stop';
 import type { Line } from '../wire';
 import './ports.css';
@@ -12,7 +12,7 @@ const COUNTED = { lost: 'lost', silent: 'silent', doubtful: 'doubtful replies', 
 
 function counts(line: string): string {
   const texts = Object.entries(COUNTED).flatMap(([kind, title]) => {
-    const count = events.value.filter((one) => one.line === line && one.event === kind).length;
+    const count = entries.value.filter((one) => one.line === line && one.event === kind).length;
     return count ? [`${count} × ${title}`] : [];
   });
   return `${texts.join(', ') || 'none'} since this page was opened`;
