@@ -88,16 +88,30 @@ export const COMMANDS: Readonly<Record<Description['protocol'], { start: string;
   rmd: { start: 'run', acknowledge: 'clear_errors' },
 };
 
-/** What the user set as the most that may be asked of a motor, by motor and mode. */
-export const limits = signal<ReadonlyMap<string, number>>(new Map());
+/** What pages may ask of a motor at most, by motor and mode. `null`: it is unknown. */
+export const limits = signal<ReadonlyMap<string, number> | null>(null);
 
 export const limitName = (line: string, motor: number, mode: Mode) => `${nameOf(line, motor)} ${mode}`;
+
+/** Asks for the limits again and again: other pages set them, too. Returns what ends it. */
+export function watchLimits(period = 2000): () => void {
+  void readLimits();
+  const timer = setInterval(() => void readLimits(), period);
+  return () => clearInterval(timer);
+}
+
+async function readLimits() {
+  try {
+    const answer = await ask({ ask: 'limits' });
+    limits.value = new Map(answer.limits.map(({ line, motor, mode, most }) => [limitName(line, motor, mode), most]));
+  } catch {
+    // They are unknown until a later answer.
+    limits.value = null;
+  }
+}
 
 /** Sets or, with `null`, removes the limit of a mode. It holds for all pages. */
 export async function setLimit(line: string, motor: number, mode: Mode, most: number | null) {
   await ask({ ask: 'limit', line, motor, mode, most });
-  const changed = new Map(limits.value);
-  if (most === null) changed.delete(limitName(line, motor, mode));
-  else changed.set(limitName(line, motor, mode), most);
-  limits.value = changed;
+  await readLimits();
 }

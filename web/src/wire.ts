@@ -256,6 +256,24 @@ columns: Array<Column>, };
 
 export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "later";
 
+export type Limit = { 
+/**
+ * Of what.
+ */
+mode: Mode, 
+/**
+ * Forwards and backwards, in the unit of the mode, in steps of the protocol.
+ */
+most: number, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, };
+
 export type Line = { 
 /**
  * Its name.
@@ -479,7 +497,7 @@ line: string,
 /**
  * The motor's number or ID.
  */
-motor: number, } | { "ask": "dump", 
+motor: number, } | { "ask": "limits" } | { "ask": "dump", 
 /**
  * The line.
  */
@@ -776,7 +794,11 @@ values: Array<Value>, } | { "to": "run",
 /**
  * The first reference: the measured value, or the limit if that is less.
  */
-from: number, } | { "to": "limit" } | { "to": "dump", 
+from: number, } | { "to": "limit" } | { "to": "limits", 
+/**
+ * Those of all motors.
+ */
+limits: Array<Limit>, } | { "to": "dump", 
 /**
  * The file.
  */

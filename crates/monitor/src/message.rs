@@ -127,6 +127,8 @@ pub enum Ask {
         /// The most, forwards and backwards, in the unit of the mode.
         most: Option<f64>,
     },
+    /// Lists the limits that pages have set.
+    Limits,
     /// Writes all settings of a motor as a file.
     Dump {
         /// The motor.
@@ -168,6 +170,19 @@ pub enum Mode {
     Torque,
     /// The angle of an RMD motor, in degrees from its zero.
     Position,
+}
+
+/// What pages may ask of a motor at most.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Limit {
+    /// The motor.
+    #[serde(flatten)]
+    pub motor: MotorName,
+    /// Of what.
+    pub mode: Mode,
+    /// Forwards and backwards, in the unit of the mode, in steps of the protocol.
+    pub most: f64,
 }
 
 /// A text of the server, besides those of the share.
@@ -283,6 +298,11 @@ pub enum Answer {
     },
     /// To limit.
     Limit,
+    /// To limits.
+    Limits {
+        /// Those of all motors.
+        limits: Vec<Limit>,
+    },
     /// To dump.
     Dump {
         /// The file.

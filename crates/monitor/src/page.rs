@@ -247,6 +247,7 @@ impl Page {
             | Ask::Motors { .. }
             | Ask::Describe { .. }
             | Ask::Read { .. }
+            | Ask::Limits
             | Ask::Dump { .. }
             | Ask::Diff { .. } => Ok(()),
             Ask::Write { .. }
@@ -377,7 +378,7 @@ fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
 /// The motor that a request is about.
 fn motor_of(ask: &Ask) -> Option<MotorName> {
     match ask {
-        Ask::StopAll | Ask::LetGo | Ask::Motors { .. } | Ask::Describe { .. } => None,
+        Ask::StopAll | Ask::LetGo | Ask::Motors { .. } | Ask::Describe { .. } | Ask::Limits => None,
         Ask::Read { motor, .. }
         | Ask::Write { motor, .. }
         | Ask::Act { motor, .. }

@@ -27,6 +27,15 @@ async fn written(page: &Page, ask: Ask) -> Vec<(String, Option<f64>)> {
     }
 }
 
+async fn limits(page: &Page) -> Vec<(String, u8, Mode, f64)> {
+    match page.ask(Ask::Limits).await {
+        Ok(Answer::Limits { limits }) => {
+            limits.into_iter().map(|it| (it.motor.line, it.motor.motor, it.mode, it.most)).collect()
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 async fn dump(page: &Page, motor: MotorName) -> String {
     match page.ask(Ask::Dump { motor }).await {
         Ok(Answer::Dump { text, .. }) => text,
@@ -213,4 +222,23 @@ async fn a_restore_needs_a_motor_at_rest_and_a_file_for_it() {
     let other = file.replace(offset, "encoder_offset = 9");
     let (_, message) = page.refused(restore(rmd(2), &other)).await;
     assert!(message.contains("encoder_offset is in the ROM"), "{message}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn every_page_sees_the_limits() {
+    let world = World::new("limits", Profile::Spec);
+    let one = world.page().await;
+    let other = world.other(&one).await;
+    assert_eq!(limits(&other).await, []);
+    one.ask(limit(st(2), Mode::Speed, Some(500.0))).await.unwrap();
+    // The digits of a limit never exceed it.
+    one.ask(limit(rmd(1), Mode::Position, Some(90.009))).await.unwrap();
+    one.ask(limit(rmd(1), Mode::Speed, Some(100.0))).await.unwrap();
+    let (st_line, rmd_line) = (st(2).line, rmd(1).line);
+    let rmd_speed = (rmd_line.clone(), 1, Mode::Speed, 100.0);
+    let rmd_position = (rmd_line, 1, Mode::Position, 90.0);
+    let st_speed = (st_line, 2, Mode::Speed, 500.0);
+    assert_eq!(limits(&other).await, [rmd_speed, rmd_position.clone(), st_speed.clone()]);
+    one.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
+    assert_eq!(limits(&other).await, [rmd_position, st_speed]);
 }

@@ -152,7 +152,7 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
   const decimals = decimalsOf(unit);
   const target = useSignal<string | null>(null);
   const rate = useSignal(String(usual(unit).rate));
-  const limit = limits.value.get(limitName(line, motor, mode));
+  const limit = limits.value?.get(limitName(line, motor, mode));
   const newLimit = useSignal('');
   const isHeld = useSignal(false);
 
@@ -211,12 +211,14 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
   const typed = (signal: { value: string | null }) => (event: { currentTarget: HTMLInputElement }) => {
     signal.value = event.currentTarget.value;
   };
+  const none = limits.value ? 'none set' : 'unknown';
+  const limitText = limit === undefined ? none : `±${number(limit, decimals)} ${unit}`;
   const saveLimit = (wanted: () => number | null) =>
     attempt(async () => {
       const value = wanted();
       await setLimit(line, motor, mode, value);
       newLimit.value = '';
-      return value === null ? 'There is no limit now.' : `The limit is ±${value} ${unit}, for all pages.`;
+      return value === null ? 'There is no limit now.' : 'The limit holds for all pages.';
     });
   return (
     <form
@@ -275,7 +277,7 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
       <Said said={said} />
       <div class="wide field">
         <label for={`limit-${line}-${motor}-${mode}`}>
-          Limit of all pages: {limit === undefined ? 'none set' : `±${number(limit, decimals)} ${unit}`}
+          Limit of all pages: {limitText}
         </label>
         <span class="with-button">
           <input

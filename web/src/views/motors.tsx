@@ -1,6 +1,6 @@
 // A card a motor: what it does, and the controls that move it.
 import { useEffect } from 'preact/hooks';
-import { allMotors, describeFailed, descriptions, motorEvents, watchDescriptions, watchRates } from '../drives';
+import { allMotors, describeFailed, descriptions, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
 import { lines, refreshMotors, searchFailed, searching, welcome } from '../link';
 import { overviewRefused, watchOverview } from '../overview';
 import { Said } from '../parts';
@@ -48,6 +48,7 @@ export default function Motors() {
   useEffect(watchDescriptions, []);
   useEffect(watchOverview, []);
   useEffect(() => watchRates(), []);
+  useEffect(() => watchLimits(), []);
 
   const all = allMotors.value;
   return (

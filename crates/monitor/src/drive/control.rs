@@ -88,6 +88,11 @@ impl Control {
         self.known(target, |known| with(&mut known.limited))
     }
 
+    /// The motors that pages have commanded or limited.
+    pub(super) fn motors(&self) -> Vec<MotorName> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect()
+    }
+
     /// Waits until no other page commands the motor.
     pub(super) async fn turn(&self, target: &Target) -> OwnedMutexGuard<()> {
         let lock = self.known(target, |known| Arc::clone(&known.commands));

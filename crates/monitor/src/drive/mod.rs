@@ -25,7 +25,7 @@ use std::sync::Arc;
 use motorlink_telemetry::share::message::{Line, MotorName, Protocol};
 use motorlink_telemetry::share::words::Speaks;
 
-use crate::message::{Answer, Ask};
+use crate::message::{Answer, Ask, Limit, Mode};
 use crate::program::{Program, Refusal};
 use control::Control;
 use exchange::Exchanges;
@@ -87,6 +87,7 @@ impl Drives {
                 self.control.limited(&target, |limited| limited.set(target.motor, mode, most))?;
                 Ok(Answer::Limit)
             }
+            Ask::Limits => Ok(Answer::Limits { limits: self.limits()? }),
             Ask::Write { motor, name, value, to_rom } => {
                 let target = self.target(motor)?;
                 let write = write::Write { target, name, value, to_rom };
@@ -108,6 +109,18 @@ impl Drives {
                 Ok(Answer::Run { from: run.carry_out(&self.control, drive).await? })
             }
         }
+    }
+
+    fn limits(&self) -> Result<Vec<Limit>, Refusal> {
+        let mut limits = Vec::new();
+        for motor in self.control.motors() {
+            let target = self.target(motor)?;
+            for mode in [Mode::Speed, Mode::Torque, Mode::Position] {
+                let most = self.control.limited(&target, |it| it.most(target.motor, mode));
+                limits.extend(most.map(|most| Limit { motor: target.name.clone(), mode, most }));
+            }
+        }
+        Ok(limits)
     }
 
     fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {
