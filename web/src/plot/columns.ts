@@ -1,7 +1,7 @@
-// What a curve needs to be drawn at a width: for each column of the screen the first, least, most and
-// last value of its samples (M4). The columns lie on a grid of time that does not move with the view:
-// a column that is complete never changes, so scrolling computes only the new ones, and nothing flickers.
-import { BREAK, type Extremes, type Samples } from './samples';
+// What a curve needs to be drawn at a width: for each column of the screen the least and the most value
+// of its samples. The columns lie on a grid of time that does not move with the view: a column that is
+// complete never changes, so scrolling computes only the new ones, and nothing flickers.
+import { type Extremes, type Samples } from './samples';
 
 /** Columns that begin at `from * width`, in seconds. */
 export class Columns {
@@ -14,10 +14,8 @@ export class Columns {
   private next = new Float64Array(0);
   private readonly found: Extremes = { min: 0, max: 0 };
   /** The values of column `k` are at `k % size`, see `slot`. */
-  first = new Float64Array(0);
   min = new Float64Array(0);
   max = new Float64Array(0);
-  last = new Float64Array(0);
   /** Whether the column has a sample with a value, and where the curve is interrupted. */
   has = new Uint8Array(0);
   broken = new Uint8Array(0);
@@ -58,10 +56,8 @@ export class Columns {
       const floats = () => new Float64Array(this.size);
       this.tag = floats();
       this.next = floats();
-      this.first = floats();
       this.min = floats();
       this.max = floats();
-      this.last = floats();
       this.complete = new Uint8Array(this.size);
       this.has = new Uint8Array(this.size);
       this.broken = new Uint8Array(this.size);
@@ -74,18 +70,9 @@ export class Columns {
     this.min[slot] = this.found.min;
     this.max[slot] = this.found.max;
     this.has[slot] = this.found.min <= this.found.max ? 1 : 0;
-    let broken = 0;
-    let from = start;
-    let to = end - 1;
-    if (from < end && !isFinite(samples.y(from))) broken |= BROKEN_BEFORE;
-    if (from < end && !isFinite(samples.y(to))) broken |= BROKEN_AFTER;
-    if (this.has[slot]) {
-      while (!isFinite(samples.y(from))) from += 1;
-      while (!isFinite(samples.y(to))) to -= 1;
-      this.first[slot] = samples.y(from);
-      this.last[slot] = samples.y(to);
-    }
-    this.broken[slot] = broken;
+    const first = start < end ? samples.y(start) : 0;
+    const last = start < end ? samples.y(end - 1) : 0;
+    this.broken[slot] = (isFinite(first) ? 0 : BROKEN_BEFORE) | (isFinite(last) ? 0 : BROKEN_AFTER);
   }
 }
 
@@ -127,7 +114,11 @@ export interface Frame {
   stepped: boolean;
 }
 
-/** Draws the columns `from` to `to` of a curve. Dashes never leave out a column that is higher than 2 pixels. */
+/** In pixels. A column of less height is a point. One of more than `STEEP` is never left out by a dash. */
+const FLAT = 0.25;
+const STEEP = 2;
+
+/** Draws the columns `from` to `to` of a curve. */
 export function drawColumns(pen: Pen, columns: Columns, from: number, to: number, frame: Frame) {
   const { x, y, dash, stepped } = frame;
   let joined = false;
@@ -141,25 +132,27 @@ export function drawColumns(pen: Pen, columns: Columns, from: number, to: number
     }
     if (broken & BROKEN_BEFORE) joined = false;
     const at = x((k + 0.5) * columns.width);
-    const first = y(columns.first[slot]!);
     const least = y(columns.min[slot]!);
     const most = y(columns.max[slot]!);
-    const last = y(columns.last[slot]!);
-    const steep = least - most > 2 || (joined && Math.abs(first - previous) > 2);
-    const drawn = steep || isDrawn(k, dash);
-    if (joined && drawn) {
+    // Two points a column, the nearer one first. More points look the same, and the browser paints longer.
+    const upwards = !joined || Math.abs(previous - least) < Math.abs(previous - most);
+    const near = upwards ? least : most;
+    const far = upwards ? most : least;
+    const isSteep = least - most > STEEP || (joined && Math.abs(near - previous) > STEEP);
+    if (joined && (isSteep || isDrawn(k, dash))) {
       if (stepped) pen.lineTo(at, previous);
-      pen.lineTo(at, first);
-    } else pen.moveTo(at, first);
-    if (least - most > 0.25) {
-      pen.lineTo(at, least);
-      pen.lineTo(at, most);
-      pen.lineTo(at, last);
+      pen.lineTo(at, near);
+      if (least - most > FLAT) pen.lineTo(at, far);
+    } else if (!joined && least - most < FLAT) {
+      dot(pen, at, far);
     } else if (!joined) {
-      dot(pen, at, last);
+      pen.moveTo(at, near);
+      pen.lineTo(at, far);
+    } else {
+      pen.moveTo(at, far);
     }
     joined = !(broken & BROKEN_AFTER);
-    previous = last;
+    previous = far;
   }
 }
 
@@ -226,5 +219,3 @@ function dot(pen: Pen, x: number, y: number) {
   pen.lineTo(x + 1.5, y);
   pen.moveTo(x, y);
 }
-
-export { BREAK };

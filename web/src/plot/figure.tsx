@@ -77,6 +77,7 @@ export function Figure(props: FigureProps) {
       clock: props.clock,
       height,
       marks,
+      live,
       events: {
         onSelect: (min, max) => (window.show(min, max), changed()),
         onPick: props.onPick && ((trace, x) => latest.current.onPick?.(trace, x)),
@@ -110,7 +111,9 @@ export function Figure(props: FigureProps) {
     };
     const seen = new IntersectionObserver(([entry]) => {
       panel.visible = entry!.isIntersecting;
-      if (panel.visible) scheduler.request();
+      if (!panel.visible) return;
+      panel.write();
+      scheduler.request();
     });
     seen.observe(host.current!);
     const remove = scheduler.add(panel);
@@ -149,6 +152,7 @@ export function Figure(props: FigureProps) {
       if (note) of.note = note(trace);
       for (const cell of row.querySelectorAll<HTMLElement>('[data-is]')) put(cell, of[cell.dataset.is!] ?? '');
     }
+    legend.current?.classList.toggle('plot-two', b !== null);
     if (reading.current) put(reading.current, cursorText(hover.current));
   };
 

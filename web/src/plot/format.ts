@@ -1,13 +1,17 @@
 // Numbers and times as texts of nearly constant width.
 
+const MINUS = '−';
+
 /** A value with about six digits. */
 export function value(number: number): string {
   if (!isFinite(number)) return '–';
-  if (Number.isInteger(number) && Math.abs(number) < 1e9) return String(number).replace('-', '−');
   const size = Math.abs(number);
-  if (size !== 0 && (size >= 1e7 || size < 1e-4)) return number.toExponential(4).replace('-', '−');
-  const decimals = Math.min(Math.max(5 - Math.floor(Math.log10(size || 1)), 0), 6);
-  return number.toFixed(Math.min(decimals, 4)).replace('-', '−');
+  const text = () => {
+    if (Number.isInteger(size) && size < 1e12) return String(size);
+    if (size >= 1e7 || size < 1e-4) return size.toExponential(4);
+    return size.toFixed(Math.min(Math.max(5 - Math.floor(Math.log10(size)), 0), 4));
+  };
+  return `${number < 0 ? MINUS : ''}${text()}`;
 }
 
 /** A value and its unit. */
@@ -19,7 +23,7 @@ export function withUnit(number: number, unit: string): string {
 export function duration(seconds: number): string {
   const size = Math.abs(seconds);
   if (!isFinite(size)) return '–';
-  const sign = seconds < 0 ? '−' : '';
+  const sign = seconds < 0 ? MINUS : '';
   if (size < 1e-3) return `${sign}${(size * 1e6).toFixed(0)} µs`;
   if (size < 1) return `${sign}${(size * 1e3).toFixed(2)} ms`;
   if (size < 120) return `${sign}${size.toFixed(3)} s`;
@@ -61,6 +65,6 @@ export function dayClock(origin: number): Clock {
 
 /** Seconds from the zero of the data. */
 export const secondsClock: Clock = {
-  tick: (x, step) => `${x.toFixed(decimalsOf(step)).replace('-', '−')} s`,
-  full: (x) => `${x.toFixed(4).replace('-', '−')} s`,
+  tick: (x, step) => `${x.toFixed(decimalsOf(step)).replace('-', MINUS)} s`,
+  full: (x) => `${x.toFixed(4).replace('-', MINUS)} s`,
 };

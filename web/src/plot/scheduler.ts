@@ -13,6 +13,8 @@ export interface Panel {
 
 const NUMBERS = 125;
 const STALE = 250;
+/** The browser paints about twice as long as the script runs, afterwards. */
+const PAUSE = 4;
 
 export class Scheduler {
   private readonly panels = new Set<Panel>();
@@ -75,6 +77,6 @@ export class Scheduler {
     }
     if (write) this.written = time;
     this.dirty = false;
-    this.earliest = time + 2 * (performance.now() - start);
+    this.earliest = time + PAUSE * (performance.now() - start);
   };
 }

@@ -52,8 +52,9 @@ const newest = (trace: Trace) => {
 const note = (trace: Trace) => {
   const { rate, period, samples, doubtful, refused } = trace as Curve;
   if (refused) return refused;
-  const read = samples.end - samples.first > 1 ? `, ${value(Math.round(1 / period))} read` : '';
-  return `${rate} a second asked${read}${doubtful ? `, ${doubtful} doubtful left out` : ''}`;
+  const achieved = Math.round(1 / period);
+  const slow = samples.end - samples.first > 1 && achieved < 0.9 * rate;
+  return `${slow ? `${achieved} of ` : ''}${rate}/s${doubtful ? `, ${doubtful} doubtful left out` : ''}`;
 };
 
 export default function Plots() {
