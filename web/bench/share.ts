@@ -132,8 +132,8 @@ export function install(shape: Shape) {
       for (;;) {
         const { every = Infinity, length = 0 } = shape.pause ?? {};
         const phase = stream.next % every;
-        if (phase < length) stream.next += stream.period * Math.ceil((length - phase) / stream.period);
-        const until = Math.min(now(), stream.next - phase + every);
+        if (phase < length) stream.next += length - phase + SHORT;
+        const until = Math.min(now(), phase < length ? stream.next + every - length : stream.next + every - phase + stream.period);
         const count = Math.min(Math.floor((until - stream.next) / stream.period), PAST_ROWS);
         if (count < 1) return;
         const t0 = stream.next;

@@ -6,8 +6,7 @@
 // frame costs as much as there are columns, and one plot can compare motors of different lines.
 import uPlot from 'uplot';
 import { Columns, drawColumns, drawSamples, type Frame } from './columns';
-import type { Clock } from './format';
-import { value as format } from './format';
+import { type Clock, onAxis } from './format';
 import type { Extremes, Samples } from './samples';
 import type { Style } from './style';
 
@@ -177,7 +176,7 @@ export class Chart {
           side: index % 2 === 0 ? 3 : 1,
           grid: index === 0 ? grid : { show: false },
           size: axisSize(),
-          values: (_, splits) => splits.map(format),
+          values: (_, splits, __, ___, step) => splits.map((split) => onAxis(split, step)),
         })),
       ],
       series: [

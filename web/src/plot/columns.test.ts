@@ -53,8 +53,8 @@ describe('a spike', () => {
       drawColumns(recorder, columns, first, last, plain(width, dash));
       const drawn = new Map<number, { min: number; max: number }>();
       for (const [x0, y0, x1, y1] of recorder.lines) {
-        for (const [x, y] of [[x0, y0], [x1, y1]] as const) {
-          if (Math.abs(x - Math.floor(x) - 0.5) > 1e-6) continue; // The ends of a dot.
+        const isDot = y0 === y1 && Math.abs(x1 - x0 - 3) < 1e-6;
+        for (const [x, y] of isDot ? ([[(x0 + x1) / 2, y0]] as const) : ([[x0, y0], [x1, y1]] as const)) {
           const k = Math.floor(x);
           const one = drawn.get(k) ?? { min: Infinity, max: -Infinity };
           drawn.set(k, { min: Math.min(one.min, y), max: Math.max(one.max, y) });
@@ -62,11 +62,34 @@ describe('a spike', () => {
       }
       for (let k = first; k <= last; k += 1) {
         const { min: low, max: high } = samples.extremes(samples.at(k * width), samples.at((k + 1) * width));
-        if (high - low <= 2) continue;
-        expect(drawn.get(k)).toEqual({ min: low, max: high });
+        const there = drawn.get(k);
+        if (there && there.max > there.min) expect(there).toEqual({ min: low, max: high });
+        if (dash[0] === 0 && low <= high) expect(there).toBeDefined();
+        if (there || low > high) continue;
+        // Left out between two dashes, as what was drawn just before is as high and as low.
+        const before = [...drawn].filter(([other]) => other < k).slice(-2 * dash[0]).map(([, one]) => one);
+        expect(low).toBeGreaterThanOrEqual(Math.min(...before.map(({ min: one }) => one)) - 2);
+        expect(high).toBeLessThanOrEqual(Math.max(...before.map(({ max: one }) => one)) + 2);
       }
     }
   });
+});
+
+it.each(DASHES)('a spike between dashes is drawn, dash %d %d', (...dash) => {
+  for (let place = 100; place < 130; place += 1) {
+    for (const step of [1, 0.2]) {
+      const samples = new Samples();
+      for (let x = 0; x < 200; x += step) samples.push(x, Math.abs(x - place) < step / 2 ? 15 : 5 + (samples.end % 2));
+      const byColumn = new Recorder();
+      const columns = new Columns();
+      columns.update(samples, 1, 0, 199);
+      drawColumns(byColumn, columns, 0, 199, plain(1, dash));
+      expect(byColumn.lines.some(([, y0, , y1]) => Math.max(y0, y1) === 15)).toBe(true);
+      const bySample = new Recorder();
+      drawSamples(bySample, samples, 0, samples.end, plain(1, dash), 1);
+      expect(bySample.lines.some(([, y0, , y1]) => Math.max(y0, y1) === 15)).toBe(true);
+    }
+  }
 });
 
 describe('columns', () => {

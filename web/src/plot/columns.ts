@@ -114,15 +114,20 @@ export interface Frame {
   stepped: boolean;
 }
 
-/** In pixels. A column of less height is a point. One of more than `STEEP` is never left out by a dash. */
+/** In pixels. A column of less height is a point. */
 const FLAT = 0.25;
-const STEEP = 2;
+/** In pixels. A dash never leaves out what differs by more from what was drawn before it: a spike. */
+const SPIKE = 2;
 
 /** Draws the columns `from` to `to` of a curve. */
 export function drawColumns(pen: Pen, columns: Columns, from: number, to: number, frame: Frame) {
   const { x, y, dash, stepped } = frame;
   let joined = false;
   let previous = 0;
+  // What the last dash reached.
+  let top = 0;
+  let bottom = 0;
+  let wasDrawn = false;
   for (let k = from; k <= to; k += 1) {
     const slot = columns.slot(k);
     const broken = columns.broken[slot]!;
@@ -138,8 +143,15 @@ export function drawColumns(pen: Pen, columns: Columns, from: number, to: number
     const upwards = !joined || Math.abs(previous - least) < Math.abs(previous - most);
     const near = upwards ? least : most;
     const far = upwards ? most : least;
-    const isSteep = least - most > STEEP || (joined && Math.abs(near - previous) > STEEP);
-    if (joined && (isSteep || isDrawn(k, dash))) {
+    const isDash = isDrawn(k, dash);
+    const isSpike = most < top - SPIKE || least > bottom + SPIKE;
+    if (isDash || !joined) {
+      const goesOn = wasDrawn && joined;
+      top = goesOn ? Math.min(top, most) : most;
+      bottom = goesOn ? Math.max(bottom, least) : least;
+    }
+    wasDrawn = isDash;
+    if (joined && (isDash || isSpike)) {
       if (stepped) pen.lineTo(at, previous);
       pen.lineTo(at, near);
       if (least - most > FLAT) pen.lineTo(at, far);
@@ -190,7 +202,8 @@ function dashed(
 ) {
   const [period, drawn] = dash as [number, number];
   const pixel = x(width) - x(0);
-  if (period === 0 || Math.abs(y1 - y0) > 2 * (x1 - x0)) {
+  const isSpike = Math.abs(y1 - y0) > SPIKE && x1 - x0 < (period - drawn) * pixel;
+  if (period === 0 || isSpike) {
     pen.lineTo(x1, y1);
     return;
   }

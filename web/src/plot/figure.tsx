@@ -45,6 +45,7 @@ export function Figure(props: FigureProps) {
   const host = useRef<HTMLDivElement>(null);
   const legend = useRef<HTMLTableElement>(null);
   const reading = useRef<HTMLParagraphElement>(null);
+  const picker = useRef<HTMLButtonElement>(null);
   const announcer = useRef<HTMLParagraphElement>(null);
   const [hidden, setHidden] = useState<readonly string[]>([]);
   const [, redraw] = useState(0);
@@ -152,6 +153,7 @@ export function Figure(props: FigureProps) {
       if (note) of.note = note(trace);
       for (const cell of row.querySelectorAll<HTMLElement>('[data-is]')) put(cell, of[cell.dataset.is!] ?? '');
     }
+    if (picker.current) picker.current.disabled = a === null;
     legend.current?.classList.toggle('plot-two', b !== null);
     if (reading.current) put(reading.current, cursorText(hover.current));
   };
@@ -227,7 +229,7 @@ export function Figure(props: FigureProps) {
           <div class="plot-readings">
             <p ref={reading} class="plot-reading" />
             {pickLabel && (
-              <button type="button" onClick={() => window.a !== null && actions.pick(window.a)}>
+              <button ref={picker} type="button" onClick={() => window.a !== null && actions.pick(window.a)}>
                 {pickLabel} at A
               </button>
             )}
@@ -253,9 +255,11 @@ export function Figure(props: FigureProps) {
                   <th scope="row" role="rowheader">
                     <button type="button" aria-pressed={trace.shown} onClick={() => toggle(trace)}>
                       <Swatch trace={trace} />
-                      <span class="plot-name">{trace.name}{trace.unit && <small> {trace.unit}</small>}</span>
+                      <span class="plot-name">
+                        {trace.name}
+                        <small> {trace.unit}{props.note && <span data-is="note" class="plot-side" />}</small>
+                      </span>
                     </button>
-                    {props.note && <small data-is="note" class="plot-side" />}
                   </th>
                   {cells.map(([is, name]) => (
                     <td key={is} class={`plot-${is}`} role="cell" data-name={name}>

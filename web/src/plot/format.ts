@@ -14,6 +14,12 @@ export function value(number: number): string {
   return `${number < 0 ? MINUS : ''}${text()}`;
 }
 
+/** A value at an axis whose ticks are `step` apart. */
+export function onAxis(number: number, step: number): string {
+  if (Math.abs(number) >= 1e7 || (step < 1e-6 && number !== 0)) return value(number);
+  return number.toFixed(decimalsOf(step)).replace('-', MINUS);
+}
+
 /** A value and its unit. */
 export function withUnit(number: number, unit: string): string {
   return isFinite(number) && unit ? `${value(number)} ${unit}` : value(number);

@@ -13,6 +13,7 @@ export interface Panel {
 
 const NUMBERS = 125;
 const STALE = 250;
+const UNSEEN = 1000;
 /** The browser paints about twice as long as the script runs, afterwards. */
 const PAUSE = 4;
 
@@ -22,6 +23,7 @@ export class Scheduler {
   private timer: ReturnType<typeof setInterval> | undefined;
   private earliest = 0;
   private written = -Infinity;
+  private drawnAll = -Infinity;
   private dirty = false;
 
   /** `now` is the right end of live plots. */
@@ -70,10 +72,13 @@ export class Scheduler {
     const start = performance.now();
     const write = time - this.written >= NUMBERS || (this.dirty && !this.window.live);
     if (this.dirty) this.window.follow(this.now());
+    // What is not on the screen may be printed, or scrolled into view.
+    const all = time - this.drawnAll >= UNSEEN;
+    if (all) this.drawnAll = time;
     for (const panel of this.panels) {
-      if (!panel.visible) continue;
+      if (!panel.visible && !all) continue;
       if (this.dirty) panel.draw();
-      if (write) panel.write();
+      if (write || all) panel.write();
     }
     if (write) this.written = time;
     this.dirty = false;

@@ -10,7 +10,7 @@ export const DASHES: readonly (readonly [period: number, drawn: number])[] = [
   [12, 8],
   [6, 3],
   [20, 16],
-  [24, 6],
+  [14, 4],
 ];
 
 export interface Style {

@@ -112,7 +112,7 @@ function Toolbar() {
   const now = useSignal({ live: true, behind: 0, lost: 0, kept: LONGEST });
   useEffect(() => {
     const look = () => {
-      const behind = Math.round((store.now() - time.max) * 10) / 10;
+      const behind = Math.max(0, Math.floor(store.now() - time.max));
       const next = { live: time.live, behind: time.live ? 0 : behind, lost: store.lost, kept: Math.round(store.kept) };
       if (JSON.stringify(next) !== JSON.stringify(now.peek())) now.value = next;
     };
@@ -178,7 +178,7 @@ function Toolbar() {
       </div>
       <p class="plots-state">
         <strong class={live && state.value === 'open' ? 'plots-live' : 'plots-paused'}>
-          {live ? (state.value === 'open' ? 'Live' : 'No connection') : `Paused, ${duration(behind)} behind`}
+          {live ? (state.value === 'open' ? 'Live' : 'No connection') : `Paused, ${behind} s behind`}
         </strong>
         {lost > 0 && <span class="plots-lost"> {lost} records lost: this page was too slow.</span>}
         {kept < LONGEST && <span> Only the last {duration(kept)} are kept: too many values a second.</span>}
