@@ -15,6 +15,7 @@ export function Picker() {
   const { signals } = settings.value;
   const [search, setSearch] = useState('');
   const [rate, setRate] = useState<number>(DEFAULT_RATE);
+  const [isOpen, setOpen] = useState(signals.length === 0);
   const found = useMemo(
     () => candidates(motors.value, catalogue.value, search),
     [motors.value, catalogue.value, search],
@@ -23,7 +24,7 @@ export function Picker() {
   const isFull = signals.length >= MOST_SIGNALS;
 
   return (
-    <details class="plots-picker" open={signals.length === 0}>
+    <details class="plots-picker" open={isOpen} onToggle={({ currentTarget }) => setOpen(currentTarget.open)}>
       <summary>Signals ({signals.length})</summary>
       <div class="plots-choice">
         <div class="plots-search">
