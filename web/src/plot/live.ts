@@ -79,6 +79,8 @@ function read() {
 function heard({ event, line, motor, since, t }: DriveEvent) {
   if (event === 'doubtful' && line != null && motor != null && since != null) {
     store.doubt(line, motor, since, t ?? store.lineTime(line, store.now()));
+  } else if (event === 'later' && line == null) {
+    store.doubtAll();
   } else if (event === 'lost' || event === 'silent') {
     store.interrupt(line ?? undefined, motor ?? undefined);
   }

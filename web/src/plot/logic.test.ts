@@ -29,6 +29,7 @@ describe('the window', () => {
     const window = live();
     expect([window.min, window.max]).toEqual([90, 100]);
     window.follow(99.99);
+    window.follow(NaN);
     expect(window.max).toBe(100);
     window.follow(50);
     expect(window.max).toBe(50);

@@ -11,7 +11,7 @@ export interface Panel {
   write: () => void;
 }
 
-const NUMBERS = 125;
+const NUMBERS = 60;
 const STALE = 250;
 const UNSEEN = 1000;
 /** The browser paints about twice as long as the script runs, afterwards. */

@@ -3,7 +3,7 @@ import type { SignalName } from '../wire';
 import { LONGEST } from './store';
 
 /** In Hz. A page may have 16 subscriptions, one for each rate, and other views need some. */
-export const RATES = [1, 5, 20, 50, 100, 200, 500, 1000] as const;
+export const RATES = [2, 5, 20, 50, 100, 200, 500, 1000] as const;
 /** In seconds. */
 export const SPANS = [10, 30, 60, 120, 300, 600] as const;
 export const LAYOUTS = ['one', 'unit', 'motor'] as const;

@@ -24,6 +24,7 @@ export class Window {
 
   /** Moves to the newest values. Small steps back of the clock are ignored: they would tremble. */
   follow(now: number) {
+    if (isNaN(now)) return;
     if (!(now < this.latest) || this.latest - now > 1) this.latest = now;
     if (!this.live) return;
     this.max = this.latest;
