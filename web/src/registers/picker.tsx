@@ -28,7 +28,7 @@ export function MotorPicker({ disabled = false }: { disabled?: boolean }) {
   const now = chosen.value && nameOf(chosen.value.line, chosen.value.motor);
   return (
     <>
-      <label class="field">
+      <label class="labelled">
         <span>Motor</span>
         <select
           value={now ?? ''}

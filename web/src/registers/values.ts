@@ -58,11 +58,14 @@ export function sheetOf(motor: MotorName): Sheet {
 }
 
 /** Values of a motor were read. */
-export function keep({ cells }: Sheet, values: readonly Value[]) {
+export function keep(sheet: Sheet, values: readonly Value[]) {
+  const { cells } = sheet;
   const at = performance.now();
   const next = new Map(cells.value);
   for (const value of values) {
     const known = next.get(value.name);
+    // What was read back is not true any more.
+    if (known && known.now.text !== value.text && !sheet.notes.value.get(value.name)?.isBad) note(sheet, value.name, null);
     // The first value is one that was read, not a refusal.
     const first = known && known.first.value !== null ? known.first : value;
     next.set(value.name, { first, now: value, at });

@@ -1,5 +1,6 @@
 // Commands that write the ROM of a motor and move nothing.
 import { useSignal } from '@preact/signals';
+import { sentence } from '../format';
 import { ask } from '../link';
 import { Said, useSaid } from '../parts';
 import { Confirm, RomWear } from '../registers/confirm';
@@ -56,10 +57,10 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
       }}
     >
       <p>
-        <code>{command.name}</code> <span class="doc">{command.doc}</span>
+        <code>{command.name}</code> <span class="doc">{sentence(command.doc)}</span>
       </p>
       {command.fields.map((field) => (
-        <label class="field" key={field.name}>
+        <label class="labelled" key={field.name}>
           <span>{field.name}</span>
           {field.words.length > 0 ? (
             <select value={texts.value[field.name] ?? ''} onChange={({ currentTarget }) => set(field, currentTarget.value)}>
@@ -96,7 +97,7 @@ function RomCommand({ sheet, command }: { sheet: Sheet; command: Command }) {
             if (isConfirmed && values) void send(values);
           }}
         >
-          <p>{command.doc}</p>
+          <p>{sentence(command.doc)}</p>
           {Object.entries(confirming.value).map(([name, value]) => (
             <p key={name}>
               {name}: {value}

@@ -1,6 +1,6 @@
 // A register: its value, and its change in place.
 import { Component, createRef } from 'preact';
-import { duration } from '../format';
+import { duration, sentence } from '../format';
 import { Confirm, RomWear } from '../registers/confirm';
 import { access, isSame, numberOf, rangeText, withUnit } from '../registers/model';
 import { type Cell, type Note, type Sheet, draft, note, read, reasonOf, write } from '../registers/values';
@@ -51,10 +51,13 @@ export class RegisterRow extends Component<Props, State> {
     }
   }
 
-  private begin = () => {
-    const { sheet, register, cell } = this.props;
-    note(sheet, register.name, null);
-    draft(sheet, register.name, cell?.now.value?.toString() ?? '');
+  private begin = async () => {
+    const { sheet, register } = this.props;
+    const { name, readable } = register;
+    note(sheet, name, null);
+    // The value before the first change is what later ones are compared with.
+    if (readable && !sheet.cells.value.has(name)) await read(sheet, [name]).catch(() => {});
+    draft(sheet, name, sheet.cells.value.get(name)?.now.value?.toString() ?? '');
   };
 
   private cancel = () => {
@@ -91,8 +94,9 @@ export class RegisterRow extends Component<Props, State> {
 
   render() {
     const { sheet, register, cell, draft: text, note: remark, inFile, age, isOperator } = this.props;
-    const { name, doc, unit, writable, wears_rom: wearsRom, can_keep: canKeep } = register;
+    const { name, unit, writable, wears_rom: wearsRom, can_keep: canKeep } = register;
     const { isWriting, toRom } = this.state;
+    const doc = sentence(register.doc.replaceAll('`', ''));
     const range = rangeText(register.range, unit);
     const hint = `${name}-hint`;
     return (
@@ -169,8 +173,9 @@ export class RegisterRow extends Component<Props, State> {
                 isConfirmed ? void this.write(toRom, true) : this.setState({ toRom: null })
               }
             >
+              <p>{doc}</p>
               <p>
-                {doc}: {cell?.now.text ?? 'not read'} becomes {withUnit(toRom, unit)}.
+                It is {cell?.now.text ?? 'not known'}, and becomes {withUnit(toRom, unit)}.
               </p>
               <RomWear motor={sheet.motor} />
             </Confirm>

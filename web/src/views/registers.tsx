@@ -107,7 +107,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
   return (
     <section aria-label="Table of registers">
       <div class="bar tools">
-        <label class="field search">
+        <label class="labelled search">
           <span>Search</span>
           <input
             type="search"

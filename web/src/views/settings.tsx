@@ -73,7 +73,7 @@ export function Settings({
         <button type="button" disabled={isBusy} onClick={dump}>
           Save settings of {motor}
         </button>
-        <label class="field file">
+        <label class="labelled file">
           <span>Compare with a file</span>
           <input
             type="file"

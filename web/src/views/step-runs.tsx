@@ -1,5 +1,5 @@
 // The runs that are kept: drawn over each other, and compared in a table.
-import { signal } from '@preact/signals';
+import { computed, signal } from '@preact/signals';
 import { type Series, Plot } from '../plot/static';
 import { download } from '../registers/download';
 import { DEFINITIONS, type Figure, type FigureName, WAY } from '../step/analysis';
@@ -8,13 +8,15 @@ import { type Run, csv, figureText, fileName, json, remove, runs, title, unitOf 
 /** The runs that are not drawn, by number. New ones are drawn. */
 const hidden = signal<ReadonlySet<number>>(new Set());
 
+const drawnRuns = computed(() => runs.value.filter(({ number }) => !hidden.value.has(number)));
+const series = computed(() => drawnRuns.value.flatMap(seriesOf));
+
 const FIGURES = Object.keys(DEFINITIONS) as FigureName[];
 
 export function Runs() {
   const all = runs.value;
   if (!all.length) return <p class="muted">No step was recorded yet.</p>;
-  const shown = all.filter(({ number }) => !hidden.value.has(number));
-  const series = shown.flatMap(seriesOf);
+  const shown = drawnRuns.value;
   return (
     <section aria-label="Recorded steps">
       <h3>Recorded steps</h3>
@@ -47,7 +49,7 @@ export function Runs() {
       </ul>
       {shown.length > 0 && (
         <>
-          <Plot label="Step responses; time 0 is the step" series={series} marks={[STEP]} height={320} />
+          <Plot label="Step responses; time 0 is the step" series={series.value} marks={STEP} height={320} />
           <Comparison shown={shown} />
         </>
       )}
@@ -55,7 +57,7 @@ export function Runs() {
   );
 }
 
-const STEP = { label: 'step', t: 0 };
+const STEP = [{ label: 'step', t: 0 }];
 
 function show(number: number, is: boolean) {
   const next = new Set(hidden.value);

@@ -119,7 +119,7 @@ function Setup({
         }}
       >
         <fieldset disabled={isBusy} class="setup">
-          <label class="field">
+          <label class="labelled">
             <span>What</span>
             <select value={form.value.mode} onChange={({ currentTarget }) => set({ mode: currentTarget.value })}>
               {description.modes.map(({ mode, unit }) => (
@@ -205,7 +205,7 @@ function Field({
   onInput: (text: string) => void;
 }) {
   return (
-    <label class="field">
+    <label class="labelled">
       <span>{label}</span>
       <input
         inputMode="decimal"
