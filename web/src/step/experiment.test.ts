@@ -40,6 +40,8 @@ class Bench implements Rig {
   refuse: Record<string, string> = {};
   swing = 0;
   hasReference = true;
+  isStreamed = false;
+  next: { at: number; target: number; rate: number } | null = null;
 
   async ask<A extends Ask>(wanted: A): Promise<AnswerTo<A['ask']>> {
     const why = this.refuse[wanted.ask];
@@ -50,15 +52,25 @@ class Bench implements Rig {
       rates: () => ({ rates: [{ ...MOTOR, name: 'SPEED_MEAS', asked: 1e-4, predicted: 0.002, achieved: 500 }] }),
       run: () => {
         if (wanted.ask !== 'run') throw new Error('no run');
-        this.happened.push({
-          wall: 0, line: 'st0', motor: 1, t: this.now, by: 'page 1 (control)', event: 'commanded', message: 'SET_RAMP',
-        });
-        this.target = wanted.target;
-        this.rate = wanted.rate;
+        this.say(this.now);
+        if (this.isStreamed) {
+          // The measured value, and the next reference 20 ms later.
+          this.next = { at: this.now + 0.02, target: wanted.target, rate: wanted.rate };
+        } else {
+          this.target = wanted.target;
+          this.rate = wanted.rate;
+          this.say(this.now + 0.004);
+        }
         return { from: this.speed };
       },
     };
     return answers[wanted.ask]!() as AnswerTo<A['ask']>;
+  }
+
+  private say(t: number) {
+    this.happened.push({
+      wall: 0, line: 'st0', motor: 1, t, by: 'page 1 (control)', event: 'commanded', message: 'SET_RAMP',
+    });
   }
 
   subscribe(_: unknown, period: number, onRows: (rows: Rows) => void, onRefused: (why: Error) => void) {
@@ -85,6 +97,11 @@ class Bench implements Rig {
     const end = this.now + seconds;
     while (this.now < end - 1e-9) {
       this.now += 0.002;
+      if (this.next && this.now >= this.next.at) {
+        this.say(this.next.at);
+        ({ target: this.target, rate: this.rate } = this.next);
+        this.next = null;
+      }
       const most = this.rate * 0.002;
       this.reference += Math.max(-most, Math.min(most, this.target - this.reference));
       this.speed += (this.reference - this.speed) * (1 - Math.exp(-0.002 / 0.05));
@@ -146,14 +163,23 @@ describe('a step', () => {
     expect(bench.asked.filter((one) => one.startsWith('run'))).toEqual(['run 1000']);
   });
 
-  it('has the time that the share sent the command, without a reference of the drive', async () => {
+  it('has the time of the command, and the drive\'s own reference makes it more exact', async () => {
+    // SET_RAMP, and START_MOTOR 4 ms later.
+    expect((await experiment().run()).doubt).toBeLessThan(0.002);
+    bench = new Bench();
     bench.hasReference = false;
-    const registers = DESCRIPTION.registers.filter(({ name }) => name !== 'SPEED_REF');
-    const run = await experiment({ description: { ...DESCRIPTION, registers } }).run();
-    expect(run.reference).toBeNull();
+    const run = await experiment().run();
+    expect(run.doubt).toBeCloseTo(0.0025, 6);
+  });
+
+  it('of an RMD motor is the last reference, not the measured value before it', async () => {
+    bench.hasReference = false;
+    bench.isStreamed = true;
+    const run = await experiment({ description: { ...DESCRIPTION, protocol: 'rmd' } }).run();
     expect(run.doubt).toBeCloseTo(0.0005, 6);
-    const after = run.y.findIndex((value, index) => run.t[index]! > 0 && value! > 505);
-    expect(run.t[after]).toBeLessThan(0.005);
+    const after = run.y.findIndex((value, index) => run.t[index]! > -0.1 && value! > 505);
+    expect(run.t[after]).toBeGreaterThan(0);
+    expect(run.t[after]).toBeLessThan(0.006);
   });
 
   it('of another program is not taken for this one', async () => {
@@ -165,8 +191,11 @@ describe('a step', () => {
       }
       return answer;
     };
-    // Only the samples before and after the answer are known then, and the reference.
-    expect((await experiment().run()).doubt).toBeLessThan(0.03);
+    bench.hasReference = false;
+    // Only the samples before and after the answer are known then.
+    const { doubt } = await experiment().run();
+    expect(doubt).toBeGreaterThan(0.02);
+    expect(doubt).toBeLessThan(0.1);
   });
 });
 

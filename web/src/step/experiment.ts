@@ -42,9 +42,10 @@ const STEADY = 0.5;
 const STEADY_SAMPLES = 20;
 /** It has to be steady within this time after the reference is there. */
 const PATIENCE = 15;
-/** Rows come in batches, after they are confirmed. */
-const LATE = 0.3;
+/** The server streams references with this time between them, in seconds, or less. */
+const NEXT_REFERENCE = 0.05;
 const LOOK = 0.05;
+const NO_MORE = 'The motor gives no more values.';
 
 export class Aborted extends Error {}
 
@@ -53,6 +54,17 @@ interface Sample {
   span: number;
   y: number;
   reference: number;
+}
+
+/** The earliest and the latest time. */
+type Interval = [number, number];
+
+/** A step that was asked for. */
+interface Applied {
+  /** The events before it. */
+  known: ReadonlySet<DriveEvent>;
+  before: number;
+  after: number;
 }
 
 /** Gains of all regulators of a motor, and the ramp that it adds itself. */
@@ -112,10 +124,12 @@ export class Experiment {
       const step = await this.step();
       this.onProgress(`Recording for ${this.plan.duration} s.`);
       const carried = await this.carried();
-      await this.until(() => (this.last?.t ?? 0) >= step.latest + this.plan.duration, this.plan.duration + 5, 'The motor gives no more values.');
+      const { duration } = this.plan;
+      await this.until(() => this.last!.t >= step.after + duration, duration + 5, NO_MORE);
       end();
+      const at = this.when(step);
       await this.end();
-      return this.recorded(step, gains, reference, carried);
+      return this.recorded(at, gains, reference, carried);
     } catch (why) {
       end();
       throw await this.fail(why);
@@ -174,27 +188,38 @@ export class Experiment {
     await this.until(isSteady, PATIENCE, `The value is not steady ${PATIENCE} s after the motor went to ${from}.`);
   }
 
-  /** Changes the reference at once. Returns when that was, by the clock of the line. */
-  private async step(): Promise<{ earliest: number; latest: number }> {
-    const { to, from, approach, controlled, motor } = this.plan;
+  /** Changes the reference at once. Returns the samples just before and after. */
+  private async step(): Promise<Applied> {
+    const { to, from, approach, controlled } = this.plan;
     // Enough for the record before the step.
     await this.pause(BEFORE);
     this.onProgress('Applying the step.');
     const known = new Set(this.rig.events());
     const before = this.last!;
     await this.command(to, controlled.mode === 'position' ? approach : Math.abs(to - from) * AT_ONCE);
-    const span = median(this.samples.slice(-50).map((one) => one.span));
-    await this.until(() => this.last!.t > before.t, 5, 'The motor gives no more values.');
+    await this.until(() => this.last!.t > before.t, 5, NO_MORE);
+    return { known, before: before.t, after: this.last!.t + NEXT_REFERENCE };
+  }
+
+  /** When the reference changed, by the clock of the line. */
+  private when({ known, before, after }: Applied): Interval {
+    const { motor, description, from, to } = this.plan;
+    const isOwn = ({ by }: DriveEvent) => by === this.rig.name() || !!by?.startsWith(`${this.rig.name()} (`);
     const sent = this.rig
       .events()
       .filter(
         (event) =>
-          !known.has(event) && event.event === 'commanded' && event.line === motor.line &&
-          event.motor === motor.motor && typeof event.t === 'number' && !!event.by?.startsWith(`${this.rig.name()} (`),
+          event.event === 'commanded' && event.line === motor.line && event.motor === motor.motor && isOwn(event) &&
+          typeof event.t === 'number' && !known.has(event),
       )
       .map(({ t }) => t!);
-    if (sent.length) return { earliest: Math.min(...sent), latest: Math.max(...sent) + span };
-    return { earliest: before.t, latest: this.last!.t };
+    const span = median(this.samples.filter(({ t }) => t >= before && t <= after).map((one) => one.span));
+    if (!sent.length) return narrowed([before, after], this.samples, from, to);
+    const last = Math.max(...sent);
+    // An RMD motor first gets the measured value as reference, then that of the step. An ST drive first gets
+    // the reference, then START_MOTOR.
+    if (description.protocol === 'rmd') return [last, last + span];
+    return narrowed([Math.min(...sent), last + span], this.samples, from, to);
   }
 
   /** The time between two values that the line carries, as the share says. */
@@ -220,10 +245,9 @@ export class Experiment {
   }
 
   private recorded(
-    step: { earliest: number; latest: number }, gains: Gain[], reference: string | null, carried: number | null,
+    [earliest, latest]: Interval, gains: Gain[], reference: string | null, carried: number | null,
   ): Omit<Run, 'number' | 'analysis' | 'isThinned'> {
     const { motor, controlled, from, to, duration, description } = this.plan;
-    const { earliest, latest } = narrowed(step, this.samples, from, to);
     const at = (earliest + latest) / 2;
     const kept = this.samples.filter(({ t }) => t > earliest - BEFORE - STEADY && t < latest + duration);
     const orNull = (value: number) => (Number.isNaN(value) ? null : value);
@@ -288,15 +312,15 @@ export class Experiment {
 }
 
 /** The reference that the drive reports narrows down when it changed. */
-function narrowed(step: { earliest: number; latest: number }, samples: readonly Sample[], from: number, to: number) {
+function narrowed([earliest, latest]: Interval, samples: readonly Sample[], from: number, to: number): Interval {
   const changed = samples.findIndex(
-    ({ t, reference }) => t >= step.earliest - LATE && Math.abs(reference - to) < Math.abs(reference - from),
+    ({ t, span, reference }) => t + span / 2 >= earliest && Math.abs(reference - to) < Math.abs(reference - from),
   );
   const [old, young] = [samples[changed - 1], samples[changed]];
-  if (!old || !young) return step;
-  const earliest = Math.max(step.earliest, old.t - old.span / 2);
-  const latest = Math.min(step.latest, young.t + young.span / 2);
-  return earliest <= latest ? { earliest, latest } : step;
+  if (!old || !young) return [earliest, latest];
+  const low = Math.max(earliest, old.t - old.span / 2);
+  const high = Math.min(latest, young.t + young.span / 2);
+  return low <= high ? [low, high] : [earliest, latest];
 }
 
 /** What the drive itself does with a reference that changes at once. */
