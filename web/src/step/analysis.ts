@@ -33,7 +33,7 @@ export interface Analysis {
   noise: number;
   /** The step between two measured values: that of the drive, or a larger one that was seen. */
   resolution: number;
-  /** Samples after the step, and the median and longest time between two samples, in seconds. */
+  /** Samples after the step, and the mean and longest time between two samples, in seconds. */
   samples: number;
   interval: number;
   longest: number;
@@ -90,8 +90,8 @@ export function analyse(recording: Recording): Analysis {
     noise: NaN,
     resolution,
     samples: times.length,
-    interval: median(gaps),
-    longest: gaps.length ? Math.max(...gaps) : NaN,
+    interval: mean(gaps),
+    longest: highest(gaps),
     update: NaN,
     remarks: [],
   };
@@ -108,7 +108,7 @@ export function analyse(recording: Recording): Analysis {
   }
   const final = mean(tail);
   const noise = Math.max(deviation(before), scatter(tail));
-  Object.assign(analysis, { final, noise, update: updateInterval(times, values) });
+  Object.assign(analysis, { final, noise });
 
   const way = final - analysis.initial;
   const commanded = recording.to - recording.from;
@@ -135,12 +135,12 @@ export function analyse(recording: Recording): Analysis {
     blur: blur / Math.abs(way),
     noise: noise / Math.abs(way),
     resolution: resolution / Math.abs(way),
-    update: analysis.update,
-    median: analysis.interval,
+    update: NaN,
   };
   // The last sample before the step is where the response begins.
   scaled.t = [Math.min(t[first - 1]!, latest), ...times];
   scaled.x = [(y[first - 1]! - analysis.initial) / way, ...scaled.x];
+  scaled.update = analysis.update = updateInterval(scaled);
   const error = recording.to - final;
   analysis.figures = {
     delay: delay(scaled),
@@ -188,7 +188,6 @@ interface Scaled {
   noise: number;
   resolution: number;
   update: number;
-  median: number;
 }
 
 /** When the response has reached a level, between two samples. */
@@ -279,7 +278,7 @@ function overshoot({ x, noise, resolution }: Scaled): Figure {
 
 function settling(scaled: Scaled, band: number): Figure {
   const { t, x } = scaled;
-  const swing = Math.max(...x.filter((_, index) => t[index]! >= scaled.endFrom).map((value) => Math.abs(value - 1)));
+  const swing = highest(x.filter((_, index) => t[index]! >= scaled.endFrom).map((value) => Math.abs(value - 1)));
   if (swing > 0.8 * band) {
     return { kind: 'none', why: `The value varies by ±${percent(swing)} of the way in the last fifth, which fills the band.` };
   }
@@ -305,7 +304,7 @@ function whyUnsettled(tail: number[], way: number, noise: number, resolution: nu
   if (Math.abs(drift) > 0.01 * way + blurred) {
     return `It has not settled: the value still changes by ${percent(Math.abs(drift) / way)} of the way in the last fifth. Record longer.`;
   }
-  const swing = (Math.max(...tail) - Math.min(...tail)) / 2;
+  const swing = (highest(tail) + highest(tail.map((value) => -value))) / 2;
   if (swing > 0.02 * way + SIGMAS * noise + resolution) {
     return `It has not settled: the value still swings by ±${percent(swing / way)} of the way in the last fifth.`;
   }
@@ -350,16 +349,21 @@ function commonStep(values: number[]): number {
   const sorted = [...new Set(values)].sort((a, b) => a - b);
   const steps = differences(sorted);
   if (steps.length < LEAST_STEPS) return 0;
-  const least = Math.min(...steps);
+  const least = -highest(steps.map((step) => -step));
   const isMultiple = (step: number) => Math.abs(step / least - Math.round(step / least)) < 0.02;
   return steps.every(isMultiple) ? least : 0;
 }
 
-/** Time between two new values while the response moves. */
-function updateInterval(t: number[], y: number[]): number {
-  const top = Math.max(...y) - Math.min(...y);
-  const changes = t.filter((_, index) => index > 0 && Math.abs(y[index]! - y[index - 1]!) > top / 100);
+/** Time between two new values while the response rises. */
+function updateInterval({ t, x }: Scaled): number {
+  const top = x.findIndex((value, index) => index > 0 && value >= 0.9);
+  const changes = t.filter((_, index) => index > 0 && index <= top && x[index] !== x[index - 1]);
   return changes.length > 3 ? median(differences(changes)) : NaN;
+}
+
+/** Arrays can be longer than an argument list. */
+function highest(values: readonly number[]): number {
+  return values.reduce((most, value) => Math.max(most, value), -Infinity);
 }
 
 export function median(values: number[]): number {

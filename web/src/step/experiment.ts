@@ -37,6 +37,8 @@ const PERIOD = 1e-4;
 const AT_ONCE = 1e6;
 /** Kept before the step. */
 const BEFORE = 0.3;
+/** Kept while the motor goes to the start. */
+const KEPT = 2;
 /** A value is steady if it is over this time. */
 const STEADY = 0.5;
 const STEADY_SAMPLES = 20;
@@ -83,6 +85,7 @@ export function referenceOf({ registers }: Description, { measured }: Controlled
 export class Experiment {
   private samples: Sample[] = [];
   private lost = 0;
+  private isRecording = false;
   private refused: Error | null = null;
   private aborted: Aborted | null = null;
   private onAbort: (why: Aborted) => void = () => {};
@@ -154,10 +157,18 @@ export class Experiment {
     for (let row = 0; row < t.length; row += 1) {
       this.samples.push({ t: t0 + t[row]!, span: span[row]!, y: y[row]!, reference: ref?.[row] ?? NaN });
     }
+    // A fast line gives more than 10 000 samples a second while the motor goes to the start.
+    const old = this.last!.t - KEPT;
+    if (!this.isRecording && this.samples[0]!.t < old - KEPT) this.samples = this.since(old);
   }
 
   private get last(): Sample | undefined {
     return this.samples.at(-1);
+  }
+
+  /** The samples after a time. */
+  private since(t: number): Sample[] {
+    return this.samples.slice(this.samples.findLastIndex((one) => one.t <= t) + 1);
   }
 
   private async approach() {
@@ -178,7 +189,7 @@ export class Experiment {
     const isSteady = () => {
       const now = this.last?.t ?? 0;
       if (now - since < STEADY) return false;
-      const all = this.samples.filter(({ t, y }) => t > now - STEADY && !Number.isNaN(y)).map(({ y }) => y);
+      const all = this.since(now - STEADY).map(({ y }) => y).filter((y) => !Number.isNaN(y));
       if (all.length < STEADY_SAMPLES) return false;
       const half = all.length >> 1;
       const noise = scatter(all);
@@ -194,6 +205,7 @@ export class Experiment {
     // Enough for the record before the step.
     await this.pause(BEFORE);
     this.onProgress('Applying the step.');
+    this.isRecording = true;
     const known = new Set(this.rig.events());
     const before = this.last!;
     await this.command(to, controlled.mode === 'position' ? approach : Math.abs(to - from) * AT_ONCE);

@@ -42,7 +42,9 @@ export interface Run {
 
 const KEY = 'motorlink.steps.1';
 const MOST_RUNS = 12;
-const MOST_POINTS = 3000;
+/** Points of a run that the browser keeps, and that the page keeps. */
+const MOST_KEPT = 3000;
+const MOST_POINTS = 100_000;
 
 /** The newest first. */
 export const runs = signal<readonly Run[]>(load());
@@ -57,7 +59,7 @@ export function add(run: Omit<Run, 'number' | 'analysis' | 'isThinned'>): Run {
     to: run.to,
     resolution: run.resolution,
   });
-  const added: Run = { ...run, number, analysis, isThinned: false };
+  const added = thinned({ ...run, number, analysis, isThinned: false }, MOST_POINTS);
   runs.value = [added, ...runs.value].slice(0, MOST_RUNS);
   save();
   return added;
@@ -72,7 +74,7 @@ export function remove(number: number) {
 function save() {
   for (let count = runs.value.length; count >= 0; count -= 1) {
     try {
-      localStorage.setItem(KEY, JSON.stringify(runs.value.slice(0, count).map(thinned)));
+      localStorage.setItem(KEY, JSON.stringify(runs.value.slice(0, count).map((run) => thinned(run, MOST_KEPT))));
       return;
     } catch {
       // It is full, or not permitted: the runs stay as long as the page.
@@ -80,9 +82,9 @@ function save() {
   }
 }
 
-export function thinned(run: Run): Run {
-  if (run.t.length <= MOST_POINTS) return run;
-  const every = Math.ceil(run.t.length / MOST_POINTS);
+function thinned(run: Run, most: number): Run {
+  if (run.t.length <= most) return run;
+  const every = Math.ceil(run.t.length / most);
   const some = <T>(all: T[]) => all.filter((_, index) => index % every === 0);
   return {
     ...run,

@@ -183,7 +183,7 @@ const rounded = (value: number) => String(Number(value.toPrecision(3)));
 
 function measuredText({ analysis, unit, doubt, lost, carried }: Run): string {
   const parts = [
-    `${analysis.samples} samples after the step, one each ${rounded(1000 * analysis.interval)} ms`,
+    `${analysis.samples} samples after the step, one each ${rounded(1000 * analysis.interval)} ms, at most ${rounded(1000 * analysis.longest)} ms apart`,
     ...(carried && carried < 0.9 * analysis.interval ? [`the line carries one each ${rounded(1000 * carried)} ms`] : []),
     ...(analysis.update > 1.5 * analysis.interval ? [`a new value each ${rounded(1000 * analysis.update)} ms`] : []),
     ...(analysis.resolution > 0 ? [`resolution ${rounded(analysis.resolution)} ${unit}`] : []),

@@ -236,6 +236,8 @@ function planOf(
   if (rate.value <= 0) return { why: 'Rate: it has to be above 0.', approach };
   const duration = numberOf(form.duration, DURATION);
   if ('why' in duration) return { why: `Duration: ${duration.why}`, approach };
+  const least = controlled.mode === 'position' ? (1.3 * Math.abs(to.value - from.value)) / rate.value : 0;
+  if (duration.value < least) return { why: `Record for ${least.toFixed(1)} s or more: so long the move lasts.`, approach };
   return {
     plan: {
       motor, description, controlled, from: from.value, to: to.value, duration: duration.value,
