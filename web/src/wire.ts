@@ -72,6 +72,8 @@ moves: boolean,
  */
 wears_rom: boolean, };
 
+export type Condition = "whole" | "cut" | "unreadable";
+
 export type Controlled = { 
 /**
  * What.
@@ -346,9 +348,191 @@ voltage: string,
  */
 angle: string | null, };
 
+export type Phase = "starting" | "recording" | "ending" | "ended" | "failed";
+
 export type Protocol = "st" | "rmd";
 
 export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
+
+export type Recorded = { 
+/**
+ * The name of its file; empty until there is one.
+ */
+name: string, 
+/**
+ * How far it is.
+ */
+phase: Phase, 
+/**
+ * The page that asked for it.
+ */
+by: string, 
+/**
+ * When it was asked for, in seconds since 1970.
+ */
+began: number, 
+/**
+ * How long it has recorded, in seconds.
+ */
+seconds: number, 
+/**
+ * The size of the file.
+ */
+bytes: number, 
+/**
+ * Values in it.
+ */
+values: number, 
+/**
+ * Messages that are missing in it, because this machine or the disk was too slow.
+ */
+lost: number, 
+/**
+ * Rows that are missing in it, because nothing confirmed them.
+ */
+unconfirmed: number, 
+/**
+ * The rate that was asked for, and that of the slowest motor, in Hz.
+ */
+rates: [number, number] | null, 
+/**
+ * Its motors.
+ */
+motors: Array<string>, 
+/**
+ * Motors that gave no value yet.
+ */
+silent: Array<string>, 
+/**
+ * Signals that the drives do not give.
+ */
+refused: Array<string>, 
+/**
+ * Lines on which no motor answered. They are not recorded.
+ */
+left_out: Array<string>, 
+/**
+ * Why it failed.
+ */
+message: string | null, };
+
+export type RecordedEvent = { 
+/**
+ * When, in seconds from the first message.
+ */
+t: number, 
+/**
+ * Whom it concerns: a motor or a line.
+ */
+of: string, 
+/**
+ * The kind, one word.
+ */
+kind: string, 
+/**
+ * Who commanded it; may be empty.
+ */
+by: string, 
+/**
+ * The sentence.
+ */
+message: string, };
+
+export type RecordedSignal = { 
+/**
+ * Line and motor, such as `st0/motor1`.
+ */
+motor: string, 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, 
+/**
+ * Its meaning; may be empty.
+ */
+doc: string, };
+
+export type RecordingContent = { 
+/**
+ * The name of its file.
+ */
+name: string, 
+/**
+ * The time of its first message, in seconds since 1970. Times count from there.
+ */
+zero: number, 
+/**
+ * The time of its last message.
+ */
+seconds: number, 
+/**
+ * The signals. Their numbers are their places, from 0.
+ */
+signals: Array<RecordedSignal>, 
+/**
+ * What is wrong with the file.
+ */
+damage: string | null, };
+
+export type RecordingFile = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Its size.
+ */
+bytes: number, 
+/**
+ * When it was written last, in seconds since 1970.
+ */
+modified: number, 
+/**
+ * The time of the first message, in seconds since 1970.
+ */
+began: number | null, 
+/**
+ * The time from the first to the last message, in seconds.
+ */
+seconds: number | null, 
+/**
+ * Its motors.
+ */
+motors: Array<string>, 
+/**
+ * Whether it is whole.
+ */
+condition: Condition, 
+/**
+ * What is wrong with it.
+ */
+message: string | null, };
+
+export type RecordingPart = { 
+/**
+ * Where it begins, in seconds from the first message.
+ */
+from: number, 
+/**
+ * Where it ends.
+ */
+to: number, 
+/**
+ * What happened in this time.
+ */
+events: Array<RecordedEvent>, 
+/**
+ * Later events of this time, which are left out.
+ */
+more_events: number, 
+/**
+ * What is wrong with the file, as far as it was read.
+ */
+damage: string | null, };
 
 export type Register = { 
 /**
@@ -533,7 +717,15 @@ line: string,
 /**
  * The motor's number or ID.
  */
-motor: number, });
+motor: number, } | { "ask": "record", 
+/**
+ * How often signals are read, in Hz; `null`: 100.
+ */
+rate: number | null, } | { "ask": "end-recording" } | { "ask": "recordings" } | { "ask": "recording", 
+/**
+ * The name of its file.
+ */
+name: string, });
 
 export type Role = "operator" | "viewer";
 
@@ -818,7 +1010,27 @@ differences: Array<Difference>, } | { "to": "restore",
 /**
  * What was written and read back.
  */
-written: Array<Difference>, }) | { "kind": "lapsed", 
+written: Array<Difference>, } | { "to": "record", 
+/**
+ * The name of its file.
+ */
+name: string, } | { "to": "end-recording", 
+/**
+ * The recording.
+ */
+recording: Recorded, } | { "to": "recordings", 
+/**
+ * Their folder.
+ */
+folder: string, 
+/**
+ * The newest first, without the one that is made.
+ */
+recordings: Array<RecordingFile>, 
+/**
+ * Older ones that are not listed.
+ */
+older: number, } | { "to": "recording" } & RecordingContent) | { "kind": "lapsed", 
 /**
  * Why, in words.
  */
@@ -826,7 +1038,7 @@ message: string, } | { "kind": "share",
 /**
  * Why it is lost; `null`: it is there.
  */
-lost: string | null, };
+lost: string | null, } | { "kind": "recorded" } & Recorded;
 
 export type Value = { 
 /**

@@ -4,6 +4,7 @@
 //! - [`drive`] carries out what pages ask of drives.
 //! - [`program`] is a program at a share, without blocking.
 //! - [`alive`] is the dead-man of a page.
+//! - [`recordings`] makes recordings, lists them, and reads them for plots.
 //! - [`server`] serves the page, and connects pages to the share.
 #![forbid(unsafe_code)]
 
@@ -12,4 +13,5 @@ pub mod drive;
 pub mod message;
 mod page;
 pub mod program;
+pub mod recordings;
 pub mod server;

@@ -153,6 +153,21 @@ pub enum Ask {
         /// Whether it is allowed to wear the ROM of the motor.
         to_rom: bool,
     },
+    /// Begins a recording of all motors, with the signals of `motorlink record`. It goes on until it is
+    /// ended, also without this page.
+    Record {
+        /// How often signals are read, in Hz; `null`: 100.
+        rate: Option<f64>,
+    },
+    /// Ends the recording.
+    EndRecording,
+    /// Lists the recordings. Viewers may ask for it, too.
+    Recordings,
+    /// What a recording has. Viewers may ask for it, too.
+    Recording {
+        /// The name of its file.
+        name: String,
+    },
 }
 
 fn is_false(value: &bool) -> bool {
@@ -212,6 +227,9 @@ pub enum Text {
         /// Why it is lost; `null`: it is there.
         lost: Option<String>,
     },
+    /// The recording that is made, or the last one. It comes at the start, if there was one, and
+    /// whenever something changes.
+    Recorded(Recorded),
 }
 
 /// Who the page is.
@@ -322,6 +340,27 @@ pub enum Answer {
         /// What was written and read back.
         written: Vec<Difference>,
     },
+    /// To record: it has begun.
+    Record {
+        /// The name of its file.
+        name: String,
+    },
+    /// To end-recording: the file is whole, or the recording failed.
+    EndRecording {
+        /// The recording.
+        recording: Recorded,
+    },
+    /// To recordings.
+    Recordings {
+        /// Their folder.
+        folder: String,
+        /// The newest first, without the one that is made.
+        recordings: Vec<RecordingFile>,
+        /// Older ones that are not listed.
+        older: u32,
+    },
+    /// To recording.
+    Recording(RecordingContent),
 }
 
 /// What the drives of a line have.
@@ -493,4 +532,159 @@ pub struct Difference {
     pub wears_rom: bool,
     /// Why it cannot be written; `null`: it can.
     pub fixed: Option<String>,
+}
+
+/// A recording that is made, or was made by this server.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Recorded {
+    /// The name of its file; empty until there is one.
+    pub name: String,
+    /// How far it is.
+    pub phase: Phase,
+    /// The page that asked for it.
+    pub by: String,
+    /// When it was asked for, in seconds since 1970.
+    pub began: f64,
+    /// How long it has recorded, in seconds.
+    pub seconds: f64,
+    /// The size of the file.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub bytes: u64,
+    /// Values in it.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub values: u64,
+    /// Messages that are missing in it, because this machine or the disk was too slow.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub lost: u64,
+    /// Rows that are missing in it, because nothing confirmed them.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub unconfirmed: u64,
+    /// The rate that was asked for, and that of the slowest motor, in Hz.
+    pub rates: Option<[f64; 2]>,
+    /// Its motors.
+    pub motors: Vec<String>,
+    /// Motors that gave no value yet.
+    pub silent: Vec<String>,
+    /// Signals that the drives do not give.
+    pub refused: Vec<String>,
+    /// Lines on which no motor answered. They are not recorded.
+    pub left_out: Vec<String>,
+    /// Why it failed.
+    pub message: Option<String>,
+}
+
+/// How far a recording is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Phase {
+    /// Motors are searched and their settings are read.
+    Starting,
+    /// It records.
+    Recording,
+    /// The end of the file is written.
+    Ending,
+    /// The file is whole.
+    Ended,
+    /// It did not begin, or ended early. What the file has is readable.
+    Failed,
+}
+
+/// A file in the folder of the recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RecordingFile {
+    /// Its name.
+    pub name: String,
+    /// Its size.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub bytes: u64,
+    /// When it was written last, in seconds since 1970.
+    pub modified: f64,
+    /// The time of the first message, in seconds since 1970.
+    pub began: Option<f64>,
+    /// The time from the first to the last message, in seconds.
+    pub seconds: Option<f64>,
+    /// Its motors.
+    pub motors: Vec<String>,
+    /// Whether it is whole.
+    pub condition: Condition,
+    /// What is wrong with it.
+    pub message: Option<String>,
+}
+
+/// Whether the file of a recording is whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Condition {
+    /// It is whole.
+    Whole,
+    /// It has no end, or a part is damaged. The rest is readable.
+    Cut,
+    /// It is no recording, or cannot be read.
+    Unreadable,
+}
+
+/// What a recording has.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RecordingContent {
+    /// The name of its file.
+    pub name: String,
+    /// The time of its first message, in seconds since 1970. Times count from there.
+    pub zero: f64,
+    /// The time of its last message.
+    pub seconds: f64,
+    /// The signals. Their numbers are their places, from 0.
+    pub signals: Vec<RecordedSignal>,
+    /// What is wrong with the file.
+    pub damage: Option<String>,
+}
+
+/// A signal of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RecordedSignal {
+    /// Line and motor, such as `st0/motor1`.
+    pub motor: String,
+    /// Its name.
+    pub name: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+    /// Its meaning; may be empty.
+    pub doc: String,
+}
+
+/// The text before the samples of a part of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RecordingPart {
+    /// Where it begins, in seconds from the first message.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// What happened in this time.
+    pub events: Vec<RecordedEvent>,
+    /// Later events of this time, which are left out.
+    pub more_events: u32,
+    /// What is wrong with the file, as far as it was read.
+    pub damage: Option<String>,
+}
+
+/// An event of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct RecordedEvent {
+    /// When, in seconds from the first message.
+    pub t: f64,
+    /// Whom it concerns: a motor or a line.
+    pub of: String,
+    /// The kind, one word.
+    pub kind: String,
+    /// Who commanded it; may be empty.
+    pub by: String,
+    /// The sentence.
+    pub message: String,
 }

@@ -8,13 +8,14 @@ use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{self as share, Happening, MotorName, Reason};
 use serde::Deserialize;
-use tokio::sync::{Mutex as AsyncMutex, Notify, Semaphore, mpsc};
+use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
 
 use crate::alive::{DeadMan, Lapse, Ticket};
 use crate::drive::Motion;
 use crate::message::{Answer, Ask, FromPage, Request, Role, Text};
 use crate::program::{Listener, OWN_IDS, Program, Refusal};
+use crate::recordings::Recordings;
 use crate::server::link::{Link, lost, stop_all};
 
 /// Requests of a page about drives that are under way.
@@ -33,6 +34,7 @@ pub struct Page {
     opening: AsyncMutex<()>,
     /// The session that sees, while the share is there.
     view: Mutex<Option<Program>>,
+    recordings: Arc<Recordings>,
     requests: Arc<Semaphore>,
     out: mpsc::Sender<String>,
 }
@@ -54,6 +56,7 @@ impl Page {
         role: Role,
         deadline: Micros,
         link: Arc<Link>,
+        recordings: Arc<Recordings>,
         out: mpsc::Sender<String>,
     ) -> Self {
         Page {
@@ -65,6 +68,7 @@ impl Page {
             changed: Notify::new(),
             opening: AsyncMutex::new(()),
             view: Mutex::new(None),
+            recordings,
             requests: Arc::new(Semaphore::new(REQUESTS)),
             out,
         }
@@ -195,13 +199,19 @@ impl Page {
                     page.answer(id, stopped.map(|motors| Answer::StopAll { motors })).await;
                 });
             }
-            ask => {
-                let ready = self.check(&ask).and_then(|()| {
-                    let permit = Arc::clone(&self.requests).try_acquire_owned();
-                    let busy = format!("{REQUESTS} requests are under way, which is the limit");
-                    let permit = permit.map_err(|_| refusal(Reason::Busy, busy))?;
-                    Ok((permit, self.view()?))
+            Ask::Record { .. } | Ask::EndRecording | Ask::Recordings | Ask::Recording { .. } => {
+                let permit = match self.check(&ask).and_then(|()| self.place()) {
+                    Ok(permit) => permit,
+                    Err(refusal) => return self.refuse(id, refusal).await,
+                };
+                tasks.spawn(async move {
+                    let result = page.recordings.answer(ask, &page.name, page.view()).await;
+                    drop(permit);
+                    page.answer(id, result).await;
                 });
+            }
+            ask => {
+                let ready = self.check(&ask).and_then(|()| Ok((self.place()?, self.view()?)));
                 let (permit, view) = match ready {
                     Ok(ready) => ready,
                     Err(refusal) => return self.refuse(id, refusal).await,
@@ -239,6 +249,13 @@ impl Page {
         }
     }
 
+    /// A place among the requests that are under way.
+    fn place(&self) -> Result<OwnedSemaphorePermit, Refusal> {
+        let busy = format!("{REQUESTS} requests are under way, which is the limit");
+        let permit = Arc::clone(&self.requests).try_acquire_owned();
+        permit.map_err(|_| refusal(Reason::Busy, busy))
+    }
+
     /// Whether this page may ask for that.
     fn check(&self, ask: &Ask) -> Result<(), Refusal> {
         match ask {
@@ -249,12 +266,16 @@ impl Page {
             | Ask::Read { .. }
             | Ask::Limits
             | Ask::Dump { .. }
-            | Ask::Diff { .. } => Ok(()),
+            | Ask::Diff { .. }
+            | Ask::Recordings
+            | Ask::Recording { .. } => Ok(()),
             Ask::Write { .. }
             | Ask::Act { .. }
             | Ask::Run { .. }
             | Ask::Limit { .. }
-            | Ask::Restore { .. } => self.check_operator(),
+            | Ask::Restore { .. }
+            | Ask::Record { .. }
+            | Ask::EndRecording => self.check_operator(),
         }
     }
 
@@ -378,7 +399,15 @@ fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
 /// The motor that a request is about.
 fn motor_of(ask: &Ask) -> Option<MotorName> {
     match ask {
-        Ask::StopAll | Ask::LetGo | Ask::Motors { .. } | Ask::Describe { .. } | Ask::Limits => None,
+        Ask::StopAll
+        | Ask::LetGo
+        | Ask::Motors { .. }
+        | Ask::Describe { .. }
+        | Ask::Limits
+        | Ask::Record { .. }
+        | Ask::EndRecording
+        | Ask::Recordings
+        | Ask::Recording { .. } => None,
         Ask::Read { motor, .. }
         | Ask::Write { motor, .. }
         | Ask::Act { motor, .. }

@@ -29,6 +29,7 @@ fn the_page_has_the_types_of_the_server() {
     let mut types = Types::default();
     types.visit::<message::FromPage>();
     types.visit::<message::Text>();
+    types.visit::<message::RecordingPart>();
     types.visit::<share::Text>();
     let mut text =
         "// Written by `make web-types` from crates/monitor and crates/telemetry.\n".to_owned();

@@ -66,6 +66,10 @@ pub struct Args {
     #[arg(long, value_name = "TIME", default_value = "300ms",
         value_parser = span_up_to(Duration::from_secs(2)))]
     deadline: Duration,
+    /// The folder of the recordings that pages make and show. The first recording makes it
+    #[arg(long, value_name = "DIR", default_value = "recordings",
+        value_hint = clap::ValueHint::DirPath)]
+    recordings: PathBuf,
     /// Open the address of operators in the browser of this desktop
     #[arg(long)]
     open: bool,
@@ -163,8 +167,10 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
 fn start(args: &Args, share: PathBuf, web: Web) -> Result<server::Server, Failure> {
     let names = args.listen.names();
     let (deadline, program) = (args.deadline, PROGRAM.to_owned());
+    let recordings = args.recordings.clone();
     let Web { listener, tls } = web;
-    Ok(server::Server::start(Options { listener, tls, names, share, deadline, program })?)
+    let options = Options { listener, tls, names, share, recordings, deadline, program };
+    Ok(server::Server::start(options)?)
 }
 
 /// Says where browsers and programs connect.

@@ -63,7 +63,12 @@ impl Drives {
         drive: &impl Motion,
     ) -> Result<Answer, Refusal> {
         match ask {
-            Ask::StopAll | Ask::LetGo => Err(usage("the server carries this out without drives")),
+            Ask::StopAll
+            | Ask::LetGo
+            | Ask::Record { .. }
+            | Ask::EndRecording
+            | Ask::Recordings
+            | Ask::Recording { .. } => Err(usage("the server carries this out without drives")),
             Ask::Motors { line } => {
                 let speaks = self.speaks(&line)?;
                 Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })

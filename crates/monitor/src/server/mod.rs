@@ -4,6 +4,7 @@
 
 mod door;
 pub mod link;
+mod recordings;
 mod routes;
 mod site;
 mod socket;
@@ -23,6 +24,7 @@ pub use door::random_word;
 pub use tls::{Tls, TlsError};
 
 use crate::message::Role;
+use crate::recordings::Recordings;
 use door::Door;
 use link::Link;
 use state::State;
@@ -42,6 +44,8 @@ pub struct Options {
     pub names: Vec<String>,
     /// The socket of the share.
     pub share: PathBuf,
+    /// The folder of recordings. The first recording makes it.
+    pub recordings: PathBuf,
     /// How long a page may give no sign of life until its motors stop.
     pub deadline: Duration,
     /// The name and version of this program.
@@ -61,11 +65,13 @@ impl Server {
     /// # Errors
     /// The system gives no threads, sockets or random numbers.
     pub fn start(options: Options) -> io::Result<Self> {
-        let Options { listener, tls, names, share, deadline, program } = options;
+        let Options { listener, tls, names, share, recordings, deadline, program } = options;
         let address = listener.local_addr()?;
         listener.set_nonblocking(true)?;
         let door = Door::new(address.port(), tls.is_some(), names)?;
-        let state = Arc::new(State::new(door, Link::new(share), deadline, program)?);
+        let recordings = Recordings::new(recordings, share.clone());
+        let state = State::new(door, Link::new(share), recordings, deadline, program)?;
+        let state = Arc::new(state);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("monitor")
@@ -91,6 +97,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
+        self.state.recordings.close();
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_timeout(LAST);
         }

@@ -16,9 +16,9 @@ use axum::{Extension, Json, Router};
 use motorlink_telemetry::share::message::StoppedMotor;
 use serde::{Deserialize, Serialize};
 
-use super::site;
 use super::socket::{self, LONGEST_TEXT};
 use super::state::State;
+use super::{recordings, site};
 use crate::alive::Lapse;
 use crate::message::Role;
 
@@ -41,6 +41,8 @@ pub fn router(state: Arc<State>) -> Router {
         .route("/ws", get(open))
         .route("/api/stop-all", post(stop_all))
         .route("/api/let-go", post(let_go))
+        .route("/api/recordings/{name}", get(recordings::download))
+        .route("/api/recordings/{name}/part", get(recordings::part))
         .fallback(get(file))
         .layer(from_fn_with_state(Arc::clone(&state), admit))
         .with_state(state)

@@ -9,14 +9,14 @@ use futures_util::stream::{SplitSink, SplitStream, StreamExt};
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message as share;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 use super::link::{AGAIN, Link};
 use super::state::State;
 use crate::alive::Lapse;
-use crate::message::{Role, Text, Welcome};
+use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page::{Broken, Page, encode};
 use crate::program::{Listener, Program};
 
@@ -62,7 +62,8 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     };
     let (out, outgoing) = mpsc::channel(WAITING);
     let deadline = Micros::from(state.deadline);
-    let page = Arc::new(Page::new(name.clone(), role, deadline, Arc::clone(&state.link), out));
+    let (link, recordings) = (Arc::clone(&state.link), Arc::clone(&state.recordings));
+    let page = Arc::new(Page::new(name.clone(), role, deadline, link, recordings, out));
     state.pages().insert(name.clone(), Arc::clone(&page));
     let watched = Arc::clone(&page);
     let watch = tokio::spawn(async move { watched.watch().await }).abort_handle();
@@ -83,7 +84,7 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     let view = View::new(Arc::clone(&state.link), own_name, listener);
     let why = tokio::select! {
         // The page has gone, or does not read.
-        () = write(&page, &mut sink, first, outgoing, view) => return,
+        () = write(&page, &mut sink, first, outgoing, state.recordings.watch(), view) => return,
         why = read(&page, stream) => why,
     };
     if let Err(why) = why {
@@ -137,12 +138,14 @@ async fn read(page: &Arc<Page>, mut stream: SplitStream<WebSocket>) -> Result<()
 async fn write(
     page: &Page,
     sink: &mut Sink,
-    first: Vec<String>,
+    mut first: Vec<String>,
     mut outgoing: mpsc::Receiver<String>,
+    mut recorded: watch::Receiver<Option<Recorded>>,
     mut view: View,
 ) {
     let mut beats = interval(BEAT);
     beats.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    first.extend(recorded.borrow_and_update().clone().map(|it| encode(&Text::Recorded(it))));
     let mut first = first.into_iter();
     loop {
         let message = match first.next() {
@@ -151,6 +154,10 @@ async fn write(
                 biased;
                 _ = beats.tick() => Message::Text(encode(&page.beat()).into()),
                 Some(text) = outgoing.recv() => Message::Text(text.into()),
+                Ok(()) = recorded.changed() => {
+                    let Some(changed) = recorded.borrow_and_update().clone() else { continue };
+                    Message::Text(encode(&Text::Recorded(changed)).into())
+                }
                 message = view.next(page) => message,
             },
         };

@@ -11,6 +11,7 @@ use tokio::sync::Semaphore;
 use super::door::{Door, random_word};
 use super::link::Link;
 use crate::page::Page;
+use crate::recordings::Recordings;
 
 /// Pages at the same time.
 const PAGES: usize = 32;
@@ -19,6 +20,7 @@ const PAGES: usize = 32;
 pub struct State {
     pub door: Door,
     pub link: Arc<Link>,
+    pub recordings: Arc<Recordings>,
     pub deadline: Duration,
     pub program: String,
     pub run: String,
@@ -32,10 +34,17 @@ impl State {
     ///
     /// # Errors
     /// The system has no random numbers.
-    pub fn new(door: Door, link: Link, deadline: Duration, program: String) -> io::Result<Self> {
+    pub fn new(
+        door: Door,
+        link: Link,
+        recordings: Recordings,
+        deadline: Duration,
+        program: String,
+    ) -> io::Result<Self> {
         Ok(State {
             door,
             link: Arc::new(link),
+            recordings: Arc::new(recordings),
             deadline,
             program,
             run: random_word()?,

@@ -1,9 +1,9 @@
 //! Connections: how many, and how long they may take.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use axum::Router;
+use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
@@ -11,7 +11,7 @@ use rustix::net::sockopt::set_socket_send_buffer_size;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
-use tokio::time::{sleep, timeout};
+use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_rustls::TlsAcceptor;
 
 /// Connections at the same time, besides those of pages.
@@ -26,6 +26,35 @@ const EXCHANGE: Duration = Duration::from_secs(30);
 const STORED: usize = 1 << 15;
 /// The pause after a connection that could not be taken.
 const PAUSE: Duration = Duration::from_millis(50);
+
+/// When a connection is given up. What takes long, such as a download, moves it on while it goes on.
+#[derive(Clone)]
+pub struct Deadline(Arc<Mutex<Instant>>);
+
+impl Deadline {
+    fn new() -> Self {
+        Deadline(Arc::new(Mutex::new(Instant::now() + EXCHANGE)))
+    }
+
+    /// The connection goes on: its time begins again.
+    pub fn extend(&self) {
+        *self.time() = Instant::now() + EXCHANGE;
+    }
+
+    async fn pass(&self) {
+        loop {
+            let time = *self.time();
+            if time <= Instant::now() {
+                return;
+            }
+            sleep_until(time).await;
+        }
+    }
+
+    fn time(&self) -> MutexGuard<'_, Instant> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// Serves each connection in a task of its own: a panic in one ends that one.
 pub async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, router: Router) {
@@ -64,8 +93,12 @@ async fn exchange(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, 
     builder.timer(TokioTimer::new()).header_read_timeout(ARRIVAL).max_buf_size(HEADER);
     // A connection for each request: one that waits for more would have to be watched, too.
     builder.keep_alive(false);
-    let service = TowerToHyperService::new(router);
+    let deadline = Deadline::new();
+    let service = TowerToHyperService::new(router.layer(Extension(deadline.clone())));
     let connection = builder.serve_connection(TokioIo::new(stream), service).with_upgrades();
-    // A broken request concerns its sender alone.
-    let _ = timeout(EXCHANGE, connection).await;
+    tokio::select! {
+        // A broken request concerns its sender alone.
+        _ = connection => {}
+        () = deadline.pass() => {}
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Seek};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
 use mcap::records::op;
@@ -12,6 +12,11 @@ use super::damage::{Damage, Loss};
 use super::record::Channel;
 use super::record::{ChunkHead, Fields, HEAD, MessageHead, split};
 use super::recording::{Kind, Place, Recording};
+
+/// All times.
+const ALL: RangeInclusive<u64> = 0..=u64::MAX;
+/// The beginning of a chunk, with its times.
+const CHUNK_HEAD: u64 = (HEAD + ChunkHead::LONGEST) as u64;
 
 /// A message.
 #[derive(Debug, Clone)]
@@ -41,11 +46,26 @@ pub struct Messages<'a, R> {
     place: usize,
     ready: VecDeque<Message>,
     last: Option<u64>,
+    /// Chunks without a message between these are left out.
+    between: RangeInclusive<u64>,
 }
 
 impl<'a, R: Read + Seek> Messages<'a, R> {
-    pub(super) fn new(recording: &'a mut Recording<R>) -> Self {
-        Messages { recording, place: 0, ready: VecDeque::new(), last: None }
+    pub(super) fn new(recording: &'a mut Recording<R>, between: RangeInclusive<u64>) -> Self {
+        Messages { recording, place: 0, ready: VecDeque::new(), last: None, between }
+    }
+
+    /// Whether the head of a chunk says that all its messages are at other times.
+    fn is_elsewhere(&mut self, place: &Place) -> io::Result<bool> {
+        if place.kind != Kind::Chunk || self.between == ALL {
+            return Ok(false);
+        }
+        let bytes = self.recording.source.bytes(place.at.start, CHUNK_HEAD)?;
+        let head = bytes.get(HEAD..).and_then(ChunkHead::parse);
+        Ok(head.is_some_and(|ChunkHead { times: [first, last], .. }| {
+            let is_told = last > 0 && first <= last;
+            is_told && (last < *self.between.start() || first > *self.between.end())
+        }))
     }
 }
 
@@ -60,7 +80,12 @@ impl<R: Read + Seek> Iterator for Messages<'_, R> {
             }
             let place = self.recording.places.get(self.place)?.clone();
             self.place += 1;
-            match self.recording.read_place(&place, self.last) {
+            let read = match self.is_elsewhere(&place) {
+                Ok(true) => continue,
+                Ok(false) => self.recording.read_place(&place, self.last),
+                Err(error) => Err(error),
+            };
+            match read {
                 Ok(messages) => self.ready = messages,
                 Err(error) => {
                     self.place = usize::MAX;
@@ -75,7 +100,13 @@ impl<R: Read + Seek> Recording<R> {
     /// All messages in the order of the file. Damage is left out, and is in
     /// [`losses`](Self::losses) afterwards.
     pub fn messages(&mut self) -> Messages<'_, R> {
-        Messages::new(self)
+        Messages::new(self, ALL)
+    }
+
+    /// Messages of the chunks that have some between these times, ns since 1970. A long recording is
+    /// read faster by this. Those of other times in the same chunks are given, too.
+    pub fn messages_between(&mut self, times: RangeInclusive<u64>) -> Messages<'_, R> {
+        Messages::new(self, times)
     }
 
     /// The messages of a place. `after` is the time of the message before it.

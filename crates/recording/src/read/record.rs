@@ -184,6 +184,8 @@ impl MessageHead {
 /// The beginning of a chunk's record.
 #[derive(Debug, Clone)]
 pub struct ChunkHead {
+    /// Times of the first and of the last message, ns since 1970; both 0 without one.
+    pub times: [u64; 2],
     /// Size of the records when they are uncompressed.
     pub size: u64,
     /// Checksum of the uncompressed records; 0 if there is none.
@@ -201,11 +203,11 @@ impl ChunkHead {
 
     pub fn parse(body: &[u8]) -> Option<Self> {
         let mut fields = Fields(body);
-        let _times = (fields.u64()?, fields.u64()?);
+        let times = [fields.u64()?, fields.u64()?];
         let (size, sum) = (fields.u64()?, fields.u32()?);
         let (compression, stored) = (fields.text()?, fields.u64()?);
         let length = (body.len() - fields.0.len()) as u64;
-        Some(ChunkHead { size, sum, compression, stored, length })
+        Some(ChunkHead { times, size, sum, compression, stored, length })
     }
 
     /// Whether the head agrees with the length of its record.

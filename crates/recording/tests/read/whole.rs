@@ -4,7 +4,9 @@ use std::io::Cursor;
 
 use motorlink_recording::read::{ReadError, Recording};
 
-use crate::files::{all, check, compressed, finished, messages, options, read};
+use crate::files::{
+    IN_A_CHUNK, all, check, chunk_starts, compressed, finished, messages, options, read,
+};
 
 #[test]
 fn a_whole_file_gives_all_messages_in_order() {
@@ -68,4 +70,26 @@ fn a_file_of_another_kind_is_an_error() {
     assert!(matches!(Recording::new(Cursor::new(b"")), Err(ReadError::Empty)));
     assert!(matches!(Recording::new(Cursor::new(b"t [s],SPEED_MEAS\n")), Err(ReadError::NotMcap)));
     assert!(matches!(Recording::checked(Cursor::new(b"\x89MCAP0\r")), Err(ReadError::NotMcap)));
+}
+
+#[test]
+fn chunks_of_other_times_are_not_read() {
+    let file = finished(options(), 4);
+    let mut recording = Recording::new(Cursor::new(&file)).unwrap();
+    let all: Vec<u64> = recording.messages().map(|it| it.unwrap().log_time).collect();
+    let in_a_chunk = IN_A_CHUNK as usize;
+    let mut between = |first: u64, last: u64| -> Vec<u64> {
+        recording.messages_between(first..=last).map(|it| it.unwrap().log_time).collect()
+    };
+    let second = in_a_chunk..2 * in_a_chunk;
+    assert_eq!(between(all[in_a_chunk], all[in_a_chunk]), all[second.clone()]);
+    assert_eq!(between(all[in_a_chunk + 1], all[2 * in_a_chunk]), all[in_a_chunk..3 * in_a_chunk]);
+    assert_eq!(between(0, all[0] - 1), [0; 0]);
+    assert_eq!(between(0, u64::MAX), all);
+    // A chunk that was cut may have any times.
+    let cut = &file[..chunk_starts(&file)[1] + 150];
+    let mut recording = Recording::new(Cursor::new(cut)).unwrap();
+    let some = recording.messages_between(0..=1).count();
+    let whole = recording.messages().count();
+    assert!(some > 0 && some + in_a_chunk == whole, "{some} of {whole}");
 }
