@@ -96,9 +96,10 @@ class Outcome:
 
 
 class Running:
-    """A program that runs during the test. Its output is read continuously."""
+    """A program that runs during the test. Its output is read continuously. `first` is called in its
+    process before it begins."""
 
-    def __init__(self, arguments, stdin=subprocess.DEVNULL, folder=None, **variables):
+    def __init__(self, arguments, stdin=subprocess.DEVNULL, folder=None, first=None, **variables):
         self.process = subprocess.Popen(
             arguments,
             cwd=folder,
@@ -107,6 +108,7 @@ class Running:
             stderr=subprocess.PIPE,
             text=True,
             env=environment(variables),
+            preexec_fn=first,
         )
         self.out, self.err = [], []
         self._news = threading.Condition()

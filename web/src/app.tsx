@@ -5,6 +5,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { sentence } from './format';
 import { closedWhy, delay, lapsed, lastWelcome, latchedBy, shareLost, state, welcome } from './link';
 import { Said, useSaid } from './parts';
+import { RecordButton } from './record-button';
 import { release, stopAll, stopReport } from './stop';
 import { VIEWS, load, view } from './views';
 
@@ -62,6 +63,7 @@ function Status() {
       <span aria-label="Connection" role="group">
         <Connection />
       </span>
+      <RecordButton />
       {who && (
         <span class="muted">
           {who.name}, {who.role}

@@ -3,7 +3,7 @@ import { signal } from '@preact/signals';
 import { ServerClock } from './clock';
 import { type Rows, decode, groupOf } from './rows';
 import type {
-  Beat, Event as DriveEvent, Group, Line, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
+  Beat, Event as DriveEvent, Group, Line, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
 } from './wire';
 
 export type { Rows } from './rows';
@@ -67,6 +67,8 @@ export const lapsed = signal<string | null>(null);
 export const closedWhy = signal<string | null>(null);
 /** Why the share is lost. */
 export const shareLost = signal<string | null>(null);
+/** The recording that is made, or the last one. */
+export const recorded = signal<Recorded | null>(null);
 /** Whether this page turned motors, so that its end stops them. */
 export const holds = signal(false);
 /** Time to the server and back, in ms. It grows while nothing is received. */
@@ -318,6 +320,7 @@ function heard(text: Text | ShareText) {
       state.value = 'open';
       shareLost.value = null;
       closedWhy.value = null;
+      recorded.value = null;
       measuredDelay = 0;
       clock.forget();
       begunAgain();
@@ -367,6 +370,9 @@ function heard(text: Text | ShareText) {
       else if (wasLost) begunAgain();
       break;
     }
+    case 'recorded':
+      recorded.value = text;
+      break;
     default:
       break;
   }

@@ -27,21 +27,24 @@ export function groupOf(buffer: ArrayBuffer): number | null {
   return head.getUint32(0, true) === VERSION ? head.getUint32(4, true) : null;
 }
 
-/** The rows of a message of a group, or null if its size is not that of its rows and columns. */
-export function decode(buffer: ArrayBuffer, { line, motor, columns }: Group): Rows | null {
+/** The columns of a message with so many signals, or null if its size is not that of its rows. */
+export function decodeColumns(buffer: ArrayBuffer, signals: number) {
   const head = new DataView(buffer);
   const rows = head.getUint32(12, true);
-  const wide = columns.length + 2;
+  const wide = signals + 2;
   if (head.getUint32(16, true) !== wide || buffer.byteLength !== HEADER + 8 * rows * wide) return null;
   const column = (at: number) => new Float64Array(buffer, HEADER + 8 * rows * at, rows);
   return {
-    line,
-    motor,
-    columns,
     t0: head.getFloat64(24, true),
     t: column(0),
     span: column(1),
-    values: columns.map((_, at) => column(at + 2)),
+    values: Array.from({ length: signals }, (_, at) => column(at + 2)),
     lost: head.getUint32(20, true),
   };
+}
+
+/** The rows of a message of a group, or null if its size is not that of its rows and columns. */
+export function decode(buffer: ArrayBuffer, { line, motor, columns }: Group): Rows | null {
+  const decoded = decodeColumns(buffer, columns.length);
+  return decoded && { line, motor, columns, ...decoded };
 }

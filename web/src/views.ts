@@ -14,12 +14,13 @@ export const VIEWS: readonly [View, ...View[]] = [
   { path: 'registers', title: 'Registers' },
   { path: 'step', title: 'Step response' },
   { path: 'wire', title: 'Wire' },
+  { path: 'recordings', title: 'Recordings' },
   { path: 'events', title: 'Events' },
   { path: 'ports', title: 'Ports' },
 ];
 
 const modules = import.meta.glob<{ default: ComponentType }>(
-  './views/{motors,plots,registers,step,wire,events,ports}.tsx',
+  './views/{motors,plots,registers,step,wire,recordings,events,ports}.tsx',
 );
 
 /** Loads a view, or gives null if this build does not have it. */

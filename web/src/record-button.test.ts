@@ -1,0 +1,32 @@
+import { describe, expect, it, vi } from 'vitest';
+import type { Recorded } from './wire';
+
+vi.mock('./link', () => ({}));
+vi.mock('./parts', () => ({}));
+const { isActive, missing, summary } = await import('./record-button');
+
+const recording: Recorded = {
+  name: '2026-11-23T14-05-09Z.mcap', phase: 'recording', by: 'page 1', began: 0, seconds: 75.3, bytes: 1_234_567,
+  values: 10, lost: 0, unconfirmed: 0, rates: null, motors: [], silent: [], refused: [], left_out: [], message: null,
+};
+
+describe('the recording in the header', () => {
+  it('says its time and size', () => {
+    expect(summary(recording)).toBe('REC 01:15 1.2 MB');
+    expect(summary({ ...recording, phase: 'starting' })).toMatch(/^REC starts/);
+  });
+
+  it('is on from its start to the end of its file', () => {
+    const on = (['starting', 'recording', 'ending', 'ended', 'failed'] as const).map((phase) =>
+      isActive({ ...recording, phase }));
+    expect(on).toEqual([true, true, true, false, false]);
+    expect(isActive(null)).toBe(false);
+  });
+
+  it('says what is missing', () => {
+    expect(missing(recording)).toBe('');
+    expect(missing({ ...recording, lost: 3, silent: ['st0/motor1'], left_out: ['rmd0'] })).toBe(
+      '3 lost, no values of st0/motor1, no motor answered on rmd0',
+    );
+  });
+});
