@@ -154,21 +154,19 @@ class Page:
 
     def turn(self, hold=False):
         """Turns ST motor 1 and RMD motor 2."""
-        answer = self.act("st0", 1, "SET_RAMP", hold, speed_rpm=1500, duration_ms=100)
-        assert answer["kind"] == "answer", answer
-        self.start(hold)
-        answer = self.act("rmd0", 2, "set_speed", hold, speed_dps=360)
-        assert answer["kind"] == "answer", answer
+        self.act_soon("st0", 1, "SET_RAMP", hold, speed_rpm=1500, duration_ms=100)
+        self.act_soon("st0", 1, "START_MOTOR", hold)
+        self.act_soon("rmd0", 2, "set_speed", hold, speed_dps=360)
 
-    def start(self, hold=False):
-        """Starts ST motor 1, as soon as it has stopped."""
+    def act_soon(self, *words, **values):
+        """A command that is carried out, as soon as the motor has stopped and the line is not busy."""
 
-        def started():
-            answer = self.act("st0", 1, "START_MOTOR", hold)
-            assert answer["kind"] == "answer" or answer["reason"] == "refused", answer
+        def done():
+            answer = self.act(*words, **values)
+            assert answer["kind"] == "answer" or answer["reason"] in ("refused", "expired"), answer
             return answer["kind"] == "answer"
 
-        eventually(started, "a start")
+        eventually(done, f"{words}")
 
     def lapsed(self, within=15):
         """Waits until the server stops the motors of the page; gives the reason."""

@@ -84,8 +84,8 @@ def event(name, **members):
 
 def speeds(client):
     """The speeds of ST motor 1 and RMD motor 2, by the drives themselves."""
-    rpm = client.command("st0", 1, 2, 30)["bytes"]
-    dps = client.command("rmd0", 2, 0x9C, *7 * [0])["bytes"]
+    rpm = client.command("st0", 1, 2, 30, within=30)["bytes"]
+    dps = client.command("rmd0", 2, 0x9C, *7 * [0], within=30)["bytes"]
     return struct.unpack("<i", bytes(rpm))[0], struct.unpack_from("<h", bytes(dps), 4)[0]
 
 

@@ -16,7 +16,7 @@ from sharing import Client, are_still, event, speeds
 #: Pages that are killed. ROUNDS=20 for more.
 ROUNDS = int(os.environ.get("ROUNDS", "3"))
 #: A deadline that a live page keeps on a busy machine.
-DEADLINE = ("--deadline", "1s")
+DEADLINE = ("--deadline", "2s")
 #: A busy machine may be late with a reply.
 PATIENT = ("--timeout", "60s")
 SET_SPEED = 0xA2
@@ -112,8 +112,8 @@ def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(s
         elif ends == "not drawn":
             page.draws = False
         else:
-            page.late = 1.5
-        assert page.lapsed() == "the page gave no sign of life for 1000 ms"
+            page.late = 3.0
+        assert page.lapsed() == "the page gave no sign of life for 2000 ms"
         rests(watcher)
         turns_on()
         answer = page.act("st0", 1, "START_MOTOR")
@@ -121,7 +121,7 @@ def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(s
         page.forget()
         page.lives, page.draws, page.late = True, True, 0.0
         eventually(lambda: page.act("st0", 1, "START_MOTOR")["kind"] == "answer", "a page that is alive again")
-        assert page.act("rmd0", 2, "set_speed", speed_dps=360)["kind"] == "answer"
+        page.act_soon("rmd0", 2, "set_speed", speed_dps=360)
         turns(watcher)
         page.leave()
         rests(watcher)
@@ -135,11 +135,11 @@ def test_hold_to_run_ends_with_the_key(site, watcher):
         page.held = False
         assert page.lapsed() == "the key or the finger of hold-to-run is up"
         rests(watcher)
-        # Without the key it ends at once, whatever the command says.
+        # Without the key the next sign of life ends it, or says so before it is sent.
         page.forget()
-        page.turn()
-        assert page.act("st0", 1, "START_MOTOR", hold=True)["kind"] in ("answer", "refusal")
-        assert "hold-to-run" in page.lapsed()
+        answer = page.act("rmd0", 2, "set_speed", hold=True, speed_dps=360)
+        why = page.lapsed() if answer["kind"] == "answer" else answer["message"]
+        assert why == "the key or the finger of hold-to-run is up"
         rests(watcher)
 
 
@@ -197,7 +197,7 @@ def test_a_stop_of_one_motor_leaves_the_others(site, watcher):
         assert stopped == {"line": "st0", "motor": 1}
         eventually(lambda: abs(speeds(watcher)[0]) < 30, "a motor that rests")
         assert speeds(watcher)[1] > 300
-        page.start()
+        page.act_soon("st0", 1, "START_MOTOR")
         turns(watcher)
 
 
@@ -274,7 +274,7 @@ def test_a_server_that_was_suspended_counts_the_time(monitor, watcher):
         try:
             # The page goes on, and what it says waits.
             sent = page.frame
-            eventually(lambda: page.frame > sent + 15, "signs of life")
+            eventually(lambda: page.frame > sent + 25, "signs of life")
         finally:
             os.kill(server.process.pid, signal.SIGCONT)
         assert "no sign of life" in page.lapsed()
@@ -291,7 +291,7 @@ def test_a_guard_stops_the_motor_when_the_server_is_killed(start, serve, drives,
     with site.page() as page:
         page.alive()
         for command, values in (("SET_RAMP", {"speed_rpm": 1500, "duration_ms": 100}), ("START_MOTOR", {})):
-            assert page.act("st0", 1, command, **values)["kind"] == "answer"
+            page.act_soon("st0", 1, command, **values)
         eventually(lambda: drives.motor(1, drives.ports[0]["port"])["speed_rpm"] > 1000, "a motor that turns")
         server.kill()
         eventually(lambda: abs(drives.motor(1, drives.ports[0]["port"])["speed_rpm"]) < 30, "a motor that rests")
@@ -362,7 +362,7 @@ def test_several_pages_have_names_and_sessions_of_their_own(site, watcher):
         one.turn()
         turns(watcher)
         # The last who moves a motor has it.
-        assert two.act("rmd0", 2, "set_speed", speed_dps=340)["kind"] == "answer"
+        two.act_soon("rmd0", 2, "set_speed", speed_dps=340)
         one.leave()
         eventually(lambda: abs(speeds(watcher)[0]) < 30, "the motor of the page that left")
         assert speeds(watcher)[1] > 300
