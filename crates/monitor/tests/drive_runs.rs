@@ -297,3 +297,32 @@ async fn a_motor_that_cannot_start_gets_no_ramp() {
     assert_eq!(page.refused(run(rmd(1), Mode::Speed, 10.0, 10.0)).await.0, Reason::Latched);
     assert_eq!(world.rmd_motion(1), Vec::<Vec<u8>>::new());
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn no_start_follows_a_stop_that_comes_while_a_run_begins() {
+    let world = World::new("run-begins", Profile::Spec);
+    let page = world.page().await;
+    let is_stop = |bytes: &[u8]| bytes == [0x03, 0x02];
+    let mut stopped_early = 0;
+    for round in 0..20 {
+        let end = std::time::Instant::now() + world::LIMIT;
+        while page.read(st(1), &["STATUS"]).await[0].1 != "IDLE" {
+            assert!(std::time::Instant::now() < end, "the motor does not stop");
+        }
+        let begin = world.st.lock().unwrap().len();
+        let since = || world.st.lock().unwrap()[begin..].to_vec();
+        let starting = page.ask(run(st(1), Mode::Speed, 1500.0, 3000.0));
+        // The stop comes after the first, second or a later request of the run.
+        let stopping = async {
+            until(|| (since().len() > round % 7).then_some(())).await;
+            page.stop(st(1)).await;
+        };
+        let (started, ()) = tokio::join!(starting, stopping);
+        stopped_early += u32::from(started.is_err());
+        let sent = since();
+        let stop = sent.iter().position(|(_, bytes)| is_stop(bytes)).unwrap();
+        let moves = |(_, bytes): &Sent| matches!(bytes[..], [0x07, ..] | [0x03, 0x01]);
+        assert!(!sent[stop..].iter().any(moves), "{round}: {started:?} {sent:02x?}");
+    }
+    assert!(stopped_early > 0);
+}

@@ -75,7 +75,7 @@ impl Act {
         let reply = send(control, &exchanges, request).await?;
         let values = self.values(&exchanges, &reply)?;
         if is_start(request) {
-            started(&exchanges).await?;
+            started(&Exchanges::new(&program, &self.target)).await?;
         } else {
             exchanges.confirm().await.map_err(|why| match is_worth_repeating(&why) {
                 true => unconfirmed(&exchanges),
@@ -107,10 +107,9 @@ pub(super) async fn send(
 }
 
 /// Checks that a START_MOTOR had an effect: a drive acknowledges it in any case.
-pub(super) async fn started(exchanges: &Exchanges<'_>) -> Result<(), Refusal> {
+pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
     let mut starting = Starting::default();
     let _ = starting.replied(0);
-    let reads = Exchanges::new(exchanges.program, exchanges.target);
     let Some((motor, profile)) = reads.of_st() else { return Ok(()) };
     loop {
         let StRequest::GetRegister(register) = starting.request() else { return Ok(()) };
@@ -118,7 +117,7 @@ pub(super) async fn started(exchanges: &Exchanges<'_>) -> Result<(), Refusal> {
         let bits = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
         let Some(result) = starting.replied(bits) else { continue };
         reads.confirm().await.map_err(|why| match is_worth_repeating(&why) {
-            true => unconfirmed(&reads),
+            true => unconfirmed(reads),
             false => why,
         })?;
         return match result {

@@ -193,12 +193,13 @@ impl Begun<'_> {
 
     /// Reads what a run begins with. Its replies are confirmed.
     async fn measure(&self, requests: &[Request]) -> Result<Vec<Vec<u8>>, Refusal> {
-        let reads = self.reads();
-        let mut attempt = 1;
+        // Only the first one begins the sequence: a stop after it ends the run.
+        let (mut reads, mut attempt) = (self.reads(), 1);
         loop {
             let mut replies = Vec::new();
             for request in requests {
                 replies.push(reads.request(request).await?);
+                reads = reads.continues();
             }
             match reads.confirm().await {
                 Ok(()) => return Ok(replies),
@@ -314,7 +315,7 @@ impl Begun<'_> {
     async fn start(&self, motor: MotorNumber) -> Result<(), Refusal> {
         let start = StRequest::ExecuteCommand(Command::StartMotor);
         self.command(&Request::st(motor.number(), start)).await?;
-        started(&self.reads()).await
+        started(&self.reads().continues()).await
     }
 }
 
