@@ -60,7 +60,8 @@ describe('hold to run', () => {
     ['pointerup', () => give(button, 'pointerup')],
     ['pointercancel', () => give(button, 'pointercancel')],
     ['lostpointercapture', () => give(button, 'lostpointercapture')],
-    ['contextmenu', () => give(button, 'contextmenu')],
+    ['a menu of the mouse', () => give(button, 'contextmenu', { pointerType: 'mouse' })],
+    ['a menu of the keyboard', () => give(button, 'contextmenu')],
     ['a second button of the mouse', () => give(button, 'pointerdown', { button: 2, pointerId: 1 })],
     ['blur of the button', () => give(button, 'blur')],
     ['blur of the window', () => give(frame, 'blur')],
@@ -82,6 +83,13 @@ describe('hold to run', () => {
     expect(held.value).toBe(false);
     expect(said).toEqual([true, false]);
     expect(ended).toHaveBeenCalledOnce();
+  });
+
+  it('lasts while a phone asks for a menu under the finger, which does not open', () => {
+    press();
+    const opens = give(button, 'contextmenu', { pointerType: 'touch' });
+    expect(opens).toBe(false);
+    expect(held.value).toBe(true);
   });
 
   it.each(['h', 'H', 'Enter'])('lasts from key down to key up of %s, and ignores repetitions', (name) => {

@@ -37,7 +37,8 @@ export function holdToRun(button: HTMLElement, began: () => void, ended: () => v
     [button, 'lostpointercapture', release],
     [button, 'contextmenu', (event) => {
       event.preventDefault();
-      release();
+      // A finger that is held long asks for a menu on phones, which does not open then.
+      if ((event as PointerEvent).pointerType !== 'touch') release();
     }],
     [button, 'blur', release],
     [button, 'keydown', (event) => {
