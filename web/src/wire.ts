@@ -802,7 +802,27 @@ motor: number, } | { "ask": "stop",
 /**
  * The motor; all motors that were started or read, without it.
  */
-motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" });
+motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "frames", 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * Not before this time of the line's clock, in seconds.
+ */
+from?: number | null, 
+/**
+ * Not after this time of the line's clock, in seconds.
+ */
+to?: number | null, 
+/**
+ * Only those after the frame with this number.
+ */
+after?: number | null, 
+/**
+ * How many at most.
+ */
+most: number, });
 
 export type ShareText = { "kind": "answer", 
 /**
@@ -848,7 +868,27 @@ motors: Array<StoppedMotor>, } | { "to": "latch" } | { "to": "release" } | { "to
 /**
  * Those of all signals that are read.
  */
-rates: Array<SignalRate>, }) | { "kind": "refusal", 
+rates: Array<SignalRate>, } | { "to": "frames", 
+/**
+ * In the order in which they were seen.
+ */
+frames: Array<WireFrame>, 
+/**
+ * More such frames are kept: those after the last one of these.
+ */
+more: boolean, 
+/**
+ * Frames after the one that was named are forgotten.
+ */
+missed: boolean, 
+/**
+ * When the oldest frame that is kept was seen, by the clock of the line, in seconds.
+ */
+kept_since?: number | null, 
+/**
+ * What the line carried from the first one of these frames to the last.
+ */
+load: WireLoad, }) | { "kind": "refusal", 
 /**
  * That of the request.
  */
@@ -1075,3 +1115,83 @@ deadline: number,
  * Which run of the server it is. Another one knows nothing of the page's subscriptions and motors.
  */
 run: string, };
+
+export type WireFrame = { 
+/**
+ * Its number on this line. Later frames have greater ones.
+ */
+number: number, 
+/**
+ * When it was sent, or its last byte came: by the clock of the line, in seconds.
+ */
+t: number, 
+/**
+ * Its direction.
+ */
+direction: WireWay, 
+/**
+ * What it is.
+ */
+result: WireResult, 
+/**
+ * The identifier of a CAN frame.
+ */
+id?: number | null, 
+/**
+ * The bytes on a serial line, or the data of a CAN frame, in hexadecimal.
+ */
+bytes: string, 
+/**
+ * What it means, or why it is no frame.
+ */
+words: string, 
+/**
+ * The motor, if it is known.
+ */
+motor?: number | null, 
+/**
+ * Whether it repeats a request that got no reply.
+ */
+retry?: boolean, 
+/**
+ * Whether it is a request that got no reply.
+ */
+unanswered?: boolean, };
+
+export type WireLoad = { 
+/**
+ * When it begins, by the clock of the line, in seconds. Missing without frames.
+ */
+from?: number | null, 
+/**
+ * When it ends.
+ */
+to?: number | null, 
+/**
+ * Bits on the wire: 10 a byte on a serial line. On a CAN bus without stuffed bits.
+ */
+bits: number, 
+/**
+ * The part of the time in which a reply was awaited, 0 to 1.
+ */
+busy: number, 
+/**
+ * Requests that the drive refused.
+ */
+nacks: number, 
+/**
+ * Bytes that are no frame.
+ */
+damaged: number, 
+/**
+ * Requests that were sent again.
+ */
+retries: number, 
+/**
+ * Requests without a reply.
+ */
+unanswered: number, };
+
+export type WireResult = "ok" | "nack" | "damaged" | "foreign" | "later";
+
+export type WireWay = "to-drive" | "from-drive";
