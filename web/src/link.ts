@@ -61,6 +61,8 @@ export interface Entry extends DriveEvent {
 export const entries = signal<readonly Entry[]>([]);
 /** The last events, each as it came, the newest last. */
 export const events = signal<readonly DriveEvent[]>([]);
+/** Rows that were left out because nothing confirmed them, by line. */
+export const unconfirmed = signal<ReadonlyMap<string, number>>(new Map());
 /** Why the page's motors were stopped last. */
 export const lapsed = signal<string | null>(null);
 /** Why the server closed the last connection. */
@@ -343,6 +345,11 @@ function heard(text: Text | ShareText) {
     case 'group': {
       const want = [...wants].find((one) => one.subscription === text.subscription);
       if (want) groups.set(text.group, { want, group: text });
+      break;
+    }
+    case 'unconfirmed': {
+      const count = (unconfirmed.value.get(text.line) ?? 0) + text.rows;
+      unconfirmed.value = new Map(unconfirmed.value).set(text.line, count);
       break;
     }
     case 'event':

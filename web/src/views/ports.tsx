@@ -2,7 +2,7 @@
 import { useEffect } from 'preact/hooks';
 import { lineEvents, motorEvents, rates, watchRates } from '../drives';
 import { rate, timeOfDay } from '../format';
-import { entries, lines, motors, refreshMotors, searchFailed, searching, welcome } from '../link';
+import { entries, lines, motors, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
 import { nameOf } from '../stop';
 import type { Line } from '../wire';
 import './ports.css';
@@ -15,6 +15,8 @@ function counts(line: string): string {
     const count = entries.value.filter((one) => one.line === line && one.event === kind).length;
     return count ? [`${count} × ${title}`] : [];
   });
+  const rows = unconfirmed.value.get(line) ?? 0;
+  if (rows) texts.push(`${rows} × values left out without confirmation`);
   return `${texts.join(', ') || 'none'} since this page was opened`;
 }
 
