@@ -167,7 +167,7 @@ export function Figure(props: FigureProps) {
     if (b !== null) parts.push(`B ${full(b)}`);
     const both = between(a, b);
     if (both) parts.push(`B − A ${duration(both.dt)}`, `1/(B − A) ${withUnit(both.frequency, 'Hz')}`);
-    return parts.join('  ');
+    return parts.map((part) => part.replaceAll(' ', '\u00a0')).join('  ');
   };
 
   const waiting = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);

@@ -263,6 +263,7 @@ describe('search', () => {
   it('finds by each word', () => {
     expect(found('')).toHaveLength(5);
     expect(found('meas ST0 2')).toEqual(['st0 2 SPEED_MEAS']);
+    expect(found('rmd0/12 speed')).toEqual(['rmd0 12 speed_dps']);
     expect(found('rpm')).toHaveLength(4);
     expect(found('nothing')).toEqual([]);
   });

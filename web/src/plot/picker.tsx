@@ -4,7 +4,7 @@ import { motors } from '../link';
 import { catalogue, settings } from './live';
 import { candidates } from './search';
 import { type Chosen, MOST_SIGNALS, RATES } from './settings';
-import { keyOf } from './store';
+import { keyOf, nameOf } from './store';
 
 const MOST_SHOWN = 60;
 const DEFAULT_RATE = 20;
@@ -33,7 +33,7 @@ export function Picker() {
             <input
               type="search"
               value={search}
-              placeholder="st0 1 speed"
+              placeholder="st0/1 speed"
               onInput={({ currentTarget }) => setSearch(currentTarget.value)}
             />
           </label>
@@ -52,7 +52,7 @@ export function Picker() {
                       onChange={() =>
                         put(is ? signals.filter((one) => keyOf(one) !== key) : [...signals, { ...signal.id, rate }])}
                     />
-                    <span>{signal.line} {signal.motor} {signal.name} {signal.unit && <small>{signal.unit}</small>}</span>
+                    <span>{nameOf(signal)} {signal.unit && <small>{signal.unit}</small>}</span>
                   </label>
                 </li>
               );
@@ -72,7 +72,7 @@ export function Picker() {
             <ul aria-label="Chosen signals">
               {signals.map((signal) => {
                 const key = keyOf(signal);
-                const name = `${signal.line} ${signal.motor} ${signal.name}`;
+                const name = nameOf(signal);
                 return (
                   <li key={key}>
                     <span>{name}</span>

@@ -12,7 +12,7 @@ export function candidates(
   catalogue: ReadonlyMap<string, readonly Column[]>,
   search: string,
 ): Candidate[] {
-  const words = search.toLowerCase().split(/\s+/).filter(Boolean);
+  const words = search.toLowerCase().split(/[\s/]+/).filter(Boolean);
   const first: Candidate[] = [];
   const others: Candidate[] = [];
   for (const [line, found] of motors) {

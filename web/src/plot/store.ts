@@ -46,6 +46,11 @@ export function keyOf({ line, motor, name }: SignalName): string {
   return `${line}/${motor}/${name}`;
 }
 
+/** As the page writes it: `st0/1 SPEED_MEAS`. */
+export function nameOf({ line, motor, name }: SignalName): string {
+  return `${line}/${motor} ${name}`;
+}
+
 /** A live signal. Its times are in seconds after `origin`. */
 export class Curve implements Trace {
   readonly key: string;
@@ -75,7 +80,7 @@ export class Curve implements Trace {
     this.line = wanted.line;
     this.motor = wanted.motor;
     this.signal = wanted.name;
-    this.name = `${wanted.line} ${wanted.motor} ${wanted.name}`;
+    this.name = nameOf(wanted);
     this.unit = wanted.unit;
     this.rate = wanted.rate;
     this.period = 1 / wanted.rate;

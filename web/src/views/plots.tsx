@@ -8,7 +8,7 @@ import { dayClock, duration, value } from '../plot/format';
 import { curves, missing, scheduler, settings, start, store, time } from '../plot/live';
 import { Picker } from '../plot/picker';
 import { LAYOUTS, type Layout, SPANS } from '../plot/settings';
-import { type Curve, LONGEST } from '../plot/store';
+import { type Curve, LONGEST, nameOf } from '../plot/store';
 import { age as old } from '../plot/format';
 import type { Trace } from '../plot/chart';
 import './plots.css';
@@ -26,7 +26,7 @@ const panels = computed<Panel[]>(() => {
   const { layout } = settings.value;
   const groups = new Map<string, Curve[]>();
   for (const curve of curves.value) {
-    const of = { one: 'Signals', unit: curve.unit || 'Without unit', motor: `${curve.line} motor ${curve.motor}` }[layout];
+    const of = { one: 'Signals', unit: curve.unit || 'Without unit', motor: `${curve.line}/${curve.motor}` }[layout];
     groups.set(of, [...(groups.get(of) ?? []), curve]);
   }
   return [...groups].map(([label, traces]) => ({ label, traces }));
@@ -61,12 +61,13 @@ export default function Plots() {
   useEffect(start, []);
   const height = useHeight();
   return (
-    <section class="plots" aria-label="Plots">
+    <section class="plots">
+      <h2>Plots</h2>
       <Toolbar />
       <Picker />
       {missing.value.length > 0 && (
         <p class="plots-note">
-          Not there now: {missing.value.map(({ line, motor, name }) => `${line} ${motor} ${name}`).join(', ')}.
+          Not there now: {missing.value.map(nameOf).join(', ')}.
         </p>
       )}
       {panels.value.length === 0 && <Empty />}

@@ -1,0 +1,105 @@
+// Plots of simulated drives.
+import AxeBuilder from '@axe-core/playwright';
+import type { Page } from '@playwright/test';
+import { readFileSync } from 'node:fs';
+import { expect, open, spin, test } from './bench';
+
+/** Chooses signals by their names. */
+async function choose(page: Page, ...names: string[]) {
+  await open(page, 'Plots');
+  await page.getByLabel('Values a second').first().selectOption('100');
+  for (const name of names) {
+    await page.getByRole('searchbox', { name: 'Search' }).fill(name);
+    await page.getByRole('list', { name: 'Signals that can be read' }).getByLabel(name).first().check();
+  }
+}
+
+/** A cell of a curve beside the plot. */
+const cell = (page: Page, curve: string, column: string) =>
+  page.getByRole('row').filter({ hasText: curve }).locator(`td[data-name="${column}"] [data-is]`).first();
+
+const numberIn = async (page: Page, curve: string, column: string) =>
+  Number((await cell(page, curve, column).textContent())!.replace('−', '-'));
+
+test.describe.configure({ timeout: 180_000 });
+
+const SPEED = 'st0/1 SPEED_MEAS';
+const RMD = 'rmd0/1 speed_dps';
+
+test('shows what turns, also while it is paused', async ({ live }) => {
+  await choose(live, SPEED, RMD);
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  await open(live, 'Motors');
+  await spin(live, 1000);
+  await open(live, 'Plots');
+  await expect.poll(() => numberIn(live, SPEED, 'Max')).toBeGreaterThan(300);
+  await live.getByRole('button', { name: 'Pause' }).click();
+  await expect(live.getByText(/Paused, \d+ s behind/)).toBeVisible();
+  const max = await numberIn(live, SPEED, 'Max');
+  await live.keyboard.press('Escape');
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBeLessThan(50);
+  expect(await numberIn(live, SPEED, 'Max')).toBe(max);
+  await live.getByRole('button', { name: 'Back to live' }).click();
+  await expect(live.getByText('Live', { exact: true })).toBeVisible();
+  expect(await numberIn(live, SPEED, 'Max')).toBeGreaterThanOrEqual(max);
+});
+
+test('keeps its signals over a reload, and its samples over a look at another view', async ({ live }) => {
+  await choose(live, SPEED, RMD);
+  await live.getByLabel('Visible time').selectOption({ label: '1 min' });
+  await live.reload();
+  await expect(live.getByText('Signals (2)')).toBeVisible();
+  await expect(live.getByLabel('Visible time')).toHaveValue('60');
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  await live.evaluate(() => localStorage.setItem('motorlink.plots', '{"signals":[{"line":7},null],"span":"x"'));
+  await live.reload();
+  await expect(live.getByText('Signals (0)')).toBeVisible();
+});
+
+test('cursors by keys: values, difference, the wire', async ({ live }) => {
+  await choose(live, SPEED);
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  await live.getByRole('button', { name: 'Pause' }).click();
+  await live.getByRole('application', { name: 'Signals' }).focus();
+  // Cursors begin in the middle of the plot, where there are no values yet. The end is live.
+  for (const key of ['Home', 'ArrowRight', ',', ',', '.', 'Shift+ArrowRight', 'Shift+ArrowRight']) await live.keyboard.press(key);
+  await expect(live.locator('.plot-reading')).toHaveText(/A\s.*B\s.*B\s−\sA\s.*1\/\(B\s−\sA\)\s.*Hz/);
+  await expect(live.locator('.plot [aria-live]')).toHaveText(/st0\/1 SPEED_MEAS/);
+  await live.keyboard.press('Enter');
+  await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
+});
+
+test('values that are not present any more are said to be old', async ({ bench, live }) => {
+  await choose(live, SPEED);
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  bench.monitor.process.kill('SIGSTOP');
+  await expect(live.locator('.plot-old [data-is="old"]')).toHaveText(/[23] s old/);
+  bench.monitor.process.kill('SIGCONT');
+  await expect(live.locator('.plot-old')).toHaveCount(0);
+});
+
+test('exports what is visible as CSV', async ({ live }) => {
+  await choose(live, SPEED, RMD);
+  await expect.poll(() => numberIn(live, RMD, 'Now')).toBe(0);
+  const [download] = await Promise.all([
+    live.waitForEvent('download'),
+    live.getByRole('button', { name: 'Export CSV' }).click(),
+  ]);
+  const [header, ...rows] = readFileSync(await download.path(), 'utf8').split('\r\n');
+  expect(header).toBe(`time,line,line_seconds,${SPEED} (rpm),${RMD} (°/s)`);
+  expect(rows.length).toBeGreaterThan(5);
+  expect(rows[0]).toMatch(/^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z,(st0|rmd0),\d+\.\d{6},/);
+});
+
+for (const colorScheme of ['light', 'dark'] as const) {
+  test(`with curves and its table is accessible, ${colorScheme}`, async ({ live }) => {
+    await live.emulateMedia({ colorScheme });
+    await choose(live, SPEED, RMD);
+    await live.getByLabel('Division into plots').selectOption('A plot for each unit');
+    await expect.poll(() => numberIn(live, RMD, 'Now')).toBe(0);
+    for (const table of await live.getByText('Values as a table').all()) await table.click();
+    await expect(live.getByRole('table').nth(1).getByRole('row').nth(2)).toBeVisible();
+    const { violations } = await new AxeBuilder({ page: live }).analyze();
+    expect(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`)).toEqual([]);
+  });
+}
