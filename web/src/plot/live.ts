@@ -21,7 +21,8 @@ export const missing = signal<readonly Chosen[]>([]);
 /** Changes with the curves of the store. */
 export const curves = signal(store.curves);
 export const time = new Window(settings.value.span, true, LEAST_SPAN, LONGEST);
-export const scheduler = new Scheduler(time, () => store.now());
+const lessMotion = matchMedia('(prefers-reduced-motion: reduce)');
+export const scheduler = new Scheduler(time, () => store.now(), () => lessMotion.matches);
 
 let started = false;
 let numbers: ReadonlyMap<string, number> = new Map();

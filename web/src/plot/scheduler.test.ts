@@ -51,8 +51,9 @@ it('does nothing without a change', () => {
   const one = panel();
   scheduler.add(one);
   frame();
+  vi.advanceTimersByTime(1000);
   for (let count = 0; count < 10; count += 1) frame();
-  expect([one.drawn, frames.length]).toEqual([1, 0]);
+  expect([one.drawn, frames.length, vi.getTimerCount()]).toEqual([1, 0, 0]);
 });
 
 it('hardly draws what is not on the screen, and not what stands still', () => {
@@ -101,4 +102,20 @@ it('lets live values become old without new ones, and ends with the last plot', 
   scheduler.sampled();
   expect(frames).toHaveLength(0);
   expect(vi.getTimerCount()).toBe(0);
+});
+
+it('moves in few steps for those who do not want motion, and obeys the user at once', () => {
+  const scheduler = new Scheduler(new Window(10, true, 1, 600), () => 1, () => true);
+  const one = panel();
+  scheduler.add(one);
+  frame();
+  for (let count = 0; count < 60; count += 1) {
+    scheduler.sampled();
+    frame();
+  }
+  expect(one.drawn).toBe(2);
+  expect(one.written).toBeGreaterThan(10);
+  scheduler.request();
+  frame();
+  expect(one.drawn).toBe(3);
 });

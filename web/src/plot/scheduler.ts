@@ -14,6 +14,7 @@ export interface Panel {
 const NUMBERS = 60;
 const STALE = 250;
 const UNSEEN = 1000;
+const CALM = 500;
 /** The browser paints about twice as long as the script runs, afterwards. */
 const PAUSE = 4;
 
@@ -24,18 +25,24 @@ export class Scheduler {
   private earliest = 0;
   private written = -Infinity;
   private drawnAll = -Infinity;
+  /** What the user sees is wrong, and has to be drawn at once. */
   private dirty = false;
+  /** There is something new. */
+  private grown = false;
+  private drawn = -Infinity;
 
-  /** `now` is the right end of live plots. */
   constructor(
     readonly window: Window,
-    private readonly now: () => number = () => NaN,
+    /** The right end of live plots. Finished data have none. */
+    private readonly now: (() => number) | null = null,
+    /** Whether live plots move in few steps, for people who do not want motion. */
+    private readonly isCalm: () => boolean = () => false,
   ) {}
 
   add(panel: Panel): () => void {
     this.panels.add(panel);
     // Without new samples plots scroll on slowly, and values become old.
-    this.timer ??= setInterval(() => this.window.live && this.request(), STALE);
+    if (this.now) this.timer ??= setInterval(this.sampled, STALE);
     this.request();
     return () => {
       this.panels.delete(panel);
@@ -55,7 +62,7 @@ export class Scheduler {
 
   /** New samples. A plot that stands still shows them as numbers only. */
   sampled = () => {
-    if (this.window.live) this.dirty = true;
+    if (this.window.live) this.grown = true;
     this.wake();
   };
 
@@ -71,17 +78,25 @@ export class Scheduler {
     }
     const start = performance.now();
     const write = time - this.written >= NUMBERS || (this.dirty && !this.window.live);
-    if (this.dirty) this.window.follow(this.now());
+    const due = this.grown && time - this.drawn >= (this.isCalm() ? CALM : 0);
+    const draws = this.dirty || due;
+    if (draws) {
+      if (this.now) this.window.follow(this.now());
+      this.drawn = time;
+    } else if (this.grown) {
+      this.wake();
+    }
     // What is not on the screen may be printed, or scrolled into view.
     const all = time - this.drawnAll >= UNSEEN;
     if (all) this.drawnAll = time;
     for (const panel of this.panels) {
       if (!panel.visible && !all) continue;
-      if (this.dirty) panel.draw();
+      if (draws) panel.draw();
       if (write || all) panel.write();
     }
     if (write) this.written = time;
     this.dirty = false;
+    if (draws) this.grown = false;
     this.earliest = time + PAUSE * (performance.now() - start);
   };
 }

@@ -119,6 +119,8 @@ describe('subscriptions', () => {
     set(wanted('A'), wanted('B', 20));
     share.subscriptions[0]!.refuse(new Error('no such signal'));
     expect(store.curves.map(({ refused }) => refused)).toEqual(['no such signal', '']);
+    share.send(0, { A: [1] });
+    expect(store.curves[0]!.refused).toBe('');
   });
 });
 

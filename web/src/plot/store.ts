@@ -244,6 +244,7 @@ export class Store {
     const doubt = this.doubts.get(`${line}/${motor}`);
     this.curvesOf(columns, line, motor).forEach((curve, column) => {
       if (!curve) return;
+      curve.refused = '';
       if (lost > 0) curve.breaks = 'yes';
       const ys = values[column]!;
       for (let row = 0; row < t.length; row += 1) {
