@@ -198,6 +198,27 @@ describe('samples as drives give them', () => {
     expect(analyse({ ...recording, t }).remarks.join()).toMatch(/gap of 20\d ms/);
   });
 
+  it('have a gap at the highest value: the overshoot is uncertain, or not given', () => {
+    const peak = Math.PI / (30 * Math.sqrt(0.75));
+    const without = (half: number) => {
+      const recording = record(response);
+      const kept = Array.from(recording.t, (_, index) => index).filter(
+        (index) => Math.abs(recording.t[index]! - 100 - peak) > half,
+      );
+      return analyse({ ...recording, t: kept.map((at) => recording.t[at]!), y: kept.map((at) => recording.y[at]!) });
+    };
+    const { overshoot } = without(0.012).figures;
+    if (overshoot.kind !== 'value') throw new Error(overshoot.why);
+    expect(overshoot.value + overshoot.error).toBeGreaterThan(16.303);
+    expect(overshoot.error).toBeGreaterThan(1);
+    expect(why(without(0.035).figures.overshoot)).toMatch(/may be in a gap/);
+  });
+
+  it('may be there between the earliest and the latest time of the step', () => {
+    const result = analyse({ ...record(response), at: [99.999, 100.03] });
+    expect(Math.abs(value(result, 'rise') - rise)).toBeLessThan(0.001);
+  });
+
   it('do not say exactly when the step was', () => {
     const result = analyse(record(response, { doubt: 0.02 }));
     const { delay } = result.figures;

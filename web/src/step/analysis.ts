@@ -69,6 +69,8 @@ const LEAST_END = 8;
 const SIGMAS = 4;
 /** Fewer different values may have a common step by chance. */
 const LEAST_STEPS = 8;
+/** Times between samples that are so many times the mean are gaps. */
+const GAP = 4;
 /** A straight line is met to this part of the rise time. */
 const STRAIGHT = 0.03;
 /** A smaller overshoot, as a part of the way, is not told from none. */
@@ -126,20 +128,20 @@ export function analyse(recording: Recording): Analysis {
   const unsettled = whyUnsettled(tail, Math.abs(way), noise, resolution);
   if (unsettled) return { ...analysis, figures: none(unsettled) };
 
+  // The last sample before the step is where the response begins.
+  const begin = Math.max(0, t.findLastIndex((time) => time < earliest));
   const scaled: Scaled = {
-    t: times,
-    x: values.map((value) => (value - analysis.initial) / way),
+    t: t.slice(begin),
+    x: y.slice(begin).map((value) => (value - analysis.initial) / way),
     at: (earliest + latest) / 2,
     doubt: (latest - earliest) / 2,
     endFrom,
     blur: blur / Math.abs(way),
     noise: noise / Math.abs(way),
     resolution: resolution / Math.abs(way),
+    mean: analysis.interval,
     update: NaN,
   };
-  // The last sample before the step is where the response begins.
-  scaled.t = [Math.min(t[first - 1]!, latest), ...times];
-  scaled.x = [(y[first - 1]! - analysis.initial) / way, ...scaled.x];
   scaled.update = analysis.update = updateInterval(scaled);
   const error = recording.to - final;
   analysis.figures = {
@@ -168,7 +170,7 @@ export function analyse(recording: Recording): Analysis {
       'The value rises in a straight line. A ramp or a limit of the current sets the rise time, not the gains.',
     );
   }
-  if (analysis.longest > 5 * analysis.interval) {
+  if (analysis.longest > GAP * analysis.interval) {
     analysis.remarks.push(`A gap of ${milliseconds(analysis.longest)} is in the record.`);
   }
   if (gap > 2 * analysis.interval) {
@@ -188,6 +190,8 @@ interface Scaled {
   noise: number;
   resolution: number;
   update: number;
+  /** The mean time between two samples. */
+  mean: number;
 }
 
 /** When the response has reached a level, between two samples. */
@@ -260,20 +264,41 @@ function rise(scaled: Scaled): Figure {
   return { kind: 'value', value, error };
 }
 
-function overshoot({ x, noise, resolution }: Scaled): Figure {
+function overshoot(scaled: Scaled): Figure {
+  const { x, noise, resolution } = scaled;
   const index = x.reduce((best, value, at) => (value > x[best]! ? at : best), 0);
   const over = x[index]! - 1;
   // The highest of many samples is too high by noise.
   const bound = Math.max((SIGMAS - 1) * noise + resolution, LEAST_OVERSHOOT);
+  const missed = Math.max(0, highestBetween(scaled) - x[index]!);
   if (over <= bound) {
-    return {
-      kind: 'below', bound: 100 * bound,
-      why: 'None is larger than noise and resolution.',
-    };
+    return { kind: 'below', bound: 100 * (bound + missed), why: 'None is larger than noise and resolution.' };
   }
   const [left, right] = [x[index - 1] ?? x[index]!, x[index + 1] ?? x[index]!];
   const curvature = Math.abs(left - 2 * x[index]! + right) / 8;
-  return { kind: 'value', value: 100 * over, error: 100 * (2 * noise + resolution + curvature) };
+  if (missed > over / 2) {
+    return { kind: 'none', why: `The highest value may be in a gap of the samples: ${percent(over)} or more.` };
+  }
+  return { kind: 'value', value: 100 * over, error: 100 * (2 * noise + resolution + Math.max(curvature, missed)) };
+}
+
+/** The most that the response can reach between two samples: where the lines before and after meet. */
+function highestBetween({ t, x, mean: interval }: Scaled): number {
+  let most = -Infinity;
+  for (let index = 1; index < t.length; index += 1) {
+    const gap = t[index]! - t[index - 1]!;
+    if (gap <= GAP * interval || Math.max(x[index]!, x[index - 1]!) < 1) continue;
+    const before = t.findLastIndex((time) => time <= t[index - 1]! - gap);
+    const after = t.findIndex((time) => time >= t[index]! + gap);
+    if (before < 0 || after < 0) continue;
+    const up = (x[index - 1]! - x[before]!) / (t[index - 1]! - t[before]!);
+    const down = (x[index]! - x[after]!) / (t[after]! - t[index]!);
+    if (up <= 0 || down <= 0) continue;
+    // The time after the first of the two samples at which both lines meet.
+    const at = (x[index]! + down * gap - x[index - 1]!) / (up + down);
+    if (at > 0 && at < gap) most = Math.max(most, x[index - 1]! + up * at);
+  }
+  return most;
 }
 
 function settling(scaled: Scaled, band: number): Figure {

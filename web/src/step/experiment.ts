@@ -173,7 +173,7 @@ export class Experiment {
 
   private async approach() {
     const { from, to, approach } = this.plan;
-    await this.until(() => this.samples.length > 2, 5, 'The motor gives no values.');
+    await this.until(() => this.samples.length > 2, 10, 'The motor gives no values.');
     let duration = 0;
     // A motor at rest is at 0 without a command. Starting it for that may need a rev-up.
     const isAtRest = from === 0 && this.plan.controlled.mode !== 'position' && this.samples.every(({ y }) => y === 0);

@@ -84,6 +84,7 @@ it('writes CSV and JSON with the gains and the definitions', async () => {
 it('gives numbers as many digits as their error has', async () => {
   const { figureText } = await import('./run');
   expect(figureText({ kind: 'value', value: 0.04373, error: 0.0021 }, 's')).toBe('43.7 ± 2.1 ms');
+  expect(figureText({ kind: 'value', value: -0.0004, error: 0.55 }, 'rpm')).toBe('0.00 ± 0.55 rpm');
   expect(figureText({ kind: 'value', value: 1.234, error: 0.26 }, 's')).toBe('1234 ± 260 ms');
   expect(figureText({ kind: 'value', value: 16.3, error: 0 }, '%')).toBe('16.30 ± 0.00 %');
   expect(figureText({ kind: 'below', bound: 0.0123, why: '' }, 's')).toBe('below 12 ms');

@@ -161,7 +161,8 @@ export function figureText(figure: Figure, unit: string): string {
     case 'value': {
       const error = scale * figure.error;
       const decimals = decimalsFor(error);
-      return `${(scale * figure.value).toFixed(decimals)} ± ${error.toFixed(decimals)} ${shown}`;
+      const value = (scale * figure.value).toFixed(decimals);
+      return `${Number(value) === 0 ? value.replace('-', '') : value} ± ${error.toFixed(decimals)} ${shown}`;
     }
     case 'below':
       return `below ${Number((scale * figure.bound).toPrecision(2))} ${shown}`;
