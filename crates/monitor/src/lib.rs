@@ -2,6 +2,7 @@
 //!
 //! - [`message`] has the texts between a page and the server, besides those of the share.
 //! - [`drive`] carries out what pages ask of drives.
+//! - [`foxglove`] is for other viewers of the same data.
 //! - [`program`] is a program at a share, without blocking.
 //! - [`alive`] is the dead-man of a page.
 //! - [`recordings`] makes recordings, lists them, and reads them for plots.
@@ -10,6 +11,7 @@
 
 pub mod alive;
 pub mod drive;
+pub mod foxglove;
 pub mod message;
 mod page;
 pub mod program;

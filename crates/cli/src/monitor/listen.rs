@@ -28,6 +28,9 @@ pub struct Listen {
     /// The private key of the first certificate, as PEM
     #[arg(long, value_name = "FILE", requires = "tls_cert", value_hint = clap::ValueHint::FilePath)]
     tls_key: Option<PathBuf>,
+    /// Where programs read the same data that have no token, PlotJuggler for one: 127.0.0.1:8765
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    foxglove: Option<SocketAddr>,
     /// Listen on an address of the network without TLS. Anybody there can read the tokens
     #[arg(long)]
     insecure: bool,
@@ -45,6 +48,22 @@ impl Listen {
             .trying("give --tls-cert and --tls-key, or --insecure if you trust the network"));
         }
         TcpListener::bind(address).map_err(|error| refused(address, &error))
+    }
+
+    /// Opens the port for programs without a token.
+    pub fn bind_foxglove(&self) -> Result<Option<TcpListener>, Failure> {
+        let Some(address) = self.foxglove else { return Ok(None) };
+        if !address.ip().is_loopback() && !self.insecure {
+            return Err(Failure::usage(format!(
+                "--foxglove {address} is for the network, where anybody can read the drives"
+            ))
+            .trying("give an address of this computer, or --insecure if you trust the network"));
+        }
+        let failed = |error| {
+            Failure::link(format!("cannot listen on {address}: {error}"))
+                .trying("give another --foxglove, such as --foxglove 127.0.0.1:0 for any free port")
+        };
+        TcpListener::bind(address).map(Some).map_err(failed)
     }
 
     /// The certificate, if there is one.

@@ -38,7 +38,8 @@ a share: other programs use the drives at the same time at --at. With --share, o
 share:PATH/LINE, it shows a share that runs already.
 
 Who may do what: the first address is for operators. The second one is for viewers, who see everything \
-and can stop, nothing else. Each has a token: who has the address may do that. Only programs of this \
+and can stop, nothing else. The third one is for programs that speak Foxglove's protocol, and read \
+only. Each has a token: who has the address may do that. Only programs of this \
 computer can connect, unless --listen has another address. That needs --tls-cert and --tls-key, or \
 --insecure: without TLS anybody on the network can read the tokens.
 
@@ -82,6 +83,7 @@ pub struct Args {
 struct Web {
     listener: TcpListener,
     tls: Option<Tls>,
+    foxglove: Option<TcpListener>,
 }
 
 pub fn run(mut args: Args) -> Result<(), Failure> {
@@ -90,7 +92,11 @@ pub fn run(mut args: Args) -> Result<(), Failure> {
     }
     let running = running_share(&args)?;
     // Before the ports: if no browser can connect, no drive is touched.
-    let web = Web { tls: args.listen.tls()?, listener: args.listen.bind()? };
+    let web = Web {
+        tls: args.listen.tls()?,
+        listener: args.listen.bind()?,
+        foxglove: args.listen.bind_foxglove()?,
+    };
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     match running {
@@ -168,8 +174,8 @@ fn start(args: &Args, share: PathBuf, web: Web) -> Result<server::Server, Failur
     let names = args.listen.names();
     let (deadline, program) = (args.deadline, PROGRAM.to_owned());
     let recordings = args.recordings.clone();
-    let Web { listener, tls } = web;
-    let options = Options { listener, tls, names, share, recordings, deadline, program };
+    let Web { listener, tls, foxglove } = web;
+    let options = Options { listener, tls, names, foxglove, share, recordings, deadline, program };
     Ok(server::Server::start(options)?)
 }
 
@@ -184,6 +190,7 @@ fn ready(
     let host = args.listen.host();
     let url = monitor.url(&host, Role::Operator);
     let viewer_url = monitor.url(&host, Role::Viewer);
+    let foxglove_url = monitor.foxglove_url(&host);
     let at = format!("unix:{}", path.display());
     if args.open
         && let Err(error) = open::that_detached(&url)
@@ -191,13 +198,21 @@ fn ready(
         output::note(format!("no browser can be opened: {error}; open the first address yourself"));
     }
     if args.json {
-        return output::print_line(&json!({
-            "event": "ready", "at": at, "lines": share::lines_in_json(lines),
-            "url": url, "viewer_url": viewer_url, "simulated": is_simulated,
-        }));
+        let mut ready = json!({
+            "event": "ready", "at": at, "lines": share::lines_in_json(lines), "url": url,
+            "viewer_url": viewer_url, "foxglove_url": foxglove_url, "simulated": is_simulated,
+        });
+        if let Some(url) = monitor.bare_url() {
+            ready["foxglove_url_without_token"] = json!(url);
+        }
+        return output::print_line(&ready);
     }
     output::print_line(&format!("monitor: {url}"))?;
     output::print_line(&format!("for viewers: {viewer_url}"))?;
+    output::print_line(&format!("for Foxglove and Lichtblick: {foxglove_url}"))?;
+    if let Some(url) = monitor.bare_url() {
+        output::print_line(&format!("for PlotJuggler: {url}"))?;
+    }
     output::print_line(&share::lines_in_words(&at, lines))?;
     match is_simulated {
         true => output::print_line(&"all drives are simulated; -p PORT shows real ones"),

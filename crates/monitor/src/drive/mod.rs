@@ -41,6 +41,11 @@ pub struct Drives {
 }
 
 impl Drives {
+    /// The names of the lines, and what their drives speak.
+    pub fn lines(&self) -> Vec<(String, Speaks)> {
+        self.lines.iter().map(|(name, speaks)| (name.clone(), *speaks)).collect()
+    }
+
     /// The drives of these lines.
     pub fn new(lines: Vec<Line>) -> Self {
         let speaks = |line: &Line| match line.protocol {

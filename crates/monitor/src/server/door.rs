@@ -3,8 +3,8 @@
 use std::net::IpAddr;
 
 use axum::http::header::{COOKIE, HOST, ORIGIN};
-use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName};
+use axum::http::uri::{Authority, Scheme};
+use axum::http::{HeaderMap, HeaderName, Uri};
 
 use crate::message::Role;
 
@@ -77,8 +77,7 @@ impl Door {
         let Some(host) = single(headers, HOST) else { return false };
         let Ok(authority) = host.parse::<Authority>() else { return false };
         let name = authority.host();
-        let address = name.strip_prefix('[').and_then(|name| name.strip_suffix(']'));
-        let is_address = address.unwrap_or(name).parse::<IpAddr>().is_ok();
+        let is_address = address(name).is_some();
         let is_known = |own: &str| own.eq_ignore_ascii_case(name);
         let is_own =
             is_address || is_known("localhost") || self.names.iter().any(|own| is_known(own));
@@ -99,6 +98,31 @@ impl Door {
         let origin = single(headers, ORIGIN);
         Some(own.zip(origin).is_some_and(|(own, origin)| own.eq_ignore_ascii_case(origin)))
     }
+}
+
+/// Whether the request came from a page of this computer; `None`: from no page.
+pub fn is_local_origin(headers: &HeaderMap) -> Option<bool> {
+    if !headers.contains_key(ORIGIN) {
+        return None;
+    }
+    let uri = single(headers, ORIGIN).and_then(|origin| origin.parse::<Uri>().ok());
+    let is_local = |uri: Uri| {
+        let is_web = uri.scheme().is_some_and(|it| *it == Scheme::HTTP || *it == Scheme::HTTPS);
+        let is_bare = uri.path() == "/" && uri.query().is_none();
+        let name = uri.host().unwrap_or_default();
+        is_web && is_bare && (name.eq_ignore_ascii_case("localhost") || is_loopback(name))
+    };
+    Some(uri.is_some_and(is_local))
+}
+
+/// Whether the host of an address is an address of this computer alone.
+fn is_loopback(host: &str) -> bool {
+    address(host).is_some_and(|ip| ip.is_loopback())
+}
+
+fn address(host: &str) -> Option<IpAddr> {
+    let inner = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
+    inner.unwrap_or(host).parse().ok()
 }
 
 /// A header that is there once.

@@ -1,7 +1,7 @@
 //! The connection of the server itself to the share: it stops all motors when no page can.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use motorlink_telemetry::share::message::{Answer, Ask, Line, Reason, StoppedMotor};
@@ -36,6 +36,11 @@ impl Link {
     /// The share at a path. [`keep`](Self::keep) connects to it.
     pub fn new(path: PathBuf) -> Self {
         Link { path, joined: watch::Sender::new(None) }
+    }
+
+    /// Where the share is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Connects a program of this name. Gives the name that events have, too.

@@ -13,7 +13,7 @@ mod tls;
 mod transport;
 
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,6 +42,8 @@ pub struct Options {
     pub tls: Option<Tls>,
     /// Names of this machine that browsers may use, besides its addresses.
     pub names: Vec<String>,
+    /// Where programs connect that speak Foxglove's protocol without a token.
+    pub foxglove: Option<TcpListener>,
     /// The socket of the share.
     pub share: PathBuf,
     /// The folder of recordings. The first recording makes it.
@@ -57,6 +59,7 @@ pub struct Server {
     runtime: Option<Runtime>,
     state: Arc<State>,
     address: SocketAddr,
+    bare: Option<SocketAddr>,
 }
 
 impl Server {
@@ -65,9 +68,10 @@ impl Server {
     /// # Errors
     /// The system gives no threads, sockets or random numbers.
     pub fn start(options: Options) -> io::Result<Self> {
-        let Options { listener, tls, names, share, recordings, deadline, program } = options;
+        let Options { listener, tls, names, foxglove, share, recordings, deadline, program } =
+            options;
         let address = listener.local_addr()?;
-        listener.set_nonblocking(true)?;
+        let bare_address = foxglove.as_ref().map(TcpListener::local_addr).transpose()?;
         let door = Door::new(address.port(), tls.is_some(), names)?;
         let recordings = Recordings::new(recordings, share.clone());
         let state = State::new(door, Link::new(share), recordings, deadline, program)?;
@@ -77,15 +81,19 @@ impl Server {
             .thread_name("monitor")
             .enable_all()
             .build()?;
-        let listener = {
+        let (listener, bare) = {
             let _inside = runtime.enter();
-            tokio::net::TcpListener::from_std(listener)?
+            (nonblocking(listener)?, foxglove.map(nonblocking).transpose()?)
         };
         let tls = tls.as_ref().map(Tls::acceptor);
         let link = Arc::clone(&state.link);
         runtime.spawn(async move { link.keep().await });
         runtime.spawn(transport::serve(listener, tls, routes::router(Arc::clone(&state))));
-        Ok(Server { runtime: Some(runtime), state, address })
+        if let Some(bare) = bare {
+            let router = routes::bare_router(Arc::clone(&state));
+            runtime.spawn(transport::serve(bare, None, router));
+        }
+        Ok(Server { runtime: Some(runtime), state, address, bare: bare_address })
     }
 
     /// The address that a person of this role opens. `host` is this machine.
@@ -93,6 +101,27 @@ impl Server {
         let (port, token) = (self.address.port(), self.state.door.token(role));
         format!("{}://{host}:{port}/?token={token}", self.state.door.scheme())
     }
+
+    /// The address for programs that speak Foxglove's protocol: with the token of viewers.
+    pub fn foxglove_url(&self, host: &str) -> String {
+        let (port, token) = (self.address.port(), self.state.door.token(Role::Viewer));
+        let scheme = if self.state.door.scheme() == "https" { "wss" } else { "ws" };
+        format!("{scheme}://{host}:{port}{}?token={token}", routes::VIEWER_PATH)
+    }
+
+    /// The address of [`Options::foxglove`].
+    pub fn bare_url(&self) -> Option<String> {
+        let mut address = self.bare?;
+        if address.ip().is_unspecified() {
+            address.set_ip(Ipv4Addr::LOCALHOST.into());
+        }
+        Some(format!("ws://{address}"))
+    }
+}
+
+fn nonblocking(listener: TcpListener) -> io::Result<tokio::net::TcpListener> {
+    listener.set_nonblocking(true)?;
+    tokio::net::TcpListener::from_std(listener)
 }
 
 impl Drop for Server {

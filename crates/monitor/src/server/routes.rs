@@ -16,10 +16,12 @@ use axum::{Extension, Json, Router};
 use motorlink_telemetry::share::message::StoppedMotor;
 use serde::{Deserialize, Serialize};
 
+use super::door::is_local_origin;
 use super::socket::{self, LONGEST_TEXT};
 use super::state::State;
 use super::{recordings, site};
 use crate::alive::Lapse;
+use crate::foxglove::{self, SUBPROTOCOLS};
 use crate::message::Role;
 
 /// What a page may load: its own files, and nothing that is written into it.
@@ -34,11 +36,23 @@ const HEADERS: [(HeaderName, &str); 6] = [
     (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
 ];
 
+/// Where programs connect that speak Foxglove's protocol.
+pub const VIEWER_PATH: &str = "/foxglove";
+
+/// The listener for programs that know neither paths nor tokens. Every path is the same.
+pub fn bare_router(state: Arc<State>) -> Router {
+    Router::new()
+        .fallback(get(view))
+        .layer(from_fn_with_state(Arc::clone(&state), admit_bare))
+        .with_state(state)
+}
+
 /// All paths.
 pub fn router(state: Arc<State>) -> Router {
     Router::new()
         .route("/", get(page))
         .route("/ws", get(open))
+        .route(VIEWER_PATH, get(view))
         .route("/api/stop-all", post(stop_all))
         .route("/api/let-go", post(let_go))
         .route("/api/recordings/{name}", get(recordings::download))
@@ -67,6 +81,20 @@ async fn admit(Shared(state): Shared<Arc<State>>, mut request: Request, next: Ne
     response
 }
 
+/// Lets in programs of this computer. Browsers say from which page a request is: no page of the network
+/// reads the drives.
+async fn admit_bare(Shared(state): Shared<Arc<State>>, request: Request, next: Next) -> Response {
+    let headers = request.headers();
+    let is_own_host = request.uri().authority().is_none() && state.door.is_own_host(headers);
+    let mut response = match is_own_host && is_local_origin(headers).unwrap_or(true) {
+        true => next.run(request).await,
+        false => (StatusCode::FORBIDDEN, "Only programs may use this server.\n").into_response(),
+    };
+    let headers = response.headers_mut();
+    headers.extend(HEADERS.map(|(name, value)| (name, HeaderValue::from_static(value))));
+    response
+}
+
 /// The role of a request, or what it gets instead.
 fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
     let refuse = |code, why: &'static str| Err(Box::new((code, why).into_response()));
@@ -74,14 +102,20 @@ fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
     if request.uri().authority().is_some() || !state.door.is_own_host(headers) {
         return refuse(StatusCode::FORBIDDEN, "This server does not have this name.\n");
     }
+    // No other page knows a token. Viewers that are pages themselves have another origin.
+    if request.uri().path() == VIEWER_PATH
+        && let Some(role) = given_role(state, request)
+    {
+        return Ok(role);
+    }
     // Browsers send it with what another page could misuse.
-    let needs_origin = request.method() != Method::GET || request.uri().path() == "/ws";
+    let needs_origin =
+        request.method() != Method::GET || matches!(request.uri().path(), "/ws" | VIEWER_PATH);
     if !state.door.is_own_origin(headers).unwrap_or(!needs_origin) {
         return refuse(StatusCode::FORBIDDEN, "Another page may not use this server.\n");
     }
     if request.uri().path() == "/"
-        && let Ok(Query(Given { token: Some(token) })) = Query::try_from_uri(request.uri())
-        && let Some(role) = state.door.role_of(&token)
+        && let Some(role) = given_role(state, request)
     {
         let cookie = [(LOCATION, "/".to_owned()), (SET_COOKIE, state.door.set_cookie(role))];
         return Err(Box::new((StatusCode::SEE_OTHER, cookie).into_response()));
@@ -93,6 +127,12 @@ fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
             "Open the address that `motorlink monitor` prints: it has a token.\n",
         ),
     }
+}
+
+/// The role of the token in the address.
+fn given_role(state: &State, request: &Request) -> Option<Role> {
+    let Query(Given { token }) = Query::try_from_uri(request.uri()).ok()?;
+    state.door.role_of(&token?)
 }
 
 async fn page(headers: HeaderMap) -> Response {
@@ -112,6 +152,19 @@ async fn open(
         .max_message_size(LONGEST_TEXT)
         .max_frame_size(LONGEST_TEXT)
         .on_upgrade(move |socket| socket::serve(state, socket, role))
+}
+
+/// A program that speaks Foxglove's protocol.
+async fn view(Shared(state): Shared<Arc<State>>, upgrade: WebSocketUpgrade) -> Response {
+    let upgrade = upgrade.protocols(SUBPROTOCOLS);
+    if upgrade.selected_protocol().is_none() {
+        let why = format!("The subprotocols are {}.\n", SUBPROTOCOLS.join(" and "));
+        return (StatusCode::BAD_REQUEST, why).into_response();
+    }
+    upgrade
+        .max_message_size(foxglove::LONGEST_TEXT)
+        .max_frame_size(foxglove::LONGEST_TEXT)
+        .on_upgrade(move |socket| foxglove::serve(Arc::clone(&state.viewers), socket))
 }
 
 #[derive(Serialize)]

@@ -10,6 +10,7 @@ use tokio::sync::Semaphore;
 
 use super::door::{Door, random_word};
 use super::link::Link;
+use crate::foxglove::Viewers;
 use crate::page::Page;
 use crate::recordings::Recordings;
 
@@ -24,6 +25,8 @@ pub struct State {
     pub deadline: Duration,
     pub program: String,
     pub run: String,
+    /// Programs that show the same data.
+    pub viewers: Arc<Viewers>,
     pages: Mutex<BTreeMap<String, Arc<Page>>>,
     last_page: AtomicU64,
     pub places: Semaphore,
@@ -41,13 +44,16 @@ impl State {
         deadline: Duration,
         program: String,
     ) -> io::Result<Self> {
+        let (link, run) = (Arc::new(link), random_word()?);
+        let viewers = Viewers::new(Arc::clone(&link), program.clone(), run.clone());
         Ok(State {
             door,
-            link: Arc::new(link),
+            link,
             recordings: Arc::new(recordings),
             deadline,
             program,
-            run: random_word()?,
+            run,
+            viewers: Arc::new(viewers),
             pages: Mutex::default(),
             last_page: AtomicU64::new(0),
             places: Semaphore::new(PAGES),

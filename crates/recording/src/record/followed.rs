@@ -1,13 +1,18 @@
 //! A line of a share: from the rows and events of the share to messages. The share reads the drives, and
 //! another program may command them.
 
+use std::path::PathBuf;
+
 use motorlink_telemetry::sample::Sample;
 use motorlink_telemetry::share::message::{Event, Happening, SignalRate};
-use motorlink_telemetry::share::stream::{Item, Stream};
+use motorlink_telemetry::share::stream::{Followed as Target, Item, Stream, Wanted};
 use motorlink_telemetry::share::words::Told;
 use motorlink_telemetry::signal::Signal;
 
-use super::content::{Content, Values};
+use super::choice::Group;
+use super::content::{Content, Line, Values};
+use super::wall::wall_now;
+use crate::error::RecordError;
 use crate::schema::Time;
 use crate::write::Entry;
 
@@ -18,6 +23,23 @@ pub(super) struct Followed {
     stream: Stream,
     /// Whether events of the share itself are recorded here. One line of each share has them.
     has_events_of_share: bool,
+}
+
+/// Asks the share at a path to read these signals of a line. It has its own name for the line.
+pub(super) fn stream(
+    (path, name): (PathBuf, String),
+    line: &Line,
+    groups: &[Group],
+    by: &str,
+) -> Result<Stream, RecordError> {
+    let wanted = groups.iter().map(|group| Wanted {
+        signals: group.motors.iter().flat_map(|(_, signals)| signals).copied().collect(),
+        period: group.period.0 as f64 / 1e6,
+    });
+    let wanted = wanted.filter(|wanted| !wanted.signals.is_empty()).collect();
+    let target = Target { path, line: name, speaks: line.speaks, name: by.to_owned(), wanted };
+    let failed = |why| RecordError::Share { port: line.port.clone(), why };
+    Stream::open(target, || wall_now().0).map_err(failed)
 }
 
 impl Followed {

@@ -1,4 +1,5 @@
-//! Records drives: [`Recorder`] in threads, [`track`] without one.
+//! Records drives: [`Recorder`] in threads, [`track`] without one. [`live`] makes the same messages for
+//! viewers.
 
 mod abort;
 pub mod choice;
@@ -8,6 +9,7 @@ mod content;
 mod followed;
 pub mod frames;
 mod joint;
+pub mod live;
 mod open;
 mod recorder;
 mod settings;

@@ -101,17 +101,32 @@ fn of_port(
     abort: &Abort,
 ) -> Result<Opened, RecordError> {
     abort.check()?;
+    let mut opened = unsearched(label, port, protocol)?;
+    let given: Vec<Motor> = match protocol {
+        Protocol::St => port.motors.iter().copied().map(Motor::St).collect(),
+        Protocol::Rmd => port.ids.map(Motor::Rmd).collect(),
+    };
+    let Line { port, speaks, .. } = &opened.line;
+    opened.line.motors = found(&opened.runner, port, *speaks, &given, by, abort)?;
+    Ok(opened)
+}
+
+/// A line of which no motor is known yet.
+pub(super) fn unsearched(
+    label: String,
+    port: &Port,
+    protocol: Protocol,
+) -> Result<Opened, RecordError> {
     let taps = Taps::default();
     let around = taps.clone();
-    let (acquisition, speaks, given): (_, _, Vec<Motor>) = match protocol {
+    let (acquisition, speaks) = match protocol {
         Protocol::St => {
             let mut options = st::Options { profile: port.profile, ..Default::default() };
             options.timeout = port.timeout.unwrap_or(options.timeout);
             let wrap = move |link| around.around_line(link);
             let client = st::EventClient::open_wrapped(&port.name, wrap, options);
             let line = StLine::new(client.map_err(LineError::from)?);
-            let given = port.motors.iter().copied().map(Motor::St).collect();
-            (Acquisition::new(Box::new(line)), Speaks::St(port.profile), given)
+            (Acquisition::new(Box::new(line)), Speaks::St(port.profile))
         }
         Protocol::Rmd => {
             let mut options = rmd::Options::default();
@@ -119,7 +134,7 @@ fn of_port(
             let wrap = move |link| around.around_bus(link);
             let client = rmd::EventClient::open_wrapped(&port.name, wrap, options);
             let line = RmdLine::new(client.map_err(LineError::from)?);
-            (Acquisition::new(Box::new(line)), Speaks::Rmd, port.ids.map(Motor::Rmd).collect())
+            (Acquisition::new(Box::new(line)), Speaks::Rmd)
         }
     };
     let anchor = Anchor::now(acquisition.clock());
@@ -127,8 +142,7 @@ fn of_port(
     let port = port.name.to_string();
     let share = place_of(&port);
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
-    let motors = found(&runner, &port, speaks, &given, by, abort)?;
-    let line = Line { label, port, speaks, motors, full_scale };
+    let line = Line { label, port, speaks, motors: Vec::new(), full_scale };
     Ok(Opened { runner, line, anchor, taps, lent: None, share })
 }
 

@@ -9,14 +9,13 @@ use std::time::{Duration, Instant};
 use motorlink_proto::time::{Instant as Moment, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::runner::Runner;
-use motorlink_telemetry::share::stream::{Followed as Target, Stream, Wanted};
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
 use super::choice::{self, Group};
 use super::client::{Client, Lent};
 use super::content::{Content, Counts, Line};
-use super::followed::Followed;
+use super::followed::{self, Followed};
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
@@ -27,9 +26,9 @@ use crate::schema::{self, Log, Loss, Severity, Time, drive, name, recording};
 use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
 
 /// How often messages are made of what came.
-const TURN: Duration = Duration::from_millis(20);
+pub(super) const TURN: Duration = Duration::from_millis(20);
 /// How often the rates of the engines are asked for.
-const RATES: Duration = Duration::from_millis(1_100);
+pub(super) const RATES: Duration = Duration::from_millis(1_100);
 /// How long the end waits until the last values are confirmed.
 const CONFIRMATION: Duration = Duration::from_millis(500);
 
@@ -315,22 +314,13 @@ impl Recorded {
     fn follow(
         Opened { runner, line, share, .. }: Opened,
         groups: Vec<Group>,
-        by: &Arc<str>,
+        by: &str,
         is_first: bool,
         topics: &mut Topics,
     ) -> Result<Self, RecordError> {
         // The share reads the signals from now on.
         runner.end();
-        let wanted = groups.iter().map(|group| Wanted {
-            signals: group.motors.iter().flat_map(|(_, signals)| signals).copied().collect(),
-            period: group.period.0 as f64 / 1e6,
-        });
-        let wanted = wanted.filter(|wanted| !wanted.signals.is_empty()).collect();
-        let (path, name) = share.unwrap_or_default();
-        let target = Target { path, line: name, speaks: line.speaks, name: by.to_string(), wanted };
-        let stream = Stream::open(target, || wall_now().0);
-        let port = line.port.clone();
-        let stream = stream.map_err(|why| RecordError::Share { port, why })?;
+        let stream = followed::stream(share.unwrap_or_default(), &line, &groups, by)?;
         let content = Content::new(line, groups, topics);
         Ok(Recorded::Share(Followed::new(content, stream, is_first)))
     }

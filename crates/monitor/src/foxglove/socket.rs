@@ -1,0 +1,104 @@
+//! The connection of a viewer.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt, StreamExt};
+use tokio::time::{Instant, timeout};
+
+use super::protocol::{Level, status};
+use super::session::Out;
+use super::viewers::{Viewer, Viewers};
+
+/// How long a message may wait for a viewer that does not read.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Messages of a viewer in a second.
+const MESSAGES: u32 = 1000;
+
+type Sink = SplitSink<WebSocket, Message>;
+
+/// Serves a viewer until it goes.
+pub async fn serve(viewers: Arc<Viewers>, socket: WebSocket) {
+    let (mut sink, stream) = socket.split();
+    let Ok(_place) = viewers.places.try_acquire() else {
+        return close(&mut sink, "the server has as many viewers as it can have").await;
+    };
+    let joined = viewers.join();
+    let why = tokio::select! {
+        // The viewer has gone, or does not read.
+        () = write(&joined.viewer, &mut sink) => return,
+        why = read(&viewers, &joined.viewer, stream) => why,
+    };
+    if let Err(why) = why {
+        close(&mut sink, &why).await;
+    }
+}
+
+/// Ends a connection with the reason.
+async fn close(sink: &mut Sink, why: &str) {
+    let frame = CloseFrame { code: close_code::POLICY, reason: "".into() };
+    let last = async {
+        sink.send(Message::Text(status(Level::Error, why).into())).await?;
+        sink.send(Message::Close(Some(frame))).await
+    };
+    // It may have gone.
+    let _ = timeout(PATIENCE, last).await;
+}
+
+/// Takes what a viewer sends, until it goes.
+async fn read(
+    viewers: &Viewers,
+    viewer: &Viewer,
+    mut stream: SplitStream<WebSocket>,
+) -> Result<(), String> {
+    let (mut since, mut count) = (Instant::now(), 0);
+    loop {
+        let message = stream.next().await;
+        if since.elapsed() >= Duration::from_secs(1) {
+            (since, count) = (Instant::now(), 0);
+        }
+        count += 1;
+        if count > MESSAGES {
+            return Err(format!("more than {MESSAGES} messages in a second"));
+        }
+        match message {
+            Some(Ok(Message::Text(text))) => {
+                let channels = viewers.channels();
+                viewer.session().receive(&text, channels);
+            }
+            Some(Ok(Message::Binary(_))) => viewer.session().receive_binary(),
+            Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+            Some(Ok(Message::Close(_))) | None => return Ok(()),
+            Some(Err(error)) => return Err(error.to_string()),
+        }
+        viewer.news.notify_one();
+        if viewer.session().is_flooded() {
+            return Err("this viewer does not read what it is told".to_owned());
+        }
+    }
+}
+
+/// Sends to a viewer, until it has gone or does not read.
+async fn write(viewer: &Viewer, sink: &mut Sink) {
+    loop {
+        let out = viewer.session().take(Instant::now());
+        let sent = async {
+            match out {
+                Some(Out::Text(text)) => sink.feed(Message::Text(text.into())).await?,
+                Some(Out::Message(bytes)) => sink.feed(Message::Binary(bytes.into())).await?,
+                None => {
+                    sink.flush().await?;
+                    return Ok(true);
+                }
+            }
+            Ok::<bool, axum::Error>(false)
+        };
+        match timeout(PATIENCE, sent).await {
+            Ok(Ok(true)) => viewer.news.notified().await,
+            Ok(Ok(false)) => {}
+            Ok(Err(_)) | Err(_) => return,
+        }
+    }
+}
