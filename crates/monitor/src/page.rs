@@ -118,7 +118,7 @@ impl Page {
 
     fn lapse(&self, control: &mut Control, lapse: Lapse) {
         if let Some(drive) = control.drive.take() {
-            drive.close();
+            drive.close_because(refusal(Reason::Lapsed, lapse.to_string()));
         }
         // If it takes no texts, it learns from the next beat that it holds no motors.
         let _ = self.out.try_send(encode(&Text::Lapsed { message: lapse.to_string() }));

@@ -54,7 +54,8 @@ pub(crate) type Lane = (String, Option<u8>);
 #[derive(Default)]
 struct Pending {
     last: u32,
-    has_ended: bool,
+    /// Why requests get no answer any more.
+    ended: Option<Refusal>,
     answers: BTreeMap<u32, oneshot::Sender<Result<Answer, Refusal>>>,
 }
 
@@ -128,8 +129,8 @@ impl Program {
         let (sender, answer) = oneshot::channel();
         let id = {
             let mut pending = self.shared.pending();
-            if pending.has_ended {
-                return Err(ended());
+            if let Some(ended) = &pending.ended {
+                return Err(ended.clone());
             }
             pending.last = pending.last.wrapping_add(1).max(OWN_IDS);
             let id = pending.last;
@@ -137,16 +138,21 @@ impl Program {
             id
         };
         if self.pass(&Request { id, ask }).await.is_err() {
-            return Err(ended());
+            return Err(self.shared.ended());
         }
-        answer.await.unwrap_or_else(|_| Err(ended()))
+        answer.await.unwrap_or_else(|_| Err(self.shared.ended()))
     }
 
     /// Ends the connection at once: the share stops the motors that it turned.
     pub fn close(&self) {
+        self.close_because(ended());
+    }
+
+    /// As [`close`](Self::close). Requests without an answer get this one.
+    pub fn close_because(&self, why: Refusal) {
         // It has ended already.
         let _ = shutdown(&self.shared.socket, Shutdown::Both);
-        self.shared.end();
+        self.shared.end(why);
     }
 
     /// Whether both ask through the same connection.
@@ -166,7 +172,7 @@ impl Program {
 
     /// Whether the share or the [`Listener`] has ended.
     pub fn has_ended(&self) -> bool {
-        self.shared.pending().has_ended
+        self.shared.pending().ended.is_some()
     }
 
     /// Sends a request with an id below [`OWN_IDS`]. The [`Listener`] gives its end.
@@ -217,7 +223,7 @@ impl Drop for Listener {
     fn drop(&mut self) {
         // Copies of the program keep the socket open.
         let _ = shutdown(&self.shared.socket, Shutdown::Both);
-        self.shared.end();
+        self.shared.end(ended());
     }
 }
 
@@ -227,10 +233,15 @@ impl Shared {
     }
 
     /// No request gets an answer any more.
-    fn end(&self) {
+    fn end(&self, why: Refusal) {
         let mut pending = self.pending();
-        pending.has_ended = true;
+        pending.ended.get_or_insert(why);
         pending.answers.clear();
+    }
+
+    /// Why there is no answer.
+    fn ended(&self) -> Refusal {
+        self.pending().ended.clone().unwrap_or_else(ended)
     }
 
     /// Gives a frame back, unless it is an answer to a request of this side.
