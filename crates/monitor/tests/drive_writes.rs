@@ -157,6 +157,10 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
     page.act(st(1), "STOP_MOTOR", &[]).await.unwrap();
     page.ask(limit(st(1), Mode::Speed, Some(500.0))).await.unwrap();
     page.refused(act(st(1), "START_MOTOR", &[])).await;
+    // Neither does a ramp from before the share was lost.
+    other.ask(ramp(500.0)).await.unwrap();
+    page.drives.reconnected();
+    page.refused(act(st(1), "START_MOTOR", &[])).await;
     page.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
     other.act(rmd(1), "set_speed", &[("speed_dps", 200.0)]).await.unwrap();
     for (motor, mode, most) in [

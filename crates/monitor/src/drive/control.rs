@@ -99,6 +99,12 @@ impl Control {
         lock.lock_owned().await
     }
 
+    /// Ramps that drives acknowledged so far may be lost.
+    pub(super) fn forget(&self) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.values_mut().for_each(|known| known.limited.forget());
+    }
+
     fn known<T>(&self, target: &Target, with: impl FnOnce(&mut Known) -> T) -> T {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         with(all.entry(target.name.clone()).or_default())

@@ -108,9 +108,13 @@ impl Limited {
     pub(super) fn ended(&mut self, is_acknowledged: bool) {
         match is_acknowledged {
             true => self.account.acknowledged(),
-            // Whatever the drive has been told may be lost.
-            false => self.losses = self.losses.wrapping_add(1),
+            false => self.forget(),
         }
+    }
+
+    /// Ramps that the drive acknowledged so far may be lost.
+    pub(super) fn forget(&mut self) {
+        self.losses = self.losses.wrapping_add(1);
     }
 
     fn seen(&self) -> Counters {

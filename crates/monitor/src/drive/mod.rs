@@ -133,6 +133,12 @@ impl Drives {
         Ok(limits)
     }
 
+    /// The share was lost and is there again. The limits stay. A start under a limit needs a new ramp: the
+    /// drives may have been switched off.
+    pub fn reconnected(&self) {
+        self.control.forget();
+    }
+
     fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {
         self.lines.get(line).copied().ok_or_else(|| {
             let names: Vec<&str> = self.lines.keys().map(String::as_str).collect();

@@ -60,7 +60,10 @@ impl Link {
                 Ok((program, lines, mut listener)) => {
                     // The limits that pages have set stay.
                     let drives = match &known {
-                        Some((before, drives)) if is_same(before, &lines) => drives.clone(),
+                        Some((before, drives)) if is_same(before, &lines) => {
+                            drives.reconnected();
+                            drives.clone()
+                        }
                         _ => Drives::new(lines.clone()),
                     };
                     known = Some((lines, drives.clone()));
