@@ -1,4 +1,4 @@
-import { signal } from '@preact/signals';
+import { type Signal, signal } from '@preact/signals';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 
 /** What the test does with a request of the page. */
@@ -9,11 +9,11 @@ interface Asked {
 }
 
 let asked: Asked[];
-let connected: boolean;
+let welcome: Signal<object | null>;
 let posted: { done: (response: Response) => void; failed: (why: Error) => void }[];
-const latchedBy = signal<string | null>(null);
-const held = signal(false);
-const entries = signal<object[]>([]);
+let latchedBy: Signal<string | null>;
+let held: Signal<boolean>;
+let entries: Signal<object[]>;
 const sayAlive = vi.fn();
 
 class Refused extends Error {
@@ -28,28 +28,30 @@ class Refused extends Error {
 let stop: typeof import('./stop');
 
 beforeEach(async () => {
-  vi.useFakeTimers();
+  vi.useFakeTimers({ toFake: ['setTimeout', 'performance'] });
   asked = [];
   posted = [];
-  connected = true;
-  latchedBy.value = null;
-  entries.value = [{ number: 1, event: 'stopped', line: 'st0', motor: 1 }];
-  held.value = true;
+  // The module of the last test still follows its own.
+  welcome = signal({});
+  latchedBy = signal(null);
+  entries = signal([{ number: 1, event: 'stopped', line: 'st0', motor: 1 }]);
+  held = signal(true);
   vi.doMock('./link', () => ({
     Refused,
     entries,
     held,
     latchedBy,
     sayAlive,
-    welcome: {
+    welcome,
+    state: {
       get value() {
-        return connected ? {} : null;
+        return welcome.value ? 'open' : 'lost';
       },
     },
     lastWelcome: signal({ deadline: 300 }),
     motors: signal(new Map([['st0', [1, 2]], ['rmd0', [1, 2]]])),
     ask: (ask: { ask: string }) =>
-      connected
+      welcome.value
         ? new Promise((done, failed) => asked.push({ ask, done, failed }))
         : Promise.reject(new Refused('line', 'There is no connection to the server.')),
   }));
@@ -105,7 +107,7 @@ describe('stop all', () => {
   });
 
   it('goes by HTTP at once without a connection', async () => {
-    connected = false;
+    welcome.value = null;
     stop.stopAll();
     await pass(0);
     expect(posted).toHaveLength(1);
@@ -145,7 +147,7 @@ describe('stop all', () => {
 
   it('says that the server is not reachable, whether that fails or hangs', async () => {
     for (const fails of [true, false]) {
-      connected = !fails;
+      welcome.value = fails ? null : {};
       posted = [];
       stop.stopAll();
       await pass(200);
@@ -155,9 +157,23 @@ describe('stop all', () => {
       expect(report().message).toContain('its own deadline of 300 ms; others turn on');
     }
     // An answer after all is better news.
-    asked[0]!.done({ motors: ALL });
+    asked.at(-1)!.done({ motors: ALL });
     await pass(0);
     expect(report().phase).toBe('stopped');
+  });
+
+  it('is sent again when the connection is back soon, and only then', async () => {
+    for (const [gone, count] of [[2000, 1], [20_000, 0]] as const) {
+      welcome.value = null;
+      asked = [];
+      posted = [];
+      stop.stopAll();
+      await pass(0);
+      posted[0]!.failed(new TypeError('no network'));
+      await pass(gone);
+      welcome.value = {};
+      expect(asked).toHaveLength(count);
+    }
   });
 
   it('gives the reason of a server that cannot stop', async () => {
@@ -194,7 +210,7 @@ describe('the stop of one motor', () => {
   });
 
   it('stops all motors without a connection', async () => {
-    connected = false;
+    welcome.value = null;
     await expect(stop.stopMotor('st0', 1)).resolves.toContain('Stop all');
     await pass(0);
     expect(posted).toHaveLength(1);

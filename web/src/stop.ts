@@ -1,6 +1,6 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
-import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, welcome } from './link';
+import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, state, welcome } from './link';
 import type { StoppedMotor } from './wire';
 
 export interface StopReport {
@@ -17,6 +17,8 @@ const SECOND_WAY = 150;
 /** A server that is reached latches at once, even if motors take longer to confirm. */
 const UNREACHED = 1000;
 
+/** For so long a stop that reached nothing is sent again with the next connection. */
+const AGAIN = 10_000;
 /** Why a stop fails where no motor is. Anything else may be a motor that turns. */
 const NO_MOTOR = /has never answered|BAD_MOTOR_SELECTED/;
 const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
@@ -24,9 +26,15 @@ const WAITING = 'The server has the stop, and waits for the motors to confirm it
 let last = 0;
 /** The newest event when all motors were stopped last. */
 let before = 0;
+let pressedAt = -Infinity;
 
 /** Stops all motors, at once. Never asks anything, and can be called as often as wanted. */
 export function stopAll() {
+  pressedAt = performance.now();
+  send();
+}
+
+function send() {
   last += 1;
   const number = last;
   before = entries.value.at(-1)?.number ?? 0;
@@ -77,7 +85,8 @@ async function postStopAll(): Promise<StoppedMotor[]> {
 }
 
 function refused(why: Refused): StopReport {
-  return { phase: 'unconfirmed', message: `The server could not stop the motors: ${why.message}. They may still be turning.` };
+  const message = `The server could not stop the motors: ${why.message}. They may still be turning.`;
+  return { phase: 'unconfirmed', message };
 }
 
 function unreachable(): StopReport {
@@ -87,7 +96,8 @@ function unreachable(): StopReport {
     phase: 'unreachable',
     message:
       `Not reachable. The server stops the motors that this page turned by ${own}; others turn on. ` +
-      'If the server itself has ended, only a guard or the power switch stops them.',
+      'If the server itself has ended, only a guard or the power switch stops them. ' +
+      `If the connection is back within ${AGAIN / 1000} s, the stop is sent again.`,
   };
 }
 
@@ -121,9 +131,9 @@ function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   return { phase: 'stopped', message };
 }
 
-/** Stops one motor. Without a connection all motors are stopped, because only that has a second way. */
+/** Stops one motor. Without a connection that answers all motors are stopped, because only that has a second way. */
 export async function stopMotor(line: string, motor: number): Promise<string> {
-  if (!welcome.value) {
+  if (state.value !== 'open') {
     stopAll();
     return 'There is no connection. Stop all was sent the second way.';
   }
@@ -208,4 +218,9 @@ entries.subscribe(() => {
     count === found.length
       ? { phase: 'stopped', message: `Stopped: ${count} of ${count} motors confirmed.` }
       : { phase: 'sent', message: `${WAITING} ${count} of ${found.length} did.` };
+});
+
+welcome.subscribe((who) => {
+  const isLate = performance.now() - pressedAt > AGAIN;
+  if (who && stopReport.peek()?.phase === 'unreachable' && !isLate) send();
 });
