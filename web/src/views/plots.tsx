@@ -160,6 +160,8 @@ function Toolbar() {
             <option key={seconds} value={String(seconds)}>{seconds < 60 ? `${seconds} s` : `${seconds / 60} min`}</option>
           ))}
         </select>
+      </div>
+      <div class="plots-group">
         <button type="button" aria-label="Zoom in" onClick={change(() => time.zoom(0.5))}>+</button>
         <button type="button" aria-label="Zoom out" onClick={change(() => time.zoom(2))}>−</button>
         <button type="button" aria-label="Earlier" onClick={change(() => time.pan(-0.5))}>←</button>
