@@ -14,7 +14,7 @@ export const rig: Rig = {
   wait: (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds)),
 };
 
-const STOPS = new Set(['stopping', 'stopped', 'stop-failed', 'latched']);
+const STOPS = new Set(['stopping', 'stopped', 'stop-failed']);
 
 /** Calls `abort` with the reason when something else than the experiment ends it. Returns what ends the watch. */
 export function watch({ line, motor }: MotorName, abort: (why: string) => void): () => void {

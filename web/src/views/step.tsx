@@ -4,7 +4,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
 import { number, tooOld } from '../format';
 import { age, latchedBy, state, subscribe, welcome } from '../link';
-import { Said, useSaid } from '../parts';
+import { Said, type Sentence, useSaid } from '../parts';
 import { numberOf } from '../registers/model';
 import { MotorPicker } from '../registers/picker';
 import { chosen } from '../registers/values';
@@ -67,6 +67,8 @@ function Setup({
   /** Whether the motor turns on at the start of the step, after the run. */
   const isTurning = useSignal(false);
   const { said, attempt } = useSaid();
+  /** What came of the last run. It stays when all motors are stopped: that ends a run. */
+  const result = useSignal<Sentence | null>(null);
   const controlled = description.modes.find(({ mode }) => mode === form.value.mode);
 
   useEffect(
@@ -83,32 +85,34 @@ function Setup({
   const isBusy = progress.value !== null;
   const refusal = whyNot();
 
-  const start = (plan: Plan) =>
-    attempt(async () => {
-      if (running.current) return;
-      const experiment = new Experiment(plan, rig, (text) => {
-        progress.value = { text, count: experiment.count };
-      });
-      running.current = experiment;
-      isTurning.value = false;
-      onBusy(true);
-      progress.value = { text: 'Beginning.', count: 0 };
-      const timer = setInterval(() => {
-        if (progress.value) progress.value = { ...progress.value, count: experiment.count };
-      }, 500);
-      const unwatch = watch(motor, (why) => experiment.abort(why));
-      try {
-        const run = add(await experiment.run());
-        isTurning.value = experiment.isMoving;
-        return summary(run);
-      } finally {
-        unwatch();
-        clearInterval(timer);
-        running.current = null;
-        progress.value = null;
-        onBusy(false);
-      }
+  const start = async (plan: Plan) => {
+    if (running.current) return;
+    result.value = null;
+    const experiment = new Experiment(plan, rig, (text) => {
+      progress.value = { text, count: experiment.count };
     });
+    running.current = experiment;
+    isTurning.value = false;
+    onBusy(true);
+    progress.value = { text: 'Beginning.', count: 0 };
+    const timer = setInterval(() => {
+      if (progress.value) progress.value = { ...progress.value, count: experiment.count };
+    }, 500);
+    const unwatch = watch(motor, (why) => experiment.abort(why));
+    try {
+      const run = add(await experiment.run());
+      result.value = { tone: 'ok', text: summary(run) };
+    } catch (why) {
+      result.value = { tone: 'bad', text: (why as Error).message };
+    } finally {
+      unwatch();
+      clearInterval(timer);
+      isTurning.value = experiment.isMoving;
+      running.current = null;
+      progress.value = null;
+      onBusy(false);
+    }
+  };
 
   return (
     <section aria-label="Set up a step">
@@ -184,6 +188,7 @@ function Setup({
         {progress.value?.text}
       </p>
       {progress.value && <p class="muted count">{progress.value.count} samples</p>}
+      <Said said={result.value} />
       <Said said={said} />
     </section>
   );
