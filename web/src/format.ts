@@ -37,7 +37,9 @@ export function duration(seconds: number): string {
 /** A rate of values a second. */
 export function rate(perSecond: number): string {
   if (!Number.isFinite(perSecond)) return '–';
-  return `${perSecond < 10 ? perSecond.toFixed(1) : perSecond.toFixed(0)}/s`;
+  const text = perSecond < 9.95 ? perSecond.toFixed(1) : perSecond.toFixed(0);
+  // A space that is as wide as a digit.
+  return `${text.padStart(3, '\u2007')}/s`;
 }
 
 const TIME = new Intl.DateTimeFormat('en-GB', {
