@@ -96,7 +96,6 @@ function unreachable(): StopReport {
     phase: 'unreachable',
     message:
       `Not reachable. The server stops the motors that this page turned by ${own}; others turn on. ` +
-      'If the server itself has ended, only a guard or the power switch stops them. ' +
       `If the connection is back within ${AGAIN / 1000} s, the stop is sent again.`,
   };
 }
