@@ -92,7 +92,8 @@ export function Figure(props: FigureProps) {
         onHome: () => (latest.current.onHome(), changed()),
         onHover: (x) => {
           hover.current = x;
-          changed();
+          // Numbers only: the curves stay as they are.
+          scheduler.sampled();
         },
       },
     });
