@@ -44,7 +44,7 @@ test('shows what turns, also while it is paused', async ({ live }) => {
   expect(await numberIn(live, SPEED, 'Max')).toBeGreaterThanOrEqual(max);
 });
 
-test('keeps its signals over a reload, and its samples over a look at another view', async ({ live }) => {
+test('keeps its signals over a reload, and ignores broken settings', async ({ live }) => {
   await choose(live, SPEED, RMD);
   await live.getByLabel('Visible time').selectOption({ label: '1 min' });
   await live.reload();
