@@ -17,11 +17,11 @@ export async function csv(
   pause = () => new Promise<void>((done) => setTimeout(done)),
 ): Promise<string[]> {
   const names = traces.map(({ name, unit }) => (unit ? `${name} (${unit})` : name));
-  const parts = [line([...header, ...names])];
+  const parts = [csvLine([...header, ...names])];
   let part = '';
   let since = performance.now();
   for (const { x, line: of, values } of rows(traces, min, max)) {
-    part += line([...times(x, of), ...values.map((value) => (value === undefined || isNaN(value) ? '' : String(value)))]);
+    part += csvLine([...times(x, of), ...values.map((value) => (value === undefined || isNaN(value) ? '' : String(value)))]);
     if (performance.now() - since < AT_ONCE) continue;
     parts.push(part);
     part = '';
@@ -31,7 +31,8 @@ export async function csv(
   return [...parts, part];
 }
 
-function line(fields: readonly string[]): string {
+/** A row of a file, with its end. */
+export function csvLine(fields: readonly string[]): string {
   return `${fields.map(quoted).join(',')}\r\n`;
 }
 

@@ -1,4 +1,5 @@
 //! A share in a thread.
+#![allow(dead_code, reason = "each test uses a part")]
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,0 +1,59 @@
+// The frames of a line: live, searched, saved, and around an instant.
+import { readFileSync } from 'node:fs';
+import type { Page } from '@playwright/test';
+import { expect, open, test } from './bench';
+
+const region = (page: Page) => page.getByRole('region', { name: 'Frames' });
+/** All rows, also those that are not in the document. */
+const count = async (page: Page) => Number(await region(page).getByRole('table').getAttribute('aria-rowcount')) - 1;
+
+test('frames come live, can be paused, searched and saved', async ({ live }) => {
+  await open(live, 'Wire');
+  await expect.poll(() => count(live)).toBeGreaterThan(300);
+  const rows = region(live).getByRole('row');
+  expect(await rows.count()).toBeLessThan(120);
+  // The newest frame is seen.
+  const words = await rows.last().innerText();
+  await expect.poll(async () => (await rows.last().innerText()) !== words).toBe(true);
+  await expect(rows.last()).toBeInViewport();
+  await expect(live.getByText(/^Live\. .* a reply was awaited \d+ % of the time/)).toBeVisible();
+
+  await live.getByRole('button', { name: 'Pause' }).click();
+  await expect(live.getByText(/^Paused\./)).toBeVisible();
+  await expect(live.getByRole('button', { name: 'Continue' })).toBeVisible();
+  const all = await count(live);
+  await live.getByRole('combobox', { name: 'Direction' }).selectOption('from the drive');
+  await expect.poll(() => count(live)).toBeLessThan(all);
+  await expect(rows.filter({ hasText: '→ drive' })).toHaveCount(0);
+  await live.getByRole('searchbox', { name: 'Search' }).fill('ack rpm');
+  await expect(rows.nth(1)).toContainText('rpm');
+
+  const download = live.waitForEvent('download');
+  await live.getByRole('button', { name: 'Save as CSV' }).click();
+  const file = readFileSync(await (await download).path(), 'utf8').trimEnd().split('\r\n');
+  expect(file).toHaveLength(1 + (await count(live)));
+  expect(file[0]).toMatch(/^t,direction,motor,/);
+  expect(file.at(-1)).toMatch(/^\d+\.\d{6},from-drive,1?2?,ok,/);
+});
+
+test('the frames around an instant are shown, the nearest is marked', async ({ live }) => {
+  await open(live, 'Wire');
+  await expect.poll(() => count(live)).toBeGreaterThan(300);
+  await live.getByRole('button', { name: 'Pause' }).click();
+  const frames = region(live);
+  await frames.focus();
+  await live.keyboard.press('Home');
+  for (let moved = 0; moved < 100; moved += 1) await live.keyboard.press('ArrowDown');
+  const chosen = frames.locator('tr[aria-current]');
+  const time = (await chosen.getByRole('cell').first().innerText()).trim();
+  await live.evaluate((t) => (location.hash = `#/wire?line=st0&t=${t}`), time);
+  const marked = frames.getByRole('row').filter({ hasText: '▶' });
+  await expect(marked).toContainText(time);
+  await expect(marked).toBeInViewport();
+  await expect(live.getByText(new RegExp(`^From 0\\.25 s before ${time} s`))).toBeVisible();
+  await expect(live.getByRole('region', { name: 'Chosen frame' })).toContainText('nearest to the instant');
+  const around = await count(live);
+  expect(around).toBeGreaterThan(10);
+  await live.getByRole('button', { name: 'Live' }).click();
+  await expect(live.getByText(/^Live\./)).toBeVisible();
+});
