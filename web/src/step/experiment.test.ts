@@ -109,12 +109,14 @@ class Bench implements Rig {
       y!.push(Math.round(this.speed + this.swing * Math.sin(4 * this.now)));
       reference!.push(this.reference);
     }
-    const columns = [{ name: 'SPEED_MEAS', unit: 'rpm' }, { name: 'SPEED_REF', unit: 'rpm' }];
-    this.onRows?.({
-      line: 'st0', motor: 1, t0: 0, lost: 0, t: Float64Array.from(t!), span: Float64Array.from(t!, () => 0.001),
-      columns: this.hasReference ? columns : columns.slice(0, 1),
-      values: [Float64Array.from(y!), Float64Array.from(reference!)],
-    });
+    const rows = { line: 'st0', motor: 1, t0: 0, lost: 0, span: Float64Array.from(t!, () => 0.001) };
+    const give = (name: string, values: number[], later: number) =>
+      this.onRows?.({
+        ...rows, columns: [{ name, unit: 'rpm' }], t: Float64Array.from(t!, (time) => time + later),
+        values: [Float64Array.from(values)],
+      });
+    give('SPEED_MEAS', y!, 0);
+    if (this.hasReference) give('SPEED_REF', reference!, 0.001);
   }
 }
 
@@ -236,6 +238,16 @@ describe('what ends a step stops the motor', () => {
       if (progress.at(-1)?.startsWith('Recording')) bench.onRows = null;
     };
     await expect(experiment().run()).rejects.toThrow(/no more values\. Stopped/);
+  });
+
+  it('when values are doubtful', async () => {
+    bench.onWait = () => {
+      const isTold = bench.happened.some(({ event }) => event === 'doubtful');
+      if (!progress.at(-1)?.startsWith('Recording') || isTold) return;
+      bench.happened.push({ wall: 0, line: 'st0', motor: 1, event: 'doubtful', message: 'values may be those of other signals' });
+    };
+    await expect(experiment().run()).rejects.toThrow(/not used: values may be.*Repeat the step\. Stopped/);
+    expect(bench.stops).toBe(1);
   });
 
   it('when signals are refused', async () => {

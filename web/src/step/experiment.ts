@@ -55,7 +55,6 @@ interface Sample {
   t: number;
   span: number;
   y: number;
-  reference: number;
 }
 
 /** The earliest and the latest time. */
@@ -84,6 +83,8 @@ export function referenceOf({ registers }: Description, { measured }: Controlled
 
 export class Experiment {
   private samples: Sample[] = [];
+  /** The reference that the drive reports. It may be read in other exchanges. */
+  private references: Sample[] = [];
   private lost = 0;
   private isRecording = false;
   private refused: Error | null = null;
@@ -130,6 +131,7 @@ export class Experiment {
       const { duration } = this.plan;
       await this.until(() => this.last!.t >= step.after + duration, duration + 5, NO_MORE);
       end();
+      this.checkDoubts(step);
       const at = this.when(step);
       await this.end();
       return this.recorded(at, gains, reference, carried);
@@ -151,24 +153,22 @@ export class Experiment {
 
   private take({ columns, t0, t, span, values, lost }: Rows, reference: string | null) {
     this.lost += lost;
-    const column = (name: string | null) => values[columns.findIndex((one) => one.name === name)];
-    const [y, ref] = [column(this.plan.controlled.measured), column(reference)];
-    if (!y) return;
-    for (let row = 0; row < t.length; row += 1) {
-      this.samples.push({ t: t0 + t[row]!, span: span[row]!, y: y[row]!, reference: ref?.[row] ?? NaN });
-    }
-    // A fast line gives more than 10 000 samples a second while the motor goes to the start.
-    const old = this.last!.t - KEPT;
-    if (!this.isRecording && this.samples[0]!.t < old - KEPT) this.samples = this.since(old);
+    const append = (samples: Sample[], name: string | null): Sample[] => {
+      const column = values[columns.findIndex((one) => one.name === name)];
+      if (!column) return samples;
+      for (let row = 0; row < t.length; row += 1) {
+        samples.push({ t: t0 + t[row]!, span: span[row]!, y: column[row]! });
+      }
+      // A fast line gives more than 10 000 samples a second while the motor goes to the start.
+      const old = samples.at(-1)!.t - KEPT;
+      return !this.isRecording && samples[0]!.t < old - KEPT ? since(samples, old) : samples;
+    };
+    this.samples = append(this.samples, this.plan.controlled.measured);
+    this.references = append(this.references, reference);
   }
 
   private get last(): Sample | undefined {
     return this.samples.at(-1);
-  }
-
-  /** The samples after a time. */
-  private since(t: number): Sample[] {
-    return this.samples.slice(this.samples.findLastIndex((one) => one.t <= t) + 1);
   }
 
   private async approach() {
@@ -184,12 +184,12 @@ export class Experiment {
       await this.pause(duration);
     }
     this.onProgress('Waiting until the value is steady.');
-    const since = this.last?.t ?? 0;
+    const arrived = this.last?.t ?? 0;
     const tolerance = 0.02 * Math.abs(to - from);
     const isSteady = () => {
       const now = this.last?.t ?? 0;
-      if (now - since < STEADY) return false;
-      const all = this.since(now - STEADY).map(({ y }) => y).filter((y) => !Number.isNaN(y));
+      if (now - arrived < STEADY) return false;
+      const all = since(this.samples, now - STEADY).map(({ y }) => y).filter((y) => !Number.isNaN(y));
       if (all.length < STEADY_SAMPLES) return false;
       const half = all.length >> 1;
       const noise = scatter(all);
@@ -213,6 +213,16 @@ export class Experiment {
     return { known, before: before.t, after: this.last!.t + NEXT_REFERENCE };
   }
 
+  /** On a bad line, replies that came twice or late answer other requests. `later`: events were lost. */
+  private checkDoubts({ known }: Applied) {
+    const { line, motor } = this.plan.motor;
+    const doubt = this.rig
+      .events()
+      .filter((one) => ['doubtful', 'later'].includes(one.event) && !known.has(one))
+      .find((one) => (one.line ?? line) === line && (one.motor ?? motor) === motor);
+    if (doubt) throw new Error(`The record is not used: ${doubt.message}. Repeat the step.`);
+  }
+
   /** When the reference changed, by the clock of the line. */
   private when({ known, before, after }: Applied): Interval {
     const { motor, description, from, to } = this.plan;
@@ -226,12 +236,12 @@ export class Experiment {
       )
       .map(({ t }) => t!);
     const span = median(this.samples.filter(({ t }) => t >= before && t <= after).map((one) => one.span));
-    if (!sent.length) return narrowed([before, after], this.samples, from, to);
+    if (!sent.length) return narrowed([before, after], this.references, from, to);
     const last = Math.max(...sent);
     // An RMD motor first gets the measured value as reference, then that of the step. An ST drive first gets
     // the reference, then START_MOTOR.
     if (description.protocol === 'rmd') return [last, last + span];
-    return narrowed([Math.min(...sent), last + span], this.samples, from, to);
+    return narrowed([Math.min(...sent), last + span], this.references, from, to);
   }
 
   /** The time between two values that the line carries, as the share says. */
@@ -267,7 +277,7 @@ export class Experiment {
       when: Date.now(), motor, mode: controlled.mode, unit: controlled.unit, measured: controlled.measured, from, to,
       t: kept.map(({ t }) => Number((t - at).toFixed(7))),
       y: kept.map(({ y }) => orNull(y)),
-      reference: reference ? kept.map((one) => orNull(one.reference)) : null,
+      reference: reference ? held(this.references, kept).map(orNull) : null,
       doubt: (latest - earliest) / 2,
       resolution: description.registers.find(({ name }) => name === controlled.measured)?.range?.[2] ?? 0,
       gains,
@@ -323,10 +333,24 @@ export class Experiment {
   }
 }
 
+/** The last of the references at the time of each sample. */
+function held(references: readonly Sample[], samples: readonly Sample[]): number[] {
+  let next = 0;
+  return samples.map(({ t }) => {
+    while (next < references.length && references[next]!.t <= t) next += 1;
+    return references[next - 1]?.y ?? NaN;
+  });
+}
+
+/** The samples after a time. */
+function since(samples: Sample[], t: number): Sample[] {
+  return samples.slice(samples.findLastIndex((one) => one.t <= t) + 1);
+}
+
 /** The reference that the drive reports narrows down when it changed. */
 function narrowed([earliest, latest]: Interval, samples: readonly Sample[], from: number, to: number): Interval {
   const changed = samples.findIndex(
-    ({ t, span, reference }) => t + span / 2 >= earliest && Math.abs(reference - to) < Math.abs(reference - from),
+    ({ t, span, y }) => t + span / 2 >= earliest && Math.abs(y - to) < Math.abs(y - from),
   );
   const [old, young] = [samples[changed - 1], samples[changed]];
   if (!old || !young) return [earliest, latest];

@@ -7,7 +7,8 @@ import type { Rig } from './experiment';
 
 export const rig: Rig = {
   ask,
-  subscribe: (signals, period, onRows, onRefused) => subscribe(signals, period, onRows, { rows: true, onRefused }),
+  // Rows that are confirmed come seconds late if they are asked for faster than the line carries them.
+  subscribe: (signals, period, onRows, onRefused) => subscribe(signals, period, onRows, { onRefused }),
   stop: ({ line, motor }) => stopMotor(line, motor),
   events: () => events.value,
   name: () => welcome.value?.name ?? '',

@@ -1,0 +1,82 @@
+// Step responses of simulated drives.
+import AxeBuilder from '@axe-core/playwright';
+import type { Page } from '@playwright/test';
+import { readFileSync } from 'node:fs';
+import { expect, open, test } from './bench';
+
+test.describe.configure({ timeout: 180_000 });
+
+async function setUp(page: Page, motor: string, from: number, to: number) {
+  await open(page, 'Step response');
+  await page.getByRole('combobox', { name: 'Motor' }).selectOption(motor);
+  await page.getByLabel(/^From/).fill(String(from));
+  await page.getByLabel(/^To/).fill(String(to));
+  await page.getByLabel('Record for').fill('1');
+}
+
+const apply = (page: Page) => page.getByRole('button', { name: 'Apply the step' }).click();
+
+test('a step of an ST drive: what it is like, the gains, the files', async ({ live, bench }) => {
+  await setUp(live, 'st0/1', 1000, 1500);
+  await expect(live.getByText('st0/1 goes from its measured speed to 1000 rpm at 750 rpm/s.')).toBeVisible();
+  await apply(live);
+  await expect(live.getByText(/^✓ Run 1 is recorded/)).toBeVisible({ timeout: 60_000 });
+  await expect.poll(() => bench.speed('st', 1), { timeout: 30_000 }).toBeLessThan(50);
+
+  const table = live.getByRole('region', { name: 'Comparison of the runs' });
+  const overshoot = table.getByRole('row', { name: /^Overshoot/ }).getByRole('cell');
+  await expect(overshoot).toHaveText(/^(below )?[\d.]+ (± [\d.]+ )?%/);
+  await expect(table.getByRole('row', { name: /^SPEED_KP / }).getByRole('cell')).toHaveText('249 s16A/unit');
+  const { violations } = await new AxeBuilder({ page: live }).analyze();
+  expect(violations.map(({ id }) => id)).toEqual([]);
+
+  const saved = live.waitForEvent('download');
+  await live.getByRole('button', { name: 'Save run 1 as CSV' }).click();
+  const lines = readFileSync(await (await saved).path(), 'utf8').split('\n');
+  expect(lines).toContain('# SPEED_KP = 249 s16A/unit');
+  const rows = lines.filter((line) => /^-?\d/.test(line)).map((line) => line.split(',').map(Number));
+  expect(rows.length).toBeGreaterThan(50);
+  expect(rows[0]![0]).toBeLessThan(-0.2);
+  expect(Math.abs(rows.at(-1)![1]! - 1500)).toBeLessThan(30);
+
+  // The runs are there after a reload.
+  await live.reload();
+  await expect(live.getByText('1: st0/1, speed 1000 to 1500 rpm').first()).toBeVisible();
+});
+
+test('what ends a step stops the motor', async ({ live, bench }) => {
+  const begin = async () => {
+    await setUp(live, 'rmd0/1', 300, 600);
+    await apply(live);
+    await expect.poll(() => bench.speed('rmd', 1)).toBeGreaterThan(50);
+  };
+  const stands = () => expect.poll(() => bench.speed('rmd', 1), { timeout: 30_000 }).toBeLessThan(5);
+
+  await begin();
+  await live.keyboard.press('Escape');
+  await expect(live.getByText(/^! Aborted\. .*Stopped: the motor confirmed it/)).toBeVisible();
+  await stands();
+  await expect(live.getByRole('button', { name: 'Apply the step' })).toBeDisabled();
+  await live.getByRole('button', { name: 'Release' }).click();
+
+  await begin();
+  await live.getByRole('button', { name: 'End and stop the motor' }).click();
+  await expect(live.getByText('! Aborted. You ended it. Stopped: the motor confirmed it.')).toBeVisible();
+  await stands();
+
+  await begin();
+  await open(live, 'Registers');
+  await stands();
+
+  await begin();
+  await live.close();
+  await stands();
+});
+
+test('a viewer moves nothing', async ({ bench, page }) => {
+  await page.goto(bench.viewerUrl);
+  await expect(page.getByRole('article')).toHaveCount(6);
+  await setUp(page, 'rmd0/1', 300, 600);
+  await expect(page.getByText('A viewer cannot move motors.')).toBeVisible();
+  await expect(page.getByRole('button', { name: 'Apply the step' })).toBeDisabled();
+});
