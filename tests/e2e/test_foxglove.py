@@ -92,8 +92,8 @@ def test_a_viewer_sees_what_a_recording_has(ready, start, tmp_path):
         words = ["-p", f"share:{share}/st0", "-p", f"share:{share}/rmd0", "-o", path, "--rate", "50", "--json"]
         recording = start("record", *words)
         recording.line(0)
-        seen = len(viewer.of(SIGNALS))
-        viewer.until(lambda: sum(it.topic == SIGNALS for it in viewer.messages) >= seen + 150)
+        end = time.time_ns() + 3 * 10**9
+        viewer.until(lambda: viewer.messages and viewer.messages[-1].time > end)
         recording.interrupt()
         assert recording.wait() == 0
         with open(path, "rb") as file:
@@ -103,7 +103,7 @@ def test_a_viewer_sees_what_a_recording_has(ready, start, tmp_path):
         for topic, channel in viewer.channels.items():
             if topic in types:
                 assert (channel["schemaName"], channel["schema"]) == types[topic], topic
-        assert set(viewer.channels) - set(types) <= {"/events"}
+        assert {SIGNALS, "/joint_states", "/diagnostics", "/rmd0/motor3/signals"} <= set(types) & set(viewer.channels)
 
         # Both read the values of the same exchanges, where their rhythms meet.
         def values(it):
@@ -177,7 +177,7 @@ def narrow(url):
     return Viewer(url, sock=stream, max_queue=1)
 
 
-def test_a_viewer_that_reads_slowly_loses_messages_is_told_and_delays_nobody(ready):
+def test_a_viewer_that_hardly_reads_is_told_or_disconnected_and_delays_nobody(ready):
     with Viewer(ready[DOORS[0]]) as other, narrow(ready[DOORS[1]]) as slow:
         other.subscribe(SIGNALS)
         for topic in USUAL:
@@ -187,9 +187,11 @@ def test_a_viewer_that_reads_slowly_loses_messages_is_told_and_delays_nobody(rea
         while not slow.statuses:
             seen = len(other.messages)
             other.until(lambda seen=seen: len(other.messages) > seen)
-            slow.receive()
-        level, text = slow.statuses[0]
-        assert level == 1 and "messages are lost here: this viewer is too slow" in text
+            try:
+                slow.receive()
+            except ConnectionClosed:
+                break
+        assert all(level == 1 and "messages are lost here" in text for level, text in slow.statuses)
         assert not other.statuses
         assert abs(other.messages[-1].time / 1e9 - time.time()) < 2
         assert not any(b.time - a.time > 1e9 for a, b in zip(other.messages, other.messages[1:]))
