@@ -330,7 +330,7 @@ struct References {
 }
 
 impl References {
-    /// Sends them until the target is reached, one is refused, or `ended` says so.
+    /// Sends them until the target is reached, one is refused, or `ended` becomes true.
     async fn send(self, from: f64, mut ended: watch::Receiver<bool>) {
         let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
         let mut ticks = interval_at(Instant::now() + PERIOD, PERIOD);
@@ -342,7 +342,7 @@ impl References {
                 _ = ended.changed() => return,
                 _ = ticks.tick() => {}
             }
-            // After a pause of the server the reference goes on where it was, and does not jump.
+            // After a pause of the server the reference continues where it was, without a jump.
             let step = self.rate * PERIOD.as_secs_f64();
             let left = self.to - value;
             value = if left.abs() <= step { self.to } else { value + step.copysign(left) };

@@ -141,7 +141,7 @@ pub(super) async fn diff(
     Ok(Answer::Diff { differences })
 }
 
-/// Writes what differs between a file and a motor. It has a session of its own, and goes on if the page
+/// Writes what differs between a file and a motor. It has a session of its own, and continues if the page
 /// leaves: a motor with settings of two files is worse than one with those of either.
 pub(super) async fn restore(
     control: &Arc<Control>,
