@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use motorlink_capture::Direction;
 use motorlink_proto::st::{Frame, FrameCode, Parse, SEGMENTS};
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Instant, Micros};
 
 use super::record::{LONGEST, Seen, What};
-use super::{KEPT, MEMORY};
 
+/// For how long frames are kept.
+pub const KEPT: Micros = Micros::from_millis(120_000);
+/// The memory for the frames of a line. A full CAN bus with 1 Mbit/s fills it in more than a minute.
+pub const MEMORY: usize = 16 << 20;
 /// The bytes of a block, about.
 const BLOCK: usize = 16 << 10;
 /// The most bytes that are kept of the configuration of a data segment.

@@ -20,12 +20,9 @@ use motorlink_proto::time::{Instant, Micros};
 use memory::Memory;
 use record::What;
 
+pub use memory::{KEPT, MEMORY};
 pub(super) use reading::{Part, read};
 
-/// For how long frames are kept.
-pub const KEPT: Micros = Micros::from_millis(120_000);
-/// The memory for the frames of a line. A full CAN bus with 1 Mbit/s fills it in more than a minute.
-pub const MEMORY: usize = 16 << 20;
 /// The most frames of an answer.
 pub const MOST_FRAMES: u32 = 1000;
 
