@@ -106,15 +106,25 @@ export class Bench {
 
   /** Turns the first ST motor from another program at the share, which stays until the end of the test. */
   async start() {
-    const socket = connect(String(this.ready['at']).replace('unix:', ''));
-    this.others.push(socket);
     const command = (id: number, ...bytes: number[]) => ({ id, ask: 'command', line: 'st0', motor: 1, bytes, time_to_live: 1 });
-    const requests = [
-      { id: 1, ask: 'hello', protocol: 1, name: 'other' },
+    this.join(
       command(2, 7, 232, 3, 0, 0, 244, 1), // SET_RAMP: to 1000 rpm in 500 ms
       command(3, 3, 1), // EXECUTE_CMD START_MOTOR
-    ];
-    for (const request of requests) {
+    );
+  }
+
+  /** Reads the speed of the first ST motor from another program, until the end of the test. */
+  async read() {
+    const signals = [{ line: 'st0', motor: 1, name: 'SPEED_MEAS' }];
+    this.join({ id: 2, ask: 'subscribe', signals, period: 0.02, queue: 100, drop: 'oldest' });
+  }
+
+  /** Another program at the share. */
+  private join(...requests: object[]) {
+    const socket = connect(String(this.ready['at']).replace('unix:', ''));
+    this.others.push(socket);
+    socket.resume();
+    for (const request of [{ id: 1, ask: 'hello', protocol: 1, name: 'other' }, ...requests]) {
       const text = Buffer.from(JSON.stringify(request));
       const header = Buffer.alloc(8);
       header.writeUInt32LE(text.length);

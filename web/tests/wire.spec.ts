@@ -7,7 +7,8 @@ const region = (page: Page) => page.getByRole('region', { name: 'Frames' });
 /** All rows, also those that are not in the document. */
 const count = async (page: Page) => Number(await region(page).getByRole('table').getAttribute('aria-rowcount')) - 1;
 
-test('frames come live, can be paused, searched and saved', async ({ live }) => {
+test('frames come live, can be paused, searched and saved', async ({ bench, live }) => {
+  await bench.read();
   await open(live, 'Wire');
   await expect.poll(() => count(live)).toBeGreaterThan(300);
   const rows = region(live).getByRole('row');
@@ -36,14 +37,15 @@ test('frames come live, can be paused, searched and saved', async ({ live }) => 
   expect(file.at(-1)).toMatch(/^\d+\.\d{6},from-drive,1?2?,ok,/);
 });
 
-test('the frames around an instant are shown, the nearest is marked', async ({ live }) => {
+test('the frames around an instant are shown, the nearest is marked', async ({ bench, live }) => {
+  await bench.read();
   await open(live, 'Wire');
   await expect.poll(() => count(live)).toBeGreaterThan(300);
   await live.getByRole('button', { name: 'Pause' }).click();
   const frames = region(live);
   await frames.focus();
   await live.keyboard.press('Home');
-  for (let moved = 0; moved < 100; moved += 1) await live.keyboard.press('ArrowDown');
+  for (let moved = 0; moved < 5; moved += 1) await live.keyboard.press('PageDown');
   const chosen = frames.locator('tr[aria-current]');
   const time = (await chosen.getByRole('cell').first().innerText()).trim();
   await live.evaluate((t) => (location.hash = `#/wire?line=st0&t=${t}`), time);

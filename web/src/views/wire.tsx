@@ -213,7 +213,9 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
               <th scope="col" class="number">
                 Time, s
               </th>
-              <th scope="col">Direction</th>
+              <th scope="col">
+                <span class="wide">Direction</span>
+              </th>
               <th scope="col">Motor</th>
               <th scope="col">Result</th>
               <th scope="col">Bytes</th>
@@ -248,7 +250,7 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
 function Space({ rows, height }: { rows: number; height: number }) {
   return rows === 0 ? null : (
     <tr aria-hidden="true" class="space">
-      <td colSpan={6} style={{ height: `${rows * height}px` }} />
+      <td style={{ height: `${rows * height}px` }} />
     </tr>
   );
 }
@@ -270,7 +272,9 @@ function Row({ frame, index, isChosen, isMarked, onChosen }: RowProps) {
         {isMarked && '▶ '}
         {timeOf(frame.t)}
       </td>
-      <td>{frame.direction === 'to-drive' ? '→ drive' : '← drive'}</td>
+      <td>
+        {frame.direction === 'to-drive' ? '→' : '←'} <span class="wide">drive</span>
+      </td>
       <td>{frame.motor ?? ''}</td>
       <td>{trouble && <span class={frame.result === 'foreign' ? 'muted' : 'bad'}>! {trouble}</span>}</td>
       <td class="mono">{bytesOf(frame)}</td>
