@@ -55,11 +55,7 @@ export function RecordButton({ rate = null }: { rate?: number | null }) {
           {isOn ? '■ End recording' : '● Record'}
         </button>
       )}
-      {active && (
-        <span class="record-state">
-          <span aria-hidden="true">⏺</span> {summary(active)}
-        </span>
-      )}
+      {active && <span class="record-state">{summary(active)}</span>}
       {lacks && <strong class="bad">! {lacks}</strong>}
       {!isOn && recording?.phase === 'failed' && !said && (
         <span class="bad">! The recording failed: {recording.message}</span>

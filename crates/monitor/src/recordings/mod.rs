@@ -51,6 +51,8 @@ pub struct Recordings {
 impl Recordings {
     /// Recordings of the share at this socket, in this folder. The first recording makes the folder.
     pub fn new(path: PathBuf, share: PathBuf) -> Self {
+        // Pages show it, and the folder of this program says nothing to them.
+        let path = std::path::absolute(&path).unwrap_or(path);
         let folder = Arc::new(AsyncMutex::new(Folder::new(path.clone())));
         let (told, _) = watch::channel(None);
         Recordings { path, share, told, making: Mutex::default(), folder }
