@@ -258,6 +258,7 @@ web: ## the monitor's page, in web/dist: npm ci and vite
 	@mkdir -p target && flock target/web.lock $(MAKE) --no-print-directory web/dist/index.html
 web/dist/index.html: web/node_modules/.ready $(shell find web/src web/index.html web/vite.config.ts -type f)
 	cd web && npm run --silent build
+	@touch crates/monitor/build.rs # which cannot watch a folder that is not there
 web/node_modules/.ready: web/package-lock.json
 	cd web && npm ci $(NPM_FLAGS) && touch node_modules/.ready
 # For systems where rustup does not install the toolchain of rust-toolchain.toml automatically.

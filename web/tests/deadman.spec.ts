@@ -60,11 +60,12 @@ turning('it is reloaded', async ({ bench, world }) => {
 });
 
 turning('its main thread hangs', async ({ bench, world }) => {
-  void world.page.evaluate(() => {
+  const hang = world.page.evaluate(() => {
     const end = performance.now() + 3000;
     while (performance.now() < end);
   });
   await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+  await hang;
 });
 
 for (const cut of ['both', 'to-server', 'to-browser'] as const) {

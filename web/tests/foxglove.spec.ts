@@ -65,8 +65,8 @@ for (const subprotocol of ['foxglove.sdk.v1', 'foxglove.websocket.v1']) {
     await expect.poll(() => viewer.of(signals).length).toBeGreaterThan(seen + 5);
     // The drive measures in steps of 6 rpm.
     expect(Math.abs((viewer.last(signals)!['speed_meas'] as number) - truth)).toBeLessThan(60);
-    const { sec, nsec } = viewer.last(signals)!['stamp'] as { sec: number; nsec: number };
-    expect(BigInt(sec) * 1_000_000_000n + BigInt(nsec)).toBe(viewer.of(signals).at(-1)!.time);
+    const { sec, nanosec } = viewer.last(signals)!['stamp'] as { sec: number; nanosec: number };
+    expect(BigInt(sec) * 1_000_000_000n + BigInt(nanosec)).toBe(viewer.of(signals).at(-1)!.time);
     const joint = () => viewer.of('/joint_states').findLast((one) => (one.value['name'] as string[])[0] === 'st0_motor1');
     expect((joint()!.value['velocity'] as Float64Array)[0]).toBeGreaterThan(90);
     await expect.poll(() => viewer.last('/rmd0/motor2/signals_2_hz')?.['voltage_volts'] as number).toBeGreaterThan(5);
