@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use motorlink_proto::time::{Instant, Micros};
+use motorlink_proto::time::Instant;
 
 use crate::event::Event;
 use crate::plan::Wants;
 use crate::sample::Values;
-use crate::schedule::PollId;
+use crate::schedule::{PollId, last_on_grid};
 
 /// What a consumer receives, in the order in which it happened.
 #[derive(Debug, Clone)]
@@ -134,26 +134,29 @@ impl Queue {
 pub(crate) struct Consumer {
     pub(crate) subscription: Subscription,
     pub(crate) wants: Wants,
-    /// The instant from which the values of a poll are wanted next.
-    next: BTreeMap<PollId, Instant>,
+    /// The last instant of this consumer for which the values of a poll came.
+    last: BTreeMap<PollId, Instant>,
 }
 
 impl Consumer {
     pub(crate) fn new(subscription: Subscription, wants: Wants) -> Self {
-        Consumer { subscription, wants, next: BTreeMap::new() }
+        Consumer { subscription, wants, last: BTreeMap::new() }
     }
 
     /// Passes the values of a poll on, if they are wanted now. A poll may be more frequent than this
-    /// consumer wants.
-    pub(crate) fn values(&mut self, poll: PollId, values: &Arc<Values>) {
+    /// consumer wants. Then its values count for the last instant at which the consumer wants some, as
+    /// those of its other polls do: instants are multiples of its period behind `anchor`.
+    pub(crate) fn values(&mut self, anchor: Instant, poll: PollId, values: &Arc<Values>) {
         let periods = values.poll.signals.iter().filter_map(|signal| self.wants.get(signal));
         let Some(period) = periods.min() else { return };
-        let next = self.next.entry(poll).or_insert(values.instant);
-        if values.instant < *next {
+        let instant = last_on_grid(anchor, *period, values.instant);
+        if self.last.insert(poll, instant).is_some_and(|last| last >= instant) {
             return;
         }
-        *next = (*next + *period).max(values.instant + Micros(1));
-        self.subscription.push(Record::Values(Arc::clone(values)));
+        self.subscription.push(Record::Values(match instant == values.instant {
+            true => Arc::clone(values),
+            false => Arc::new(Values { instant, ..Values::clone(values) }),
+        }));
     }
 }
 
@@ -163,6 +166,7 @@ mod tests {
     use crate::plan::{Poll, Read};
     use crate::signal::{Motor, Signal};
     use motorlink_proto::rmd::{Code, MotorId};
+    use motorlink_proto::time::Micros;
 
     fn values(instant: u64) -> Arc<Values> {
         let motor = Motor::Rmd(MotorId::new(1).unwrap());
@@ -231,11 +235,25 @@ mod tests {
         let instants = |period: u64| {
             let subscription = Subscription::new(100, Full::DropOldest);
             let mut consumer = Consumer::new(subscription, Wants::from([(signal, Micros(period))]));
-            (0..10).for_each(|n| consumer.values(PollId(0), &values(n * 10_000)));
+            (0..10).for_each(|n| consumer.values(Instant(0), PollId(0), &values(n * 10_000)));
             taken(&consumer.subscription).into_iter().map(|at| at / 1000).collect::<Vec<_>>()
         };
         assert_eq!(instants(10_000), [0, 10, 20, 30, 40, 50, 60, 70, 80, 90]);
         assert_eq!(instants(30_000), [0, 30, 60, 90]);
-        assert_eq!(instants(15_000), [0, 20, 30, 50, 60, 80, 90]);
+        assert_eq!(instants(15_000), [0, 15, 30, 45, 60, 75, 90]);
+    }
+
+    #[test]
+    fn the_polls_of_a_slow_consumer_have_the_same_instants() {
+        let signal = values(0).poll.signals[0];
+        let subscription = Subscription::new(100, Full::DropOldest);
+        let mut consumer = Consumer::new(subscription, Wants::from([(signal, Micros(30))]));
+        // It came between the two polls of an instant, and one of them is slower than the other.
+        let polls =
+            [(1, 40), (0, 50), (1, 50), (0, 60), (1, 60), (0, 70), (1, 70), (0, 80), (0, 90)];
+        for (poll, instant) in polls {
+            consumer.values(Instant(0), PollId(poll), &values(instant));
+        }
+        assert_eq!(taken(&consumer.subscription), [30, 30, 60, 60, 90]);
     }
 }

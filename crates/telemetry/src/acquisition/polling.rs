@@ -58,13 +58,14 @@ impl Acquisition {
                     }
                     let instant = self.instants.get(&lane).copied().unwrap_or(requested);
                     let values = Arc::new(Values { poll, instant, requested, replied, samples });
+                    let anchor = self.schedule.first_instant().unwrap_or(instant);
                     // What is computed from them comes first: then they complete their row.
                     for derivation in &mut self.derivations {
                         if let Some(computed) = derivation.take(&values) {
-                            pass(&mut self.consumers, derivation.id(), &computed);
+                            pass(&mut self.consumers, anchor, derivation.id(), &computed);
                         }
                     }
-                    pass(&mut self.consumers, id, &values);
+                    pass(&mut self.consumers, anchor, id, &values);
                 }
                 None => {
                     self.refuse(id, poll.signals.clone(), LineError::Reply);
@@ -193,8 +194,13 @@ impl Acquisition {
 }
 
 /// Passes values to the consumers that want them.
-fn pass(consumers: &mut BTreeMap<ConsumerId, Consumer>, id: PollId, values: &Arc<Values>) {
-    consumers.values_mut().for_each(|consumer| consumer.values(id, values));
+fn pass(
+    consumers: &mut BTreeMap<ConsumerId, Consumer>,
+    anchor: Instant,
+    id: PollId,
+    values: &Arc<Values>,
+) {
+    consumers.values_mut().for_each(|consumer| consumer.values(anchor, id, values));
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.

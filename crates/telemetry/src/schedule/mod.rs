@@ -471,8 +471,8 @@ fn stretched(period: Micros, stretch: f64) -> Micros {
     Micros((period.0 as f64 * stretch).round() as u64).max(period)
 }
 
-/// The last instant of a period that is not after `now`.
-fn last_on_grid(anchor: Instant, period: Micros, now: Instant) -> Instant {
+/// The last multiple of a period behind the anchor that is not after `now`.
+pub fn last_on_grid(anchor: Instant, period: Micros, now: Instant) -> Instant {
     let since = now.since(anchor).0;
     anchor + Micros(since - since % period.0)
 }
