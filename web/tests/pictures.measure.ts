@@ -27,11 +27,21 @@ test('pictures', async () => {
         const context = await browser.newContext({ viewport, colorScheme });
         const page = await context.newPage();
         await page.goto(bench.url);
+        if (size === '' && colorScheme === 'dark') {
+          await open(page, 'Plots');
+          for (const name of ['SPEED_MEAS', 'TORQUE_MEAS']) {
+            await page.getByRole('searchbox', { name: 'Search' }).fill(`st0/1 ${name}`);
+            await page.getByRole('checkbox', { name: `st0/1 ${name}` }).check();
+          }
+          await page.getByText('Signals (2)').click();
+          await open(page, 'Motors');
+        }
         await spin(page, 1500);
         await turn(page);
         // The ramps are over, and the trends are full.
         await page.waitForTimeout(10_000);
         await page.mouse.move(0, 0);
+        await page.evaluate(() => scrollTo(0, 0));
         await page.screenshot({ path: `${DOCS}/monitor${size}${suffix}.png` });
         if (size === '' && colorScheme === 'dark') {
           for (const view of ['Plots', 'Registers', 'Wire'] as const) {

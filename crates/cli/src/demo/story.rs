@@ -88,6 +88,7 @@ impl<'a> Story<'a> {
             rmd.malformed
         ));
         lines.push(String::new());
+        lines.push("See them in a browser: `make monitor`, or `motorlink monitor`.".to_owned());
         lines.push("Next: `motorlink sim &`, then `motorlink st -p ./st0 status`,".to_owned());
         lines.push(
             "`motorlink rmd -p slcan:./can0 scan`; `motorlink ports` for real drives.".to_owned(),
