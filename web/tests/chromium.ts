@@ -26,10 +26,10 @@ export class Chromium {
     const started = spawn(
       PROGRAM,
       [...ARGUMENTS, ...through, '--headless', '--remote-debugging-port=0', `--user-data-dir=${folder}`, 'about:blank'],
-      { stdio: 'ignore' },
+      { stdio: 'ignore', detached: true },
     );
     // Also if a test is given up.
-    process.on('exit', () => started.kill('SIGKILL'));
+    process.on('exit', () => end(started));
     const file = join(folder, 'DevToolsActivePort');
     while (!existsSync(file) || !readFileSync(file, 'utf8').includes('\n')) {
       if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);
@@ -61,15 +61,24 @@ export class Chromium {
 
   /** Ends the whole browser, as a crash does. */
   kill() {
-    this.process.kill('SIGKILL');
+    end(this.process);
   }
 
   async close() {
     const ended = new Promise((done) => this.process.once('exit', done));
-    if (this.process.exitCode === null && this.process.signalCode === null) {
-      this.process.kill('SIGKILL');
-      await ended;
-    }
-    rmSync(this.folder, { recursive: true, force: true, maxRetries: 5 });
+    const hasEnded = this.process.exitCode !== null || this.process.signalCode !== null;
+    end(this.process);
+    if (!hasEnded) await ended;
+    // Its other processes end a moment later, and write until then.
+    rmSync(this.folder, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
+  }
+}
+
+/** Ends a browser with the processes that it started. */
+function end({ pid }: ChildProcess) {
+  try {
+    process.kill(-pid!, 'SIGKILL');
+  } catch {
+    // They have ended.
   }
 }
