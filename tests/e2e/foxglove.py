@@ -3,6 +3,7 @@ description. mcap-ros2-support decodes its messages."""
 
 import json
 import struct
+import time
 from collections import namedtuple
 
 from mcap.records import Schema
@@ -45,9 +46,9 @@ class Viewer:
         """Takes the next message."""
         message = self.socket.recv(timeout=within)
         if isinstance(message, bytes):
-            code, subscription, time = struct.unpack_from("<BIQ", message)
+            code, subscription, at = struct.unpack_from("<BIQ", message)
             assert code == 1
-            self.messages.append(Message(self.topics[subscription], time, message[13:]))
+            self.messages.append(Message(self.topics[subscription], at, message[13:]))
             return
         text = json.loads(message)
         if text["op"] == "advertise":
@@ -58,8 +59,9 @@ class Viewer:
 
     def until(self, condition, within=20):
         """Reads until `condition` is true, and gives what it gave."""
+        end = time.monotonic() + within
         while not (found := condition()):
-            self.receive(within)
+            self.receive(max(0.0, end - time.monotonic()))
         return found
 
     def subscribe(self, topic):
