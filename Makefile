@@ -89,7 +89,7 @@ e2e: $(VENV)/ready ## 5 min: the program against independent clients
 web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size
 
-browser: web ## 4 min: the monitor in Debian's Chromium, on simulated drives
+browser: web ## 8 min: the monitor in Debian's Chromium, on simulated drives
 	-@tests/install browser
 	$(PROGRAM)
 	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent browser -- $(T)
