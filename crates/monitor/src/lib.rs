@@ -17,3 +17,4 @@ mod page;
 pub mod program;
 pub mod recordings;
 pub mod server;
+mod socket;

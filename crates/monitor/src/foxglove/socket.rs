@@ -1,29 +1,23 @@
 //! The connection of a viewer.
 
 use std::sync::Arc;
-use std::time::Duration;
 
-use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
-use futures_util::stream::{SplitSink, SplitStream};
+use axum::extract::ws::{Message, WebSocket};
+use futures_util::stream::SplitStream;
 use futures_util::{SinkExt, StreamExt};
 use tokio::time::{Instant, timeout};
 
 use super::protocol::{Level, status};
 use super::session::Out;
 use super::viewers::{Viewer, Viewers};
-
-/// How long a message may wait for a viewer that does not read.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// Messages of a viewer in a second.
-const MESSAGES: u32 = 1000;
-
-type Sink = SplitSink<WebSocket, Message>;
+use crate::socket::{Budget, PATIENCE, Sink, close};
 
 /// Serves a viewer until it goes.
 pub async fn serve(viewers: Arc<Viewers>, socket: WebSocket) {
     let (mut sink, stream) = socket.split();
     let Ok(_place) = viewers.places.try_acquire() else {
-        return close(&mut sink, "the server has as many viewers as it can have").await;
+        let why = "the server has as many viewers as it can have";
+        return close(&mut sink, status(Level::Error, why)).await;
     };
     let joined = viewers.join();
     let why = tokio::select! {
@@ -32,19 +26,8 @@ pub async fn serve(viewers: Arc<Viewers>, socket: WebSocket) {
         why = read(&viewers, &joined.viewer, stream) => why,
     };
     if let Err(why) = why {
-        close(&mut sink, &why).await;
+        close(&mut sink, status(Level::Error, &why)).await;
     }
-}
-
-/// Ends a connection with the reason.
-async fn close(sink: &mut Sink, why: &str) {
-    let frame = CloseFrame { code: close_code::POLICY, reason: "".into() };
-    let last = async {
-        sink.send(Message::Text(status(Level::Error, why).into())).await?;
-        sink.send(Message::Close(Some(frame))).await
-    };
-    // It may have gone.
-    let _ = timeout(PATIENCE, last).await;
 }
 
 /// Takes what a viewer sends, until it goes.
@@ -53,16 +36,10 @@ async fn read(
     viewer: &Viewer,
     mut stream: SplitStream<WebSocket>,
 ) -> Result<(), String> {
-    let (mut since, mut count) = (Instant::now(), 0);
+    let mut budget = Budget::new();
     loop {
         let message = stream.next().await;
-        if since.elapsed() >= Duration::from_secs(1) {
-            (since, count) = (Instant::now(), 0);
-        }
-        count += 1;
-        if count > MESSAGES {
-            return Err(format!("more than {MESSAGES} messages in a second"));
-        }
+        budget.spend()?;
         match message {
             Some(Ok(Message::Text(text))) => {
                 let channels = viewers.channels();

@@ -3,15 +3,15 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use axum::extract::ws::{Message, WebSocket};
 use futures_util::SinkExt;
-use futures_util::stream::{SplitSink, SplitStream, StreamExt};
+use futures_util::stream::{SplitStream, StreamExt};
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message as share;
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
-use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::link::{AGAIN, Link};
 use super::state::State;
@@ -19,19 +19,14 @@ use crate::alive::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page::{Broken, Page, encode};
 use crate::program::{Listener, Program};
+use crate::socket::{Budget, PATIENCE, Sink, close};
 
 /// The longest text of a page.
 pub const LONGEST_TEXT: usize = 1 << 16;
 /// Time between beats.
 const BEAT: Duration = Duration::from_millis(50);
-/// How long a message may wait for a page that does not read.
-const PATIENCE: Duration = Duration::from_secs(10);
 /// Texts of the server that wait for a page.
 const WAITING: usize = 256;
-/// Messages of a page in a second.
-const MESSAGES: u32 = 1000;
-
-type Sink = SplitSink<WebSocket, Message>;
 
 /// Ends a page, however its task ends.
 struct Present<'s> {
@@ -53,7 +48,8 @@ impl Drop for Present<'_> {
 pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     let (mut sink, stream) = socket.split();
     let Ok(_place) = state.places.try_acquire() else {
-        return close(&mut sink, "the server has as many pages as it can have".to_owned()).await;
+        let why = "the server has as many pages as it can have".to_owned();
+        return close(&mut sink, closing(why)).await;
     };
     let own_name = format!("page {}", state.next_page());
     let (view, name, lost) = match state.link.connect(&own_name).await {
@@ -88,26 +84,19 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
         why = read(&page, stream) => why,
     };
     if let Err(why) = why {
-        close(&mut sink, why).await;
+        close(&mut sink, closing(why)).await;
     }
 }
 
-/// Ends a connection with the reason.
-async fn close(sink: &mut Sink, message: String) {
-    let closing = encode(&share::Text::Closing { message });
-    let frame = CloseFrame { code: close_code::POLICY, reason: "".into() };
-    let last = async {
-        sink.send(Message::Text(closing.into())).await?;
-        sink.send(Message::Close(Some(frame))).await
-    };
-    // It may have gone.
-    let _ = timeout(PATIENCE, last).await;
+/// The last text to a page.
+fn closing(message: String) -> String {
+    encode(&share::Text::Closing { message })
 }
 
 /// Takes what the page sends, until it ends.
 async fn read(page: &Arc<Page>, mut stream: SplitStream<WebSocket>) -> Result<(), Broken> {
     let mut tasks = JoinSet::new();
-    let (mut since, mut count) = (Instant::now(), 0);
+    let mut budget = Budget::new();
     loop {
         let message = tokio::select! {
             biased;
@@ -117,13 +106,7 @@ async fn read(page: &Arc<Page>, mut stream: SplitStream<WebSocket>) -> Result<()
                 _ => continue,
             },
         };
-        if since.elapsed() >= Duration::from_secs(1) {
-            (since, count) = (Instant::now(), 0);
-        }
-        count += 1;
-        if count > MESSAGES {
-            return Err(format!("more than {MESSAGES} messages in a second"));
-        }
+        budget.spend()?;
         match message {
             Some(Ok(Message::Text(text))) => page.receive(&text, &mut tasks).await?,
             Some(Ok(Message::Binary(_))) => return Err("a page sends texts only".to_owned()),
