@@ -59,11 +59,17 @@ impl<F: FnMut(Instant, Lane, &Job<&'static str>) -> (Micros, Outcome)> Line<F> {
 
     /// Polls as id, lane, rate in Hz.
     fn polls(&mut self, polls: &[(u32, u8, u64)]) {
+        self.polls_with_openers(polls, &[]);
+    }
+
+    /// Openers as lane and id.
+    fn polls_with_openers(&mut self, polls: &[(u32, u8, u64)], openers: &[(u8, u32)]) {
         let polls: Vec<_> = polls
             .iter()
             .map(|&(id, lane, rate)| (PollId(id), Lane(lane), Micros(SECOND / rate)))
             .collect();
-        self.schedule.set_polls(self.now, &polls);
+        let openers = openers.iter().map(|&(lane, id)| (Lane(lane), PollId(id)));
+        self.schedule.set_polls(self.now, &polls, openers.collect());
     }
 
     fn command(&mut self, lane: u8, name: &'static str, ttl: u64) -> CommandId {
@@ -490,7 +496,7 @@ proptest! {
             match what {
                 0 => {
                     let polls = [(PollId(1), lane, Micros(number)), (PollId(2), Lane(1), Micros(7_000))];
-                    schedule.set_polls(now, &polls);
+                    schedule.set_polls(now, &polls, BTreeMap::new());
                 }
                 1 => drop(schedule.command(lane, "set", now + Micros(number))),
                 2 => drop(schedule.stop(now, lane, "stop", |_| number % 2 == 0)),
@@ -544,8 +550,7 @@ fn an_opener_goes_first_after_the_line_was_opened_and_the_first_instant_is_behin
             _ => (Micros(MILLISECOND), Outcome::Answered),
         }
     });
-    line.polls(&[(1, 0, 100), (2, 0, 100)]);
-    line.schedule.set_openers(BTreeMap::from([(Lane(0), PollId(2))]));
+    line.polls_with_openers(&[(1, 0, 100), (2, 0, 100)], &[(0, 2)]);
     line.run(100 * MILLISECOND);
     let begun: Vec<_> = line
         .events
@@ -566,4 +571,25 @@ fn an_opener_goes_first_after_the_line_was_opened_and_the_first_instant_is_behin
     line.schedule.reopened(line.now);
     line.run(MILLISECOND);
     assert!(matches!(line.events[0].2, Event::Poll(PollId(2), _)), "{:?}", line.events);
+}
+
+#[test]
+fn an_opener_is_not_slowed_with_the_polls_of_an_overloaded_line() {
+    // 10 000 reads a second are asked of a line that carries 1 000.
+    let mut line = Line::new(SERIAL, taking(MILLISECOND));
+    line.polls_with_openers(&[(1, 0, 10_000), (2, 0, 10)], &[(0, 2)]);
+    line.run(5 * SECOND);
+    let openers = line.times(2);
+    assert!((48..=51).contains(&openers.len()), "{}", openers.len());
+    let longest = openers.windows(2).map(|two| two[1].0.since(two[0].0)).max().unwrap();
+    assert!(longest < Micros(110 * MILLISECOND), "{longest:?}");
+    let reads = line.count(1);
+    assert!((4_500..4_800).contains(&reads), "{reads}");
+    // An opener every 100 ms would take a tenth of the line, and confirm nothing between slower reads.
+    let mut line = Line::new(SERIAL, taking(10 * MILLISECOND));
+    let reads: Vec<_> = (1..=40).map(|id| (id, 0, 1_000)).collect();
+    line.polls_with_openers(&[reads, vec![(50, 0, 10)]].concat(), &[(0, 50)]);
+    line.run(10 * SECOND);
+    let counts: Vec<_> = [1, 40, 50].map(|id| line.count(id)).into();
+    assert!(counts.iter().all(|count| (22..=24).contains(count)), "{counts:?}");
 }

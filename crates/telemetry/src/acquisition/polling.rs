@@ -152,10 +152,10 @@ impl Acquisition {
             .chain(confirmations)
             .map(|(id, poll)| (*id, self.line.lane(&poll.request()), poll.period))
             .collect();
-        self.schedule.set_polls(self.clock.now(), &lanes);
         let is_opener = |id: &PollId| self.polls.get(id).is_some_and(|it| it.read == Read::Confirm);
         let openers = lanes.iter().filter(|(id, ..)| is_opener(id));
-        self.schedule.set_openers(openers.map(|(id, lane, _)| (*lane, *id)).collect());
+        let openers = openers.map(|(id, lane, _)| (*lane, *id)).collect();
+        self.schedule.set_polls(self.clock.now(), &lanes, openers);
         true
     }
 

@@ -31,6 +31,26 @@ pub struct Durations {
     pub jitter: Micros,
 }
 
+/// How often a group of polls begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Rhythm {
+    /// The period that is asked.
+    pub(super) period: Micros,
+    /// The part of it that is multiplied on a slow line. The rest of it is a least time.
+    pub(super) stretched: Micros,
+}
+
+impl Rhythm {
+    /// The period on a line with this factor.
+    pub(super) fn at(self, stretch: f64) -> Micros {
+        stretched(self.stretched, stretch).max(self.period)
+    }
+}
+
+pub(super) fn stretched(period: Micros, stretch: f64) -> Micros {
+    Micros((period.0 as f64 * stretch).round() as u64).max(period)
+}
+
 /// What is known of a poll.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cost {
@@ -171,7 +191,7 @@ impl Load {
     pub(super) fn update<'a>(
         &mut self,
         now: Instant,
-        groups: impl Iterator<Item = (Micros, &'a [PollId])> + Clone,
+        groups: impl Iterator<Item = (Rhythm, &'a [PollId])> + Clone,
     ) {
         let since = *self.window.get_or_insert(now);
         let span = now.since(since);
@@ -181,13 +201,17 @@ impl Load {
             return;
         }
         self.is_decided = true;
-        let exchanges =
-            groups.flat_map(|(period, polls)| polls.iter().map(move |poll| (period, poll)));
-        self.demand = exchanges
-            .filter_map(|(period, poll)| Some(self.costs.get(poll)?.mean / period.0 as f64))
-            .sum::<f64>()
-            / self.overlap();
-        let needed = (self.demand / (FULL - self.commands).max(LEAST)).max(1.0);
+        let demand = |stretch: f64| {
+            let exchanges = groups.clone().flat_map(|(rhythm, polls)| {
+                polls.iter().map(move |poll| (rhythm.at(stretch), poll))
+            });
+            let parts = exchanges
+                .filter_map(|(period, poll)| Some(self.costs.get(poll)?.mean / period.0 as f64));
+            parts.sum::<f64>() / self.overlap()
+        };
+        let room = (FULL - self.commands).max(LEAST);
+        let (asked, needed) = (demand(1.0), factor(room, demand));
+        self.demand = asked;
         if needed == 1.0 || (needed / self.stretch - 1.0).abs() > STEADY {
             self.stretch = needed;
         }
@@ -213,6 +237,26 @@ impl Load {
         }
         (self.window, self.busy, self.filled, self.of_commands) = (Some(now), 0, 0, 0);
     }
+}
+
+/// The least factor with which the demand is not more than the room that there is.
+fn factor(room: f64, demand: impl Fn(f64) -> f64) -> f64 {
+    let mut low = 1.0;
+    if demand(low) <= room {
+        return low;
+    }
+    let mut high = 2.0;
+    while demand(high) > room {
+        (low, high) = (high, high * 2.0);
+    }
+    while high - low > low * STEADY / 16.0 {
+        let middle = f64::midpoint(low, high);
+        match demand(middle) > room {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    high
 }
 
 impl Cost {

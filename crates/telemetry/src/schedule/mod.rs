@@ -12,7 +12,8 @@
 //! never answered goes first, so that the load of the line is known soon.
 //!
 //! **Overload.** If a line cannot carry what is asked, all its periods are multiplied by the same
-//! factor ([`Load`]).
+//! factor ([`Load`]). The opener of a lane is an exception: it becomes slower only where the fastest
+//! poll of the lane would be slower than it.
 //!
 //! **Recovery.** A lane that is not in sync is brought in sync before a command begins
 //! ([`Schedule::recover`]). The command waits meanwhile, and can expire or be overtaken.
@@ -37,6 +38,7 @@ pub use exchange::{CommandId, Displaced, Lane, Outcome, PollId, Verdict};
 use exchange::{Kind, UnderWay};
 use lane::LaneState;
 pub use load::Load;
+use load::{Rhythm, stretched};
 
 /// Commands of a lane that go ahead of a poll that is due. Then the poll goes first once, so that
 /// signals are read also while a program sends commands without a pause.
@@ -91,7 +93,8 @@ pub struct QueueFull;
 #[derive(Debug)]
 struct Group {
     lane: Lane,
-    period: Micros,
+    rhythm: Rhythm,
+    is_opener: bool,
     polls: Vec<PollId>,
     /// The poll of this instant that is next.
     position: usize,
@@ -137,14 +140,26 @@ impl<C: Clone> Schedule<C> {
 
     /// Replaces the polls: each with its lane and period. A poll that stays keeps its instants. The
     /// first instant of a new one is now.
-    pub fn set_polls(&mut self, now: Instant, polls: &[(PollId, Lane, Micros)]) {
+    ///
+    /// `openers` go first in their lane after the line was opened: they take the time in which the line
+    /// is brought in sync, so that the polls behind them are on time. Where instants of a lane meet, its
+    /// opener is the last exchange.
+    pub fn set_polls(
+        &mut self,
+        now: Instant,
+        polls: &[(PollId, Lane, Micros)],
+        openers: BTreeMap<Lane, PollId>,
+    ) {
         let anchor = *self.anchor.get_or_insert(now);
-        let mut groups: BTreeMap<(Lane, Micros), Group> = BTreeMap::new();
+        let mut groups: BTreeMap<(Lane, Micros, bool), Group> = BTreeMap::new();
         for &(poll, lane, period) in polls {
             let period = period.max(Micros(1));
-            let group = groups.entry((lane, period)).or_insert_with(|| Group {
+            let is_opener = openers.get(&lane) == Some(&poll);
+            let rhythm = Rhythm { period, stretched: period };
+            let group = groups.entry((lane, period, is_opener)).or_insert_with(|| Group {
                 lane,
-                period,
+                rhythm,
+                is_opener,
                 polls: Vec::new(),
                 position: 0,
                 due: now,
@@ -153,25 +168,30 @@ impl<C: Clone> Schedule<C> {
             group.polls.push(poll);
             self.lanes.entry(lane).or_default();
         }
-        for group in groups.values_mut() {
-            let same = |old: &&Group| (old.lane, old.period) == (group.lane, group.period);
+        let mut groups: Vec<_> = groups.into_values().collect();
+        for at in 0..groups.len() {
+            if groups[at].is_opener {
+                let of_lane = groups.iter().filter(|it| it.lane == groups[at].lane);
+                let fastest = of_lane.map(|it| it.rhythm.period).min();
+                groups[at].rhythm.stretched = fastest.unwrap_or_default();
+            }
+        }
+        for group in &mut groups {
+            let same = |old: &&Group| {
+                let key = |it: &Group| (it.lane, it.rhythm.period, it.is_opener);
+                key(old) == key(group)
+            };
             match self.groups.iter().find(same) {
                 Some(old) => {
                     (group.due, group.skipped) = (old.due, old.skipped);
                     group.position = old.position.min(group.polls.len().saturating_sub(1));
                 }
-                None => group.due = last_on_grid(anchor, group.period, now),
+                None => group.due = last_on_grid(anchor, group.rhythm.period, now),
             }
         }
-        self.groups = groups.into_values().collect();
+        (self.groups, self.openers) = (groups, openers);
         self.load.keep(|poll| polls.iter().any(|(kept, ..)| *kept == poll));
         self.load.decide_anew();
-    }
-
-    /// The polls that go first in a lane after the line was opened: they take the time in which the
-    /// line is brought in sync, so that the polls behind them are on time.
-    pub fn set_openers(&mut self, openers: BTreeMap<Lane, PollId>) {
-        self.openers = openers;
     }
 
     /// Silent lanes take nearly no time.
@@ -179,7 +199,7 @@ impl<C: Clone> Schedule<C> {
         let answers =
             |group: &&Group| self.lanes.get(&group.lane).is_some_and(|lane| !lane.is_silent());
         let groups = self.groups.iter().filter(answers);
-        self.load.update(now, groups.map(|group| (group.period, &*group.polls)));
+        self.load.update(now, groups.map(|group| (group.rhythm, &*group.polls)));
     }
 
     /// Queues a command that is sent until `deadline`, or refused.
@@ -322,8 +342,8 @@ impl<C: Clone> Schedule<C> {
             is_free && group.due <= now
         };
         let group = self.groups.iter_mut().filter(ready).min_by_key(|group| {
-            let deadline = group.due + stretched(group.period, stretch);
-            (self.load.has_measured(group.next_poll()), deadline, group.period)
+            let deadline = group.due + group.rhythm.at(stretch);
+            (self.load.has_measured(group.next_poll()), deadline, group.rhythm.period)
         })?;
         let (lane, instant) = (group.lane, group.due);
         let state = self.lanes.get_mut(&lane)?;
@@ -400,7 +420,7 @@ impl<C: Clone> Schedule<C> {
         self.lanes.values_mut().for_each(LaneState::reopened);
         let anchor = self.anchor.unwrap_or(now);
         for group in &mut self.groups {
-            group.due = group.due.max(last_on_grid(anchor, group.period, now));
+            group.due = group.due.max(last_on_grid(anchor, group.rhythm.period, now));
         }
     }
 
@@ -455,20 +475,16 @@ impl Group {
 
     /// Goes on with the next instant. Instants that are over are skipped.
     fn finish_instant(&mut self, now: Instant, stretch: f64, anchor: Instant) {
-        let period = stretched(self.period, stretch);
+        let period = self.rhythm.at(stretch);
         let periods = (now.since(self.due).0 / period.0).max(1);
         self.skipped += periods - 1;
         self.due += Micros(periods.saturating_mul(period.0));
-        if period == self.period {
+        if period == self.rhythm.period {
             // An instant of a slowed line is between two of the grid.
             self.due = last_on_grid(anchor, period, self.due + Micros(period.0 - 1));
         }
         self.position = 0;
     }
-}
-
-fn stretched(period: Micros, stretch: f64) -> Micros {
-    Micros((period.0 as f64 * stretch).round() as u64).max(period)
 }
 
 /// The last multiple of a period behind the anchor that is not after `now`.
