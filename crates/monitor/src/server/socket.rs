@@ -11,7 +11,7 @@ use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message as share;
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
-use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 use super::link::{AGAIN, Link};
 use super::state::State;
@@ -146,7 +146,11 @@ async fn write(
         };
         let sent = async {
             sink.feed(message).await?;
-            while let Some(message) = view.received(page) {
+            // A beat does not wait until nothing more has come.
+            let beat = Instant::now() + BEAT;
+            while Instant::now() < beat
+                && let Some(message) = view.received(page)
+            {
                 sink.feed(message).await?;
             }
             sink.flush().await
