@@ -352,6 +352,8 @@ def test_a_drive_that_answers_later_appears(sim, start):
             cable.plug_in()
             assert late.reads(SIGNALS, 3) and early.reads(SIGNALS, 3)
             cable.unplug()
+            early.subscribe("/diagnostics")
+            early.until(lambda: any(it.status[0].level == 3 for _, it in early.of("/diagnostics")))
             cable.plug_in()
             seen = len(late.messages)
             late.until(lambda: len(late.messages) > seen + 3)

@@ -10,5 +10,5 @@ mod viewers;
 
 pub use protocol::SUBPROTOCOLS;
 pub use session::LONGEST_TEXT;
-pub use socket::serve;
+pub use socket::{PACKED, serve};
 pub use viewers::Viewers;

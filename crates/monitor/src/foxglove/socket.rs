@@ -12,6 +12,9 @@ use super::session::Out;
 use super::viewers::{Viewer, Viewers};
 use crate::socket::{Budget, PATIENCE, Sink, close};
 
+/// How much is handed to the system at once, in bytes: a viewer that takes this in time is there.
+pub const PACKED: usize = 1 << 12;
+
 /// Serves a viewer until it goes.
 pub async fn serve(viewers: Arc<Viewers>, socket: WebSocket) {
     let (mut sink, stream) = socket.split();

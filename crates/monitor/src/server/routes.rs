@@ -164,6 +164,7 @@ async fn view(Shared(state): Shared<Arc<State>>, upgrade: WebSocketUpgrade) -> R
     upgrade
         .max_message_size(foxglove::LONGEST_TEXT)
         .max_frame_size(foxglove::LONGEST_TEXT)
+        .write_buffer_size(foxglove::PACKED)
         .on_upgrade(move |socket| foxglove::serve(Arc::clone(&state.viewers), socket))
 }
 
