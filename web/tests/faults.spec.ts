@@ -1,0 +1,64 @@
+// Faults of a drive, a cable that goes and comes back, and a viewer beside an operator.
+import { card, expect, open, spin, test } from './bench';
+
+const TURNS = 300;
+const STILL = 5;
+
+test('a fault is shown in words, with what to do, and acknowledged', async ({ bench, live }) => {
+  await spin(live, 1000);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+  const answer = await bench.drives.tell({
+    command: 'fault', port: `pty:${bench.folder}/st0`, motor: 1, fault: 'BREAK_IN',
+  });
+  expect(answer).toEqual({ ok: true });
+  const motor = card(live, 'st0/1');
+  const fault = motor.getByRole('list', { name: 'Faults' }).getByRole('listitem');
+  await expect(fault.getByText(/BREAK_IN \(occurred, not acknowledged\)/)).toBeVisible();
+  // Its meaning, and what to do.
+  await expect(fault.getByRole('paragraph')).toHaveText(/\w+.*\. \w+.*\./);
+  await expect(motor.getByText('1 fault', { exact: false }).first()).toBeVisible();
+  await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+  await motor.getByRole('button', { name: 'Acknowledge faults' }).click();
+  await expect(motor.getByText('Faults acknowledged.')).toBeVisible();
+  await expect(motor.getByText(/no faults/)).toBeVisible();
+  await spin(live, 1000);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+});
+
+test('a cable that goes and comes back needs no click', async ({ bench, live }) => {
+  const motor = card(live, 'st0/1');
+  await spin(live, 1000);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+  await bench.drives.end();
+  await expect(motor.getByText(/\d s old/).first()).toBeVisible();
+  await expect(motor.getByText('not live')).toBeVisible();
+  await open(live, 'Ports');
+  await expect(live.getByText(/lost since|✕ lost/).first()).toBeVisible();
+  await open(live, 'Motors');
+  await bench.plug();
+  await expect(motor.getByText('live', { exact: true })).toBeVisible();
+  expect(await bench.speed('st', 1)).toBeLessThan(STILL);
+  await spin(live, 1000);
+  await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+});
+
+test('a viewer beside an operator sees the motion, cannot move, and can stop', async ({ bench, live, browser }) => {
+  const context = await browser.newContext();
+  try {
+    const viewer = await context.newPage();
+    await viewer.goto(bench.viewerUrl);
+    const seen = card(viewer, 'st0/1');
+    await spin(live, 1000);
+    const speed = seen.locator('.value').filter({ hasText: 'Speed' }).locator('.digits');
+    await expect.poll(async () => Number(await speed.textContent())).toBeGreaterThan(TURNS);
+    await expect(seen.getByText('live', { exact: true })).toBeVisible();
+    for (const name of ['Start', 'Acknowledge faults', 'Run to target']) {
+      await expect(seen.getByRole('button', { name, exact: true })).toBeDisabled();
+    }
+    await seen.getByRole('button', { name: 'Stop', exact: true }).click();
+    await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+    await expect(seen.getByText('Stopped: the motor confirmed it.')).toBeVisible();
+  } finally {
+    await context.close();
+  }
+});
