@@ -240,6 +240,19 @@ describe('signs of life', () => {
     expect(Socket.last.signs.at(-1)).toMatchObject({ frame });
   });
 
+  it('follow the first frame after a pause at once', () => {
+    Socket.last.welcome();
+    live(500);
+    vi.advanceTimersByTime(200);
+    const before = Socket.last.signs.length;
+    beat();
+    draw();
+    expect(Socket.last.signs).toHaveLength(before + 1);
+    expect(Socket.last.signs.at(-1)).toMatchObject({ beat: lastBeat });
+    draw();
+    expect(Socket.last.signs).toHaveLength(before + 1);
+  });
+
   it('give the motors up when the page is hidden or left', () => {
     Socket.last.welcome();
     link.held.value = true;

@@ -114,6 +114,9 @@ const clock = new ServerClock();
 let beat = 0;
 let drawnBeat = 0;
 let frame = 0;
+/** The frame that the last sign of life named, and when the last sign with a new frame was sent. */
+let saidFrame = 0;
+let aliveAt = -Infinity;
 /** For how long no beat was received, without the time in which this page did not run. */
 let quiet = 0;
 let measuredDelay = 0;
@@ -222,12 +225,19 @@ export function release() {
 
 /** A sign of life. It is true only as long as the browser draws this page. */
 export function sayAlive() {
-  if (welcome.value) say({ beat: drawnBeat, frame, held: held.value, at: performance.now() });
+  if (!welcome.value) return;
+  const now = performance.now();
+  if (say({ beat: drawnBeat, frame, held: held.value, at: now }) && frame > saidFrame) {
+    saidFrame = frame;
+    aliveAt = now;
+  }
 }
 
 function drawn() {
   frame += 1;
   drawnBeat = beat;
+  // The timer may have run before this frame: its sign then proved nothing, and the next is 100 ms away.
+  if (performance.now() - aliveAt > ALIVE) sayAlive();
   requestAnimationFrame(drawn);
 }
 
