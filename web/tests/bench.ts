@@ -2,7 +2,7 @@
 import { test as base, expect, type Page } from '@playwright/test';
 import { type ChildProcess, spawn } from 'node:child_process';
 import { connect, type Socket } from 'node:net';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { createInterface } from 'node:readline';
@@ -84,6 +84,15 @@ export class Bench {
       this.folder,
     );
     await this.drives.line((line) => line['protocol'] === 'rmd');
+  }
+
+  /** An ST drive whose torque register reads the time since the start in ms, modulo 2^16. */
+  async plugClock() {
+    writeFileSync(`${this.folder}/clock.toml`, 'clock_register = "TORQUE_MEAS"\n');
+    this.drives = new Program(
+      ['sim', `${this.folder}/clock.toml`, '--st', `pty:${this.folder}/st0`, '--stdin', '--json'], this.folder,
+    );
+    await this.drives.line((line) => line['protocol'] === 'st');
   }
 
   /** As `plug`, with an ST drive on TCP. Gives its port. */

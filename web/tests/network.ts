@@ -11,11 +11,13 @@ export interface Weather {
   hoard: number;
   /** Bytes a second; 0: no limit. */
   rate: number;
+  /** Bytes arrive in pieces of at most so many; 0: as they were sent. */
+  piece: number;
   /** Nothing arrives and nothing is closed: a cable is out, or a machine is gone. */
   cut: 'no' | 'both' | 'to-server' | 'to-browser';
 }
 
-export const FINE: Weather = { delay: 0, jitter: 0, hoard: 0, rate: 0, cut: 'no' };
+export const FINE: Weather = { delay: 0, jitter: 0, hoard: 0, rate: 0, piece: 0, cut: 'no' };
 
 /** One direction of a connection. */
 class Pipe {
@@ -23,6 +25,7 @@ class Pipe {
   private hoarded: Buffer[] = [];
   private last = 0;
   private timer: NodeJS.Timeout | undefined;
+  private isAbandoned = false;
 
   constructor(
     private to: Socket,
@@ -31,24 +34,40 @@ class Pipe {
   ) {}
 
   push(bytes: Buffer) {
-    const { delay, jitter, hoard, rate } = this.weather();
+    const { delay, jitter, hoard, rate, piece } = this.weather();
     this.hoarded.push(bytes);
     const size = this.hoarded.reduce((sum, part) => sum + part.length, 0);
     if (size < hoard) return;
     const whole = Buffer.concat(this.hoarded);
     this.hoarded = [];
-    const takes = rate ? (1000 * whole.length) / rate : 0;
     const arrival = performance.now() + delay + Math.random() * jitter;
-    this.last = Math.max(arrival, this.last) + takes;
-    this.queue.push({ bytes: whole, at: this.last });
+    this.last = Math.max(arrival, this.last);
+    for (let from = 0; from < whole.length; ) {
+      const part = whole.subarray(from, piece ? from + piece : undefined);
+      this.last += rate ? (1000 * part.length) / rate : 0;
+      this.queue.push({ bytes: part, at: this.last });
+      from += part.length;
+    }
     this.pump();
+  }
+
+  /** What waits arrives now, as far as the weather lets it. */
+  hurry() {
+    this.last = 0;
+    this.queue.forEach((one) => (one.at = 0));
+    this.pump();
+  }
+
+  /** Nothing arrives any more, and nobody is told. */
+  abandon() {
+    this.isAbandoned = true;
   }
 
   /** Moves what has arrived. */
   pump = () => {
     clearTimeout(this.timer);
     const { cut } = this.weather();
-    if (cut === 'both' || cut === this.way) return;
+    if (this.isAbandoned || cut === 'both' || cut === this.way) return;
     while (this.queue[0] && this.queue[0].at <= performance.now()) {
       this.to.write(this.queue.shift()!.bytes);
     }
@@ -85,12 +104,17 @@ export class Network {
 
   set(weather: Partial<Weather>) {
     this.weather = { ...FINE, ...weather };
-    this.pipes.forEach((pipe) => pipe.pump());
+    this.pipes.forEach((pipe) => pipe.hurry());
   }
 
   /** Closes all connections, as a proxy does that ends. */
   drop() {
     this.sockets.forEach((socket) => socket.destroy());
+  }
+
+  /** All connections die without a word, as with a router that was switched off. New ones work. */
+  abandon() {
+    this.pipes.forEach((pipe) => pipe.abandon());
   }
 
   async close() {
