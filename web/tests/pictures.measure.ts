@@ -29,6 +29,8 @@ test('pictures', async () => {
         await page.goto(bench.url);
         if (size === '' && colorScheme === 'dark') {
           await open(page, 'Plots');
+          await page.getByText('Signals (6)').click();
+          await page.getByRole('button', { name: 'Remove all' }).click();
           for (const name of ['SPEED_MEAS', 'TORQUE_MEAS']) {
             await page.getByRole('searchbox', { name: 'Search' }).fill(`st0/1 ${name}`);
             await page.getByRole('checkbox', { name: `st0/1 ${name}` }).check();

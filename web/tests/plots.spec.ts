@@ -7,6 +7,8 @@ import { expect, open, spin, test } from './bench';
 /** Chooses signals by their names. */
 async function choose(page: Page, ...names: string[]) {
   await open(page, 'Plots');
+  await page.getByText(/^Signals \(\d+\)$/).click();
+  await page.getByRole('button', { name: 'Remove all' }).click();
   await page.getByLabel('Values a second').first().selectOption('100');
   for (const name of names) {
     await page.getByRole('searchbox', { name: 'Search' }).fill(name);
@@ -43,6 +45,30 @@ test('shows what turns, also while it is paused', async ({ live }) => {
   await expect(live.getByText('Live', { exact: true })).toBeVisible();
   expect(await numberIn(live, SPEED, 'Max')).toBeGreaterThanOrEqual(max);
 });
+
+test('begins with the speeds of the motors, and remembers another choice', async ({ live }) => {
+  await open(live, 'Plots');
+  await expect(live.getByText('Signals (6)')).toBeVisible();
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  await expect.poll(() => numberIn(live, 'rmd0/4 speed_dps', 'Now')).toBe(0);
+  await live.getByText('Signals (6)').click();
+  await live.getByRole('button', { name: `Remove ${SPEED}` }).click();
+  await live.reload();
+  await expect(live.getByText('Signals (5)')).toBeVisible();
+});
+
+for (const [width, most] of [[1280, 440], [390, 374]] as const) {
+  test(`has room for curves beside or above the table of curves, ${width} pixels`, async ({ live }) => {
+    await live.setViewportSize({ width, height: 800 });
+    await open(live, 'Plots');
+    await expect(live.getByText('Signals (6)')).toBeVisible();
+    await expect.poll(() => numberIn(live, RMD, 'Max')).toBe(0);
+    const legend = live.getByRole('region', { name: 'Curves of Signals' });
+    expect((await legend.boundingBox())!.width).toBeLessThanOrEqual(most);
+    // Nothing is cut off.
+    expect(await legend.evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)).toBe(0);
+  });
+}
 
 test('keeps its signals over a reload, and ignores broken settings', async ({ live }) => {
   await choose(live, SPEED, RMD);

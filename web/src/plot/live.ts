@@ -1,10 +1,11 @@
 // The plots' state, which outlives the view: signals are read on while another view is open, so that a
 // look at the wire does not tear a hole into the curves.
 import { effect, signal, untracked } from '@preact/signals';
+import { allMotors, descriptions, watchDescriptions } from '../drives';
 import * as link from '../link';
 import type { Column, Event as DriveEvent } from '../wire';
 import { Scheduler } from './scheduler';
-import { type Chosen, load, save, type Settings } from './settings';
+import { type Chosen, load, remembers, save, type Settings, usual } from './settings';
 import { keyOf, LONGEST, Store, type Wanted } from './store';
 import { numbered, styleOf } from './style';
 import { Window } from './window';
@@ -25,6 +26,8 @@ const lessMotion = matchMedia('(prefers-reduced-motion: reduce)');
 export const scheduler = new Scheduler(time, () => store.now(), () => lessMotion.matches);
 
 let started = false;
+/** What nobody chose: it is not remembered. */
+let proposed = settings.value;
 let numbers: ReadonlyMap<string, number> = new Map();
 let lastEvent: DriveEvent | undefined;
 
@@ -34,7 +37,10 @@ export function start() {
   started = true;
   store.onSamples = scheduler.sampled;
   lastEvent = link.events.value.at(-1);
-  effect(() => save(localStorage, settings.value));
+  effect(() => {
+    if (settings.value !== proposed) save(localStorage, settings.value);
+  });
+  if (!remembers(localStorage)) propose();
   effect(() => {
     for (const { line } of link.lines.value) void describe(line);
   });
@@ -48,6 +54,17 @@ export function start() {
   effect(() => {
     if (link.state.value === 'lost') store.interrupt();
     scheduler.request();
+  });
+}
+
+/** Shows the usual signals of the motors that are found, until somebody chooses others. */
+function propose() {
+  const forget = watchDescriptions();
+  effect(() => {
+    const signals = usual(allMotors.value, (line) => descriptions.value.get(line)?.overview.speed);
+    const known = settings.peek();
+    if (known !== proposed) forget();
+    else if (signals.length !== known.signals.length) settings.value = proposed = { ...known, signals };
   });
 }
 

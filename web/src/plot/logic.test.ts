@@ -7,7 +7,7 @@ import { between, valueAt } from './readings';
 import { rows, rowsBefore } from './rows';
 import { BREAK, Samples } from './samples';
 import { candidates } from './search';
-import { DEFAULTS, load, MOST_SIGNALS, parse, save } from './settings';
+import { DEFAULTS, load, MOST_SIGNALS, parse, remembers, save, usual } from './settings';
 import { DARK, DASHES, LIGHT, numbered, styleOf } from './style';
 import { random } from './testing';
 import { Window } from './window';
@@ -170,9 +170,28 @@ describe('settings', () => {
     expect(parse({ signals: many }).signals).toHaveLength(MOST_SIGNALS);
   });
 
+  it('are remembered once they are saved', () => {
+    const place = storage(null);
+    expect(remembers(place)).toBe(false);
+    save(place, DEFAULTS);
+    expect(remembers(place)).toBe(true);
+  });
+
+  it('begin with the speeds of the first motors that are described', () => {
+    const motors = [{ line: 'st0', motor: 1 }, { line: 'can0', motor: 3 }, { line: 'x0', motor: 1 }];
+    const speedOf = (line: string) => ({ st0: 'SPEED_MEAS', can0: 'speed_dps' })[line];
+    expect(usual(motors, speedOf).map(({ line, motor, name }) => `${line}/${motor} ${name}`)).toEqual([
+      'st0/1 SPEED_MEAS', 'can0/3 speed_dps',
+    ]);
+    const many = Array.from({ length: 36 }, (_, motor) => ({ line: 'st0', motor }));
+    expect(usual(many, speedOf)).toHaveLength(6);
+    expect(usual([], speedOf)).toEqual([]);
+  });
+
   it('do not hurt where nothing can be stored', () => {
     const refuses = { getItem: () => { throw new Error('denied'); }, setItem: () => { throw new Error('full'); } };
     expect(load(refuses)).toEqual(DEFAULTS);
+    expect(remembers(refuses)).toBe(false);
     save(refuses, DEFAULTS);
   });
 });

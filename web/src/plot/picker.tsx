@@ -15,7 +15,6 @@ export function Picker() {
   const { signals } = settings.value;
   const [search, setSearch] = useState('');
   const [rate, setRate] = useState<number>(DEFAULT_RATE);
-  const [isOpen, setOpen] = useState(signals.length === 0);
   const found = useMemo(
     () => candidates(motors.value, catalogue.value, search),
     [motors.value, catalogue.value, search],
@@ -24,7 +23,7 @@ export function Picker() {
   const isFull = signals.length >= MOST_SIGNALS;
 
   return (
-    <details class="plots-picker" open={isOpen} onToggle={({ currentTarget }) => setOpen(currentTarget.open)}>
+    <details class="plots-picker">
       <summary>Signals ({signals.length})</summary>
       <div class="plots-choice">
         <div class="plots-search">

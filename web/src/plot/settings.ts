@@ -35,12 +35,36 @@ export function load(storage: Storage): Settings {
   }
 }
 
+/** Whether there are settings of an earlier visit. */
+export function remembers(storage: Storage): boolean {
+  try {
+    return storage.getItem(PLACE) !== null;
+  } catch {
+    return false;
+  }
+}
+
 export function save(storage: Storage, settings: Settings) {
   try {
     storage.setItem(PLACE, JSON.stringify(settings));
   } catch {
     // Private windows may refuse. The settings then end with the page.
   }
+}
+
+const MOST_USUAL = 6;
+const USUAL_RATE = 20;
+
+/** What is shown to somebody who has chosen nothing: the speeds of the first motors. */
+export function usual(
+  motors: readonly { line: string; motor: number }[], speedOf: (line: string) => string | undefined,
+): Chosen[] {
+  return motors
+    .flatMap(({ line, motor }) => {
+      const name = speedOf(line);
+      return name === undefined ? [] : [{ line, motor, name, rate: USUAL_RATE }];
+    })
+    .slice(0, MOST_USUAL);
 }
 
 /** What of it is usable. */
