@@ -41,7 +41,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
 .PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -217,13 +217,19 @@ header: ## crates/ffi/include/motorlink.h
 deadman: web ## how long motors turn on after their page is gone
 	-@tests/install browser
 	$(CARGO) build --release --locked -p motorlink-cli
-	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure deadman
+	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure tests/deadman
+
+# MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md. MINUTES=0: without the soak.
+view: web ## how old and how smooth what the page draws is, and its memory
+	-@tests/install browser
+	$(CARGO) build --release --locked -p motorlink-cli
+	cd web && MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure tests/view
 
 pictures: web $(VENV)/ready ## draws scenarios (docs/pictures) and screens of the program (docs/*.svg)
 	mkdir -p docs/pictures
 	$(PROGRAM)
 	MOTORLINK_BIN=$(DEBUG)/motorlink $(VENV)/bin/python tests/e2e/pictures.py docs
-	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent measure pictures
+	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent measure tests/pictures
 	$(CARGO) run --release --locked --quiet -p motorlink-cli -- demo --picture docs/demo.svg
 	@for scenario in scenarios/*.toml; do \
 		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \

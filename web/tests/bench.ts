@@ -7,7 +7,7 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { createInterface } from 'node:readline';
 
-const PROGRAM = resolve(process.env.MOTORLINK_BIN ?? '../target/debug/motorlink');
+export const PROGRAM = resolve(process.env.MOTORLINK_BIN ?? '../target/debug/motorlink');
 
 /** A process that prints a JSON object per line. */
 export class Program {
@@ -128,8 +128,8 @@ export class Bench {
     this.join({ id: 2, ask: 'subscribe', signals, period: 0.02, queue: 100, drop: 'oldest' });
   }
 
-  /** Another program at the share. */
-  private join(...requests: object[]) {
+  /** Another program at the share, until the end of the test. */
+  join(...requests: object[]) {
     const socket = connect(String(this.ready['at']).replace('unix:', ''));
     this.others.push(socket);
     socket.resume();
@@ -193,9 +193,9 @@ export const VIEWS = ['Motors', 'Plots', 'Registers', 'Step response', 'Wire', '
 /** The card of a motor. */
 export const card = (page: Page, name: string) => page.getByRole('article', { name: `Motor ${name}` });
 
-/** Turns the first ST motor from a page, and waits until the server says that it begins. */
-export async function spin(page: Page, rpm: number) {
-  const motor = card(page, 'st0/1');
+/** Turns an ST motor from a page, and waits until the server says that it begins. */
+export async function spin(page: Page, rpm: number, name = 'st0/1') {
+  const motor = card(page, name);
   await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(rpm));
   await motor.getByRole('spinbutton', { name: 'Ramp' }).fill('2000');
   await motor.getByRole('button', { name: 'Run to target' }).click();

@@ -1,12 +1,11 @@
 // How long a motor turns on after what moved it is gone: `make deadman`, docs/BENCHMARKS.md.
 import { test } from '@playwright/test';
-import { readFileSync, writeFileSync } from 'node:fs';
 import { Bench, Program, spin } from './bench';
 import { Chromium } from './chromium';
 import { Network, Wire } from './network';
+import { type Cell, publish, quantile, row, table } from './report';
 
 const RUNS = Number(process.env.RUNS ?? 50);
-const PAGE = '../docs/BENCHMARKS.md';
 /** EXECUTE_CMD STOP_MOTOR to motor 1, without its checksum. */
 const STOP = Buffer.from([0x23, 0x01, 0x02]);
 /** Below this a motor stands still, rpm. */
@@ -111,36 +110,24 @@ async function run({ guarded = false, event, from }: Case) {
   }
 }
 
-const row = (cells: (string | number)[]) => `| ${cells.join(' | ')} |`;
-
 function quantiles(all: (number | null)[]) {
-  const sorted = all.filter((one) => one !== null).sort((a, b) => a - b);
-  const at = (part: number) => sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))];
-  return [0, 0.5, 0.95, 1].map((part) => at(part)?.toFixed(0) ?? '-');
+  const found = all.filter((one) => one !== null);
+  return [0, 0.5, 0.95, 1].map((part) => (found.length > 0 ? quantile(found, part).toFixed(0) : '-'));
 }
 
 test('dead-man', async () => {
   test.setTimeout(4 * 3600 * 1000);
-  const rows: string[] = [];
+  const rows: Cell[][] = [];
   for (const one of CASES) {
     const results: Awaited<ReturnType<typeof run>>[] = [];
     for (let left = RUNS; left > 0; left -= 1) results.push(await run(one));
     const left = results.filter(({ still }) => still === null).length;
-    rows.push(
-      row([
-        one.name, results.length, ...quantiles(results.map(({ stop }) => stop)),
-        ...quantiles(results.map(({ still }) => still)), left,
-      ]),
-    );
-    console.log(rows.at(-1));
+    rows.push([
+      one.name, results.length, ...quantiles(results.map(({ stop }) => stop)),
+      ...quantiles(results.map(({ still }) => still)), left,
+    ]);
+    console.log(row(rows.at(-1)!));
   }
-  if (!process.env.MOTORLINK_UPDATE_DOCS) return;
-  const [begin, end] = ['<!-- dead-man -->', '<!-- end of dead-man -->'];
-  const page = readFileSync(PAGE, 'utf8');
-  const [before, rest] = page.split(begin);
-  const after = rest?.split(end)[1];
-  if (after === undefined) throw new Error(`${PAGE} has no place for the table`);
-  const head = row(['event', 'runs', 'STOP min', 'p50', 'p95', 'max', 'still min', 'p50', 'p95', 'max', 'left turning']);
-  const line = row(['---', ...Array<string>(10).fill('--:')]);
-  writeFileSync(PAGE, `${before}${begin}\n\n${[head, line, ...rows].join('\n')}\n\n${end}${after}`);
+  const head = ['event', 'runs', 'STOP min', 'p50', 'p95', 'max', 'still min', 'p50', 'p95', 'max', 'left turning'];
+  publish('dead-man', table(head, rows));
 });
