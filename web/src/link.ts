@@ -436,7 +436,8 @@ function measure({ beat: number, wall, at, since, holds: has }: Beat) {
   measuredDelay = clock.heard(performance.now(), wall * 1000, at, since) ?? measuredDelay;
 }
 
-async function refreshLines() {
+/** Asks for the lines: their clocks and counts are those of the answer. */
+export async function refreshLines() {
   try {
     const answer = await ask({ ask: 'lines' });
     for (const { line, t, wall } of answer.lines) clocks.set(line, { t, wall });

@@ -304,7 +304,33 @@ t: number,
 /**
  * The wall clock at the same moment, in seconds since 1970.
  */
-wall: number, };
+wall: number, 
+/**
+ * What its exchanges came to since it was opened. Earlier shares do not say it.
+ */
+counts?: LineCounts | null, };
+
+export type LineCounts = { 
+/**
+ * Exchanges that are over.
+ */
+exchanges: number, 
+/**
+ * Those in which a drive refused, or answered in a way that was not expected.
+ */
+refused: number, 
+/**
+ * Those without a reply.
+ */
+silent: number, 
+/**
+ * Those that failed otherwise: damaged replies, echoes, a port that failed.
+ */
+failed: number, 
+/**
+ * How often the port was lost.
+ */
+lost: number, };
 
 export type Mode = "speed" | "torque" | "position";
 

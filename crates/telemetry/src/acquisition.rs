@@ -3,6 +3,7 @@
 mod derivation;
 mod polling;
 mod rates;
+mod tally;
 mod telling;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,7 @@ use crate::subscription::{Consumer, Subscription};
 use derivation::Derivation;
 
 pub use rates::Rate;
+pub use tally::{Counts, Tally};
 
 /// The time between two confirmations of a motor's values, if they are read more often.
 pub const CONFIRMATION: Micros = Micros::from_millis(100);
@@ -61,6 +63,7 @@ pub struct Acquisition {
     /// Events that are told once the stops that they are about have gone out.
     untold: Vec<Arc<Event>>,
     last_consumer: u64,
+    tally: Tally,
     /// Who stopped the motors.
     latch: Option<Arc<str>>,
     is_open: bool,
@@ -137,6 +140,7 @@ impl Acquisition {
             consumers: BTreeMap::new(),
             untold: Vec::new(),
             last_consumer: 0,
+            tally: Tally::default(),
             latch: None,
             is_open: true,
             instants: BTreeMap::new(),
@@ -162,6 +166,11 @@ impl Acquisition {
     /// How long a reply may take.
     pub fn timeout(&self) -> Duration {
         self.line.timeout()
+    }
+
+    /// What the exchanges came to, for other threads.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
     }
 
     /// What is readable when there is something to receive.
@@ -434,6 +443,7 @@ impl Acquisition {
     /// The exchange of a lane is over: the lane is free for another one.
     fn finish(&mut self, over: Over) -> Finished {
         let at = self.clock.now();
+        self.tally.ended(&over.result);
         let outcome = match &over.result {
             Ok(_) => Outcome::Answered,
             // The motor answered, and the lane is in sync again.
@@ -498,6 +508,7 @@ impl Acquisition {
     fn closed(&mut self, why: LineError, ended: &mut Ended<'_>) -> Option<Duration> {
         let now = self.clock.now();
         self.is_open = false;
+        self.tally.lost();
         // It may be another drive after that.
         self.derivations.iter_mut().for_each(|it| it.forget(|_| true));
         for (_, verdict) in self.schedule.closed(now) {

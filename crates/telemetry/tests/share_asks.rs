@@ -40,7 +40,16 @@ fn answer(ask: &Ask) -> Answer {
         Ask::Lines => {
             let (line, port) = ("rmd0".to_owned(), "can0".to_owned());
             let (protocol, profile) = (Protocol::Rmd, None);
-            let line = Line { line, protocol, port, profile, timeout: 5.0, t: 0.0, wall: 0.0 };
+            let line = Line {
+                line,
+                protocol,
+                port,
+                profile,
+                timeout: 5.0,
+                t: 0.0,
+                wall: 0.0,
+                counts: None,
+            };
             Answer::Lines { lines: vec![line], latched_by: None }
         }
         Ask::Command { bytes, .. } => Answer::Command { bytes: [&bytes[..1], &[7; 7]].concat() },

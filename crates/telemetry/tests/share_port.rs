@@ -363,6 +363,7 @@ fn first_command(socket: &UnixListener) -> Ask {
                         timeout: 1.0,
                         t: 0.0,
                         wall: 0.0,
+                        counts: None,
                     };
                     Answer::Lines { lines: vec![line], latched_by: None }
                 }

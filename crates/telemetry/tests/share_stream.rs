@@ -142,6 +142,7 @@ fn line() -> Line {
         timeout: 1.0,
         t: 100.0,
         wall: now() as f64 / 1e9,
+        counts: None,
     }
 }
 

@@ -2,15 +2,18 @@
 import { useEffect } from 'preact/hooks';
 import { lineEvents, motorEvents, rates, watchRates } from '../drives';
 import { rate, timeOfDay } from '../format';
-import { entries, lines, motors, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
+import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
 import { nameOf } from '../stop';
-import type { Line } from '../wire';
+import type { Line, LineCounts } from '../wire';
 import './ports.css';
+
+/** The time between two looks at the counts, in ms. */
+const COUNTS = 2000;
 
 /** Events that say that something went wrong on a line. */
 const COUNTED = { lost: 'lost', silent: 'silent', doubtful: 'doubtful replies', refused: 'refused' } as const;
 
-function counts(line: string): string {
+function incidents(line: string): string {
   const texts = Object.entries(COUNTED).flatMap(([kind, title]) => {
     const count = entries.value.filter((one) => one.line === line && one.event === kind).length;
     return count ? [`${count} × ${title}`] : [];
@@ -18,6 +21,15 @@ function counts(line: string): string {
   const rows = unconfirmed.value.get(line) ?? 0;
   if (rows) texts.push(`${rows} × values left out without confirmation`);
   return `${texts.join(', ') || 'none'} since this page was opened`;
+}
+
+/** What went wrong on a line since the server opened it. */
+function errors({ exchanges, silent, refused, failed, lost }: LineCounts): string {
+  const times = lost === 1 ? 'once' : `${lost} times`;
+  return (
+    `${silent} without reply, ${refused} refused, ${failed} failed, of ${exchanges} exchanges; ` +
+    `${lost ? `port lost ${times}` : 'port never lost'}`
+  );
 }
 
 function LineState({ line }: { line: string }) {
@@ -45,7 +57,7 @@ function LineState({ line }: { line: string }) {
   );
 }
 
-function Port({ line: { line, protocol, port, profile, timeout } }: { line: Line }) {
+function Port({ line: { line, protocol, port, profile, timeout, counts } }: { line: Line }) {
   const found = motors.value.get(line) ?? [];
   const isBusy = searching.value.has(line);
   const failure = searchFailed.value.get(line);
@@ -85,8 +97,14 @@ function Port({ line: { line, protocol, port, profile, timeout } }: { line: Line
               );
             })}
           </dd>
+          {counts && (
+            <>
+              <dt>Errors</dt>
+              <dd>{errors(counts)}</dd>
+            </>
+          )}
           <dt>Incidents</dt>
-          <dd>{counts(line)}</dd>
+          <dd>{incidents(line)}</dd>
         </dl>
         <p role="status" class="bad">
           {failure !== undefined && `! ${failure}`}
@@ -138,6 +156,11 @@ function Rates() {
 
 export default function Ports() {
   useEffect(() => watchRates(), []);
+  useEffect(() => {
+    void refreshLines();
+    const timer = setInterval(() => void refreshLines(), COUNTS);
+    return () => clearInterval(timer);
+  }, []);
   return (
     <>
       <div class="bar">

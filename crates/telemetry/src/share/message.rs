@@ -5,6 +5,8 @@ use std::time::Duration;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::acquisition::Counts;
+
 /// The longest name of a program, in bytes.
 pub const LONGEST_NAME: usize = 64;
 /// The most records that wait for a program in one subscription.
@@ -389,6 +391,37 @@ pub struct Line {
     pub t: f64,
     /// The wall clock at the same moment, in seconds since 1970.
     pub wall: f64,
+    /// What its exchanges came to since it was opened. Earlier shares do not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts: Option<LineCounts>,
+}
+
+/// What the exchanges of a line came to since it was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct LineCounts {
+    /// Exchanges that are over.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub exchanges: u64,
+    /// Those in which a drive refused, or answered in a way that was not expected.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub refused: u64,
+    /// Those without a reply.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub silent: u64,
+    /// Those that failed otherwise: damaged replies, echoes, a port that failed.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub failed: u64,
+    /// How often the port was lost.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
+    pub lost: u64,
+}
+
+impl From<Counts> for LineCounts {
+    fn from(counts: Counts) -> Self {
+        let Counts { exchanges, refused, silent, failed, lost } = counts;
+        LineCounts { exchanges, refused, silent, failed, lost }
+    }
 }
 
 impl Line {

@@ -12,7 +12,7 @@ use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, Re
 use motorlink_proto::time::Instant;
 
 use super::place::{SessionId, seconds, wall_now};
-use crate::acquisition::Acquisition;
+use crate::acquisition::{Acquisition, Tally};
 use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
@@ -35,6 +35,7 @@ pub struct Held {
     runner: Runner,
     clock: Clock,
     tap: Tap,
+    tally: Tally,
     /// One moment by both clocks.
     anchor: (Instant, f64),
     events: Subscription,
@@ -92,6 +93,7 @@ impl Held {
             anchor: (clock.now(), wall_now()),
             clock,
             tap,
+            tally: acquisition.tally().clone(),
             events,
             words: Words::default(),
             owners: BTreeMap::new(),
@@ -158,7 +160,8 @@ impl Held {
         let profile = self.speaks.profile().map(|profile| profile.name().to_owned());
         let (line, port) = (self.name.clone(), self.port.clone());
         let timeout = self.timeout.as_secs_f64();
-        Line { line, protocol, port, profile, timeout, t: seconds(now), wall: self.wall(now) }
+        let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
+        Line { line, protocol, port, profile, timeout, t, wall, counts }
     }
 
     /// The wall clock at a moment of the line's clock.

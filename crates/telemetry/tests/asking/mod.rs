@@ -1,0 +1,89 @@
+//! A program at a share that waits for its answers.
+#![allow(dead_code, reason = "each test uses a part")]
+
+use std::collections::VecDeque;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
+use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Line, Text};
+
+use crate::shared::LIMIT;
+
+pub struct Asker {
+    stream: UnixStream,
+    dialogue: Dialogue,
+    pub events: VecDeque<Event>,
+    ended: VecDeque<Ended>,
+}
+
+impl Asker {
+    pub fn join(path: &Path, name: &str) -> Self {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(LIMIT)).unwrap();
+        let dialogue = Dialogue::default();
+        let (events, ended) = (VecDeque::new(), VecDeque::new());
+        let mut asker = Asker { stream, dialogue, events, ended };
+        let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
+        asker.ask(hello).unwrap();
+        asker
+    }
+
+    pub fn send(&mut self, ask: Ask) -> u32 {
+        let (id, bytes) = self.dialogue.request(ask).unwrap();
+        self.stream.write_all(&bytes).unwrap();
+        id
+    }
+
+    pub fn ask(&mut self, ask: Ask) -> Result<Answer, Refusal> {
+        let id = self.send(ask);
+        self.end_of(id)
+    }
+
+    pub fn end_of(&mut self, id: u32) -> Result<Answer, Refusal> {
+        loop {
+            if let Some(at) = self.ended.iter().position(|ended| ended.id == id) {
+                return self.ended.remove(at).unwrap().result;
+            }
+            self.hear();
+        }
+    }
+
+    pub fn event(&mut self, happening: Happening) -> Event {
+        loop {
+            if let Some(at) = self.events.iter().position(|it| it.event == happening) {
+                return self.events.remove(at).unwrap();
+            }
+            self.hear();
+        }
+    }
+
+    pub fn lines(&mut self) -> Vec<Line> {
+        match self.ask(Ask::Lines).unwrap() {
+            Answer::Lines { lines, .. } => lines,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub fn names(&mut self) -> Vec<String> {
+        self.lines().into_iter().map(|line| line.line).collect()
+    }
+
+    fn hear(&mut self) {
+        loop {
+            match self.dialogue.hear().unwrap() {
+                Some(Heard::Ended(ended)) => return self.ended.push_back(ended),
+                Some(Heard::Text(Text::Event(event))) => return self.events.push_back(event),
+                Some(_) => return,
+                None => {
+                    let mut bytes = [0; 4096];
+                    let size = self.stream.read(&mut bytes).unwrap();
+                    assert!(size > 0, "the connection has ended");
+                    self.dialogue.push(&bytes[..size]);
+                }
+            }
+        }
+    }
+}
