@@ -102,7 +102,7 @@ interface Pending {
 }
 
 const SHARE_ASKS: ReadonlySet<string> = new Set<ShareRequest['ask']>([
-  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'frames', 'stop', 'latch', 'release',
+  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'frames', 'ports', 'open', 'close', 'stop', 'latch', 'release',
 ]);
 
 const pending = new Map<number, Pending>();
@@ -426,7 +426,7 @@ function happened(event: DriveEvent) {
   }
   if (event.event === 'latched') latchedBy.value = event.by ?? 'another program';
   if (event.event === 'released') latchedBy.value = null;
-  if (event.event === 'back') void refreshLines();
+  if (['back', 'opened', 'closed'].includes(event.event)) void refreshLines();
 }
 
 function measure({ beat: number, wall, at, since, holds: has }: Beat) {
@@ -442,6 +442,7 @@ export async function refreshLines() {
     const answer = await ask({ ask: 'lines' });
     for (const { line, t, wall } of answer.lines) clocks.set(line, { t, wall });
     lines.value = answer.lines;
+    forgetMotors(answer.lines);
     latchedBy.value = answer.latched_by ?? null;
     for (const { line } of answer.lines) {
       if (!motors.value.get(line)?.length) void refreshMotors(line);
@@ -449,6 +450,13 @@ export async function refreshLines() {
   } catch {
     // The next connection asks again.
   }
+}
+
+/** Lines that were closed have no motors any more. */
+function forgetMotors(known: readonly Line[]) {
+  const isThere = ([line]: [string, unknown]) => known.some((one) => one.line === line);
+  const left = [...motors.value].filter(isThere);
+  if (left.length < motors.value.size) motors.value = new Map(left);
 }
 
 /** Lines that are being searched. */

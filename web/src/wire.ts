@@ -232,6 +232,32 @@ range: [number, number, number],
  */
 words: Array<string>, };
 
+export type FoundPort = { 
+/**
+ * Its name, as `open` takes it.
+ */
+port: string, 
+/**
+ * The protocol of the drives that it can have without an adapter.
+ */
+protocol: Protocol, 
+/**
+ * Manufacturer and product.
+ */
+description?: string | null, 
+/**
+ * A second path that does not depend on the order in which devices are plugged in.
+ */
+stable_path?: string | null, 
+/**
+ * Why it cannot be used now, and what to do.
+ */
+problem?: string | null, 
+/**
+ * The line that has it open.
+ */
+line?: string | null, };
+
 export type FromPage = Alive | Request | ShareRequest;
 
 export type Group = { 
@@ -256,7 +282,7 @@ motor: number,
  */
 columns: Array<Column>, };
 
-export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "later";
+export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "later";
 
 export type Limit = { 
 /**
@@ -828,7 +854,27 @@ motor: number, } | { "ask": "stop",
 /**
  * The motor; all motors that were started or read, without it.
  */
-motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "frames", 
+motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "open", 
+/**
+ * The port, as `-p` takes it: a device, a CAN interface, an adapter or a TCP address.
+ */
+port: string, 
+/**
+ * What its drives speak.
+ */
+protocol: Protocol, 
+/**
+ * The profile of ST drives; the document's without it.
+ */
+profile?: string | null, 
+/**
+ * How long to wait for a reply, in seconds; that of the protocol without it.
+ */
+timeout?: number | null, } | { "ask": "close", 
+/**
+ * The line.
+ */
+line: string, } | { "ask": "frames", 
 /**
  * The line.
  */
@@ -894,7 +940,19 @@ motors: Array<StoppedMotor>, } | { "to": "latch" } | { "to": "release" } | { "to
 /**
  * Those of all signals that are read.
  */
-rates: Array<SignalRate>, } | { "to": "frames", 
+rates: Array<SignalRate>, } | { "to": "ports", 
+/**
+ * Those that can be found without opening them.
+ */
+ports: Array<FoundPort>, } | { "to": "open", 
+/**
+ * The name of the new line.
+ */
+line: string, } | { "to": "close", 
+/**
+ * The motors that were stopped, and how they took it.
+ */
+motors: Array<StoppedMotor>, } | { "to": "frames", 
 /**
  * In the order in which they were seen.
  */

@@ -2,8 +2,8 @@
 //!
 //! A page also exchanges the messages of [a share](motorlink_telemetry::share::message) through the
 //! server. It receives the share's answers, refusals, groups, events and samples as they are. Of the
-//! share's requests it may send `lines`, `signals`, `subscribe`, `unsubscribe`, `rates`, `stop`, `latch`
-//! and `release`. Texts of both sides have the same [`Refusal`](motorlink_telemetry::share::message::Text).
+//! share's requests it may send `lines`, `signals`, `subscribe`, `unsubscribe`, `rates`, `frames`, `ports`,
+//! `open`, `close`, `stop`, `latch` and `release`. Texts of both sides have the same [`Refusal`](motorlink_telemetry::share::message::Text).
 
 use std::collections::BTreeMap;
 

@@ -170,9 +170,12 @@ impl Page {
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
             | Ask::Rates
+            | Ask::Ports
             | Ask::Frames { .. } => {}
             Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
-            Ask::Latch | Ask::Release => self.check_operator()?,
+            Ask::Latch | Ask::Release | Ask::Open { .. } | Ask::Close { .. } => {
+                self.check_operator()?;
+            }
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
                 let message = "a page may not send this request".to_owned();
                 return Err(Refusal { reason: Reason::Forbidden, message, code: None });
@@ -217,9 +220,10 @@ impl Page {
                     Err(refusal) => return self.refuse(id, refusal).await,
                 };
                 let ticket = self.control().man.ticket(motor_of(&ask));
+                let line = line_of(&ask);
                 tasks.spawn(async move {
                     let motion = Permitted { page: Arc::clone(&page), ticket };
-                    let result = match page.link.drives().await {
+                    let result = match page.link.drives_of(line.as_deref()).await {
                         Ok(drives) => drives.answer(ask, &view, &motion).await,
                         Err(refusal) => Err(refusal),
                     };
@@ -416,6 +420,14 @@ fn motor_of(ask: &Ask) -> Option<MotorName> {
         | Ask::Dump { motor }
         | Ask::Diff { motor, .. }
         | Ask::Restore { motor, .. } => Some(motor.clone()),
+    }
+}
+
+/// The line that a request is about.
+fn line_of(ask: &Ask) -> Option<String> {
+    match ask {
+        Ask::Motors { line } | Ask::Describe { line } => Some(line.clone()),
+        ask => motor_of(ask).map(|motor| motor.line),
     }
 }
 

@@ -207,7 +207,7 @@ impl Remote {
     /// As [`command`](Self::command), without waiting: `ended` receives the result in the engine's thread.
     ///
     /// # Errors
-    /// The engine has ended. If it ends later, `ended` is dropped.
+    /// The engine has ended. If it ends later, `ended` receives that it has.
     pub fn command_then(
         &self,
         by: &Arc<str>,
@@ -241,7 +241,7 @@ impl Remote {
     /// As [`stop`](Self::stop), without waiting: `ended` receives the result in the engine's thread.
     ///
     /// # Errors
-    /// The engine has ended. If it ends later, `ended` is dropped.
+    /// The engine has ended. If it ends later, `ended` receives that it has.
     pub fn stop_then(
         &self,
         by: &Arc<str>,
@@ -287,16 +287,28 @@ impl Engine {
                 match inbox.try_recv() {
                     Ok(task) => task(&mut self),
                     Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => return self.acquisition.end(),
+                    Err(TryRecvError::Disconnected) => return self.end(inbox),
                 }
             }
             let Engine { acquisition, waiting } = &mut self;
             let wait = acquisition.advance(&mut |id, result| tell(waiting, id, result));
             match self.await_next(&woken, wait) {
                 Ok(is_woken) if !(is_woken && is_closed(&mut woken)) => {}
-                _ => return self.acquisition.end(),
+                _ => return self.end(inbox),
             }
         }
+    }
+
+    /// Stops the motors, and tells those who wait.
+    fn end(mut self, inbox: &Receiver<Task>) -> Vec<Stopped> {
+        // Nothing that is asked for here is sent any more.
+        while let Ok(task) = inbox.try_recv() {
+            task(&mut self);
+        }
+        let Engine { acquisition, waiting } = self;
+        let stopped = acquisition.end();
+        waiting.into_values().for_each(|ended| ended(Err(CommandError::Ended)));
+        stopped
     }
 
     /// Waits until there is something to do; whether somebody woke the engine.

@@ -1,10 +1,12 @@
-//! The lines of a share: what their exchanges came to.
+//! The lines of a share: what their exchanges came to, and lines that come and go.
 
 mod asking;
 mod drives;
 mod shared;
 
 use asking::Asker;
+use drives::served;
+use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
 use shared::Share;
 
@@ -31,4 +33,175 @@ fn a_line_counts_its_exchanges_and_what_went_wrong() {
     let after = counts(&mut program);
     assert!(after.exchanges >= before.exchanges + 2, "{before:?} {after:?}");
     assert_eq!((after.refused, after.silent, after.failed, after.lost), (1, 0, 0, 0));
+}
+
+fn open(port: &str, protocol: Protocol) -> Ask {
+    Ask::Open { port: port.to_owned(), protocol, profile: None, timeout: Some(5.0) }
+}
+
+fn close(line: &str) -> Ask {
+    Ask::Close { line: line.to_owned() }
+}
+
+fn opened(answer: Result<Answer, Refusal>) -> String {
+    match answer {
+        Ok(Answer::Open { line }) => line,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn refused(answer: Result<Answer, Refusal>) -> (Reason, String) {
+    let refusal = answer.expect_err("it is refused");
+    (refusal.reason, refusal.message)
+}
+
+#[test]
+fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
+    let share = Share::new("lines");
+    let (_bench, _serving, st, rmd) = served("lines-more");
+    let mut program = Asker::join(&share.path, "opens");
+    let mut other = Asker::join(&share.path, "sees");
+    assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st1");
+    assert_eq!(opened(program.ask(open(&format!("slcan:{rmd}"), Protocol::Rmd))), "rmd1");
+    let event = other.event(Happening::Opened);
+    assert_eq!((event.line.as_deref(), event.by.as_deref()), (Some("st1"), Some("opens")));
+    assert_eq!(other.names(), ["st0", "rmd0", "st1", "rmd1"]);
+    other.ask(command("st1", 1, &[2, 30])).unwrap();
+
+    // The rows of a subscription over two lines go on when one of them is closed.
+    let signal = |line: &str| SignalName { line: line.to_owned(), motor: 1, name: "STATUS".into() };
+    let signals = vec![signal("st0"), signal("st1")];
+    let subscribe =
+        Ask::Subscribe { signals, period: 0.01, queue: 100, drop: DropRule::Oldest, rows: true };
+    other.ask(subscribe).unwrap();
+    let (reason, why) = refused(program.ask(open(&st, Protocol::St)));
+    assert!(
+        reason == Reason::Usage && why.ends_with("is open already: it is the line st1"),
+        "{why}"
+    );
+    assert!(matches!(program.ask(close("st1")), Ok(Answer::Close { motors }) if motors.is_empty()));
+    assert_eq!(other.event(Happening::Closed).line.as_deref(), Some("st1"));
+    assert_eq!(other.names(), ["st0", "rmd0", "rmd1"]);
+    let (reason, why) = refused(other.ask(command("st1", 1, &[2, 30])));
+    assert_eq!(
+        (reason, why.as_str()),
+        (Reason::Usage, "no line `st1`; the lines are st0, rmd0, rmd1")
+    );
+    assert!(matches!(other.ask(Ask::Rates), Ok(Answer::Rates { .. })));
+    // Programs may still mean the earlier line: its name is not used again.
+    assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st2");
+}
+
+#[test]
+fn motors_of_a_line_stop_before_it_is_closed() {
+    let share = Share::new("close-stops");
+    let mut program = Asker::join(&share.path, "turns");
+    let mut other = Asker::join(&share.path, "closes");
+    program.ask(command("st0", 1, &[7, 232, 3, 0, 0, 244, 1])).unwrap();
+    program.ask(command("st0", 1, &[3, 1])).unwrap();
+    share.reaches("st1.speed_rpm", |rpm| rpm > 300.0);
+    let Ok(Answer::Close { motors }) = other.ask(close("st0")) else { panic!("no answer") };
+    let motor = MotorName { line: "st0".to_owned(), motor: 1 };
+    assert_eq!(motors, [StoppedMotor { motor, failure: None }]);
+    assert_eq!(program.event(Happening::Stopped).motor, Some(1));
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 10.0);
+}
+
+#[test]
+fn requests_that_wait_when_a_line_is_closed_get_an_end() {
+    let share = Share::new("close-waits");
+    let mut program = Asker::join(&share.path, "waits");
+    let waiting: Vec<u32> =
+        (0..100).map(|_| program.send(command("rmd0", 1, &[0x9c, 0, 0, 0, 0, 0, 0, 0]))).collect();
+    let closing = program.send(close("rmd0"));
+    let rates = program.send(Ask::Rates);
+    for id in waiting {
+        // It was carried out, or it says that the line has gone.
+        let _ = program.end_of(id);
+    }
+    assert!(matches!(program.end_of(closing), Ok(Answer::Close { .. })));
+    assert!(matches!(program.end_of(rates), Ok(Answer::Rates { .. })));
+}
+
+#[test]
+fn a_latch_holds_for_a_line_that_is_opened_later() {
+    let share = Share::new("latch-later");
+    let (_bench, _serving, st, _) = served("latch-later-more");
+    let mut program = Asker::join(&share.path, "latches");
+    program.ask(Ask::Latch).unwrap();
+    assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st1");
+    assert_eq!(refused(program.ask(command("st1", 1, &[3, 1]))).0, Reason::Latched);
+}
+
+#[test]
+fn one_of_two_programs_that_open_the_same_port_gets_it() {
+    let share = Share::new("open-twice");
+    let (_bench, _serving, st, _) = served("open-twice-more");
+    let mut one = Asker::join(&share.path, "one");
+    let mut two = Asker::join(&share.path, "two");
+    let asked = (one.send(open(&st, Protocol::St)), two.send(open(&st, Protocol::St)));
+    let ends = [one.end_of(asked.0), two.end_of(asked.1)];
+    assert_eq!(ends.iter().filter(|end| end.is_ok()).count(), 1, "{ends:?}");
+    assert_eq!(one.names(), ["st0", "rmd0", "st1"]);
+}
+
+#[test]
+fn only_devices_are_opened() {
+    motorlink_testbench::register();
+    motorlink_telemetry::share::port::register();
+    let share = Share::new("devices");
+    let mut program = Asker::join(&share.path, "tries");
+    let file = std::env::temp_dir().join(format!("no-device-{}", std::process::id()));
+    std::fs::write(&file, "as it was").unwrap();
+    let terminal = rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR).unwrap();
+    rustix::pty::grantpt(&terminal).unwrap();
+    rustix::pty::unlockpt(&terminal).unwrap();
+    let name = rustix::pty::ptsname(&terminal, Vec::new()).unwrap().into_string().unwrap();
+    let link = file.with_extension("link");
+    std::os::unix::fs::symlink(&name, &link).unwrap();
+    let (file, link) = (file.display().to_string(), link.display().to_string());
+    let socket = share.path.display().to_string();
+    for port in [
+        file.clone(),
+        format!("serial:{file}"),
+        format!("slcan:{file}"),
+        name.clone(),
+        format!("slcan:{name}"),
+        link.clone(),
+        "/dev/null".to_owned(),
+        "/dev/tty".to_owned(),
+        "/proc/self/mem".to_owned(),
+        format!("unix:{socket}"),
+        format!("slcan:unix:{socket}"),
+        format!("share:{socket}/st0"),
+        "sim:".to_owned(),
+        format!("sim:{file}"),
+        "socketcan:../../etc".to_owned(),
+        "socketcan:lo".to_owned(),
+        "tcp:127.0.0.1:9?clock=127.0.0.1:10".to_owned(),
+        "/dev/no-such-device".to_owned(),
+    ] {
+        let (reason, why) = refused(program.ask(open(&port, Protocol::St)));
+        assert!(reason == Reason::Usage && why.contains("is not opened"), "{port}: {why}");
+    }
+    for port in ["", "x", "\u{1b}[2J", &"a".repeat(600)] {
+        assert_eq!(refused(program.ask(open(port, Protocol::St))).0, Reason::Usage, "{port:?}");
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "as it was");
+    std::fs::remove_file(file).unwrap();
+    std::fs::remove_file(link).unwrap();
+    let (_bench, _serving, st, _) = served("devices-more");
+    assert!(refused(program.ask(open(&st, Protocol::Rmd))).1.contains("slcan:DEVICE"));
+    let profile = Some("other".to_owned());
+    let ask = Ask::Open { port: st.clone(), protocol: Protocol::St, profile, timeout: None };
+    assert!(refused(program.ask(ask)).1.contains("is one of spec"));
+    for timeout in [0.0, -1.0, 1e9] {
+        let timeout = Some(timeout);
+        let ask = Ask::Open { port: st.clone(), protocol: Protocol::St, profile: None, timeout };
+        assert_eq!(refused(program.ask(ask)).0, Reason::Usage);
+    }
+    // No program serves this port.
+    assert_eq!(refused(program.ask(open("tcp:127.0.0.1:1", Protocol::St))).0, Reason::Line);
+    assert_eq!(program.names(), ["st0", "rmd0"]);
+    assert!(matches!(program.ask(Ask::Ports), Ok(Answer::Ports { .. })));
 }

@@ -5,6 +5,8 @@ import { rate, timeOfDay } from '../format';
 import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
 import { nameOf } from '../stop';
 import type { Line, LineCounts } from '../wire';
+import { Said, useSaid } from '../parts';
+import { CloseLine, Connect } from './connect';
 import './ports.css';
 
 /** The time between two looks at the counts, in ms. */
@@ -57,7 +59,11 @@ function LineState({ line }: { line: string }) {
   );
 }
 
-function Port({ line: { line, protocol, port, profile, timeout, counts } }: { line: Line }) {
+interface Close {
+  (what: () => Promise<string>): void;
+}
+
+function Port({ close, line: { line, protocol, port, profile, timeout, counts } }: { line: Line; close: Close }) {
   const found = motors.value.get(line) ?? [];
   const isBusy = searching.value.has(line);
   const failure = searchFailed.value.get(line);
@@ -69,6 +75,7 @@ function Port({ line: { line, protocol, port, profile, timeout, counts } }: { li
           <button type="button" disabled={isBusy || !welcome.value} onClick={() => void refreshMotors(line)}>
             {isBusy ? 'Searching …' : 'Search motors again'}
           </button>
+          <CloseLine line={line} closed={close} />
         </div>
         <dl class="facts">
           <dt>State</dt>
@@ -161,17 +168,21 @@ export default function Ports() {
     const timer = setInterval(() => void refreshLines(), COUNTS);
     return () => clearInterval(timer);
   }, []);
+  const { said, attempt } = useSaid();
+  const close: Close = (what) => void attempt(what);
   return (
     <>
       <div class="bar">
         <h2>Ports</h2>
       </div>
+      <Said said={said} />
       {lines.value.length === 0 && <p class="muted">The server has not said yet which lines it holds.</p>}
       <ul class="ports">
         {lines.value.map((line) => (
-          <Port key={line.line} line={line} />
+          <Port key={line.line} line={line} close={close} />
         ))}
       </ul>
+      <Connect />
       <h3 class="apart">Rates</h3>
       <Rates />
     </>

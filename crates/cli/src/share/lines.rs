@@ -2,15 +2,10 @@
 
 use std::time::Duration;
 
-use motorlink::port::PortName;
 use motorlink::st::Profile;
-use motorlink::{rmd, st};
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::Protocol;
-use motorlink_telemetry::share::wire::Tap;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::opening::{OpenError, Wish};
 
 use crate::connection::missing_port;
 use crate::failure::Failure;
@@ -39,44 +34,31 @@ impl Lines {
 
     /// Opens each port, once for each protocol that it can have.
     pub fn open(&self) -> Result<Vec<Held>, Failure> {
-        let (mut held, mut st, mut rmd) = (Vec::new(), 0, 0);
+        let (mut held, mut st, mut rmd) = (Vec::new(), 0_usize, 0_usize);
         if self.is_empty() {
             return Err(missing_port());
         }
         for text in &self.ports {
-            let port: PortName = text.parse()?;
-            if port.as_line().is_some() {
-                let defaults = st::Options::default();
-                let timeout = self.timeout.unwrap_or(defaults.timeout);
-                let options = st::Options { profile: self.profile, timeout, ..defaults };
-                let (tap, around) = taps();
-                let wrap = move |link| around.around_line(link);
-                let client = st::EventClient::open_wrapped(&port, wrap, options)?;
-                let engine = Acquisition::new(Box::new(StLine::new(client)));
-                let name = format!("{}{st}", Protocol::St.word());
-                let speaks = Speaks::St(self.profile);
-                held.push(Held::start(&name, &port.to_string(), speaks, engine, tap)?);
-                st += 1;
-            }
-            if port.as_can().is_some() {
-                let defaults = rmd::Options::default();
-                let timeout = self.timeout.unwrap_or(defaults.timeout);
-                let options = rmd::Options { timeout, ..defaults };
-                let (tap, around) = taps();
-                let wrap = move |link| around.around_bus(link);
-                let client = rmd::EventClient::open_wrapped(&port, wrap, options)?;
-                let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-                let name = format!("{}{rmd}", Protocol::Rmd.word());
-                held.push(Held::start(&name, &port.to_string(), Speaks::Rmd, engine, tap)?);
-                rmd += 1;
+            let wish = Wish { port: text.parse()?, profile: self.profile, timeout: self.timeout };
+            for protocol in wish.protocols() {
+                let number = match protocol {
+                    Protocol::St => &mut st,
+                    Protocol::Rmd => &mut rmd,
+                };
+                let name = format!("{}{number}", protocol.word());
+                held.push(Held::start(&name, wish.open(protocol)?)?);
+                *number += 1;
             }
         }
         Ok(held)
     }
 }
 
-/// A tap, for the line and to put around its port.
-fn taps() -> (Tap, Tap) {
-    let tap = Tap::default();
-    (tap.clone(), tap)
+impl From<OpenError> for Failure {
+    fn from(error: OpenError) -> Self {
+        match error {
+            OpenError::St(error) => error.into(),
+            OpenError::Rmd(error) => error.into(),
+        }
+    }
 }

@@ -115,6 +115,17 @@ pub trait Port: fmt::Debug + Send + Sync {
     fn is_held(&self) -> bool {
         false
     }
+
+    /// Whether it is a device that this computer lists now, a drive that this program serves, or an
+    /// address in a network. Other names lead to files, terminals and sockets of other programs.
+    fn is_device(&self) -> bool {
+        false
+    }
+
+    /// What it occupies: the same for all names and options of a device.
+    fn place(&self) -> String {
+        self.body()
+    }
 }
 
 /// A port that carries bytes.
@@ -189,6 +200,16 @@ impl PortName {
     /// As [`Port::is_held`].
     pub fn is_held(&self) -> bool {
         self.0.is_held()
+    }
+
+    /// As [`Port::is_device`].
+    pub fn is_device(&self) -> bool {
+        self.0.is_device()
+    }
+
+    /// As [`Port::place`].
+    pub fn place(&self) -> String {
+        self.0.place()
     }
 
     /// As [`LinePort::baud`].

@@ -46,6 +46,11 @@ impl Drives {
         self.lines.iter().map(|(name, speaks)| (name.clone(), *speaks)).collect()
     }
 
+    /// Whether there is a line of this name.
+    pub fn has(&self, line: &str) -> bool {
+        self.lines.contains_key(line)
+    }
+
     /// The drives of these lines.
     pub fn new(lines: Vec<Line>) -> Self {
         let speaks = |line: &Line| match line.protocol {
@@ -54,6 +59,11 @@ impl Drives {
         };
         let lines = lines.iter().filter_map(|line| Some((line.line.clone(), speaks(line)?)));
         Drives { lines: Arc::new(lines.collect()), control: Arc::default() }
+    }
+
+    /// The same drives with other lines. The limits of lines that stay are kept.
+    pub fn with_lines(&self, lines: Vec<Line>) -> Self {
+        Drives { control: Arc::clone(&self.control), ..Self::new(lines) }
     }
 
     /// Carries out a request. `view` is used for what moves nothing. `drive` is asked for a session when a

@@ -12,6 +12,7 @@ use tokio::time::sleep;
 
 use super::protocol::{Channel, Level, Text, encode, status};
 use super::session::Session;
+use crate::drive::Drives;
 use crate::server::link::{AGAIN, Link};
 
 /// Viewers at the same time.
@@ -166,13 +167,25 @@ impl Present {
 
 /// Reads the share for viewers, until it is aborted.
 async fn feed(link: Arc<Link>, viewers: Weak<Viewers>) {
-    let drives = loop {
-        if let Ok(drives) = link.drives().await {
-            break drives;
+    loop {
+        let drives = loop {
+            if let Ok(drives) = link.drives().await {
+                break drives;
+            }
+            sleep(AGAIN).await;
+        };
+        let live = follow(&link, &viewers, &drives);
+        link.other_lines(&drives).await;
+        drop(live);
+        if let Some(viewers) = viewers.upgrade() {
+            viewers.present().troubles.clear();
         }
-        sleep(AGAIN).await;
-    };
-    let (their, mut numbers) = (Weak::clone(&viewers), Vec::new());
+    }
+}
+
+/// Reads these lines until what it gives is dropped.
+fn follow(link: &Link, viewers: &Weak<Viewers>, drives: &Drives) -> Option<Live> {
+    let (their, mut numbers) = (Weak::clone(viewers), Vec::new());
     let put = move |item| {
         if let Some(viewers) = their.upgrade() {
             viewers.take(item, &mut numbers);
@@ -180,13 +193,13 @@ async fn feed(link: Arc<Link>, viewers: Weak<Viewers>) {
     };
     let config = Config { period: PERIOD, by: NAME.into() };
     match Live::start(&config, link.path(), drives.lines(), put) {
-        // It ends with this task.
-        Ok(_live) => std::future::pending().await,
+        Ok(live) => Some(live),
         Err(error) => {
             if let Some(viewers) = viewers.upgrade() {
                 let why = format!("the system gives no thread: {error}");
                 viewers.present().trouble(String::new(), why);
             }
+            None
         }
     }
 }

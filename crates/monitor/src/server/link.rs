@@ -4,7 +4,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use motorlink_telemetry::share::message::{Answer, Ask, Line, Reason, StoppedMotor};
+use motorlink_telemetry::share::frame::Kind;
+use motorlink_telemetry::share::message::{
+    Answer, Ask, Event, Happening, Line, Reason, StoppedMotor, Text, decode,
+};
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
@@ -15,6 +18,8 @@ use crate::program::{Listener, Program, Refusal};
 const NAME: &str = "monitor";
 /// The longest time for the hello of a share.
 const HELLO: Duration = Duration::from_secs(5);
+/// The longest time until the server knows a line that was opened.
+const OPENED: Duration = Duration::from_secs(1);
 /// The pause between two attempts to connect.
 pub const AGAIN: Duration = Duration::from_millis(250);
 
@@ -57,22 +62,25 @@ impl Link {
         let mut known: Option<(Vec<Line>, Drives)> = None;
         loop {
             let why = match self.join().await {
-                Ok((program, lines, mut listener)) => {
+                Ok((program, mut lines, mut listener)) => {
                     // The limits that pages have set stay.
-                    let drives = match &known {
+                    let mut drives = match &known {
                         Some((before, drives)) if is_same(before, &lines) => {
                             drives.reconnected();
                             drives.clone()
                         }
                         _ => Drives::new(lines.clone()),
                     };
-                    known = Some((lines, drives.clone()));
-                    self.joined.send_replace(Some(Ok(Joined { program, drives })));
-                    loop {
-                        if let Err(error) = listener.next().await {
-                            break error;
+                    let lost = loop {
+                        let joined = Joined { program: program.clone(), drives: drives.clone() };
+                        self.joined.send_replace(Some(Ok(joined)));
+                        match next_lines(&program, &mut listener).await {
+                            Ok(next) => (lines, drives) = (next.clone(), drives.with_lines(next)),
+                            Err(error) => break error,
                         }
-                    }
+                    };
+                    known = Some((lines, drives));
+                    lost
                 }
                 Err(error) => error,
             };
@@ -83,18 +91,8 @@ impl Link {
 
     async fn join(&self) -> io::Result<(Program, Vec<Line>, Listener)> {
         let (program, mut listener, _) = self.connect(NAME).await?;
-        let lines = tokio::select! {
-            answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
-            // Events come before the answer.
-            error = async { loop { if let Err(error) = listener.next().await { break error } } } => {
-                return Err(error);
-            }
-        };
-        match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
-            Ok(Answer::Lines { lines, .. }) => Ok((program, lines, listener)),
-            Ok(_) => Err(io::Error::other("it gives another answer")),
-            Err(refusal) => Err(io::Error::other(refusal.message)),
-        }
+        let lines = lines(&program, &mut listener).await?;
+        Ok((program, lines, listener))
     }
 
     /// The drives of the share.
@@ -103,6 +101,36 @@ impl Link {
     /// It is lost.
     pub async fn drives(&self) -> Result<Drives, Refusal> {
         Ok(self.get().await?.drives)
+    }
+
+    /// As [`drives`](Self::drives). If the line is not known it may just have been opened: it is waited
+    /// for.
+    ///
+    /// # Errors
+    /// It is lost.
+    pub async fn drives_of(&self, line: Option<&str>) -> Result<Drives, Refusal> {
+        let drives = self.drives().await?;
+        let Some(line) = line.filter(|line| !drives.has(line)) else { return Ok(drives) };
+        let mut changes = self.joined.subscribe();
+        let is_there = |joined: &Option<Result<Joined, String>>| match joined {
+            Some(Ok(joined)) => joined.drives.has(line),
+            _ => false,
+        };
+        // Otherwise it is a line that is not there.
+        let _ = timeout(OPENED, changes.wait_for(is_there)).await;
+        self.drives().await
+    }
+
+    /// Waits until the share has other lines than these.
+    pub async fn other_lines(&self, drives: &Drives) {
+        let mut changes = self.joined.subscribe();
+        let known = drives.lines();
+        let is_other = |joined: &Option<Result<Joined, String>>| match joined {
+            Some(Ok(joined)) => joined.drives.lines() != known,
+            _ => false,
+        };
+        // This side keeps the sender.
+        let _ = changes.wait_for(is_other).await;
     }
 
     /// Latches the share, then stops all motors.
@@ -120,6 +148,38 @@ impl Link {
         // This side keeps the sender.
         let joined = joined.ok().and_then(|joined| joined.clone());
         joined.unwrap_or_else(|| Err("the server ends".to_owned())).map_err(|why| lost(&why))
+    }
+}
+
+/// Asks for the lines.
+async fn lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Line>> {
+    let lines = tokio::select! {
+        answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
+        // Events come before the answer.
+        error = async { loop { if let Err(error) = listener.next().await { break error } } } => {
+            return Err(error);
+        }
+    };
+    match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
+        Ok(Answer::Lines { lines, .. }) => Ok(lines),
+        Ok(_) => Err(io::Error::other("it gives another answer")),
+        Err(refusal) => Err(io::Error::other(refusal.message)),
+    }
+}
+
+/// Waits until lines are opened or closed, and gives all lines.
+async fn next_lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Line>> {
+    loop {
+        let frame = listener.next().await?;
+        let is_of_lines =
+            |event: &Event| matches!(event.event, Happening::Opened | Happening::Closed);
+        if frame.kind == Kind::Text
+            && let Ok(Text::Event(event)) = decode(&frame.payload)
+            && is_of_lines(&event)
+        {
+            // An event that comes before the answer happened before it.
+            return lines(program, listener).await;
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink::port::{Direction, EventBytes, EventCan, PortName, TapBytes, TapCan};
 use motorlink::{rmd, st};
 use motorlink_monitor::drive::{Drives, Motion};
 use motorlink_monitor::message::{Answer, Ask};
@@ -16,6 +16,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
+use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
@@ -114,7 +115,8 @@ impl World {
         let client = st::EventClient::open_wrapped(&st_path.parse().unwrap(), wrap, options);
         let line = StLine::new(client.unwrap());
         let engine = Acquisition::new(Box::new(line));
-        let st_held = Held::start("st0", &st_path, Speaks::St(profile), engine, st_tap).unwrap();
+        let (port, speaks) = (st_path.parse().unwrap(), Speaks::St(profile));
+        let st_held = Held::start("st0", Opened { port, speaks, engine, tap: st_tap }).unwrap();
 
         let rmd_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
         let wire = Arc::clone(&rmd_sent);
@@ -129,10 +131,11 @@ impl World {
             rmd_around.around_bus(Box::new(TapCan::new(around_bus(link), observer)))
         };
         let options = rmd::Options { timeout: PATIENT, ..Default::default() };
-        let port = format!("slcan:{rmd_path}").parse().unwrap();
+        let port: PortName = format!("slcan:{rmd_path}").parse().unwrap();
         let client = rmd::EventClient::open_wrapped(&port, wrap, options).unwrap();
         let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-        let rmd_held = Held::start("rmd0", &rmd_path, Speaks::Rmd, engine, rmd_tap).unwrap();
+        let opened = Opened { port, speaks: Speaks::Rmd, engine, tap: rmd_tap };
+        let rmd_held = Held::start("rmd0", opened).unwrap();
 
         let socket = path(name, "socket");
         let mut server = Server::open(&socket, "test", vec![st_held, rmd_held]).unwrap();

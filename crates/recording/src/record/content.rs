@@ -179,7 +179,7 @@ impl Content {
     /// An event.
     pub(super) fn told(&mut self, stamp: Time, told: Told, put: &mut dyn FnMut(Entry)) {
         let silent = match told.event {
-            Happening::Silent | Happening::Lost => Some(true),
+            Happening::Silent | Happening::Lost | Happening::Closed => Some(true),
             Happening::Answers | Happening::Back => Some(false),
             _ => None,
         };
@@ -291,9 +291,11 @@ impl Line {
     fn log(&self, stamp: Time, told: Told) -> Log {
         let severity = match told.event {
             Happening::StopFailed => Severity::Error,
-            Happening::Lost | Happening::Silent | Happening::Refused | Happening::Doubtful => {
-                Severity::Warn
-            }
+            Happening::Lost
+            | Happening::Closed
+            | Happening::Silent
+            | Happening::Refused
+            | Happening::Doubtful => Severity::Warn,
             _ => Severity::Info,
         };
         Log {

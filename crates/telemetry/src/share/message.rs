@@ -7,6 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::acquisition::Counts;
 
+/// The most lines of a share that programs open. Those of its start do not count.
+pub const MOST_OPENED: usize = 16;
+/// The longest name of a port, in bytes.
+pub const LONGEST_PORT: usize = 512;
+/// The longest time for a reply, in seconds.
+pub const LONGEST_TIMEOUT: f64 = 60.0;
 /// The longest name of a program, in bytes.
 pub const LONGEST_NAME: usize = 64;
 /// The most records that wait for a program in one subscription.
@@ -107,6 +113,26 @@ pub enum Ask {
     Release,
     /// The rates of all signals that are read.
     Rates,
+    /// The ports that the computer of the share has.
+    Ports,
+    /// Opens a port as a new line.
+    Open {
+        /// The port, as `-p` takes it: a device, a CAN interface, an adapter or a TCP address.
+        port: String,
+        /// What its drives speak.
+        protocol: Protocol,
+        /// The profile of ST drives; the document's without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        profile: Option<String>,
+        /// How long to wait for a reply, in seconds; that of the protocol without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        timeout: Option<f64>,
+    },
+    /// Stops the motors that were started through a line, and closes its port.
+    Close {
+        /// The line.
+        line: String,
+    },
     /// Frames on the wire: the first ones of a time or after a frame, otherwise the newest.
     Frames {
         /// The line.
@@ -271,6 +297,21 @@ pub enum Answer {
         /// Those of all signals that are read.
         rates: Vec<SignalRate>,
     },
+    /// To ports.
+    Ports {
+        /// Those that can be found without opening them.
+        ports: Vec<FoundPort>,
+    },
+    /// To open.
+    Open {
+        /// The name of the new line.
+        line: String,
+    },
+    /// To close.
+    Close {
+        /// The motors that were stopped, and how they took it.
+        motors: Vec<StoppedMotor>,
+    },
     /// To frames.
     Frames {
         /// In the order in which they were seen.
@@ -285,6 +326,28 @@ pub enum Answer {
         /// What the line carried from the first one of these frames to the last.
         load: WireLoad,
     },
+}
+
+/// A port of the computer of a share.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct FoundPort {
+    /// Its name, as `open` takes it.
+    pub port: String,
+    /// The protocol of the drives that it can have without an adapter.
+    pub protocol: Protocol,
+    /// Manufacturer and product.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// A second path that does not depend on the order in which devices are plugged in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stable_path: Option<String>,
+    /// Why it cannot be used now, and what to do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// The line that has it open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<String>,
 }
 
 /// A frame on the wire, or bytes that are none.
@@ -566,6 +629,10 @@ pub enum Happening {
     Refused,
     /// Values of a motor may be those of other signals since the given time.
     Doubtful,
+    /// A line was opened.
+    Opened,
+    /// A line was closed.
+    Closed,
     /// An event of a later version.
     #[serde(other)]
     Later,

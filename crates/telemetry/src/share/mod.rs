@@ -4,13 +4,14 @@
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port.
-//! [`words`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
+//! [`opening`] opens the ports of lines. [`words`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
 
 pub mod data;
 pub mod dialogue;
 pub mod frame;
 pub mod hub;
 pub mod message;
+pub mod opening;
 pub mod port;
 pub mod server;
 pub mod stream;

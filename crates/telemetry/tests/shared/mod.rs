@@ -8,12 +8,13 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use motorlink::port::EventBytes;
+use motorlink::port::{EventBytes, PortName};
 use motorlink::st::{EventClient, Options};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
 use motorlink_telemetry::share::hub::Held;
+use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
@@ -56,18 +57,19 @@ impl Share {
         };
         let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, Options::default());
         let line = StLine::new(client.unwrap());
-        let speaks = Speaks::St(Profile::Spec);
-        let st = Held::start("st0", &st, speaks, Acquisition::new(Box::new(line)), tap).unwrap();
+        let engine = Acquisition::new(Box::new(line));
+        let (port, speaks) = (st.parse().unwrap(), Speaks::St(Profile::Spec));
+        let st = Held::start("st0", Opened { port, speaks, engine, tap }).unwrap();
         let options = motorlink::rmd::Options { timeout, ..Default::default() };
         let tap = Tap::default();
         let wrap = {
             let tap = tap.clone();
             move |link| tap.around_bus(link)
         };
-        let port = format!("slcan:{rmd}").parse().unwrap();
+        let port: PortName = format!("slcan:{rmd}").parse().unwrap();
         let client = motorlink::rmd::EventClient::open_wrapped(&port, wrap, options);
         let engine = Acquisition::new(Box::new(RmdLine::new(client.unwrap())));
-        let rmd = Held::start("rmd0", &rmd, Speaks::Rmd, engine, tap).unwrap();
+        let rmd = Held::start("rmd0", Opened { port, speaks: Speaks::Rmd, engine, tap }).unwrap();
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         let ends = Arc::new(AtomicBool::new(false));

@@ -112,6 +112,16 @@ impl Port for Device {
     fn as_line(&self) -> Option<&dyn LinePort> {
         Some(self)
     }
+
+    fn is_device(&self) -> bool {
+        // Other ptys are terminals of this user.
+        marked_link(&self.path).is_some() || self.path.canonicalize().is_ok_and(|it| is_listed(&it))
+    }
+
+    fn place(&self) -> String {
+        let path = self.path.canonicalize();
+        format!("serial:{}", path.as_ref().unwrap_or(&self.path).display())
+    }
 }
 
 impl LinePort for Device {
@@ -174,6 +184,13 @@ fn claim(fd: &OwnedFd, device: &Path) -> Result<(), Errno> {
         ioctl_tiocexcl(fd)?;
     }
     Ok(())
+}
+
+/// Whether this computer lists the device.
+fn is_listed(device: &Path) -> bool {
+    let is_in_dev = device.parent() == Some(Path::new("/dev"));
+    let name = device.file_name().and_then(|name| name.to_str()).filter(|_| is_in_dev);
+    name.is_some_and(|name| listed(Path::new("/"), name).is_some())
 }
 
 /// The data of a tty for a list of ports.

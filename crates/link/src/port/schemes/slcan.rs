@@ -115,6 +115,14 @@ impl Port for Adapter {
     fn is_in_process(&self) -> bool {
         self.line.is_in_process()
     }
+
+    fn is_device(&self) -> bool {
+        self.line.is_device()
+    }
+
+    fn place(&self) -> String {
+        self.line.place()
+    }
 }
 
 impl CanPort for Adapter {

@@ -61,6 +61,12 @@ impl Port for CanInterface {
     fn as_can(&self) -> Option<&dyn CanPort> {
         Some(self)
     }
+
+    fn is_device(&self) -> bool {
+        let root = Path::new("/");
+        let is_there = system::names_in(&root.join("sys/class/net")).contains(&self.0);
+        is_there && listed(root, &self.0).is_some()
+    }
 }
 
 impl CanPort for CanInterface {

@@ -105,6 +105,10 @@ impl Port for TcpBytes {
     fn as_line(&self) -> Option<&dyn LinePort> {
         Some(self)
     }
+
+    fn is_device(&self) -> bool {
+        self.clock.is_none()
+    }
 }
 
 impl LinePort for TcpBytes {

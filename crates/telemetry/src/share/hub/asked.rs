@@ -35,9 +35,9 @@ const CONFIRMATION: Micros = Micros::from_millis(1_000);
 const RELEASE: Micros = Micros::from_millis(1_000);
 
 /// Why a request is refused at once.
-type Refused = (Reason, String);
+pub(super) type Refused = (Reason, String);
 
-fn usage(message: impl Into<String>) -> Refused {
+pub(super) fn usage(message: impl Into<String>) -> Refused {
     (Reason::Usage, message.into())
 }
 
@@ -132,7 +132,7 @@ impl Hub {
             }
             Ask::Signals { line } => {
                 let line = self.line(&line)?;
-                Ok(Some(Answer::Signals { signals: self.lines[line].columns() }))
+                Ok(Some(Answer::Signals { signals: self.lines[&line].columns() }))
             }
             Ask::Subscribe { signals, period, queue, drop, rows } => {
                 let queue = (queue, drop);
@@ -160,7 +160,7 @@ impl Hub {
             Ask::Stop { motor } => self.stop_asked(session, name, id, motor.as_ref()),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
-                for held in &mut self.lines {
+                for held in self.lines.values_mut() {
                     held.sequences.clear();
                     held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
@@ -170,20 +170,29 @@ impl Hub {
             Ask::Release if waited > RELEASE => Err(refused(&CommandError::Expired)),
             Ask::Release => {
                 self.latch = None;
-                for held in &self.lines {
+                for held in self.lines.values() {
                     let by = Arc::clone(name);
                     held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;
                 }
                 Ok(Some(Answer::Release))
             }
             Ask::Rates => self.rates(session, id),
+            Ask::Ports => self.list_ports(session, name, id),
+            Ask::Open { port, protocol, profile, timeout } => {
+                let order = self.order(&port, protocol, profile.as_deref(), timeout)?;
+                self.open_line(session, name, id, order)
+            }
+            Ask::Close { line } => {
+                let line = self.line(&line)?;
+                self.close_line(session, name, id, line)
+            }
             Ask::Frames { line, from, to, after, most } => {
                 let line = self.line(&line)?;
                 if !(1..=MOST_FRAMES).contains(&most) {
                     return Err(usage(format!("`most` is 1 to {MOST_FRAMES} frames")));
                 }
                 let (from, to) = (from.map(instant).transpose()?, to.map(instant).transpose()?);
-                Ok(Some(self.lines[line].frames(Part { from, to, after, most })))
+                Ok(Some(self.lines[&line].frames(Part { from, to, after, most })))
             }
         }
     }
@@ -196,15 +205,19 @@ impl Hub {
     }
 
     fn line(&self, name: &str) -> Result<usize, Refused> {
-        self.lines.iter().position(|held| held.name == name).ok_or_else(|| {
-            let names: Vec<_> = self.lines.iter().map(|held| held.name.as_str()).collect();
-            usage(format!("no line `{name}`; the lines are {}", names.join(", ")))
+        let found = self.lines.iter().find(|(_, held)| held.name == name);
+        found.map(|(line, _)| *line).ok_or_else(|| {
+            let names: Vec<_> = self.lines.values().map(|held| held.name.as_str()).collect();
+            usage(match names.as_slice() {
+                [] => format!("no line `{name}`: the share has no line"),
+                _ => format!("no line `{name}`; the lines are {}", names.join(", ")),
+            })
         })
     }
 
     fn motor(&self, MotorName { line, motor }: &MotorName) -> Result<(usize, Motor), Refused> {
         let line = self.line(line)?;
-        Ok((line, self.lines[line].motor(*motor).map_err(usage)?))
+        Ok((line, self.lines[&line].motor(*motor).map_err(usage)?))
     }
 
     fn subscribe(
@@ -240,7 +253,9 @@ impl Hub {
         session.last_feed += 1;
         let mut feed = Feed::new(session.last_feed, rows);
         for (line, signals) in wanted {
-            self.lines[line].known.extend(signals.iter().map(|signal| signal.motor));
+            if let Some(held) = self.lines.get_mut(&line) {
+                held.known.extend(signals.iter().map(|signal| signal.motor));
+            }
             feed.add(&self.lines, line, signals, period, (queue as usize, full)).map_err(ended)?;
         }
         session.feeds.insert(session.last_feed, feed);
@@ -261,7 +276,7 @@ impl Hub {
             let own = self.sessions.get(&session)?;
             own.segments.get(&(line, segment)).cloned()
         };
-        let request = self.lines[line].request(motor.motor, bytes, segments);
+        let request = self.lines[&line].request(motor.motor, bytes, segments);
         let (request, configures) = request.map_err(usage)?;
         let motor = request.motor();
         let motion = Motion::of(&request);
@@ -274,7 +289,7 @@ impl Hub {
             }
         };
         let tell = self.teller(session, Some(id), line);
-        let held = &mut self.lines[line];
+        let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
             held.follow((motor, session), motion, may_move(&request), continues)
                 .map_err(|why| (Reason::Overtaken, why))?;
@@ -304,7 +319,7 @@ impl Hub {
         let (line, motor) = self.motor(motor)?;
         let tell = self.teller(session, Some(id), line);
         let ended_with = move |result| tell(Work::Confirm { motor, result });
-        let remote = self.lines[line].remote();
+        let remote = self.lines[&line].remote();
         remote.command_then(name, Request::Confirm(motor), CONFIRMATION, ended_with).map_err(ended)
     }
 
@@ -319,9 +334,9 @@ impl Hub {
         let motors: Vec<(usize, Motor)> = match motor {
             Some(motor) => vec![self.motor(motor)?],
             None => {
-                let lines = self.lines.iter().enumerate();
+                let lines = self.lines.iter();
                 lines
-                    .flat_map(|(line, held)| held.known.iter().map(move |motor| (line, *motor)))
+                    .flat_map(|(line, held)| held.known.iter().map(move |motor| (*line, *motor)))
                     .collect()
             }
         };
@@ -331,7 +346,7 @@ impl Hub {
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
         let part = asker.gather(id, motors.len());
         for (line, motor) in motors {
-            let held = &self.lines[line];
+            let held = &self.lines[&line];
             if is_all && !held.may_turn(motor) {
                 let tell = self.teller(session, None, line);
                 let task = move |engine: &mut Acquisition| {
@@ -349,9 +364,12 @@ impl Hub {
 
     fn rates(&mut self, session: SessionId, id: u32) -> Result<Option<Answer>, Refused> {
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
+        if self.lines.is_empty() {
+            return Ok(Some(Answer::Rates { rates: Vec::new() }));
+        }
         let part = asker.gather(id, self.lines.len());
-        for (line, held) in self.lines.iter().enumerate() {
-            let tell = self.teller(session, None, line);
+        for (line, held) in &self.lines {
+            let tell = self.teller(session, None, *line);
             let task = move |engine: &mut Acquisition| {
                 tell(Work::Rates(part, engine.rates().collect()));
             };

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::line::Held;
+use super::line::Lines;
 use super::place::seconds;
 use crate::acquisition::ConsumerId;
 use crate::plan::Wants;
@@ -59,13 +59,13 @@ impl Feed {
     /// Adds the signals of one line.
     pub(super) fn add(
         &mut self,
-        lines: &[Held],
+        lines: &Lines,
         line: usize,
         wanted: BTreeSet<Signal>,
         period: Micros,
         (queue, full): (usize, Full),
     ) -> Result<(), Ended> {
-        let Some(held) = lines.get(line) else { return Ok(()) };
+        let Some(held) = lines.get(&line) else { return Ok(()) };
         let wants: Wants = wanted.iter().map(|signal| (*signal, period)).collect();
         let subscription = Subscription::new(queue, full);
         let consumer = Arc::new(OnceLock::new());
@@ -80,9 +80,9 @@ impl Feed {
     }
 
     /// Ends it.
-    pub(super) fn end(self, lines: &[Held]) {
+    pub(super) fn end(self, lines: &Lines) {
         for part in self.parts {
-            let Some(held) = lines.get(part.line) else { continue };
+            let Some(held) = lines.get(&part.line) else { continue };
             // An engine that has ended sends nothing more.
             let _ = held.remote().post(move |engine| {
                 if let Some(consumer) = part.consumer.get() {
@@ -92,11 +92,16 @@ impl Feed {
         }
     }
 
+    /// A line is gone: nothing more comes of it.
+    pub(super) fn forget(&mut self, line: usize) {
+        self.parts.retain(|part| part.line != line);
+    }
+
     /// What came since the last call.
-    pub(super) fn collect(&mut self, lines: &[Held], last_group: &mut u32) -> Vec<Frame> {
+    pub(super) fn collect(&mut self, lines: &Lines, last_group: &mut u32) -> Vec<Frame> {
         let mut payloads = Vec::new();
         for part in &mut self.parts {
-            let name = lines.get(part.line).map_or("", |held| &held.name);
+            let name = lines.get(&part.line).map_or("", |held| &held.name);
             let mut out = Out { id: self.id, line: name, last_group, payloads: &mut payloads };
             for _ in 0..AT_ONCE {
                 let Some(record) = part.subscription.take() else { break };

@@ -6,18 +6,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::Clock;
+use motorlink::port::PortName;
 use motorlink_proto::rmd::{Code, MotorId, Stop};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
 use super::place::{SessionId, seconds, wall_now};
-use crate::acquisition::{Acquisition, Tally};
+use crate::acquisition::Tally;
 use crate::event::What;
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{Remote, Runner};
 use crate::share::message::{Answer, Event, Happening, Line};
+use crate::share::opening::Opened;
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
@@ -26,10 +28,13 @@ use crate::subscription::{Full, Record, Subscription};
 /// Events of an engine that wait for the share.
 const EVENTS: usize = 10_000;
 
+/// Lines by numbers that are never used again.
+pub(super) type Lines = BTreeMap<usize, Held>;
+
 /// A line that a share holds.
 pub struct Held {
     pub(super) name: String,
-    port: String,
+    pub(super) port: PortName,
     pub(super) speaks: Speaks,
     timeout: Duration,
     runner: Runner,
@@ -70,24 +75,19 @@ pub(super) enum Motion {
 }
 
 impl Held {
-    /// Starts the engine of an open line. `tap` is around its port.
+    /// Starts the engine of an open line.
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn start(
-        name: &str,
-        port: &str,
-        speaks: Speaks,
-        mut acquisition: Acquisition,
-        tap: Tap,
-    ) -> io::Result<Self> {
+    pub fn start(name: &str, opened: Opened) -> io::Result<Self> {
+        let Opened { port, speaks, engine: mut acquisition, tap } = opened;
         let clock = acquisition.clock().clone();
         tap.follow(&clock);
         let events = Subscription::new(EVENTS, Full::DropOldest);
         acquisition.subscribe(events.clone(), Wants::new());
         Ok(Held {
             name: name.to_owned(),
-            port: port.to_owned(),
+            port,
             speaks,
             timeout: acquisition.timeout(),
             anchor: (clock.now(), wall_now()),
@@ -150,6 +150,11 @@ impl Held {
         is_starting || self.owners.contains_key(&motor) || self.unstopped.contains_key(&motor)
     }
 
+    /// What its port occupies.
+    pub(super) fn place(&self) -> String {
+        self.port.place()
+    }
+
     pub(super) fn remote(&self) -> &Remote {
         self.runner.remote()
     }
@@ -158,7 +163,7 @@ impl Held {
         let now = self.clock.now();
         let protocol = self.speaks.protocol();
         let profile = self.speaks.profile().map(|profile| profile.name().to_owned());
-        let (line, port) = (self.name.clone(), self.port.clone());
+        let (line, port) = (self.name.clone(), self.port.to_string());
         let timeout = self.timeout.as_secs_f64();
         let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
         Line { line, protocol, port, profile, timeout, t, wall, counts }

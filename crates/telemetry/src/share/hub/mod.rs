@@ -3,7 +3,9 @@
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 
 mod asked;
+mod coming;
 mod feed;
+mod jobs;
 mod line;
 mod place;
 mod session;
@@ -21,7 +23,8 @@ use crate::event::CommandError;
 use crate::line::{LineError, Reply, Stopped};
 use crate::runner::{CommandResult, Ended};
 use crate::signal::Motor;
-use line::{Configures, Motion};
+use jobs::{JobId, Jobs};
+use line::{Configures, Lines, Motion};
 use place::wall_now;
 use session::{Part, Session};
 
@@ -44,16 +47,28 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// Lines and the programs that use them.
 pub struct Hub {
     share: String,
-    lines: Vec<Held>,
+    lines: Lines,
+    last_line: usize,
+    /// How many lines there were at the start.
+    first_lines: usize,
+    /// All names that lines have had. No name is used again: programs may still mean the earlier line.
+    names: BTreeSet<String>,
+    jobs: Jobs,
     sessions: BTreeMap<SessionId, Session>,
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
     /// Motors that programs turned and whose stop failed, and when it is repeated.
     again: BTreeMap<(usize, Motor), Instant>,
-    done: Sender<Done>,
-    ended: Receiver<Done>,
+    done: Sender<News>,
+    ended: Receiver<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+/// Something that has ended in another thread.
+enum News {
+    Engine(Done),
+    Job(JobId),
 }
 
 /// Something that an engine has finished.
@@ -62,6 +77,8 @@ struct Done {
     /// The request; `None` for what nobody asked for.
     id: Option<u32>,
     line: usize,
+    /// The name of the line, which may be closed.
+    name: Arc<str>,
     what: Work,
 }
 
@@ -97,7 +114,11 @@ impl Hub {
         let (done, ended) = mpsc::channel();
         Hub {
             share: share.to_owned(),
-            lines,
+            last_line: lines.len(),
+            first_lines: lines.len(),
+            names: lines.iter().map(|held| held.name.clone()).collect(),
+            lines: (1..).zip(lines).collect(),
+            jobs: Jobs::default(),
             sessions: BTreeMap::new(),
             last_session: 0,
             latch: None,
@@ -111,7 +132,7 @@ impl Hub {
 
     /// The lines.
     pub fn lines(&self) -> Vec<message::Line> {
-        self.lines.iter().map(Held::info).collect()
+        self.lines.values().map(Held::info).collect()
     }
 
     /// A program has connected.
@@ -125,7 +146,7 @@ impl Hub {
     /// A program has gone. The motors that it turned last are stopped.
     pub fn leave(&mut self, id: SessionId) {
         let Some(session) = self.sessions.remove(&id) else { return };
-        for held in &mut self.lines {
+        for held in self.lines.values_mut() {
             held.sequences.retain(|(_, program)| *program != id);
         }
         for (_, feed) in session.feeds {
@@ -134,7 +155,7 @@ impl Hub {
         let Some(name) = session.name else { return };
         self.say(Happening::Left, &name, format!("{name} left"));
         let by = words::after(&name);
-        for line in 0..self.lines.len() {
+        for line in self.numbers() {
             for motor in self.orphans(line, id) {
                 self.stop(line, motor, id, None, &by);
             }
@@ -143,13 +164,19 @@ impl Hub {
 
     /// The motors of a program that has gone. If another program has sent a start, its end decides.
     fn orphans(&self, line: usize, gone: SessionId) -> BTreeSet<Motor> {
-        let Held { owners, starting, .. } = &self.lines[line];
+        let Some(Held { owners, starting, .. }) = self.lines.get(&line) else {
+            return BTreeSet::new();
+        };
         let owned = owners.iter().filter(|(_, owner)| **owner == gone).map(|(motor, _)| *motor);
         let started = starting.iter().filter(|(_, by)| *by == gone).map(|(motor, _)| *motor);
         let is_taken = |motor: &Motor| {
             starting.iter().any(|(it, by)| it == motor && self.sessions.contains_key(by))
         };
         owned.chain(started).filter(|motor| !is_taken(motor)).collect()
+    }
+
+    fn numbers(&self) -> Vec<usize> {
+        self.lines.keys().copied().collect()
     }
 
     /// Whether a program may send more requests now.
@@ -206,9 +233,9 @@ impl Hub {
     }
 
     fn collect_events(&mut self) -> Result<(), LineEnded> {
-        for line in 0..self.lines.len() {
+        for line in self.numbers() {
             let (mut retry, mut doubts) = (Vec::new(), Vec::new());
-            let held = &mut self.lines[line];
+            let Some(held) = self.lines.get_mut(&line) else { continue };
             let events = held.take_events(&mut retry, &mut doubts);
             let events = events.ok_or_else(|| LineEnded(held.name.clone()))?;
             for motor in doubts {
@@ -224,21 +251,25 @@ impl Hub {
 
     /// Takes the results of the engines so far.
     pub fn advance(&mut self) {
-        while let Ok(done) = self.ended.try_recv() {
-            self.finish(done);
+        while let Ok(news) = self.ended.try_recv() {
+            match news {
+                News::Engine(done) => self.finish(done),
+                News::Job(job) => self.job_ended(job),
+            }
         }
     }
 
     /// Stops the motors that were started through the share, and ends it. Gives the line of each.
     pub fn end(self) -> Vec<(String, Stopped)> {
-        let Hub { lines, .. } = self;
+        let Hub { lines, jobs, .. } = self;
         // All lines stop at the same time.
         let ends: Vec<_> = lines
-            .into_iter()
+            .into_values()
             .map(|held| (held.name.clone(), std::thread::spawn(move || held.end())))
             .collect();
         let stopped = ends.into_iter().map(|(name, end)| (name, end.join().unwrap_or_default()));
         stopped
+            .chain(jobs.end())
             .flat_map(|(name, motors)| motors.into_iter().map(move |one| (name.clone(), one)))
             .collect()
     }
@@ -249,21 +280,32 @@ impl Hub {
     }
 
     fn say(&mut self, event: Happening, by: &str, message: String) {
+        self.say_of((None, None), event, by, message);
+    }
+
+    /// Says what happened to a line or a motor.
+    fn say_of(
+        &mut self,
+        (line, motor): (Option<&str>, Option<u8>),
+        event: Happening,
+        by: &str,
+        message: String,
+    ) {
         // In the order in which it happened. The end of a line is told at the next call.
         let _ = self.collect_events();
-        let by = Some(by.to_owned());
-        let (wall, line, t, since, motor) = (wall_now(), None, None, None, None);
+        let (line, by) = (line.map(str::to_owned), Some(by.to_owned()));
+        let (wall, t, since) = (wall_now(), None, None);
         self.publish(Event { wall, line, t, since, motor, by, event, message });
     }
 
-    fn finish(&mut self, Done { session, id, line, what }: Done) {
+    fn finish(&mut self, Done { session, id, line, name, what }: Done) {
         match what {
             Work::Command(sent, result) => self.command_over(session, id, line, sent, result),
             Work::Confirm { motor, result } => {
                 self.told_of(line, motor, &result);
                 // What the engine found before it answered.
                 let _ = self.collect_events();
-                let lane = self.lines.get(line).and_then(|held| held.lane(motor));
+                let lane = self.lines.get(&line).and_then(|held| held.lane(motor));
                 let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
                 session.pending -= 1;
                 match result {
@@ -281,37 +323,22 @@ impl Hub {
                 }
             }
             Work::Stop { part, motor, by, result } => {
-                let Some(held) = self.lines.get_mut(line) else { return };
-                let is_owned = held.owners.contains_key(&motor);
-                match &result {
-                    Ok(_) => held.stopped(motor),
-                    Err(error) if may_be_executed(error) => {
-                        held.unstopped.insert(motor, by);
-                    }
-                    Err(_) => {}
-                }
-                // The end of these is an event.
-                let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
-                if is_owned && result.is_err() && !is_event {
-                    self.again.insert((line, motor), Instant::now() + AGAIN);
-                }
+                self.stop_ended(line, motor, by, &result);
                 let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
                     return;
                 };
-                let motor = MotorName { line: held.name.clone(), motor: motor.number() };
+                let motor = MotorName { line: name.to_string(), motor: motor.number() };
                 session.stopped(part, motor, result.err().map(|error| error.to_string()));
             }
             Work::Unheard(part, motor) => {
-                let Some(held) = self.lines.get(line) else { return };
                 let Some(session) = self.sessions.get_mut(&session) else { return };
-                session.unheard(part, MotorName { line: held.name.clone(), motor: motor.number() });
+                session.unheard(part, MotorName { line: name.to_string(), motor: motor.number() });
             }
             Work::Rates(part, rates) => {
-                let Some(held) = self.lines.get(line) else { return };
                 let Some(session) = self.sessions.get_mut(&session) else { return };
                 let named = |rate: Rate| SignalRate {
                     signal: SignalName {
-                        line: held.name.clone(),
+                        line: name.to_string(),
                         motor: rate.signal.motor.number(),
                         name: rate.signal.source.to_string(),
                     },
@@ -321,6 +348,24 @@ impl Hub {
                 };
                 session.rates(part, rates.into_iter().map(named).collect());
             }
+        }
+    }
+
+    /// A stop is over. If the motor did not confirm it, it is repeated.
+    fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        let is_owned = held.owners.contains_key(&motor);
+        match result {
+            Ok(_) => held.stopped(motor),
+            Err(error) if may_be_executed(error) => {
+                held.unstopped.insert(motor, by);
+            }
+            Err(_) => {}
+        }
+        // The end of these is an event.
+        let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
+        if is_owned && result.is_err() && !is_event {
+            self.again.insert((line, motor), Instant::now() + AGAIN);
         }
     }
 
@@ -334,7 +379,7 @@ impl Hub {
     ) {
         let Sent { motor, motion, configures } = sent;
         if let Some(motor) = motor {
-            if let Some(held) = self.lines.get_mut(line).filter(|_| result.is_ok()) {
+            if let Some(held) = self.lines.get_mut(&line).filter(|_| result.is_ok()) {
                 held.heard.insert(motor);
             }
             self.command_ended(session, line, motor, motion, &result);
@@ -367,7 +412,7 @@ impl Hub {
             CommandError::Line(error) => error.is_line_failure(),
             _ => false,
         });
-        if is_failure && let Some(held) = self.lines.get(line) {
+        if is_failure && let Some(held) = self.lines.get(&line) {
             self.doubt(line, held.lane(motor));
         }
     }
@@ -385,7 +430,7 @@ impl Hub {
         motion: Motion,
         result: &CommandResult,
     ) {
-        let Some(held) = self.lines.get_mut(line) else { return };
+        let Some(held) = self.lines.get_mut(&line) else { return };
         if let Some(at) = held.starting.iter().position(|it| *it == (motor, session)) {
             held.starting.remove(at);
         }
@@ -409,7 +454,7 @@ impl Hub {
 
     /// Repeats a stop that was not confirmed. A motor of a program that left is stopped, too.
     fn stop_again(&mut self, line: usize, motor: Motor) {
-        let by = self.lines.get_mut(line).and_then(|held| held.unstopped.remove(&motor));
+        let by = self.lines.get_mut(&line).and_then(|held| held.unstopped.remove(&motor));
         match by {
             Some(by) => self.stop(line, motor, SessionId::default(), None, &by),
             None => self.stop_if_orphaned(line, motor),
@@ -417,7 +462,7 @@ impl Hub {
     }
 
     fn stop_if_orphaned(&mut self, line: usize, motor: Motor) {
-        let Some(owner) = self.lines.get(line).and_then(|held| held.owners.get(&motor)) else {
+        let Some(owner) = self.lines.get(&line).and_then(|held| held.owners.get(&motor)) else {
             return;
         };
         if !self.sessions.contains_key(owner) {
@@ -435,7 +480,7 @@ impl Hub {
         by: &Arc<str>,
     ) {
         let tell = self.teller(session, None, line);
-        let Some(held) = self.lines.get_mut(line) else { return };
+        let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
         let asker = Arc::clone(by);
         let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
@@ -443,8 +488,9 @@ impl Hub {
         });
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
+            let name = held.name.as_str().into();
             let what = Work::Stop { part, motor, by, result };
-            self.finish(Done { session, id: None, line, what });
+            self.finish(Done { session, id: None, line, name, what });
         }
     }
 
@@ -456,9 +502,10 @@ impl Hub {
         line: usize,
     ) -> impl FnOnce(Work) + Send + use<> {
         let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
+        let name: Arc<str> = self.lines.get(&line).map_or("", |held| &held.name).into();
         move |what| {
             // The hub may have gone.
-            let _ = done.send(Done { session, id, line, what });
+            let _ = done.send(News::Engine(Done { session, id, line, name, what }));
             wake();
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use motorlink_proto::st::RegisterId;
 
 use super::feed::Feed;
-use super::line::Held;
+use super::line::Lines;
 use crate::share::frame::Frame;
 use crate::share::message::{
     self, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
@@ -122,6 +122,13 @@ impl Session {
         !is_doubtful
     }
 
+    /// A line is gone.
+    pub(super) fn forget(&mut self, line: usize) {
+        self.feeds.values_mut().for_each(|feed| feed.forget(line));
+        self.unconfirmed.retain(|(of, _), _| *of != line);
+        self.segments.retain(|(of, _), _| *of != line);
+    }
+
     /// The program gets nothing but this after what waits already.
     pub(super) fn close(&mut self, why: String) {
         if matches!(self.closing, Closing::Open) {
@@ -162,7 +169,7 @@ impl Session {
     }
 
     /// What the program gets next: answers first.
-    pub(super) fn next(&mut self, lines: &[Held]) -> Option<Frame> {
+    pub(super) fn next(&mut self, lines: &Lines) -> Option<Frame> {
         if let Some(text) = self.answers.pop_front() {
             return Some(Frame::text(message::encode(&text)));
         }

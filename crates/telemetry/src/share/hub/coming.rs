@@ -1,0 +1,248 @@
+//! Lines that come and go while the share runs.
+
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink::port::PortName;
+use motorlink::st::Profile;
+
+use super::asked::{Refused, usage};
+use super::jobs::{Asker, Does, End, Job, JobId, found_ports};
+use super::line::Held;
+use super::place::SessionId;
+use super::{Hub, News};
+use crate::line::Stopped;
+use crate::share::message::{
+    Answer, FoundPort, Happening, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName, Protocol,
+    Reason, StoppedMotor,
+};
+use crate::share::opening::{OpenError, Opened, Wish};
+
+/// The shortest time for a reply, in seconds.
+const SHORTEST_TIMEOUT: f64 = 1e-3;
+
+/// A port to open, and the protocol of its drives.
+pub(super) struct Order {
+    wish: Wish,
+    protocol: Protocol,
+}
+
+impl Hub {
+    /// Lists the ports of this computer.
+    pub(super) fn list_ports(
+        &mut self,
+        session: SessionId,
+        by: &Arc<str>,
+        id: u32,
+    ) -> Result<Option<Answer>, Refused> {
+        self.begin(session, by, id, None, || End::Listed(found_ports()))
+    }
+
+    /// A port that a program wants to open.
+    pub(super) fn order(
+        &self,
+        port: &str,
+        protocol: Protocol,
+        profile: Option<&str>,
+        timeout: Option<f64>,
+    ) -> Result<Order, Refused> {
+        let profile = match profile {
+            Some(profile) => profile.parse().map_err(|_| {
+                let known = Profile::ALL.map(Profile::name).join(", ");
+                usage(format!("`profile` is one of {known}"))
+            })?,
+            None => Profile::Spec,
+        };
+        if let Some(timeout) = timeout
+            && !(SHORTEST_TIMEOUT..=LONGEST_TIMEOUT).contains(&timeout)
+        {
+            return Err(usage(format!("`timeout` is {SHORTEST_TIMEOUT} to {LONGEST_TIMEOUT} s")));
+        }
+        let port = self.free_port(port)?;
+        let wish = Wish { port, profile, timeout: timeout.map(Duration::from_secs_f64) };
+        if !wish.protocols().contains(&protocol) {
+            let port = &wish.port;
+            return Err(usage(match protocol {
+                Protocol::St => format!("{port} is a CAN bus, which has no ST drive"),
+                Protocol::Rmd => format!(
+                    "{port} is a serial line, which has no RMD motors; a CAN adapter is slcan:DEVICE"
+                ),
+            }));
+        }
+        Ok(Order { wish, protocol })
+    }
+
+    /// The port of this name, if programs may open it and it is not open.
+    fn free_port(&self, name: &str) -> Result<PortName, Refused> {
+        if name.len() > LONGEST_PORT {
+            return Err(usage(format!("the name of a port has at most {LONGEST_PORT} bytes")));
+        }
+        let port: PortName = name.parse().map_err(|error| usage(format!("{error}")))?;
+        if !port.is_device() {
+            return Err(usage(format!(
+                "{port} is not opened: a share that runs opens serial devices and CAN interfaces that \
+                 this computer has now, ptys of `motorlink sim` and `motorlink guard`, slcan: on \
+                 these, and tcp:HOST:PORT; other ports are given with -p at its start"
+            )));
+        }
+        let place = port.place();
+        if let Some(held) = self.lines.values().find(|held| held.place() == place) {
+            return Err(usage(format!("{port} is open already: it is the line {}", held.name)));
+        }
+        match self.jobs.at(&place) {
+            Some(job) => {
+                let does = if job.does(Does::Opens) { "opens" } else { "closes" };
+                Err((Reason::Busy, format!("{} {does} {port} at this moment", job.asker.by)))
+            }
+            None => Ok(port),
+        }
+    }
+
+    /// Opens a line, also if the program leaves meanwhile.
+    pub(super) fn open_line(
+        &mut self,
+        session: SessionId,
+        by: &Arc<str>,
+        id: u32,
+        Order { wish, protocol }: Order,
+    ) -> Result<Option<Answer>, Refused> {
+        if self.lines.len() + self.jobs.opening() >= self.first_lines + MOST_OPENED {
+            let message = format!("programs open up to {MOST_OPENED} lines; close one first");
+            return Err((Reason::Busy, message));
+        }
+        let place = Some((wish.port.place(), Does::Opens));
+        self.begin(session, by, id, place, move || End::Opened(Box::new(wish.open(protocol))))
+    }
+
+    /// Closes a line: from now on no program can use it. Its motors are stopped.
+    pub(super) fn close_line(
+        &mut self,
+        session: SessionId,
+        by: &Arc<str>,
+        id: u32,
+        line: usize,
+    ) -> Result<Option<Answer>, Refused> {
+        self.check_jobs()?;
+        // Events of the line come before its end.
+        let _ = self.collect_events();
+        let Some(held) = self.lines.remove(&line) else { return Ok(None) };
+        self.sessions.values_mut().for_each(|session| session.forget(line));
+        self.again.retain(|(of, _), _| *of != line);
+        let place = Some((held.place(), Does::Closes));
+        self.begin(session, by, id, place, move || {
+            let (name, port) = (held.name.clone(), held.port.clone());
+            End::Closed(name, port, held.end())
+        })
+    }
+
+    fn check_jobs(&self) -> Result<(), Refused> {
+        match self.jobs.are_many() {
+            false => Ok(()),
+            true => Err((Reason::Busy, "the share opens or closes too many ports now".to_owned())),
+        }
+    }
+
+    fn begin(
+        &mut self,
+        session: SessionId,
+        by: &Arc<str>,
+        id: u32,
+        place: Option<(String, Does)>,
+        work: impl FnOnce() -> End + Send + 'static,
+    ) -> Result<Option<Answer>, Refused> {
+        self.check_jobs()?;
+        let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
+        let ended = move |job| {
+            // The hub may have gone.
+            let _ = done.send(News::Job(job));
+            wake();
+        };
+        let asker = Asker { session, id, by: Arc::clone(by) };
+        let begun = self.jobs.begin(asker, place, work, ended);
+        begun.map_err(|error| (Reason::Line, no_thread(&error)))?;
+        Ok(None)
+    }
+
+    /// The thread of a job has ended.
+    pub(super) fn job_ended(&mut self, job: JobId) {
+        let Some((Asker { session, id, by }, end)) = self.jobs.take(job).map(Job::end) else {
+            return;
+        };
+        let answer = match end {
+            Some(End::Listed(ports)) => Ok(self.listed(ports)),
+            Some(End::Opened(opened)) => self.opened(&by, *opened),
+            Some(End::Closed(name, port, stopped)) => Ok(self.closed(&by, &name, &port, stopped)),
+            None => Err((Reason::Line, "the share has a fault".to_owned())),
+        };
+        let Some(session) = self.sessions.get_mut(&session) else { return };
+        session.pending -= 1;
+        match answer {
+            Ok(answer) => session.answer(id, answer),
+            Err((reason, message)) => session.refuse(id, reason, message),
+        }
+    }
+
+    fn listed(&self, ports: Vec<(FoundPort, String)>) -> Answer {
+        let with_line = |(port, place): (FoundPort, String)| {
+            let held = self.lines.values().find(|held| held.place() == place);
+            FoundPort { line: held.map(|held| held.name.clone()), ..port }
+        };
+        Answer::Ports { ports: ports.into_iter().map(with_line).collect() }
+    }
+
+    fn opened(
+        &mut self,
+        by: &Arc<str>,
+        opened: Result<Opened, OpenError>,
+    ) -> Result<Answer, Refused> {
+        let opened = opened.map_err(|error| (Reason::Line, error.to_string()))?;
+        let port = opened.port.to_string();
+        let name = self.free_name(opened.speaks.protocol());
+        let held = Held::start(&name, opened);
+        let held = held.map_err(|error| (Reason::Line, no_thread(&error)))?;
+        if let Some(by) = &self.latch {
+            // If its engine has ended, the share ends.
+            let _ = held.remote().latch_then(by, || {});
+        }
+        self.last_line += 1;
+        self.lines.insert(self.last_line, held);
+        self.names.insert(name.clone());
+        let message = format!("{name}: {by} opened {port}");
+        self.say_of((Some(&name), None), Happening::Opened, by, message);
+        Ok(Answer::Open { line: name })
+    }
+
+    fn closed(
+        &mut self,
+        by: &Arc<str>,
+        name: &str,
+        port: &PortName,
+        stopped: Vec<Stopped>,
+    ) -> Answer {
+        let mut motors = Vec::new();
+        for Stopped { motor, result } in stopped {
+            let number = motor.number();
+            let (event, words) = match &result {
+                Ok(()) => (Happening::Stopped, "it confirmed the stop".to_owned()),
+                Err(error) => (Happening::StopFailed, format!("it may still be turning: {error}")),
+            };
+            let message = format!("{name}, motor {number}: {words}");
+            self.say_of((Some(name), Some(number)), event, by, message);
+            let motor = MotorName { line: name.to_owned(), motor: number };
+            motors.push(StoppedMotor { motor, failure: result.err().map(|it| it.to_string()) });
+        }
+        let message = format!("{name}: {by} closed {port}");
+        self.say_of((Some(name), None), Happening::Closed, by, message);
+        Answer::Close { motors }
+    }
+
+    fn free_name(&self, protocol: Protocol) -> String {
+        let mut names = (0_u64..).map(|number| format!("{}{number}", protocol.word()));
+        names.find(|name| !self.names.contains(name)).unwrap_or_default()
+    }
+}
+
+fn no_thread(error: &io::Error) -> String {
+    format!("the system gives no thread: {error}")
+}

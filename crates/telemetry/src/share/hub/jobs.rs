@@ -1,0 +1,151 @@
+//! What takes longer than the hub may wait: ports that are listed, opened and closed, in threads.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use motorlink::port::{Carries, PortName};
+use motorlink_link::list;
+
+use super::place::SessionId;
+use crate::line::Stopped;
+use crate::share::message::{FoundPort, Protocol};
+use crate::share::opening::{OpenError, Opened};
+
+/// Jobs at the same time.
+const MOST_JOBS: usize = 8;
+
+/// A job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct JobId(u64);
+
+/// The jobs that are under way.
+#[derive(Default)]
+pub(super) struct Jobs {
+    last: u64,
+    under_way: BTreeMap<JobId, Job>,
+}
+
+/// Who asked for a job.
+pub(super) struct Asker {
+    pub(super) session: SessionId,
+    /// The request.
+    pub(super) id: u32,
+    pub(super) by: Arc<str>,
+}
+
+pub(super) struct Job {
+    pub(super) asker: Asker,
+    /// What the job occupies, and what it does there.
+    place: Option<(String, Does)>,
+    thread: JoinHandle<End>,
+}
+
+/// What a job does with a port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Does {
+    Opens,
+    Closes,
+}
+
+/// What a job came to.
+pub(super) enum End {
+    Listed(Vec<(FoundPort, String)>),
+    Opened(Box<Result<Opened, OpenError>>),
+    Closed(String, PortName, Vec<Stopped>),
+}
+
+/// Says that the thread of a job ends, also if it panics.
+struct AtEnd<F: FnMut()>(F);
+
+impl<F: FnMut()> Drop for AtEnd<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
+}
+
+impl Jobs {
+    /// Waits for the lines that are being closed, and gives their motors.
+    pub(super) fn end(self) -> Vec<(String, Vec<Stopped>)> {
+        let closing = self.under_way.into_values().filter(|job| job.does(Does::Closes));
+        closing
+            .filter_map(|job| match job.thread.join() {
+                Ok(End::Closed(name, _, stopped)) => Some((name, stopped)),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// Whether there are as many as there can be.
+    pub(super) fn are_many(&self) -> bool {
+        self.under_way.len() >= MOST_JOBS
+    }
+
+    /// Begins a job. `ended` is called in its thread, after which it is [taken](Self::take).
+    pub(super) fn begin(
+        &mut self,
+        asker: Asker,
+        place: Option<(String, Does)>,
+        work: impl FnOnce() -> End + Send + 'static,
+        ended: impl Fn(JobId) + Send + 'static,
+    ) -> io::Result<()> {
+        self.last += 1;
+        let job = JobId(self.last);
+        let thread = std::thread::Builder::new().name("port".to_owned());
+        let thread = thread.spawn(move || {
+            let _at_end = AtEnd(|| ended(job));
+            work()
+        })?;
+        self.under_way.insert(job, Job { asker, place, thread });
+        Ok(())
+    }
+
+    /// A job that has ended.
+    pub(super) fn take(&mut self, job: JobId) -> Option<Job> {
+        self.under_way.remove(&job)
+    }
+
+    /// The job that occupies a place.
+    pub(super) fn at(&self, place: &str) -> Option<&Job> {
+        let is_there = |job: &&Job| job.place.as_ref().is_some_and(|(other, _)| other == place);
+        self.under_way.values().find(is_there)
+    }
+
+    /// How many open a port.
+    pub(super) fn opening(&self) -> usize {
+        self.under_way.values().filter(|job| job.does(Does::Opens)).count()
+    }
+}
+
+impl Job {
+    /// What it came to; `None` if it panicked.
+    pub(super) fn end(self) -> (Asker, Option<End>) {
+        (self.asker, self.thread.join().ok())
+    }
+
+    pub(super) fn does(&self, what: Does) -> bool {
+        self.place.as_ref().is_some_and(|(_, does)| *does == what)
+    }
+}
+
+/// The ports of this computer, and what each occupies.
+pub(super) fn found_ports() -> Vec<(FoundPort, String)> {
+    let found = list::ports().into_iter().map(|port| {
+        let place = port.name.parse::<PortName>().map_or_else(|_| String::new(), |it| it.place());
+        let protocol = match port.carries {
+            Carries::Frames => Protocol::Rmd,
+            Carries::Bytes | Carries::Both => Protocol::St,
+        };
+        let found = FoundPort {
+            port: port.name,
+            protocol,
+            description: port.description,
+            stable_path: port.stable_path.map(|path| path.display().to_string()),
+            problem: port.problem,
+            line: None,
+        };
+        (found, place)
+    });
+    found.collect()
+}

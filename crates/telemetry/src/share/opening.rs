@@ -1,0 +1,83 @@
+//! Opens the ports of a share's lines.
+
+use std::time::Duration;
+
+use motorlink::port::PortName;
+use motorlink::st::Profile;
+use motorlink::{rmd, st};
+
+use super::message::Protocol;
+use super::wire::Tap;
+use super::words::Speaks;
+use crate::acquisition::Acquisition;
+use crate::line::{RmdLine, StLine};
+
+/// A port that a share opens, and how its drives are spoken to.
+#[derive(Debug, Clone)]
+pub struct Wish {
+    /// The port.
+    pub port: PortName,
+    /// The profile of ST drives.
+    pub profile: Profile,
+    /// How long to wait for a reply; that of the protocol without it.
+    pub timeout: Option<Duration>,
+}
+
+/// A port that is open, and its engine.
+pub struct Opened {
+    /// The port.
+    pub port: PortName,
+    /// What its drives speak.
+    pub speaks: Speaks,
+    /// The engine.
+    pub engine: Acquisition,
+    /// What is around the port.
+    pub tap: Tap,
+}
+
+/// Why a port is not open.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// That of an ST drive.
+    #[error(transparent)]
+    St(#[from] st::Error),
+    /// That of RMD motors.
+    #[error(transparent)]
+    Rmd(#[from] rmd::Error),
+}
+
+impl Wish {
+    /// The protocols that the port can have.
+    pub fn protocols(&self) -> Vec<Protocol> {
+        let st = self.port.as_line().map(|_| Protocol::St);
+        st.into_iter().chain(self.port.as_can().map(|_| Protocol::Rmd)).collect()
+    }
+
+    /// Opens the port, which may wait.
+    ///
+    /// # Errors
+    /// What keeps it from being opened.
+    pub fn open(&self, protocol: Protocol) -> Result<Opened, OpenError> {
+        let tap = Tap::default();
+        let around = tap.clone();
+        let (speaks, engine) = match protocol {
+            Protocol::St => {
+                let defaults = st::Options::default();
+                let timeout = self.timeout.unwrap_or(defaults.timeout);
+                let options = st::Options { profile: self.profile, timeout, ..defaults };
+                let wrap = move |link| around.around_line(link);
+                let client = st::EventClient::open_wrapped(&self.port, wrap, options)?;
+                (Speaks::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
+            }
+            Protocol::Rmd => {
+                let defaults = rmd::Options::default();
+                let timeout = self.timeout.unwrap_or(defaults.timeout);
+                let options = rmd::Options { timeout, ..defaults };
+                let wrap = move |link| around.around_bus(link);
+                let client = rmd::EventClient::open_wrapped(&self.port, wrap, options)?;
+                (Speaks::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))
+            }
+        };
+        Ok(Opened { port: self.port.clone(), speaks, engine, tap })
+    }
+}
