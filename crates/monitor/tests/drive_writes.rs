@@ -230,7 +230,7 @@ async fn a_restore_needs_a_motor_at_rest_and_a_file_for_it() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn every_page_sees_the_limits() {
-    let world = World::new("limits", Profile::Spec);
+    let world = World::new("limits-spec", Profile::Spec);
     let one = world.page().await;
     let other = world.other(&one).await;
     assert_eq!(limits(&other).await, []);
