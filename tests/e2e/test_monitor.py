@@ -227,6 +227,25 @@ def test_what_stops_a_motor_also_ends_its_run(site, watcher, run, way):
             assert are_still(watcher)
 
 
+def test_runs_that_wait_do_not_begin_after_the_stop_of_another_page(site, watcher):
+    motor = {"line": "rmd0", "motor": 2}
+    with site.page() as page, site.page() as other:
+        for _ in range(5 * ROUNDS):
+            page.alive()
+            members = {**motor, "mode": "speed", "rate": 6000, "hold": False}
+            sent = [page.send("run", **members, target=target) for target in (300, -300, 300)]
+            # The server has the runs when it answers this.
+            page.ask("lines")
+            assert other.ask("stop", motor=motor)["kind"] == "answer"
+            for it in sent:
+                page.until(lambda heard, it=it: isinstance(heard, dict) and heard.get("id") == it)
+            # Three periods in which a run would be at its target.
+            began = len(other.beats)
+            eventually(lambda began=began: len(other.beats) > began + 3, "beats")
+            rests(watcher)
+            page.forget()
+
+
 def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, watcher):
     turns_too(watcher)
     with site.page() as page:

@@ -7,6 +7,7 @@
 //! stores what it sends.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::share::message::{MotorName, Reason};
@@ -27,10 +28,33 @@ pub struct DeadMan {
     /// Until when the last valid sign of life counts.
     until: Option<Instant>,
     motion: Option<Motion>,
-    /// How often the page's motion has ended, and how often each motor was stopped.
+    /// How often the page's motion has ended.
     ends: u64,
-    stops: BTreeMap<MotorName, u64>,
+    /// The stops that this page learned of, and those of all pages.
+    stops: Stops,
+    shared: Arc<Mutex<Stops>>,
     releases: u64,
+}
+
+/// How often motors were stopped.
+#[derive(Debug, Default)]
+pub struct Stops {
+    all: u64,
+    of: BTreeMap<MotorName, u64>,
+}
+
+impl Stops {
+    /// A motor is stopped, or all are.
+    pub fn count(&mut self, motor: Option<&MotorName>) {
+        match motor {
+            Some(motor) => *self.of.entry(motor.clone()).or_default() += 1,
+            None => self.all += 1,
+        }
+    }
+
+    fn of(&self, motor: Option<&MotorName>) -> u64 {
+        self.all + motor.and_then(|motor| self.of.get(motor)).copied().unwrap_or_default()
+    }
 }
 
 /// Motion that depends on the page.
@@ -39,8 +63,8 @@ struct Motion {
     hold: bool,
 }
 
-/// Remembers when a command was received. Motion does not begin if the page lapsed, released its key or
-/// stopped the motor since then.
+/// Remembers when a command was received. Motion does not begin if the page lapsed or released its key
+/// since then, or the motor was stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ticket {
     motor: Option<MotorName>,
@@ -67,8 +91,8 @@ pub enum Lapse {
 }
 
 impl DeadMan {
-    /// A page that has given no sign of life.
-    pub fn new(deadline: Micros) -> Self {
+    /// A page that has given no sign of life. `shared` has the stops of all pages of the server.
+    pub fn new(deadline: Micros, shared: Arc<Mutex<Stops>>) -> Self {
         DeadMan {
             deadline,
             last_beat: 0,
@@ -78,7 +102,8 @@ impl DeadMan {
             until: None,
             motion: None,
             ends: 0,
-            stops: BTreeMap::new(),
+            stops: Stops::default(),
+            shared,
             releases: 0,
         }
     }
@@ -128,19 +153,19 @@ impl DeadMan {
 
     /// A command was received. `None`: it is about no motor.
     pub fn ticket(&self, motor: Option<MotorName>) -> Ticket {
-        let stops = motor.as_ref().map_or(0, |motor| self.stops_of(motor));
+        let stops = self.stops_of(motor.as_ref());
         Ticket { motor, ends: self.ends, stops, releases: self.releases }
     }
 
     /// Motion of this command begins now, and depends on the page from now on.
     ///
     /// # Errors
-    /// The page is not alive, or has ended or stopped its motion since the command.
+    /// The page is not alive or has ended its motion since the command, or the motor was stopped.
     pub fn permit(&mut self, ticket: &Ticket, hold: bool, now: Instant) -> Result<(), Refusal> {
         if !self.is_alive(now) {
             return Err(refusal(Reason::Lapsed, "the page gives no sign of life"));
         }
-        let stops = ticket.motor.as_ref().map_or(0, |motor| self.stops_of(motor));
+        let stops = self.stops_of(ticket.motor.as_ref());
         if ticket.ends != self.ends || ticket.stops != stops {
             return Err(refusal(Reason::Overtaken, "a stop came first; nothing was sent"));
         }
@@ -152,12 +177,15 @@ impl DeadMan {
         Ok(())
     }
 
-    /// The page stops a motor, or all: its earlier commands move them no more.
+    /// The page stops a motor, or all: earlier commands of any page move them no more. This is told before
+    /// the share is.
     pub fn stop(&mut self, motor: Option<&MotorName>) {
-        match motor {
-            Some(motor) => *self.stops.entry(motor.clone()).or_default() += 1,
-            None => self.ends += 1,
-        }
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner).count(motor);
+    }
+
+    /// Another program stopped a motor, or all: earlier commands of the page move them no more.
+    pub fn stopped(&mut self, motor: Option<&MotorName>) {
+        self.stops.count(motor);
     }
 
     /// No motion depends on the page any more. Gives the reason back if some did.
@@ -170,8 +198,9 @@ impl DeadMan {
         self.until.is_some_and(|until| now < until)
     }
 
-    fn stops_of(&self, motor: &MotorName) -> u64 {
-        self.stops.get(motor).copied().unwrap_or_default()
+    fn stops_of(&self, motor: Option<&MotorName>) -> u64 {
+        let shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        self.stops.of(motor) + shared.of(motor)
     }
 }
 

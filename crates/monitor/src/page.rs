@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use motorlink::Clock;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
-use motorlink_telemetry::share::message::{self as share, Happening, MotorName, Reason};
+use motorlink_telemetry::share::message::{self as share, Event, Happening, MotorName, Reason};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
@@ -44,6 +44,8 @@ struct Control {
     man: DeadMan,
     /// The session that turned motors. The share stops them when it ends.
     drive: Option<Program>,
+    /// When that was opened, by the wall clock in seconds.
+    opened: f64,
 }
 
 /// Why a page has to be closed, in words.
@@ -59,12 +61,13 @@ impl Page {
         recordings: Arc<Recordings>,
         out: mpsc::Sender<String>,
     ) -> Self {
+        let man = DeadMan::new(deadline, Arc::clone(link.stops()));
         Page {
             name,
             role,
             clock: Clock::running(),
             link,
-            control: Mutex::new(Control { man: DeadMan::new(deadline), drive: None }),
+            control: Mutex::new(Control { man, drive: None, opened: 0.0 }),
             changed: Notify::new(),
             opening: AsyncMutex::new(()),
             view: Mutex::new(None),
@@ -76,8 +79,7 @@ impl Page {
 
     /// The next beat, which is sent now.
     pub fn beat(&self) -> Text {
-        let wall = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Text::Beat(self.control().man.beat(self.clock.now(), wall.as_secs_f64()))
+        Text::Beat(self.control().man.beat(self.clock.now(), wall()))
     }
 
     /// The session that sees; `None`: the share is lost.
@@ -235,21 +237,26 @@ impl Page {
     }
 
     /// Takes a message of the share: if somebody else stops a motor, commands from before do not move it.
-    /// The session that sees is read only while the browser reads, the other one always.
+    /// The session that sees is read only while the browser reads, the other one always: what happened
+    /// since that is open counts when it tells of it.
     pub fn notice_stop_in_view(&self, frame: &Frame) {
-        if self.control().drive.is_none() {
-            self.notice_stop(frame);
-        }
+        self.notice_stop(frame, |control, event| {
+            control.drive.is_none() || event.wall <= control.opened
+        });
     }
 
-    fn notice_stop(&self, frame: &Frame) {
+    fn notice_stop(&self, frame: &Frame, counts: impl Fn(&Control, &Event) -> bool) {
         if frame.kind == Kind::Text
             && let Ok(share::Text::Event(event)) = share::decode(&frame.payload)
             && event.event == Happening::Stopping
             && event.by.as_ref() != Some(&self.name)
         {
-            let motor = event.line.zip(event.motor);
-            self.control().man.stop(motor.map(|(line, motor)| MotorName { line, motor }).as_ref());
+            let mut control = self.control();
+            if counts(&control, &event) {
+                let motor = event.line.zip(event.motor);
+                let motor = motor.map(|(line, motor)| MotorName { line, motor });
+                control.man.stopped(motor.as_ref());
+            }
         }
     }
 
@@ -330,7 +337,10 @@ impl Page {
         let (drive, listener, _) = connected.map_err(|error| lost(&error.to_string()))?;
         // The page may have lapsed meanwhile.
         self.permit(ticket, hold)?;
-        self.control().drive = Some(drive.clone());
+        {
+            let mut control = self.control();
+            (control.drive, control.opened) = (Some(drive.clone()), wall());
+        }
         tokio::spawn(follow(Arc::clone(self), drive.clone(), listener));
         Ok(drive)
     }
@@ -339,7 +349,7 @@ impl Page {
 /// Reads what the share sends to the session that turns motors.
 async fn follow(page: Arc<Page>, drive: Program, mut listener: Listener) {
     while let Ok(frame) = listener.next().await {
-        page.notice_stop(&frame);
+        page.notice_stop(&frame, |_, _| true);
     }
     let mut control = page.control();
     if control.drive.as_ref().is_some_and(|current| current.is(&drive))
@@ -398,6 +408,11 @@ fn read(text: &str) -> Result<FromPage, (Option<u32>, String)> {
         (false, _) => own,
     };
     Err((Some(id), why))
+}
+
+/// The wall clock, in seconds since 1970.
+fn wall() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 /// The motor that a request is about.

@@ -13,8 +13,12 @@ struct Bench {
 impl Bench {
     /// A page that is alive.
     fn new() -> Self {
-        let mut bench =
-            Bench { man: DeadMan::new(DEADLINE), now: Instant(5_000_000), beat: 0, frame: 0 };
+        let mut bench = Bench {
+            man: DeadMan::new(DEADLINE, Arc::default()),
+            now: Instant(5_000_000),
+            beat: 0,
+            frame: 0,
+        };
         bench.live(1);
         bench
     }
@@ -102,7 +106,7 @@ fn a_page_without_motion_has_nothing_to_lose() {
 
 #[test]
 fn a_page_that_gave_no_sign_of_life_starts_nothing() {
-    let mut man = DeadMan::new(DEADLINE);
+    let mut man = DeadMan::new(DEADLINE, Arc::default());
     let ticket = man.ticket(None);
     assert_eq!(reason(man.permit(&ticket, false, Instant(0))), Some(Reason::Lapsed));
 }
@@ -228,6 +232,23 @@ fn a_stop_overtakes_earlier_commands_to_that_motor() {
     let two = bench.man.ticket(Some(motor(2)));
     bench.man.stop(None);
     assert_eq!(reason(bench.man.permit(&two, false, bench.now)), Some(Reason::Overtaken));
+}
+
+#[test]
+fn a_stop_of_another_page_overtakes_at_once_and_that_of_a_program_when_it_is_known() {
+    let mut bench = Bench::new();
+    let mut other = DeadMan::new(DEADLINE, Arc::clone(&bench.man.shared));
+    for all in [false, true] {
+        let stopped = motor(1);
+        let stopped = (!all).then_some(&stopped);
+        let ticket = bench.man.ticket(Some(motor(1)));
+        other.stop(stopped);
+        assert_eq!(reason(bench.man.permit(&ticket, false, bench.now)), Some(Reason::Overtaken));
+        let ticket = bench.man.ticket(Some(motor(1)));
+        bench.man.permit(&ticket, false, bench.now).expect("a command behind the stop");
+        bench.man.stopped(stopped);
+        assert_eq!(reason(bench.man.permit(&ticket, false, bench.now)), Some(Reason::Overtaken));
+    }
 }
 
 #[test]

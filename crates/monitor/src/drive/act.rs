@@ -8,8 +8,8 @@ use motorlink_telemetry::line::{Request, may_move};
 use motorlink_telemetry::share::message::Reason;
 
 use super::commands::Command;
-use super::control::{Control, Motion, permitted};
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating, unconfirmed};
+use super::control::{Control, Motion, Permitted};
+use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::Value;
 use crate::program::{Program, Refusal};
@@ -42,7 +42,8 @@ impl Act {
         if ends_motion(&request) {
             control.stopping(&self.target);
             let reply = exchanges.request(&request).await?;
-            return self.values(&exchanges, &reply);
+            let values = self.values(&exchanges, &reply)?;
+            return exchanges.carried_out().await.map(|()| values);
         }
         control.limited(&self.target, |limited| limited.check(&request))?;
         let _lane = exchanges.lane().await;
@@ -54,7 +55,7 @@ impl Act {
                 Ok(()) => return Ok(values),
                 Err(why) if !is_worth_repeating(&why) => return Err(why),
                 Err(_) if request.is_read() && attempt < ATTEMPTS => attempt += 1,
-                Err(_) => return Err(unconfirmed(&exchanges)),
+                Err(_) => return Err(exchanges.unconfirmed()),
             }
         }
     }
@@ -69,18 +70,14 @@ impl Act {
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.end_run(&self.target).await;
-        let (program, _lane) = permitted(drive, self.hold, &self.target).await?;
-        stops.check()?;
-        let exchanges = Exchanges::new(&program, &self.target).motion();
-        let reply = send(control, &exchanges, request).await?;
+        let permitted = Permitted::new(drive, self.hold, stops).await?;
+        let reply = permitted.send(control, request).await?;
+        let exchanges = Exchanges::new(&permitted.program, &self.target);
         let values = self.values(&exchanges, &reply)?;
         if is_start(request) {
-            started(&Exchanges::new(&program, &self.target)).await?;
+            started(&exchanges).await?;
         } else {
-            exchanges.confirm().await.map_err(|why| match is_worth_repeating(&why) {
-                true => unconfirmed(&exchanges),
-                false => why,
-            })?;
+            exchanges.carried_out().await?;
         }
         Ok(values)
     }
@@ -116,10 +113,7 @@ pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
         let reply = reads.st(motor.number(), &starting.request()).await?;
         let bits = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
         let Some(result) = starting.replied(bits) else { continue };
-        reads.confirm().await.map_err(|why| match is_worth_repeating(&why) {
-            true => unconfirmed(reads),
-            false => why,
-        })?;
+        reads.carried_out().await?;
         return match result {
             Ok(_) => Ok(()),
             Err(why) => {

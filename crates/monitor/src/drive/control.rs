@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::{MotorName, Reason};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 
+use super::act;
+use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
 use super::target::{Target, refusal};
 use crate::program::{Program, Refusal};
@@ -111,20 +114,61 @@ impl Control {
     }
 }
 
-/// Waits until the session may send commands to the motor, whose replies it confirms.
-pub(super) async fn permitted(
-    drive: &impl Motion,
+/// A session that may send commands to a motor, whose replies it confirms.
+pub(super) struct Permitted<'a, M> {
+    drive: &'a M,
     hold: bool,
-    target: &Target,
-) -> Result<(Program, OwnedMutexGuard<()>), Refusal> {
-    loop {
-        let program = drive.program(hold).await?;
-        let lane = program.lane(target.lane()).await;
-        // The page may have lapsed or stopped the motor meanwhile.
-        if drive.program(hold).await?.is(&program) {
-            return Ok((program, lane));
+    stops: Stops<'a>,
+    pub(super) program: Program,
+    _lane: OwnedMutexGuard<()>,
+}
+
+impl<'a, M: Motion> Permitted<'a, M> {
+    /// Waits until no other command of the session waits for its confirmation.
+    pub(super) async fn new(drive: &'a M, hold: bool, stops: Stops<'a>) -> Result<Self, Refusal> {
+        loop {
+            let program = drive.program(hold).await?;
+            let lane = program.lane(stops.target.lane()).await;
+            // The page may have lapsed meanwhile, or the motor was stopped.
+            if drive.program(hold).await?.is(&program) {
+                stops.check()?;
+                return Ok(Permitted { drive, hold, stops, program, _lane: lane });
+            }
         }
     }
+
+    /// Checks that no stop came before what the share has answered to the session. Commands that
+    /// continue that are refused by the share after a later stop.
+    pub(super) async fn check(&self) -> Result<(), Refusal> {
+        self.stops.check()?;
+        match self.drive.program(self.hold).await?.is(&self.program) {
+            true => Ok(()),
+            false => Err(overtaken()),
+        }
+    }
+
+    /// Sends one request that may move the motor, unless a stop comes before it.
+    pub(super) async fn send(
+        &self,
+        control: &Control,
+        request: &Request,
+    ) -> Result<Vec<u8>, Refusal> {
+        let exchanges = Exchanges::new(&self.program, self.stops.target).motion();
+        let mut attempt = 1;
+        loop {
+            exchanges.touch().await?;
+            self.check().await?;
+            match act::send(control, &exchanges.continues(), request).await {
+                // A stop, or a command of another program: the check tells.
+                Err(why) if why.reason == Reason::Overtaken && attempt < ATTEMPTS => attempt += 1,
+                ended => return ended,
+            }
+        }
+    }
+}
+
+fn overtaken() -> Refusal {
+    refusal(Reason::Overtaken, "a stop came first; nothing was sent")
 }
 
 impl Stops<'_> {
@@ -132,7 +176,7 @@ impl Stops<'_> {
     pub(super) fn check(&self) -> Result<(), Refusal> {
         match self.control.count(self.target) == self.count {
             true => Ok(()),
-            false => Err(refusal(Reason::Overtaken, "a stop came first; nothing was sent")),
+            false => Err(overtaken()),
         }
     }
 }

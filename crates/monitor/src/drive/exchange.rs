@@ -1,7 +1,7 @@
 //! Exchanges with a motor through a share.
 
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, Request};
+use motorlink_proto::rmd::{Command as _, MotorId, ReadMotionStatus};
+use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, RegisterId, Request};
 use motorlink_telemetry::line::Request as LineRequest;
 use motorlink_telemetry::share::message::{Answer, Ask, Reason};
 use motorlink_telemetry::share::words::Speaks;
@@ -49,6 +49,17 @@ impl<'a> Exchanges<'a> {
         self.program.lane(self.target.lane()).await
     }
 
+    /// Reads what moves nothing.
+    pub(super) async fn touch(&self) -> Result<(), Refusal> {
+        match self.of_st() {
+            Some((motor, _)) => {
+                let read = Request::GetRegister(RegisterId::STATUS);
+                self.st(motor.number(), &read).await.map(drop)
+            }
+            None => self.rmd(ReadMotionStatus.encode()).await.map(drop),
+        }
+    }
+
     /// Sends a request; gives the payload of the acknowledge of an ST drive, or the eight bytes of an RMD
     /// motor.
     pub(super) async fn request(&self, request: &LineRequest) -> Result<Vec<u8>, Refusal> {
@@ -89,6 +100,24 @@ impl<'a> Exchanges<'a> {
         self.program.ask(Ask::Confirm { line, motor }).await.map(drop)
     }
 
+    /// As [`confirm`](Self::confirm), after what must not be sent again.
+    pub(super) async fn carried_out(&self) -> Result<(), Refusal> {
+        self.confirm().await.map_err(|why| match is_worth_repeating(&why) {
+            true => self.unconfirmed(),
+            false => why,
+        })
+    }
+
+    /// What was sent may have been carried out.
+    pub(super) fn unconfirmed(&self) -> Refusal {
+        let place = self.place();
+        let message = format!(
+            "{place}: the command was sent, and its reply may be one to another request: the line failed, or \
+             a reply came twice or late; check the motor"
+        );
+        refusal(Reason::Unconfirmed, message)
+    }
+
     /// The motor of an ST drive, and the profile.
     pub(super) fn of_st(&self) -> Option<(MotorNumber, Profile)> {
         match (self.target.motor, self.target.speaks) {
@@ -119,14 +148,4 @@ impl<'a> Exchanges<'a> {
 /// Whether asking again may help: the line failed, or answers were not confirmed.
 pub(super) fn is_worth_repeating(refusal: &Refusal) -> bool {
     refusal.reason == Reason::Unconfirmed
-}
-
-/// What was sent may have been carried out.
-pub(super) fn unconfirmed(exchanges: &Exchanges<'_>) -> Refusal {
-    let place = exchanges.place();
-    let message = format!(
-        "{place}: the command was sent, and its reply may be one to another request: the line failed, or a \
-         reply came twice or late; check the motor"
-    );
-    refusal(Reason::Unconfirmed, message)
 }

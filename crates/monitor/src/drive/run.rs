@@ -23,7 +23,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
 use super::act::{send, started};
-use super::control::{Control, Motion, Running, permitted};
+use super::control::{Control, Motion, Permitted, Running};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::Mode;
@@ -83,9 +83,8 @@ impl Run {
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.end_run(&self.target).await;
-        let (program, _lane) = permitted(drive, self.hold, &self.target).await?;
-        stops.check()?;
-        let begun = Begun { run: &self, control, program: &program };
+        let permitted = Permitted::new(drive, self.hold, stops).await?;
+        let begun = Begun { run: &self, control, permitted };
         match (self.target.motor, self.target.speaks, self.mode) {
             (Motor::Rmd(id), _, Mode::Speed) => {
                 let measured = begun.motion_status().await?.speed.dps();
@@ -156,19 +155,19 @@ impl Run {
 }
 
 /// A run that its page may carry out.
-struct Begun<'a> {
+struct Begun<'a, M> {
     run: &'a Run,
     control: &'a Arc<Control>,
-    program: &'a Program,
+    permitted: Permitted<'a, M>,
 }
 
-impl Begun<'_> {
+impl<M: Motion> Begun<'_, M> {
     fn target(&self) -> &Target {
         &self.run.target
     }
 
     fn reads(&self) -> Exchanges<'_> {
-        Exchanges::new(self.program, self.target())
+        Exchanges::new(&self.permitted.program, self.target())
     }
 
     async fn command(&self, request: &Request) -> Result<(), Refusal> {
@@ -202,7 +201,7 @@ impl Begun<'_> {
                 reads = reads.continues();
             }
             match reads.confirm().await {
-                Ok(()) => return Ok(replies),
+                Ok(()) => return self.permitted.check().await.map(|()| replies),
                 Err(why) if is_worth_repeating(&why) && attempt < ATTEMPTS => attempt += 1,
                 Err(why) => return Err(why),
             }
@@ -245,7 +244,7 @@ impl Begun<'_> {
         let (ends, ended) = watch::channel(false);
         let references = References {
             control: Arc::clone(self.control),
-            program: self.program.clone(),
+            program: self.permitted.program.clone(),
             target: self.target().clone(),
             stream,
             to: self.run.to,

@@ -8,8 +8,8 @@ use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
 
 use super::act::send;
-use super::control::{Control, Motion, permitted};
-use super::exchange::{Exchanges, is_worth_repeating, unconfirmed};
+use super::control::{Control, Motion, Permitted};
+use super::exchange::Exchanges;
 use super::registers::{self, Place};
 use super::settings;
 use super::target::{Target, refusal, usage};
@@ -57,36 +57,34 @@ impl Write {
         control.limited(&self.target, |limited| limited.check(&request))?;
         if why == NotASetting::OneMeasurement {
             let _lane = exchanges.lane().await;
-            return written(control, &exchanges, &request, (register, profile, bits)).await;
+            send(control, &exchanges, &request).await?;
+            return written(&exchanges, (register, profile, bits)).await;
         }
         // A reference or a mode: it may move the motor.
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.end_run(&self.target).await;
-        let (program, _lane) = permitted(drive, false, &self.target).await?;
-        stops.check()?;
-        let exchanges = Exchanges::new(&program, &self.target).motion();
-        written(control, &exchanges, &request, (register, profile, bits)).await
+        let permitted = Permitted::new(drive, false, stops).await?;
+        permitted.send(control, &request).await?;
+        let exchanges = Exchanges::new(&permitted.program, &self.target);
+        written(&exchanges, (register, profile, bits)).await
     }
 }
 
-/// Writes a register once and reads it back: a library must not repeat a write that makes the motor act.
+/// Reads a register back that was written once: a library must not repeat a write that makes the motor
+/// act.
 async fn written(
-    control: &Control,
     exchanges: &Exchanges<'_>,
-    request: &Request,
     (register, profile, bits): (RegisterId, Profile, i32),
 ) -> Result<Vec<Value>, Refusal> {
-    send(control, exchanges, request).await?;
-    let reads = Exchanges::new(exchanges.program, exchanges.target);
     let values = match VerifiedWrite::new::<()>(profile, register, bits) {
         Err(Unverified::NotReadable) => {
             vec![value::text(&register.to_string(), "written; it cannot be read back")]
         }
         write => {
             let motor = exchanges.target.name.motor;
-            let reply = reads.st(motor, &StRequest::GetRegister(register)).await?;
-            let read = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
+            let reply = exchanges.st(motor, &StRequest::GetRegister(register)).await?;
+            let read = register.decode(profile, &reply).ok_or_else(|| exchanges.unfit())?;
             // The drive changes references and modes itself.
             if let Ok(write) = write
                 && write.expected() != read
@@ -99,11 +97,7 @@ async fn written(
             vec![value::of_register(&register.to_string(), reading)]
         }
     };
-    match exchanges.confirm().await {
-        Ok(()) => Ok(values),
-        Err(why) if is_worth_repeating(&why) => Err(unconfirmed(exchanges)),
-        Err(why) => Err(why),
-    }
+    exchanges.carried_out().await.map(|()| values)
 }
 
 fn digits(register: RegisterId, value: f64, profile: Profile) -> Result<i32, Refusal> {

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::frame::Kind;
@@ -11,6 +12,7 @@ use motorlink_telemetry::share::message::{
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
+use crate::alive::Stops;
 use crate::drive::Drives;
 use crate::program::{Listener, Program, Refusal};
 
@@ -26,6 +28,8 @@ pub const AGAIN: Duration = Duration::from_millis(250);
 /// A share that may end and be started again.
 pub struct Link {
     path: PathBuf,
+    /// The stops of all pages.
+    stops: Arc<Mutex<Stops>>,
     /// `None` until the first attempt to connect has ended.
     joined: watch::Sender<Option<Result<Joined, String>>>,
 }
@@ -40,7 +44,12 @@ struct Joined {
 impl Link {
     /// The share at a path. [`keep`](Self::keep) connects to it.
     pub fn new(path: PathBuf) -> Self {
-        Link { path, joined: watch::Sender::new(None) }
+        Link { path, stops: Arc::default(), joined: watch::Sender::new(None) }
+    }
+
+    /// The stops of all pages.
+    pub fn stops(&self) -> &Arc<Mutex<Stops>> {
+        &self.stops
     }
 
     /// Where the share is.
@@ -138,6 +147,7 @@ impl Link {
     /// # Errors
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
+        self.stops.lock().unwrap_or_else(PoisonError::into_inner).count(None);
         stop_all(&self.get().await?.program).await
     }
 
