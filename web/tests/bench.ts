@@ -18,8 +18,7 @@ export class Program {
 
   constructor(args: string[], cwd: string) {
     this.process = spawn(PROGRAM, args, { cwd, stdio: ['pipe', 'pipe', 'pipe'] });
-    // Also if a test is given up.
-    process.on('exit', () => this.process.kill('SIGKILL'));
+    endWithTests(this.process, (child) => child.kill('SIGKILL'));
     this.process.stderr!.on('data', (bytes: Buffer) => (this.stderr += bytes.toString()));
     createInterface({ input: this.process.stdout! }).on('line', (line) => {
       this.lines.push(JSON.parse(line) as Record<string, unknown>);
@@ -62,6 +61,13 @@ export class Program {
     this.process.kill('SIGCONT');
     return ended;
   }
+}
+
+/** Ends a child also if the test is given up. */
+export function endWithTests(child: ChildProcess, end: (child: ChildProcess) => void) {
+  const endIt = () => end(child);
+  process.on('exit', endIt);
+  child.on('exit', () => process.off('exit', endIt));
 }
 
 interface Port {

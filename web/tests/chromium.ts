@@ -5,6 +5,7 @@ import { type ChildProcess, spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { endWithTests } from './bench';
 
 export const PROGRAM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 /** Its background services would look for the network. Root has no sandbox. */
@@ -28,8 +29,7 @@ export class Chromium {
       [...ARGUMENTS, ...through, '--headless', '--remote-debugging-port=0', `--user-data-dir=${folder}`, 'about:blank'],
       { stdio: 'ignore', detached: true },
     );
-    // Also if a test is given up.
-    process.on('exit', () => end(started));
+    endWithTests(started, end);
     const file = join(folder, 'DevToolsActivePort');
     while (!existsSync(file) || !readFileSync(file, 'utf8').includes('\n')) {
       if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);
