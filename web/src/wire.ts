@@ -1226,7 +1226,7 @@ id?: number | null,
  */
 bytes: string, 
 /**
- * What it means, or why it is no frame.
+ * What it means, or why it is not a frame.
  */
 words: string, 
 /**

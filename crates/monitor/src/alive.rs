@@ -177,8 +177,8 @@ impl DeadMan {
         Ok(())
     }
 
-    /// The page stops a motor, or all: earlier commands of any page move them no more. This is told before
-    /// the share is.
+    /// The page stops a motor, or all: earlier commands of any page move them no more. Call this before
+    /// the share learns of it.
     pub fn stop(&mut self, motor: Option<&MotorName>) {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner).count(motor);
     }

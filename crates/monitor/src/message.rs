@@ -3,12 +3,24 @@
 //! A page also exchanges the messages of [a share](motorlink_telemetry::share::message) through the
 //! server. It receives the share's answers, refusals, groups, events and samples as they are. Of the
 //! share's requests it may send `lines`, `signals`, `subscribe`, `unsubscribe`, `rates`, `frames`, `ports`,
-//! `open`, `close`, `stop`, `latch` and `release`. Texts of both sides have the same [`Refusal`](motorlink_telemetry::share::message::Text).
+//! `open`, `close`, `stop`, `latch` and `release`. Texts of both sides have the same
+//! [`Refusal`](motorlink_telemetry::share::message::Text).
+
+mod drives;
+mod recordings;
 
 use std::collections::BTreeMap;
 
-use motorlink_telemetry::share::message::{self as share, MotorName, Protocol};
+use motorlink_telemetry::share::message::{self as share, MotorName};
 use serde::{Deserialize, Serialize};
+
+pub use drives::{
+    Command, Controlled, Description, Difference, Fault, Field, Overview, Register, State, Value,
+};
+pub use recordings::{
+    Condition, Phase, Recorded, RecordedEvent, RecordedSignal, RecordingContent, RecordingFile,
+    RecordingPart,
+};
 
 /// What a page sends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -117,7 +129,7 @@ pub enum Ask {
         /// As for [`Ask::Act`].
         hold: bool,
     },
-    /// Sets what all pages may ask of a motor. `null` is no limit.
+    /// Sets what all pages may ask of a motor. `null` removes the limit.
     Limit {
         /// The motor.
         #[serde(flatten)]
@@ -361,330 +373,4 @@ pub enum Answer {
     },
     /// To recording.
     Recording(RecordingContent),
-}
-
-/// What the drives of a line have.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Description {
-    /// The line.
-    pub line: String,
-    /// What they speak.
-    pub protocol: Protocol,
-    /// The signals of the overview of a motor.
-    pub overview: Overview,
-    /// The registers, in the order of the table.
-    pub registers: Vec<Register>,
-    /// The commands.
-    pub commands: Vec<Command>,
-    /// What can be controlled.
-    pub modes: Vec<Controlled>,
-    /// The meaning of the signal `overview.state`.
-    pub states: Vec<State>,
-    /// The bits of the signal `overview.faults`.
-    pub faults: Vec<Fault>,
-}
-
-/// The names of the signals that say most about a motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Overview {
-    /// The state. RMD motors report none.
-    pub state: Option<String>,
-    /// The faults.
-    pub faults: String,
-    /// The speed.
-    pub speed: String,
-    /// The current that makes torque.
-    pub current: String,
-    /// The temperature.
-    pub temperature: String,
-    /// The supply.
-    pub voltage: String,
-    /// The angle of an RMD motor.
-    pub angle: Option<String>,
-}
-
-/// A register, or a setting of an RMD motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Register {
-    /// Its name.
-    pub name: String,
-    /// What it belongs to, for headings.
-    pub group: String,
-    /// Its meaning.
-    pub doc: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
-    /// Whether it can be read.
-    pub readable: bool,
-    /// Whether it can be written.
-    pub writable: bool,
-    /// Whether a write wears the ROM of the motor.
-    pub wears_rom: bool,
-    /// Whether a write with `to_rom` makes the value permanent, and wears the ROM. Without it the value holds
-    /// until the motor loses its supply.
-    pub can_keep: bool,
-    /// The least and the most value, and the step between values.
-    pub range: Option<[f64; 3]>,
-}
-
-/// A command of the protocol.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Command {
-    /// Its name in the table.
-    pub name: String,
-    /// What it does.
-    pub doc: String,
-    /// Its values.
-    pub fields: Vec<Field>,
-    /// Whether it may move the motor.
-    pub moves: bool,
-    /// Whether it wears the ROM of the motor.
-    pub wears_rom: bool,
-}
-
-/// A value of a command.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Field {
-    /// Its name.
-    pub name: String,
-    /// Its meaning.
-    pub doc: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
-    /// The least and the most value, and the step between values; a step of 0 is any.
-    pub range: [f64; 3],
-    /// The names of the values 0, 1 and so on; empty for a number.
-    pub words: Vec<String>,
-}
-
-/// What can be controlled of a motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Controlled {
-    /// What.
-    pub mode: Mode,
-    /// The symbol of the unit.
-    pub unit: String,
-    /// The signal that measures it.
-    pub measured: String,
-    /// What the protocol can carry, forwards and backwards.
-    pub most: f64,
-}
-
-/// A state of an ST motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct State {
-    /// The value of the signal.
-    pub value: u32,
-    /// Its name.
-    pub name: String,
-    /// Its meaning.
-    pub doc: String,
-}
-
-/// A bit of the faults.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Fault {
-    /// The bit of the signal, from 0.
-    pub bit: u32,
-    /// Its name.
-    pub name: String,
-    /// Its meaning.
-    pub doc: String,
-    /// What to do.
-    pub advice: String,
-    /// Whether the cause is present. Otherwise it has occurred and is not acknowledged.
-    pub present: bool,
-}
-
-/// A value that was read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Value {
-    /// The register or the field.
-    pub name: String,
-    /// In its unit; `null`: there is none.
-    pub value: Option<f64>,
-    /// As text: a state, faults, a version, or the value with its decimals. Without a value: why.
-    pub text: String,
-}
-
-/// A setting that differs between a motor and a file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Difference {
-    /// Its name.
-    pub name: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
-    /// That of the motor.
-    pub now: String,
-    /// That of the file.
-    pub file: String,
-    /// Whether writing it wears the ROM of the motor.
-    pub wears_rom: bool,
-    /// Why it cannot be written; `null`: it can.
-    pub fixed: Option<String>,
-}
-
-/// A recording that is made, or was made by this server.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Recorded {
-    /// The name of its file; empty until there is one.
-    pub name: String,
-    /// How far it is.
-    pub phase: Phase,
-    /// The page that asked for it.
-    pub by: String,
-    /// When it was asked for, in seconds since 1970.
-    pub began: f64,
-    /// How long it has recorded, in seconds.
-    pub seconds: f64,
-    /// The size of the file.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub bytes: u64,
-    /// Values in it.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub values: u64,
-    /// Messages that are missing in it, because this machine or the disk was too slow.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub lost: u64,
-    /// Rows that are missing in it, because nothing confirmed them.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub unconfirmed: u64,
-    /// The rate that was asked for, and that of the slowest motor, in Hz.
-    pub rates: Option<[f64; 2]>,
-    /// Its motors.
-    pub motors: Vec<String>,
-    /// Motors that gave no value yet.
-    pub silent: Vec<String>,
-    /// Signals that the drives do not give.
-    pub refused: Vec<String>,
-    /// Lines on which no motor answered. They are not recorded.
-    pub left_out: Vec<String>,
-    /// Why it failed.
-    pub message: Option<String>,
-}
-
-/// How far a recording is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub enum Phase {
-    /// Motors are searched and their settings are read.
-    Starting,
-    /// It records.
-    Recording,
-    /// The end of the file is written.
-    Ending,
-    /// The file is whole.
-    Ended,
-    /// It did not begin, or ended early. What the file has is readable.
-    Failed,
-}
-
-/// A file in the folder of the recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct RecordingFile {
-    /// Its name.
-    pub name: String,
-    /// Its size.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub bytes: u64,
-    /// When it was written last, in seconds since 1970.
-    pub modified: f64,
-    /// The time of the first message, in seconds since 1970.
-    pub began: Option<f64>,
-    /// The time from the first to the last message, in seconds.
-    pub seconds: Option<f64>,
-    /// Its motors.
-    pub motors: Vec<String>,
-    /// Whether it is whole.
-    pub condition: Condition,
-    /// What is wrong with it.
-    pub message: Option<String>,
-}
-
-/// Whether the file of a recording is whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub enum Condition {
-    /// It is whole.
-    Whole,
-    /// It has no end, or a part is damaged. The rest is readable.
-    Cut,
-    /// It is no recording, or cannot be read.
-    Unreadable,
-}
-
-/// What a recording has.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct RecordingContent {
-    /// The name of its file.
-    pub name: String,
-    /// The time of its first message, in seconds since 1970. Times count from there.
-    pub zero: f64,
-    /// The time of its last message.
-    pub seconds: f64,
-    /// The signals. Their numbers are their places, from 0.
-    pub signals: Vec<RecordedSignal>,
-    /// What is wrong with the file.
-    pub damage: Option<String>,
-}
-
-/// A signal of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct RecordedSignal {
-    /// Line and motor, such as `st0/motor1`.
-    pub motor: String,
-    /// Its name.
-    pub name: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
-    /// Its meaning; may be empty.
-    pub doc: String,
-}
-
-/// The text before the samples of a part of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct RecordingPart {
-    /// Where it begins, in seconds from the first message.
-    pub from: f64,
-    /// Where it ends.
-    pub to: f64,
-    /// What happened in this time.
-    pub events: Vec<RecordedEvent>,
-    /// Later events of this time, which are left out.
-    pub more_events: u32,
-    /// What is wrong with the file, as far as it was read.
-    pub damage: Option<String>,
-}
-
-/// An event of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct RecordedEvent {
-    /// When, in seconds from the first message.
-    pub t: f64,
-    /// Whom it concerns: a motor or a line.
-    pub of: String,
-    /// The kind, one word.
-    pub kind: String,
-    /// Who commanded it; may be empty.
-    pub by: String,
-    /// The sentence.
-    pub message: String,
 }

@@ -21,7 +21,7 @@ pub(super) struct Limited {
 }
 
 impl Limited {
-    /// Sets a limit of all pages; `None` is no limit. It is effective from the next request.
+    /// Sets a limit of all pages; `None` removes it. It is effective from the next request.
     ///
     /// # Errors
     /// No motor of this kind can have it.

@@ -164,7 +164,7 @@ impl Session {
 }
 
 fn parse<'t, T: Deserialize<'t>>(text: &'t str) -> Result<T, String> {
-    serde_json::from_str(text).map_err(|error| format!("this is no message: {error}"))
+    serde_json::from_str(text).map_err(|error| format!("this is not a message: {error}"))
 }
 
 #[cfg(test)]

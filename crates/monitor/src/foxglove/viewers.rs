@@ -85,13 +85,13 @@ impl Drop for Joined {
 }
 
 impl Viewers {
-    /// Nobody yet. `session` is a word of this run of the server.
+    /// Without viewers. `session` names this run of the server.
     pub fn new(link: Arc<Link>, program: String, session: String) -> Self {
         let (places, present) = (Semaphore::new(VIEWERS), Mutex::default());
         Viewers { link, program, session, places, present }
     }
 
-    /// A viewer comes. It is told what there is.
+    /// A viewer comes. It gets the list of channels.
     pub(super) fn join(self: &Arc<Self>) -> Joined {
         let viewer = Arc::new(Viewer::default());
         let mut present = self.present();

@@ -146,7 +146,7 @@ impl Folder {
 /// Opens a recording in a folder for reading.
 ///
 /// # Errors
-/// It is not there, or it is no regular file.
+/// It is not there, or it is not a regular file.
 pub fn open(folder: &Path, name: &Name) -> io::Result<File> {
     // A FIFO would wait for its writer, and a link can lead to any file.
     let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;

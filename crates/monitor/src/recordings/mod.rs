@@ -93,7 +93,7 @@ impl Recordings {
                 let read = self.reading(move |_| part::content(name, file)).await?;
                 read.map(Answer::Recording).map_err(usage)
             }
-            _ => Err(usage("this is no request about recordings".to_owned())),
+            _ => Err(usage("this is not a request about recordings".to_owned())),
         }
     }
 

@@ -48,7 +48,7 @@ pub struct Thin {
     stretches: Vec<Stretch>,
     /// Times between the first samples, to know the usual one.
     intervals: Vec<f64>,
-    /// The longest time between two samples that is no gap.
+    /// The longest time between two samples without a gap.
     longest: f64,
     seen: Option<f64>,
     /// The first and the last time of samples in stretches.

@@ -368,7 +368,7 @@ pub struct WireFrame {
     pub id: Option<u32>,
     /// The bytes on a serial line, or the data of a CAN frame, in hexadecimal.
     pub bytes: String,
-    /// What it means, or why it is no frame.
+    /// What it means, or why it is not a frame.
     pub words: String,
     /// The motor, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]

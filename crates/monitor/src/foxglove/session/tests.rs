@@ -8,7 +8,7 @@ fn data(size: usize) -> Arc<[u8]> {
     vec![7; size].into()
 }
 
-/// The status that the viewer is told next: level and text.
+/// The next status for the viewer: level and text.
 fn told(session: &mut Session) -> (u64, String) {
     let Some(Out::Text(text)) = session.take(Instant::now()) else { panic!("a text") };
     let status: Value = serde_json::from_str(&text).unwrap();
@@ -52,7 +52,7 @@ fn a_slow_viewer_loses_the_oldest_messages_and_is_told_how_many() {
     );
     let Some(Out::Message(message)) = session.take(Instant::now()) else { panic!("a message") };
     assert_eq!(message[5..13], 5u64.to_le_bytes());
-    // It is told once in a second.
+    // At most one such text comes in a second.
     for time in 0..3 {
         session.offer(0, time, &data(1024));
     }
@@ -103,7 +103,7 @@ fn a_wrong_subscription_is_refused_and_those_before_it_hold() {
     for (id, channel) in [(-1, 1), (1 << 32, 1), (2, -1)] {
         session.receive(&subscribe(id, channel), 10);
         let (level, why) = told(&mut session);
-        assert!(level == 2 && why.starts_with("this is no message: "), "{why}");
+        assert!(level == 2 && why.starts_with("this is not a message: "), "{why}");
     }
     assert_eq!(session.subscriptions, BTreeMap::from([(0, 1)]));
 }

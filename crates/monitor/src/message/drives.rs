@@ -1,0 +1,177 @@
+//! What a page learns of drives.
+
+use motorlink_telemetry::share::message::Protocol;
+use serde::{Deserialize, Serialize};
+
+use super::Mode;
+
+/// What the drives of a line have.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Description {
+    /// The line.
+    pub line: String,
+    /// What they speak.
+    pub protocol: Protocol,
+    /// The signals of the overview of a motor.
+    pub overview: Overview,
+    /// The registers, in the order of the table.
+    pub registers: Vec<Register>,
+    /// The commands.
+    pub commands: Vec<Command>,
+    /// What can be controlled.
+    pub modes: Vec<Controlled>,
+    /// The meaning of the signal `overview.state`.
+    pub states: Vec<State>,
+    /// The bits of the signal `overview.faults`.
+    pub faults: Vec<Fault>,
+}
+
+/// The names of the signals that say most about a motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Overview {
+    /// The state. RMD motors report none.
+    pub state: Option<String>,
+    /// The faults.
+    pub faults: String,
+    /// The speed.
+    pub speed: String,
+    /// The current that makes torque.
+    pub current: String,
+    /// The temperature.
+    pub temperature: String,
+    /// The supply.
+    pub voltage: String,
+    /// The angle of an RMD motor.
+    pub angle: Option<String>,
+}
+
+/// A register, or a setting of an RMD motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Register {
+    /// Its name.
+    pub name: String,
+    /// What it belongs to, for headings.
+    pub group: String,
+    /// Its meaning.
+    pub doc: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+    /// Whether it can be read.
+    pub readable: bool,
+    /// Whether it can be written.
+    pub writable: bool,
+    /// Whether a write wears the ROM of the motor.
+    pub wears_rom: bool,
+    /// Whether a write with `to_rom` makes the value permanent, and wears the ROM. Without it the value holds
+    /// until the motor loses its supply.
+    pub can_keep: bool,
+    /// The least and the most value, and the step between values.
+    pub range: Option<[f64; 3]>,
+}
+
+/// A command of the protocol.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Command {
+    /// Its name in the table.
+    pub name: String,
+    /// What it does.
+    pub doc: String,
+    /// Its values.
+    pub fields: Vec<Field>,
+    /// Whether it may move the motor.
+    pub moves: bool,
+    /// Whether it wears the ROM of the motor.
+    pub wears_rom: bool,
+}
+
+/// A value of a command.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Field {
+    /// Its name.
+    pub name: String,
+    /// Its meaning.
+    pub doc: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+    /// The least and the most value, and the step between values; a step of 0 is any.
+    pub range: [f64; 3],
+    /// The names of the values 0, 1 and so on; empty for a number.
+    pub words: Vec<String>,
+}
+
+/// What can be controlled of a motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Controlled {
+    /// What.
+    pub mode: Mode,
+    /// The symbol of the unit.
+    pub unit: String,
+    /// The signal that measures it.
+    pub measured: String,
+    /// What the protocol can carry, forwards and backwards.
+    pub most: f64,
+}
+
+/// A state of an ST motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct State {
+    /// The value of the signal.
+    pub value: u32,
+    /// Its name.
+    pub name: String,
+    /// Its meaning.
+    pub doc: String,
+}
+
+/// A bit of the faults.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Fault {
+    /// The bit of the signal, from 0.
+    pub bit: u32,
+    /// Its name.
+    pub name: String,
+    /// Its meaning.
+    pub doc: String,
+    /// What to do.
+    pub advice: String,
+    /// Whether the cause is present. Otherwise it has occurred and is not acknowledged.
+    pub present: bool,
+}
+
+/// A value that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Value {
+    /// The register or the field.
+    pub name: String,
+    /// In its unit; `null`: there is none.
+    pub value: Option<f64>,
+    /// As text: a state, faults, a version, or the value with its decimals. Without a value: why.
+    pub text: String,
+}
+
+/// A setting that differs between a motor and a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Difference {
+    /// Its name.
+    pub name: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+    /// That of the motor.
+    pub now: String,
+    /// That of the file.
+    pub file: String,
+    /// Whether writing it wears the ROM of the motor.
+    pub wears_rom: bool,
+    /// Why it cannot be written; `null`: it can.
+    pub fixed: Option<String>,
+}
