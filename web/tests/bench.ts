@@ -101,10 +101,11 @@ export class Bench {
     await this.drives.line((line) => line['protocol'] === 'st');
   }
 
-  /** As `plug`, with an ST drive on TCP. Gives its port. */
-  async listen() {
-    this.drives = new Program(['sim', '--st', 'tcp-listen:127.0.0.1:0', '--stdin', '--json'], this.folder);
-    const ready = await this.drives.line((line) => line['protocol'] === 'st');
+  /** As `plug`, with an ST drive or RMD motors on TCP alone. Gives the port. */
+  async listen(protocol: 'st' | 'rmd') {
+    const ports = [`--${protocol}`, 'tcp-listen:127.0.0.1:0'];
+    this.drives = new Program(['sim', ...ports, '--stdin', '--json'], this.folder);
+    const ready = await this.drives.line((line) => line['protocol'] === protocol);
     return Number(String(ready['path']).split(':').at(-1));
   }
 
@@ -199,10 +200,11 @@ export const VIEWS = ['Motors', 'Plots', 'Registers', 'Step response', 'Wire', '
 /** The card of a motor. */
 export const card = (page: Page, name: string) => page.getByRole('article', { name: `Motor ${name}` });
 
-/** Turns an ST motor from a page, and waits until the server says that it begins. */
-export async function spin(page: Page, rpm: number, name = 'st0/1') {
+/** Turns a motor from a page, in rpm or °/s, and waits until the server says that it begins. */
+export async function spin(page: Page, speed: number, name = 'st0/1') {
   const motor = card(page, name);
-  await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(rpm));
+  const unit = name.startsWith('rmd') ? '°/s' : 'rpm';
+  await motor.getByRole('spinbutton', { name: `Target, ${unit}` }).fill(String(speed));
   await motor.getByRole('spinbutton', { name: 'Ramp' }).fill('2000');
   await motor.getByRole('button', { name: 'Run to target' }).click();
   await expect(motor.getByText(/Running from/)).toBeVisible();
