@@ -77,10 +77,28 @@ function Status() {
 function Report() {
   const report = stopReport.value;
   const tone = report ? PHASES[report.phase] : 'ok';
+  const isDone = report?.phase === 'stopped' || report?.phase === 'unconfirmed';
   return (
-    <strong role="status" aria-label="Stop" aria-live="assertive" class={`report ${tone}`}>
-      {report && `${SIGNS[tone]} ${report.message}`}
-    </strong>
+    <div class="report">
+      <strong role="status" aria-label="Stop" aria-live="assertive" class={tone}>
+        {report && `${SIGNS[tone]} ${report.message}`}
+      </strong>
+      {report?.failures && (
+        <details>
+          <summary>What each said</summary>
+          <ul tabIndex={0} aria-label="Motors that did not confirm">
+            {report.failures.map((failure) => (
+              <li key={failure}>{failure}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+      {isDone && (
+        <button type="button" onClick={() => (stopReport.value = null)}>
+          Close<span class="hidden"> what is known of the stop</span>
+        </button>
+      )}
+    </div>
   );
 }
 
@@ -89,7 +107,7 @@ function Latch() {
   const by = latchedBy.value;
   if (by === null) return null;
   return (
-    <section class="note warn" aria-label="Latch">
+    <section class="note warn latch" aria-label="Latch">
       <p>
         <strong>Stopped by {by}.</strong> Motion is refused until the latch is released.
         {welcome.value?.role === 'viewer' && ' A viewer cannot release it.'}
@@ -108,7 +126,6 @@ function Banners() {
   const isLost = state.value === 'lost' || state.value === 'silent';
   return (
     <div class="banners">
-      <Latch />
       {isLost && (
         <section class="note bad" aria-label="Connection lost">
           <p>
@@ -213,6 +230,7 @@ export function App() {
             <Status />
             <Report />
           </div>
+          <Latch />
         </header>
         <Navigation />
       </div>

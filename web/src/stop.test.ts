@@ -120,8 +120,21 @@ describe('stop all', () => {
     expect(report()).toEqual({
       phase: 'unconfirmed',
       message:
-        'st0/2 (no reply), rmd0/2 (no reply) did not confirm: they may still be turning. 2 of 4 motors confirmed.',
+        'st0/2, rmd0/2 did not confirm: they may still be turning. 2 of 4 motors confirmed.',
+      failures: ['st0/2: no reply', 'rmd0/2: no reply'],
     });
+  });
+
+  it('names the first of many motors, and keeps all of them beside it', async () => {
+    stop.stopAll();
+    const many = Array.from({ length: 30 }, (_, at) => ({ line: 'rmd1', motor: at + 1, failure: 'no reply' }));
+    asked[0]!.done({ motors: [...ALL, ...many] });
+    await pass(0);
+    expect(report().message).toBe(
+      'rmd1/1, rmd1/2, rmd1/3 and 27 more did not confirm: they may still be turning. 4 of 34 motors confirmed.',
+    );
+    expect(report().failures).toHaveLength(30);
+    expect(report().failures!.at(-1)).toBe('rmd1/30: no reply');
   });
 
   it('does not wait for addresses where no motor was found, and needs no second way then', async () => {
@@ -137,7 +150,7 @@ describe('stop all', () => {
     stop.stopAll();
     asked[0]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'no reply' }] });
     await pass(0);
-    expect(report().message).toContain('rmd0/9 (no reply) did not confirm: it may still be turning');
+    expect(report().message).toContain('rmd0/9 did not confirm: it may still be turning');
     stop.stopAll();
     asked[1]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered; it is' }] });
     await pass(0);

@@ -7,6 +7,8 @@ export interface StopReport {
   /** `stopped`: every motor that was found confirmed it. */
   phase: 'sent' | 'stopped' | 'unconfirmed' | 'unreachable';
   message: string;
+  /** Each motor that did not confirm, and why. */
+  failures?: readonly string[];
 }
 
 /** What is known of the last stop of all motors. */
@@ -21,6 +23,8 @@ const UNREACHED = 1000;
 const AGAIN = 10_000;
 /** Why a stop fails where no motor is. Anything else may be a motor that turns. */
 const NO_MOTOR = /has never answered|BAD_MOTOR_SELECTED/;
+/** Motors that a message names. The header has to leave room for the views on a phone. */
+const MOST_NAMED = 3;
 const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
 
 let last = 0;
@@ -114,13 +118,15 @@ function confirmed(stopped: readonly StoppedMotor[]): StopReport {
     ? ` The stop also went to ${others} ${others === 1 ? 'address' : 'addresses'} where no motor was found.`
     : '';
   if (failures.length) {
-    const names = failures.map(({ line, motor, failure }) => `${nameOf(line, motor)} (${failure})`);
+    const names = failures.slice(0, MOST_NAMED).map(({ line, motor }) => nameOf(line, motor));
+    const more = failures.length - names.length;
     const turning = failures.length === 1 ? 'it may' : 'they may';
     return {
       phase: 'unconfirmed',
       message:
-        `${names.join(', ')} did not confirm: ${turning} still be turning. ` +
+        `${names.join(', ')}${more ? ` and ${more} more` : ''} did not confirm: ${turning} still be turning. ` +
         `${known.length - failures.length} of ${known.length} motors confirmed.${silent}`,
+      failures: failures.map(({ line, motor, failure }) => `${nameOf(line, motor)}: ${failure}`),
     };
   }
   const count = known.length;

@@ -57,6 +57,38 @@ test.describe('stop all', () => {
     await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
   });
 
+  for (const [width, height] of [[390, 844], [1280, 800]] as const) {
+    test(`leaves room if many motors did not confirm, ${width} pixels`, async ({ bench, page }) => {
+      await page.setViewportSize({ width, height });
+      await page.route('**/api/stop-all', (route) => route.abort());
+      const failure = 'no drive confirmed it: the drive did not reply within 50 ms, and then not within 1 s';
+      const motors = Array.from({ length: 30 }, (_, at) => ({ line: 'rmd9', motor: at + 1, failure }));
+      await page.routeWebSocket(/\/ws$/, (socket) => {
+        const server = socket.connectToServer();
+        server.onMessage((message) => {
+          const isAnswer = typeof message === 'string' && message.includes('"to":"stop-all"');
+          socket.send(isAnswer ? JSON.stringify({ ...(JSON.parse(message) as object), motors }) : message);
+        });
+      });
+      await page.goto(bench.url);
+      await expect(page.getByRole('article')).toHaveCount(6);
+      await page.keyboard.press('Escape');
+      await expect(page.getByText(/rmd9\/3 and 27 more did not confirm: they may still be turning/)).toBeVisible();
+      await page.getByText('What each said').click();
+      await expect(page.getByText(`rmd9/30: ${failure}`)).toBeAttached();
+      await page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+      const release = (await page.getByRole('button', { name: 'Release' }).boundingBox())!;
+      expect(release.y + release.height).toBeLessThan(0.6 * height);
+      for (const name of [/STOP ALL/, 'Release', /^Close/]) {
+        await expect(page.getByRole('button', { name })).toBeInViewport({ ratio: 1 });
+      }
+      await page.getByRole('button', { name: /^Close/ }).click();
+      await expect(page.getByText(/did not confirm/)).toHaveCount(0);
+      await page.getByRole('button', { name: 'Release' }).click();
+      await expect(page.getByRole('button', { name: 'Release' })).toHaveCount(0);
+    });
+  }
+
   test('says so if it cannot reach the server', async ({ bench, live }) => {
     await bench.monitor.end('SIGKILL');
     await live.keyboard.press('Escape');
