@@ -1,7 +1,8 @@
 // The values on the cards: the last of each signal, and a short history of the speed.
 import { type Signal, effect, signal } from '@preact/signals';
 import { allMotors, descriptions } from './drives';
-import { type Refused, type Rows, age, subscribe } from './link';
+import { tooOld } from './format';
+import { type Refused, type Rows, age, state, subscribe } from './link';
 import { nameOf } from './stop';
 import type { Overview, SignalName } from './wire';
 
@@ -34,6 +35,11 @@ export class Live {
   age(name: string): number {
     const last = this.values.get(name);
     return last ? age(this.line, last.t) : NaN;
+  }
+
+  /** Why the value of a signal is not live, or null. */
+  old(name: string): string | null {
+    return tooOld(this.age(name)) ?? (state.value === 'lost' ? 'not live' : null);
   }
 }
 

@@ -207,7 +207,7 @@ export async function spin(page: Page, speed: number, name = 'st0/1') {
   await motor.getByRole('spinbutton', { name: `Target, ${unit}` }).fill(String(speed));
   await motor.getByRole('spinbutton', { name: 'Ramp' }).fill('2000');
   await motor.getByRole('button', { name: 'Run to target' }).click();
-  await expect(motor.getByText(/Running from/)).toBeVisible();
+  await expect(motor.getByText(/^✓ Running/)).toBeVisible();
 }
 
 /** Opens a view by its name in the navigation. */

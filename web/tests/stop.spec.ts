@@ -36,6 +36,22 @@ test.describe('stop all', () => {
     await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
   });
 
+  test('of one motor ends what its card says of the motion, and so does a lost connection', async ({ bench, live }) => {
+    const motor = card(live, 'st0/1');
+    const running = motor.getByText(/^✓ Running/);
+    await spin(live, 1000);
+    await expect(motor.getByText('Running. The reference has reached 1000 rpm.')).toBeVisible();
+    await motor.getByRole('button', { name: 'Stop', exact: true }).click();
+    await expect(motor.getByText('Stopped: the motor confirmed it.')).toBeVisible();
+    await expect(running).toHaveCount(0);
+    await spin(live, 1000);
+    await expect(motor.getByText('live', { exact: true })).toBeVisible();
+    await bench.monitor.end('SIGKILL');
+    await expect(live.getByText('Connection lost')).toBeVisible();
+    await expect(running).toHaveCount(0);
+    await expect(motor.getByText('live', { exact: true })).toHaveCount(0);
+  });
+
   test('goes by HTTP while the WebSocket is down', async ({ bench, page }) => {
     let isDown = false;
     await page.routeWebSocket(/\/ws$/, (socket) => {

@@ -5,6 +5,7 @@ import { COMMANDS, limitName, limits, setLimit } from '../drives';
 import { decimalsOf, number } from '../format';
 import { holdToRun } from '../hold';
 import { ask, held, lapsed, welcome } from '../link';
+import { useMotion } from '../motion';
 import { liveOf } from '../overview';
 import { Said, useSaid } from '../parts';
 import { nameOf, stopMotor } from '../stop';
@@ -40,7 +41,7 @@ interface Props {
 }
 
 export function Control({ line, motor, description }: Props) {
-  const { said, attempt, isBusy } = useSaid();
+  const { said, attempt, say, isBusy } = useSaid();
   const role = welcome.value?.role;
   const isViewer = role === 'viewer';
   const mayMove = role === 'operator';
@@ -118,10 +119,11 @@ export function Control({ line, motor, description }: Props) {
           line={line}
           motor={motor}
           mode={mode}
-          rateUnit={rateUnit(mode, description)}
+          description={description}
           isHold={isHold.value}
           mayMove={mayMove}
           why={why}
+          onRun={() => say(null)}
         />
       )}
       {description.commands.length > 0 && (
@@ -141,14 +143,17 @@ interface ReferenceProps {
   line: string;
   motor: number;
   mode: Controlled;
-  rateUnit: string;
+  description: Description;
   isHold: boolean;
   mayMove: boolean;
   why: string | undefined;
+  onRun: () => void;
 }
 
-function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit, isHold, mayMove, why }: ReferenceProps) {
-  const { said, attempt, isBusy } = useSaid();
+function Reference({ line, motor, mode: controlled, description, isHold, mayMove, why, onRun }: ReferenceProps) {
+  const { mode, unit, measured, most } = controlled;
+  const { said, attempt, say, isBusy } = useSaid();
+  const motion = useMotion(line, motor, description, say);
   const decimals = decimalsOf(unit);
   const target = useSignal<string | null>(null);
   const rate = useSignal(String(usual(unit).rate));
@@ -167,30 +172,30 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
     }
   }, [first]);
 
+  const rateLabel = mode === 'position' ? 'Speed' : 'Ramp';
   const span = Math.min(limit ?? usual(unit).span, most);
   const run = async (hold: boolean) => {
+    motion.forget();
     lapsed.value = null;
-    const { from } = await ask({
-      ask: 'run',
-      line,
-      motor,
-      mode,
-      target: numberOf(target.value ?? '', 'Target'),
-      rate: numberOf(rate.value, 'Ramp'),
-      hold,
-    });
+    onRun();
+    const to = numberOf(target.value ?? '', 'Target');
+    const perSecond = numberOf(rate.value, rateLabel);
+    const { from } = await ask({ ask: 'run', line, motor, mode, target: to, rate: perSecond, hold });
+    const there = `Running. The reference has reached ${number(to, decimals)} ${unit}.`;
+    motion.begin(Math.abs(to - from) / perSecond, { tone: 'ok', text: there });
     return `Running from ${number(from, decimals)} ${unit}.`;
   };
   // The answer may come after the release. What it started then has to stop.
   const runHeld = async () => {
     const text = await run(true);
     if (held.value) return text;
+    motion.forget();
     return stopMotor(line, motor);
   };
 
   const button = useRef<HTMLButtonElement>(null);
-  const latest = useRef({ runHeld, attempt });
-  latest.current = { runHeld, attempt };
+  const latest = useRef({ runHeld, attempt, motion });
+  latest.current = { runHeld, attempt, motion };
   useEffect(() => {
     if (!isHold || !mayMove || !button.current) return;
     return holdToRun(
@@ -201,13 +206,13 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
       },
       () => {
         isHeld.value = false;
+        latest.current.motion.forget();
         void latest.current.attempt(() => stopMotor(line, motor));
       },
     );
   }, [isHold, mayMove]);
 
   const step = 10 ** -decimals;
-  const rateLabel = mode === 'position' ? 'Speed' : 'Ramp';
   const typed = (signal: { value: string | null }) => (event: { currentTarget: HTMLInputElement }) => {
     signal.value = event.currentTarget.value;
   };
@@ -254,7 +259,7 @@ function Reference({ line, motor, mode: { mode, unit, measured, most }, rateUnit
         />
       </label>
       <label>
-        {rateLabel}, {rateUnit}
+        {rateLabel}, {rateUnit(controlled, description)}
         <input type="number" step="any" min="0" value={rate.value} disabled={!mayMove} onInput={typed(rate)} />
       </label>
       {isHold ? (

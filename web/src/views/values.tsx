@@ -1,7 +1,7 @@
 // The values of a card. Only these are drawn again with each tick.
 import { useEffect, useRef } from 'preact/hooks';
 import { rates } from '../drives';
-import { decimalsOf, decimalsOfStep, number, rate, sentence, tooOld } from '../format';
+import { decimalsOf, decimalsOfStep, number, rate, sentence } from '../format';
 import { state } from '../link';
 import { HISTORY, type Live, liveOf } from '../overview';
 import type { Description, Fault } from '../wire';
@@ -48,7 +48,7 @@ function faultsOf(line: string, motor: number, { overview }: Description) {
   const live = liveOf(line, motor);
   // Drawn again with each tick.
   void live.tick.value;
-  return { value: live.values.get(overview.faults)?.value ?? NaN, old: tooOld(live.age(overview.faults)) };
+  return { value: live.values.get(overview.faults)?.value ?? NaN, old: live.old(overview.faults) };
 }
 
 /** What to say about the bits of a value. */
@@ -125,7 +125,7 @@ export function Values({ line, motor, description }: Props) {
   // Drawn again with each tick.
   void live.tick.value;
   const last = (name: string) => live.values.get(name);
-  const old = (name: string) => tooOld(live.age(name));
+  const old = (name: string) => live.old(name);
 
   const status = overview.state === null ? undefined : last(overview.state);
   const known = states.find(({ value }) => value === status?.value);
@@ -180,10 +180,10 @@ export function Values({ line, motor, description }: Props) {
       </dl>
       <Spark live={live} />
       <p class="muted rates">
-        <span>{Number.isNaN(age) ? 'no value yet' : age > 1 ? 'not live' : 'live'}</span>
+        <span>{Number.isNaN(age) ? 'no value yet' : old(overview.speed) ? 'not live' : 'live'}</span>
         {speedRate && state.value === 'open' && (
           <span>
-            asked {rate(1 / speedRate.asked)}, achieved {rate(speedRate.achieved)}
+            asked {rate(1 / speedRate.asked)}, achieved {rate(speedRate.achieved || NaN)}
           </span>
         )}
         {live.lost > 0 && <span>{live.lost} lost: page too slow</span>}

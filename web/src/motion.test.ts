@@ -1,0 +1,30 @@
+import { describe, expect, it, vi } from 'vitest';
+import type { Entry } from './link';
+
+vi.mock('./link', () => ({}));
+vi.mock('./overview', () => ({}));
+const { endOf } = await import('./motion');
+
+const entry = (number: number, event: string, more: Partial<Entry> = {}): Entry => ({
+  number, event, wall: 0, until: 0, times: 1, line: 'st0', motor: 1, by: 'page 1', message: event, ...more,
+} as Entry);
+
+describe('the end of a motion', () => {
+  it.each(['stopping', 'stopped', 'stop-failed', 'silent'])('is %s of the motor', (event) => {
+    expect(endOf([entry(4, 'commanded'), entry(5, event)], 3, 'st0', 1, 'page 1')?.event).toBe(event);
+  });
+  it('is the loss or the close of the line', () => {
+    const lost = entry(5, 'lost', { motor: null });
+    expect(endOf([lost], 3, 'st0', 1, 'page 1')).toBe(lost);
+    expect(endOf([lost], 3, 'rmd0', 1, 'page 1')).toBeUndefined();
+  });
+  it('is the command of another program', () => {
+    for (const by of ['tuner', 'page 11 (control)']) {
+      expect(endOf([entry(5, 'commanded', { by })], 3, 'st0', 1, 'page 1')?.by).toBe(by);
+    }
+  });
+  it('is no event before it, of another motor, or of its own ramp', () => {
+    const all = [entry(3, 'stopped'), entry(4, 'stopped', { motor: 2 }), entry(5, 'commanded', { by: 'page 1 (control)' })];
+    expect(endOf(all, 3, 'st0', 1, 'page 1')).toBeUndefined();
+  });
+});

@@ -1,0 +1,75 @@
+// What a card says about a motion of this page, for as long as it is true.
+import { useSignal, useSignalEffect } from '@preact/signals';
+import { useEffect, useRef } from 'preact/hooks';
+import { sentence } from './format';
+import { type Entry, entries, lapsed, state, welcome } from './link';
+import { liveOf } from './overview';
+import type { Sentence } from './parts';
+import type { Description } from './wire';
+
+/** Events of a motor after which the page that turned it does not run it any more. */
+const ENDS: ReadonlySet<string> = new Set(['stopping', 'stopped', 'stop-failed', 'silent']);
+/** The same for all motors of a line. */
+const LINE_ENDS: ReadonlySet<string> = new Set(['lost', 'closed']);
+/** States of an ST drive in which its motor does not run. */
+const AT_REST = /^(IDLE|FAULT)/;
+
+/** A day, in seconds. */
+const LONGEST = 86_400;
+
+/** Whether a program is the page, or the server for it. */
+const isOwn = (by: string | null | undefined, own: string | undefined) =>
+  own !== undefined && (by === own || by?.startsWith(`${own} (`) === true);
+
+/** The first event after the entry `since` that ends a motion of the page `own`. */
+export function endOf(all: readonly Entry[], since: number, line: string, motor: number, own: string | undefined) {
+  return all.find((one) => {
+    if (one.number <= since || one.line !== line) return false;
+    if (one.motor == null) return LINE_ENDS.has(one.event);
+    return one.motor === motor && (ENDS.has(one.event) || (one.event === 'commanded' && !isOwn(one.by, own)));
+  });
+}
+
+/** Follows a motion, and says what ended it. */
+export function useMotion(line: string, motor: number, { overview, states }: Description, say: (now: Sentence | null) => void) {
+  const since = useSignal<number | null>(null);
+  const hasRun = useRef(false);
+  const arrival = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  const forget = () => {
+    clearTimeout(arrival.current);
+    since.value = null;
+    hasRun.current = false;
+  };
+  const end = (now: Sentence | null) => {
+    forget();
+    say(now);
+  };
+
+  useSignalEffect(() => {
+    if (since.value === null) return;
+    const event = endOf(entries.value, since.value, line, motor, welcome.value?.name);
+    if (event) return end({ tone: 'note', text: sentence(event.message.replace(/^\S+, motor \d+: /, '')) });
+    // The page says above what happened.
+    if (state.value === 'lost' || lapsed.value !== null) return end(null);
+    const live = liveOf(line, motor);
+    void live.tick.value;
+    const value = overview.state !== null && live.age(overview.state) < 1 ? live.values.get(overview.state)?.value : undefined;
+    const name = states.find((one) => one.value === value)?.name;
+    if (name === undefined) return;
+    if (!AT_REST.test(name)) hasRun.current = true;
+    else if (hasRun.current) end({ tone: 'note', text: `The motor does not run any more: ${name}.` });
+  });
+  useEffect(() => () => clearTimeout(arrival.current), []);
+
+  return {
+    /** Something else is asked of the motor. */
+    forget,
+    /** The motor runs from now on. `seconds` later its reference is where it was asked to be. */
+    begin(seconds: number, there: Sentence) {
+      forget();
+      since.value = entries.value.at(-1)?.number ?? 0;
+      // Longer times are none for a timer.
+      if (seconds < LONGEST) arrival.current = setTimeout(() => say(there), 1000 * seconds);
+    },
+  };
+}
