@@ -95,6 +95,24 @@ test('cursors by keys: values, difference, the wire', async ({ live }) => {
   await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
 });
 
+test('cursors by mouse: a click on a curve stays in the view, and Shift selects no text', async ({ live }) => {
+  await choose(live, SPEED);
+  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
+  await live.getByRole('button', { name: 'Pause' }).click();
+  const { x, y, width, height } = (await live.locator('.plot .u-over').boundingBox())!;
+  // A motor at rest: the curve is a line in the middle, at the right.
+  await live.mouse.click(x + width - 8, y + height / 2);
+  await expect(live.locator('.plot-reading')).toHaveText(/^A\s/);
+  await live.keyboard.down('Shift');
+  await live.mouse.click(x + width / 2, y + height / 3);
+  await live.keyboard.up('Shift');
+  await expect(live.locator('.plot-reading')).toHaveText(/B\s/);
+  expect(await live.evaluate(() => String(getSelection()))).toBe('');
+  await expect(live).toHaveURL(/#\/plots$/);
+  await live.getByRole('button', { name: 'Show the wire at A' }).click();
+  await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
+});
+
 test('values that are not present any more are said to be old', async ({ bench, live }) => {
   await choose(live, SPEED);
   await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);

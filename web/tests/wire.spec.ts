@@ -17,7 +17,7 @@ test('frames come live, can be paused, searched and saved', async ({ bench, live
   const words = await rows.last().innerText();
   await expect.poll(async () => (await rows.last().innerText()) !== words).toBe(true);
   await expect(rows.last()).toBeInViewport();
-  await expect(live.getByText(/^Live\. .* a reply was awaited \d+ % of the time/)).toBeVisible();
+  await expect(live.getByText(/^Live\. In .* % of the time waiting for replies/)).toBeVisible();
 
   await live.getByRole('button', { name: 'Pause' }).click();
   await expect(live.getByText(/^Paused\./)).toBeVisible();

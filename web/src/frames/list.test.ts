@@ -69,8 +69,9 @@ test('loads are added', () => {
   ]);
   expect(all).toEqual(load({ from: 1, to: 5, bits: 4000, busy: 0.25, nacks: 1, retries: 2, damaged: 1 }));
   expect(told(all)).toBe(
-    '4.000 s: a reply was awaited 25 % of the time, 1.0 kbit/s. 1 NACK, 2 retries, 0 without a reply, 1 damaged.',
+    'In 4.0 s: 25 % of the time waiting for replies, 1.0 kbit/s. 1 refused (NACK), 2 retries, 0 without a reply, 1 damaged.',
   );
+  expect(told({ ...all, busy: 0.004 })).toContain('less than 1 % of the time');
 });
 
 test('frames are exported as text and as values', () => {

@@ -113,12 +113,13 @@ export function told(load: WireLoad): string {
   const span = to - from;
   const rate = span > 0 ? `, ${(bits / span / 1000).toFixed(1)} kbit/s` : '';
   const troubles = [
-    counted(nacks, 'NACK', 'NACKs'),
+    `${nacks} refused (NACK)`,
     counted(retries, 'retry', 'retries'),
     `${unanswered} without a reply`,
     `${damaged} damaged`,
   ];
-  return `${span.toFixed(3)} s: a reply was awaited ${Math.round(busy * 100)} % of the time${rate}. ${troubles.join(', ')}.`;
+  const share = busy > 0 && busy < 0.005 ? 'less than 1 %' : `${Math.round(busy * 100)} %`;
+  return `In ${span.toFixed(1)} s: ${share} of the time waiting for replies${rate}. ${troubles.join(', ')}.`;
 }
 
 export const timeOf = (t: number): string => t.toFixed(6);

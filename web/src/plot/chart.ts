@@ -36,10 +36,8 @@ export interface Line {
 export interface Events {
   /** A part was selected. */
   onSelect: (min: number, max: number) => void;
-  /** A curve was clicked at this time. */
-  onPick: ((trace: Trace, x: number) => void) | undefined;
-  /** A place without a curve was clicked. */
-  onPlace: (x: number, second: boolean) => void;
+  /** A place was clicked: a sample of a curve, or one without a curve. */
+  onPlace: (x: number, second: boolean, trace: Trace | null) => void;
   onZoom: (factor: number, x: number) => void;
   /** By a share of the span. */
   onPan: (share: number) => void;
@@ -398,13 +396,16 @@ export class Chart {
     addEventListener('pointercancel', up, options);
 
     let pressed = 0;
-    over.addEventListener('mousedown', ({ clientX }) => (pressed = clientX), options);
+    over.addEventListener('mousedown', (event) => {
+      pressed = event.clientX;
+      // The browser would select text up to here.
+      if (event.shiftKey) event.preventDefault();
+    }, options);
     over.addEventListener('click', (event) => {
       if (moved || Math.abs(event.clientX - pressed) > 3) return;
       const touch = (event as PointerEvent).pointerType === 'touch';
-      const hit = touch || event.shiftKey ? null : this.curveAt(event.offsetX, event.offsetY);
-      if (hit && events.onPick) events.onPick(hit.trace, hit.x);
-      else events.onPlace(xAt(event.offsetX), event.shiftKey);
+      const hit = touch ? null : this.curveAt(event.offsetX, event.offsetY);
+      events.onPlace(hit?.x ?? xAt(event.offsetX), event.shiftKey, hit?.trace ?? null);
     }, options);
   }
 

@@ -19,7 +19,7 @@ export interface FigureProps {
   marks?: readonly Line[];
   /** Whether the curves grow, so that the newest values are worth a column. */
   live?: boolean;
-  /** The instant at a curve was chosen. */
+  /** The instant at cursor A was chosen. The curve is the one that was clicked last, or the first. */
   onPick?: ((trace: Trace, x: number) => void) | undefined;
   /** What choosing does, for a button: "Show the wire". */
   pickLabel?: string;
@@ -50,6 +50,7 @@ export function Figure(props: FigureProps) {
   const [hidden, setHidden] = useState<readonly string[]>([]);
   const [, redraw] = useState(0);
   const hover = useRef<number | null>(null);
+  const clicked = useRef<Trace | null>(null);
 
   const actions = useMemo(() => {
     const shown = () => latest.current.traces.filter((trace) => trace.shown);
@@ -66,7 +67,8 @@ export function Figure(props: FigureProps) {
       oldest: () => Math.min(...shown().map(({ samples }) => samples.oldest).filter(isFinite)),
       home: () => latest.current.onHome(),
       pick: (x: number) => {
-        const trace = shown()[0];
+        const all = shown();
+        const trace = all.find((one) => one === clicked.current) ?? all[0];
         if (trace) latest.current.onPick?.(trace, x);
       },
     };
@@ -81,8 +83,8 @@ export function Figure(props: FigureProps) {
       live,
       events: {
         onSelect: (min, max) => (window.show(min, max), changed()),
-        onPick: props.onPick && ((trace, x) => latest.current.onPick?.(trace, x)),
-        onPlace: (x, second) => {
+        onPlace: (x, second, trace) => {
+          if (trace) clicked.current = trace;
           window[second ? 'b' : 'a'] = x;
           changed();
           announce();
@@ -124,7 +126,7 @@ export function Figure(props: FigureProps) {
       seen.disconnect();
       chart.destroy();
     };
-  }, [traces, marks, height, scheduler, props.clock, props.onPick !== undefined]);
+  }, [traces, marks, height, scheduler, props.clock]);
 
   const write = () => {
     const { min, max, a, b } = window;

@@ -52,9 +52,15 @@ export interface Clock {
 
 const two = (number: number) => String(number).padStart(2, '0');
 
-/** Decimals that a step of time needs. */
+const MOST_DECIMALS = 7;
+
+/** Decimals that multiples of a step need: 2 for 0.25. */
 function decimalsOf(step: number): number {
-  return step >= 1 ? 0 : Math.min(6, Math.ceil(-Math.log10(step) - 1e-9));
+  for (let decimals = 0; decimals < MOST_DECIMALS; decimals += 1) {
+    const scaled = step * 10 ** decimals;
+    if (Math.abs(scaled - Math.round(scaled)) < 1e-6 * scaled) return decimals;
+  }
+  return MOST_DECIMALS;
 }
 
 /** The time of day at `origin + x` seconds since 1970. */

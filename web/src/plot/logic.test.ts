@@ -1,7 +1,7 @@
 // Small parts: the window of time, keys, settings, rows, CSV, search, texts, colours.
 import { describe, expect, it } from 'vitest';
 import { csv, iso } from './csv';
-import { age, dayClock, duration, secondsClock, value } from './format';
+import { age, dayClock, duration, onAxis, secondsClock, value } from './format';
 import { type Actions, press } from './keys';
 import { between, valueAt } from './readings';
 import { rows, rowsBefore } from './rows';
@@ -308,6 +308,9 @@ describe('texts', () => {
     const origin = new Date(2026, 10, 23, 12, 0, 0).getTime() / 1000;
     const { tick, full } = dayClock(origin);
     expect(tick(61, 1)).toBe('12:01:01');
+    expect(tick(61.25, 0.25)).toBe('12:01:01.25');
+    expect([0, 0.25, 0.5, 0.75, 1].map((split) => onAxis(split, 0.25))).toEqual(['0.00', '0.25', '0.50', '0.75', '1.00']);
+    expect([onAxis(2.5, 2.5), onAxis(-20, 10), onAxis(0.3, 0.1)]).toEqual(['2.5', '−20', '0.3']);
     expect(tick(61.25, 0.05)).toBe('12:01:01.25');
     expect(full(59.99999)).toBe('12:01:00.0000');
     expect(secondsClock.tick(-0.5, 0.1)).toBe('−0.5 s');

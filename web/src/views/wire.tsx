@@ -113,7 +113,7 @@ export default function Wire() {
       </div>
       <p class="load">
         {t === null ? (paused.value ? 'Paused. Before: ' : 'Live. ') : `From ${AROUND} s before ${timeOf(t)} s to ${AROUND} s after. `}
-        {told(load.value)}
+        {isLoading.value ? 'Loading …' : told(load.value)}
       </p>
       {gaps.value > 0 && <p class="warn">! Some frames between these are missing: the share has forgotten them.</p>}
       {refused.value !== null && (
@@ -238,7 +238,7 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
           </tbody>
         </table>
         {shown.length === 0 && (
-          <p class="muted">{isLoading.value ? 'Loading …' : frames.value.length > 0 ? 'No frame fits the search.' : 'No frames.'}</p>
+          <p class="muted">{frames.value.length > 0 ? 'No frame fits the search.' : !isLoading.value && 'No frames.'}</p>
         )}
       </div>
       <Detail frame={frame} isMarked={frame !== undefined && frame.number === marked} />
