@@ -131,8 +131,11 @@ function Banners() {
           <p>
             <strong>Values are old.</strong> {closedWhy.value && `${sentence(closedWhy.value)} `}The server stops the
             motors that this page turned when it hears nothing for {lastWelcome.value?.deadline ?? 300} ms. Motors of
-            other programs turn on. If the server itself has ended, only a guard or the power switch stops them. Was it
-            started again? Then open the address that it printed.
+            other programs turn on.{' '}
+            {lastWelcome.value?.separate_share
+              ? 'If the server itself has ended, the share, which is another process, has stopped the motors of this page. '
+              : 'If the server itself has ended, only a guard or the power switch stops the motors. '}
+            Was it started again? Then open the address that it printed.
           </p>
         </section>
       )}

@@ -27,7 +27,7 @@ class Socket {
   }
   welcome(more: object = {}) {
     this.readyState = 1;
-    this.give({ kind: 'welcome', server: 'm', name: 'page 1', role: 'operator', deadline: 300, run: 'r', ...more });
+    this.give({ kind: 'welcome', server: 'm', name: 'page 1', role: 'operator', deadline: 300, separate_share: false, run: 'r', ...more });
   }
   /** What the page asked for. */
   asked(kind: string) {

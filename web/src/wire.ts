@@ -1196,6 +1196,10 @@ role: Role,
  */
 deadline: number, 
 /**
+ * Whether the share is another process. It stops the motors of the pages if the server is killed.
+ */
+separate_share: boolean, 
+/**
  * Which run of the server it is. Another one knows nothing of the page's subscriptions and motors.
  */
 run: string, };

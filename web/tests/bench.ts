@@ -111,8 +111,10 @@ export class Bench {
 
   /** The deadline is long, because a loaded machine pauses browsers. */
   async serve(ports = ['-p', `${this.folder}/st0`, '-p', `slcan:${this.folder}/can0`], deadline = '1s') {
+    // The timeout of a running share is its own.
+    const timeout = ports.includes('--share') ? [] : ['--timeout', '1s'];
     this.monitor = new Program(
-      ['monitor', ...ports, '--timeout', '1s', '--deadline', deadline, '--listen', '127.0.0.1:0', '--json'],
+      ['monitor', ...ports, ...timeout, '--deadline', deadline, '--listen', '127.0.0.1:0', '--json'],
       this.folder,
     );
     this.ready = await this.monitor.line((line) => line['event'] === 'ready');

@@ -1,5 +1,5 @@
 // Stop all: from every view, by button and by key, with and without the WebSocket.
-import { card, expect, open, spin, test, VIEWS } from './bench';
+import { card, expect, open, Program, spin, test, VIEWS } from './bench';
 
 /** A motor that turns, faster than what it does at rest. */
 const TURNS = 300;
@@ -104,6 +104,24 @@ test.describe('stop all', () => {
       await expect(page.getByRole('button', { name: 'Release' })).toHaveCount(0);
     });
   }
+
+  test('is not needed if the monitor of another share is killed, and the page says so', async ({ bench, page }) => {
+    await bench.monitor.end();
+    const at = `unix:${bench.folder}/share`;
+    const share = new Program(['share', '-p', `${bench.folder}/st0`, '--timeout', '1s', '--at', at, '--json'], bench.folder);
+    try {
+      await share.line(({ event }) => event === 'ready');
+      await bench.serve(['--share', at]);
+      await page.goto(bench.url);
+      await spin(page, 1000);
+      await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
+      await bench.monitor.end('SIGKILL');
+      await expect(page.getByText(/the share, which is another process, has stopped the motors of this page/)).toBeVisible();
+      await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
+    } finally {
+      await share.end();
+    }
+  });
 
   test('says so if it cannot reach the server', async ({ bench, live }) => {
     await bench.monitor.end('SIGKILL');

@@ -256,6 +256,8 @@ pub struct Welcome {
     pub role: Role,
     /// How long a page may give no sign of life until its motors stop, in ms.
     pub deadline: f64,
+    /// Whether the share is another process. It stops the motors of the pages if the server is killed.
+    pub separate_share: bool,
     /// Which run of the server it is. Another one knows nothing of the page's subscriptions and motors.
     pub run: String,
 }

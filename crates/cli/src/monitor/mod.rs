@@ -140,7 +140,7 @@ fn show(args: &Args, path: PathBuf, web: Web) -> Result<(), Failure> {
         return Err(failed(io::Error::other("it gives another answer")));
     };
     drop(share);
-    let monitor = start(args, path.clone(), web)?;
+    let monitor = start(args, path.clone(), true, web)?;
     ready(args, &monitor, &path, &lines, false)?;
     while interrupt::wait(Duration::from_secs(3600)) {}
     Ok(())
@@ -162,7 +162,7 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
         }
     };
     let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
-    let monitor = start(args, path.clone(), web)?;
+    let monitor = start(args, path.clone(), false, web)?;
     let ready = ready(args, &monitor, &path, &server.lines(), is_simulated);
     // The motors stop first, then the pages are closed.
     let outcome = share::serve(server, args.json, ready);
@@ -170,12 +170,27 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
     outcome
 }
 
-fn start(args: &Args, share: PathBuf, web: Web) -> Result<server::Server, Failure> {
+fn start(
+    args: &Args,
+    share: PathBuf,
+    separate_share: bool,
+    web: Web,
+) -> Result<server::Server, Failure> {
     let names = args.listen.names();
     let (deadline, program) = (args.deadline, PROGRAM.to_owned());
     let recordings = args.recordings.clone();
     let Web { listener, tls, foxglove } = web;
-    let options = Options { listener, tls, names, foxglove, share, recordings, deadline, program };
+    let options = Options {
+        listener,
+        tls,
+        names,
+        foxglove,
+        share,
+        separate_share,
+        recordings,
+        deadline,
+        program,
+    };
     Ok(server::Server::start(options)?)
 }
 

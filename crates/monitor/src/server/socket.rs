@@ -70,6 +70,7 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
         name,
         role,
         deadline: state.deadline.as_secs_f64() * 1e3,
+        separate_share: state.separate_share,
         run: state.run.clone(),
     }))];
     if lost.is_some() {

@@ -21,6 +21,7 @@ const PAGES: usize = 32;
 pub struct State {
     pub door: Door,
     pub link: Arc<Link>,
+    pub separate_share: bool,
     pub recordings: Arc<Recordings>,
     pub deadline: Duration,
     pub program: String,
@@ -40,6 +41,7 @@ impl State {
     pub fn new(
         door: Door,
         link: Link,
+        separate_share: bool,
         recordings: Recordings,
         deadline: Duration,
         program: String,
@@ -49,6 +51,7 @@ impl State {
         Ok(State {
             door,
             link,
+            separate_share,
             recordings: Arc::new(recordings),
             deadline,
             program,
