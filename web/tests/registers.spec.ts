@@ -2,7 +2,7 @@
 import AxeBuilder from '@axe-core/playwright';
 import type { Page } from '@playwright/test';
 import { readFileSync } from 'node:fs';
-import { expect, open, test } from './bench';
+import { expect, open, spin, test } from './bench';
 
 test.describe.configure({ timeout: 180_000 });
 
@@ -89,6 +89,25 @@ test('settings are saved, compared and restored', async ({ live }) => {
 
   await load('other.toml', Buffer.from('[rmd]\n'));
   await expect(live.getByText(/other.toml was not compared/)).toBeVisible();
+  await load('notes.txt', Buffer.from('hello'));
+  await expect(live.getByText(/not a settings file .* `motorlink st dump`.* line 1/)).toBeVisible();
+});
+
+test('settings are not restored while the motor runs, and the page says what to do', async ({ live }) => {
+  await registers(live, 'st0/1');
+  await live.getByText('Settings files: save').click();
+  const saved = live.waitForEvent('download');
+  await live.getByRole('button', { name: 'Save settings of st0/1' }).click();
+  const buffer = readFileSync(await (await saved).path());
+  await write(live, 'SPEED_KP', '123');
+  await live.getByLabel('Compare with a file').setInputFiles({ name: 'st0.toml', mimeType: 'text/plain', buffer });
+  await expect(live.getByRole('cell', { name: 'at rest', exact: true })).toBeVisible();
+  await open(live, 'Motors');
+  await spin(live, 500);
+  await open(live, 'Registers');
+  await live.getByText('Settings files: save').click();
+  await live.getByRole('button', { name: 'Write 1 setting' }).click();
+  await expect(live.getByText(/nothing was written; stop it first/)).toBeVisible();
 });
 
 test('the ROM is written only after a question, in which the stop works', async ({ live }) => {

@@ -107,7 +107,7 @@ export class RegisterRow extends Component<Props, State> {
           <span class="doc">{doc}</span>
           <span class="doc narrow">
             {access(register)}
-            {range && `; ${range}`}
+            {range && `; range of the register: ${range}`}
           </span>
         </th>
         <td>

@@ -43,9 +43,13 @@ export function Settings({
       written.value = null;
       sheet.file.value = null;
       if (chosen.size > LONGEST) throw new Error(`${chosen.name} is longer than a file of settings.`);
-      const loaded = await compare(sheet, chosen.name, await chosen.text()).catch(fail(`${chosen.name} was not compared`));
+      const loaded = await compare(sheet, chosen.name, await chosen.text()).catch((why: unknown) => {
+        const isNoFile = why instanceof Refused && why.reason === 'usage';
+        return fail(`${chosen.name} was not compared${isNoFile ? `. ${noFile(description)}` : ''}`)(why);
+      });
       const { size } = loaded.differences;
-      return size ? `${size} ${size === 1 ? 'setting differs' : 'settings differ'}.` : 'No setting differs.';
+      if (!size) return 'No setting differs.';
+      return { tone: 'note', text: `${size} ${size === 1 ? 'setting differs' : 'settings differ'}.` };
     });
   const restore = () =>
     attempt(async () => {
@@ -90,11 +94,14 @@ export function Settings({
       </div>
       <Said said={said} />
       {warnings.value.length > 0 && (
-        <ul class="note warn" aria-label="What the file does not have">
-          {warnings.value.map((warning) => (
-            <li key={warning}>{warning}</li>
-          ))}
-        </ul>
+        <section class="note">
+          <h4>The file does not have:</h4>
+          <ul>
+            {warnings.value.map((warning) => (
+              <li key={warning}>{warning}</li>
+            ))}
+          </ul>
+        </section>
       )}
       {file && differences.length > 0 && (
         <>
@@ -122,6 +129,7 @@ export function Settings({
               >
                 Write {possible.length} {possible.length === 1 ? 'setting' : 'settings'}
               </button>
+              <span class="muted">The motor has to be at rest.</span>
               {needRom.length > 0 && !toRom.value && (
                 <span class="muted">{names(needRom)} can be written to the ROM only.</span>
               )}
@@ -146,6 +154,13 @@ export function Settings({
         </Confirm>
       )}
     </details>
+  );
+}
+
+function noFile({ protocol }: Description): string {
+  return (
+    'This is not a settings file for this motor: use one from "Save settings" or ' +
+    `\`motorlink ${protocol} dump\`. What is wrong with it`
   );
 }
 
@@ -203,7 +218,7 @@ function Differences({
               {file} {unit}
             </td>
             <td>
-              {isWritten ? (wearsRom ? 'written to the ROM' : '') : (fixed ?? (wearsRom ? 'wears the ROM' : 'yes'))}
+              {isWritten ? (wearsRom ? 'written to the ROM' : '') : (fixed ?? (wearsRom ? 'at rest, wears the ROM' : 'at rest'))}
             </td>
           </tr>
         ))}

@@ -232,7 +232,10 @@ fn not_a_file(error: FileError) -> Refusal {
 }
 
 fn not_restored(error: RestoreError<Failed>) -> Refusal {
-    let message = error.to_string();
+    let message = match &error {
+        RestoreError::Running { .. } => format!("{error}; stop it first"),
+        _ => error.to_string(),
+    };
     let reason = match &error {
         RestoreError::Fixed { .. } | RestoreError::Rom { .. } => Reason::Usage,
         RestoreError::Before(failed) => failed.refusal.reason,
