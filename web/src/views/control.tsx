@@ -282,7 +282,7 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
       <Said said={said} />
       <div class="wide field">
         <label for={`limit-${line}-${motor}-${mode}`}>
-          Limit of all pages: {limitText}
+          Limit of all pages for the target {mode}: {limitText}
         </label>
         <span class="with-button">
           <input
@@ -290,7 +290,7 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
             type="number"
             step="any"
             min="0"
-            placeholder={limit === undefined ? `most, ${unit}` : String(limit)}
+            placeholder={limit === undefined ? `at most, ${unit}` : String(limit)}
             value={newLimit.value}
             disabled={!mayMove}
             onInput={typed(newLimit)}

@@ -8,6 +8,9 @@ import { nameOf } from '../stop';
 import { Control } from './control';
 import './motors.css';
 import { Values } from './values';
+import { Words } from '../words';
+
+const MOTOR_WORDS = ['line', 'latch', 's16A', 'ROM'] as const;
 
 function Search() {
   const isBusy = searching.value.size > 0;
@@ -79,6 +82,7 @@ export default function Motors() {
           <Card key={nameOf(line, motor)} line={line} motor={motor} />
         ))}
       </ul>
+      <Words of={MOTOR_WORDS} />
     </>
   );
 }

@@ -75,7 +75,7 @@ function List() {
       {list.value && (
         <>
           <p class="muted">In the folder {list.value.folder} of the computer with the server, the newest first.</p>
-          {list.value.recordings.length === 0 && <p>There is no recording yet.</p>}
+          {list.value.recordings.length === 0 && !isOn && <p>There is no recording yet.</p>}
           <ul class="recordings-list">
             {list.value.recordings.map((file) => <Item key={file.name} file={file} />)}
           </ul>

@@ -13,6 +13,9 @@ import { RegisterRow } from './registers-row';
 import { RomCommands } from './registers-rom';
 import './registers.css';
 import { Settings } from './settings';
+import { Words } from '../words';
+
+const REGISTER_WORDS = ['s16A', 's16V', 's16degree', 'dpp', 'ROM'] as const;
 
 /** How often the registers in view are read if that is switched on, in ms. */
 const AGAIN = 2000;
@@ -140,6 +143,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
         {shown.length} of {description.registers.length} registers
         {drafts.size > 0 && `, ${drafts.size} with a value that is not written`}
       </p>
+      {!isLive.value && <p class="muted count">Values are read once, and get older. "Read" reads them again.</p>}
       <Said said={said} />
       <table class="sheet" ref={body}>
         <caption class="hidden">Registers of motor {nameOf(sheet.motor.line, sheet.motor.motor)}</caption>
@@ -148,7 +152,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
             <th scope="col">Register</th>
             <th scope="col">Value</th>
             <th scope="col" class="wide">
-              Range
+              Range of the register
             </th>
             <th scope="col" class="wide">
               Access
@@ -180,6 +184,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
         ))}
       </table>
       {shown.length === 0 && <p class="muted">No register matches.</p>}
+      <Words of={REGISTER_WORDS} />
     </section>
   );
 }

@@ -136,21 +136,21 @@ function Setup({
           <Field label={`From (${controlled.unit})`} value={form.value.from} onInput={(from) => set({ from })} />
           <Field label={`To (${controlled.unit})`} value={form.value.to} onInput={(to) => set({ to })} />
           <Field
-            label={controlled.mode === 'position' ? `Speed of the moves (${controlled.unit}/s)` : `Go to the start at (${controlled.unit}/s)`}
+            label={controlled.mode === 'position' ? `Speed of the moves (${controlled.unit}/s)` : `Change on the way to the start (${controlled.unit}/s)`}
             value={form.value.approach}
             placeholder={parsed.approach}
             onInput={(approach) => set({ approach })}
           />
           <Field label="Record for (s)" value={form.value.duration} onInput={(duration) => set({ duration })} />
           <fieldset class="after">
-            <legend>Then</legend>
+            <legend>After the record, the motor</legend>
             <label class="check">
               <input type="radio" name="after" checked={form.value.after === 'stop'} onChange={() => set({ after: 'stop' })} />
-              <span>stop</span>
+              <span>stops</span>
             </label>
             <label class="check">
               <input type="radio" name="after" checked={form.value.after === 'from'} onChange={() => set({ after: 'from' })} />
-              <span>go back to the start</span>
+              <span>goes back to the start, and turns on</span>
             </label>
           </fieldset>
         </fieldset>

@@ -9,7 +9,10 @@ import {
 import { lines, welcome } from '../link';
 import { download } from '../registers/download';
 import type { WireFrame } from '../wire';
+import { Words } from '../words';
 import './wire.css';
+
+const WIRE_WORDS = ['line', 'NACK', 'retry', 'damaged'] as const;
 
 /** As in wire.css. */
 const NARROW = matchMedia('(max-width: 760px)');
@@ -122,6 +125,7 @@ export default function Wire() {
         </p>
       )}
       <Frames shown={shown.value} mark={mark.value} isLive={t === null} chosen={chosen.value} onChosen={(number) => (chosen.value = number)} />
+      <Words of={WIRE_WORDS} />
     </>
   );
 }
