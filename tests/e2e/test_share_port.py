@@ -162,6 +162,22 @@ def test_a_stop_that_a_drive_does_not_confirm_is_an_error(share, run, drives, di
     assert "not all confirmed" in done.err
 
 
+def test_a_stop_of_all_says_where_no_motor_was_found_and_is_no_error_for_it(share, run, drives):
+    run("rmd", "-p", share.rmd, "--id", "1", "status").ended(0)
+    for motor in (20, 21):
+        run("rmd", "-p", share.rmd, "--id", motor, "status").ended(3)
+    run("st", "-p", share.st, "-m", 5, "status").ended(1)
+    # The first stop fails where nobody answers: the second one knows no more.
+    for _ in range(2):
+        done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(0)
+        assert "rmd0, motor 1: it confirmed the stop" in done.out
+        assert "rmd0: no motor was found at 20 to 21\n" in done.out
+        assert "st0: no motor was found at 5\n" in done.out
+        assert "may still be turning" not in done.out
+    said = run("share", "stop", "--at", f"unix:{share.path}", "--json", within=60).ended(0)
+    assert '"event":"no-motor","line":"rmd0"' in said.out.replace(" ", "")
+
+
 def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start, run, drives):
     reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms")
     reads.line(3)

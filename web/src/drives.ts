@@ -82,10 +82,28 @@ export function watchRates(period = 1000): () => void {
   return () => clearInterval(timer);
 }
 
+interface Named {
+  start: string;
+  /** What the button for it says, and what it does. */
+  title: string;
+  hint: string;
+  acknowledge: string;
+}
+
 /** The names of the commands that each drive has under another name, as in its table. */
-export const COMMANDS: Readonly<Record<Description['protocol'], { start: string; acknowledge: string }>> = {
-  st: { start: 'START_MOTOR', acknowledge: 'FAULT_ACK' },
-  rmd: { start: 'run', acknowledge: 'clear_errors' },
+export const COMMANDS: Readonly<Record<Description['protocol'], Named>> = {
+  st: {
+    start: 'START_MOTOR',
+    title: 'Start',
+    hint: 'The motor goes to the last reference of the drive.',
+    acknowledge: 'FAULT_ACK',
+  },
+  rmd: {
+    start: 'run',
+    title: 'Resume',
+    hint: 'The motor goes on with its motion before the stop, at once and without a ramp.',
+    acknowledge: 'clear_errors',
+  },
 };
 
 /** What pages may ask of a motor at most, by motor and mode. `null`: it is unknown. */

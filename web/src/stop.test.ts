@@ -152,10 +152,15 @@ describe('stop all', () => {
     await pass(0);
     expect(report().message).toContain('rmd0/9 did not confirm: it may still be turning');
     stop.stopAll();
-    asked[1]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'it has never answered; it is' }] });
+    asked[1]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'no reply', absent: true }] });
     await pass(0);
     expect(report().phase).toBe('stopped');
     expect(report().message).toContain('4 of 4 motors confirmed. The stop also went to 1 address where no motor was found.');
+    // The page knows better: a search of this page found it.
+    stop.stopAll();
+    asked[2]!.done({ motors: [{ line: 'rmd0', motor: 2, failure: 'no reply', absent: true }] });
+    await pass(0);
+    expect(report().message).toContain('rmd0/2 did not confirm: it may still be turning');
   });
 
   it('says that the server is not reachable, whether that fails or hangs', async () => {
@@ -187,6 +192,12 @@ describe('stop all', () => {
       welcome.value = {};
       expect(asked).toHaveLength(count);
     }
+  });
+
+  it('names the latch as the first obstacle to motion', () => {
+    expect(stop.checkLatch).not.toThrow();
+    latchedBy.value = 'page 1';
+    expect(stop.checkLatch).toThrow('Motion is latched: press Release.');
   });
 
   it('gives the reason of a server that cannot stop', async () => {

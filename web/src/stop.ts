@@ -21,8 +21,6 @@ const UNREACHED = 1000;
 
 /** For so long a stop that reached nothing is sent again with the next connection. */
 const AGAIN = 10_000;
-/** Why a stop fails where no motor is. Anything else may be a motor that turns. */
-const NO_MOTOR = /has never answered|BAD_MOTOR_SELECTED/;
 /** Motors that a message names. The header has to leave room for the views on a phone. */
 const MOST_NAMED = 3;
 const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
@@ -109,8 +107,8 @@ export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
 
 function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   // A search also asks addresses where no motor is. Their stop is sent, too.
-  const isMotor = ({ line, motor, failure }: StoppedMotor) =>
-    !failure || !NO_MOTOR.test(failure) || motors.value.get(line)?.includes(motor);
+  const isMotor = ({ line, motor, absent }: StoppedMotor) =>
+    !absent || motors.value.get(line)?.includes(motor);
   const known = stopped.filter(isMotor);
   const failures = known.filter(({ failure }) => failure);
   const others = stopped.length - known.length;
@@ -136,6 +134,11 @@ function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   return { phase: 'stopped', message };
 }
 
+/** Motion is refused while the share is latched, whatever else may be in its way. */
+export function checkLatch() {
+  if (latchedBy.value !== null) throw new Error('Motion is latched: press Release.');
+}
+
 /** Stops one motor. Without a connection that answers all motors are stopped, because only that has a second way. */
 export async function stopMotor(line: string, motor: number): Promise<string> {
   if (state.value !== 'open') {
@@ -143,8 +146,8 @@ export async function stopMotor(line: string, motor: number): Promise<string> {
     return 'There is no connection. Stop all was sent the second way.';
   }
   const { motors: stopped } = await ask({ ask: 'stop', motor: { line, motor } });
-  const failure = stopped.find(({ failure }) => failure)?.failure;
-  if (failure) throw new Error(`${failure}. It may still be turning.`);
+  const failed = stopped.find(({ failure }) => failure);
+  if (failed) throw new Error(failed.absent ? `${failed.failure}.` : `${failed.failure}. It may still be turning.`);
   return 'Stopped: the motor confirmed it.';
 }
 

@@ -1070,9 +1070,15 @@ doc: string, };
 
 export type StoppedMotor = { 
 /**
- * Why it may still be turning; without it the drive confirmed the stop.
+ * Why the stop was not confirmed; without it the drive confirmed it. The motor may still be turning,
+ * unless `absent`.
  */
 failure?: string | null, 
+/**
+ * No motor was found there: the drive says that it has none, or nothing has ever answered and no
+ * program commanded it to move.
+ */
+absent?: boolean, 
 /**
  * The line.
  */

@@ -149,6 +149,8 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
         }
     }
     assert_eq!((world.st_writes(), world.rmd_motion(1)), (vec![], vec![]));
+    let (_, message) = page.refused(act(st(1), "START_MOTOR", &[])).await;
+    assert!(message.contains("limit of 1000 rpm: use Run to target, or set a ramp"), "{message}");
     // Other motors have no limits.
     other.act(rmd(2), "set_speed", &[("speed_dps", 200.0)]).await.unwrap();
     other.ask(ramp(1000.0)).await.unwrap();
@@ -163,6 +165,12 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
     page.refused(act(st(1), "START_MOTOR", &[])).await;
     page.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
     other.act(rmd(1), "set_speed", &[("speed_dps", 200.0)]).await.unwrap();
+    // A limit also binds what the motor did before.
+    other.act(rmd(1), "stop", &[]).await.unwrap();
+    page.ask(limit(rmd(1), Mode::Speed, Some(100.0))).await.unwrap();
+    let (_, message) = other.refused(act(rmd(1), "run", &[])).await;
+    assert!(message.contains("resumes the motion before the stop"), "{message}");
+    page.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
     for (motor, mode, most) in [
         (st(1), Mode::Position, 1.0),
         (st(1), Mode::Speed, -1.0),

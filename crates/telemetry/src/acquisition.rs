@@ -501,7 +501,7 @@ impl Acquisition {
     }
 
     fn stop_failed(&mut self, id: CommandId, why: &CommandError) {
-        self.tell(What::StopFailed(id, why.to_string().into()));
+        self.tell(What::StopFailed(id, Arc::new(why.clone())));
     }
 
     /// The port is closed. Gives no time: its back-off is in [`retry_in`](Self::retry_in).

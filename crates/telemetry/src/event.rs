@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use motorlink_proto::st::ErrorCode;
 use motorlink_proto::time::Instant;
 
 use crate::line::{LineError, Request};
@@ -44,8 +45,8 @@ pub enum What {
     Stopping(CommandId, Arc<str>, Request),
     /// A drive confirmed a stop.
     Stopped(CommandId),
-    /// No drive confirmed a stop. The motor may still be turning.
-    StopFailed(CommandId, Arc<str>),
+    /// No drive confirmed a stop. The motor may still be turning, unless the drive has no such motor.
+    StopFailed(CommandId, Arc<CommandError>),
     /// Motion is refused until the latch is released.
     Latched(Arc<str>),
     /// Motion is possible again.
@@ -79,4 +80,21 @@ pub enum CommandError {
     /// The drive refused, or did not answer.
     #[error(transparent)]
     Line(#[from] LineError),
+}
+
+impl CommandError {
+    /// The error code of a drive.
+    pub fn code(&self) -> Option<ErrorCode> {
+        match self {
+            CommandError::Line(LineError::St(motorlink::st::Error::Refused { code, .. })) => {
+                Some(*code)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the drive says that it has no motor of this number.
+    pub fn is_of_no_motor(&self) -> bool {
+        self.code() == Some(ErrorCode::BadMotorSelected)
+    }
 }

@@ -102,7 +102,7 @@ fn motors_of_a_line_stop_before_it_is_closed() {
     share.reaches("st1.speed_rpm", |rpm| rpm > 300.0);
     let Ok(Answer::Close { motors }) = other.ask(close("st0")) else { panic!("no answer") };
     let motor = MotorName { line: "st0".to_owned(), motor: 1 };
-    assert_eq!(motors, [StoppedMotor { motor, failure: None }]);
+    assert_eq!(motors, [StoppedMotor { motor, failure: None, absent: false }]);
     assert_eq!(program.event(Happening::Stopped).motor, Some(1));
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 10.0);
 }

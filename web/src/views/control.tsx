@@ -8,7 +8,7 @@ import { ask, held, lapsed, welcome } from '../link';
 import { useMotion } from '../motion';
 import { liveOf } from '../overview';
 import { Said, useSaid } from '../parts';
-import { nameOf, stopMotor } from '../stop';
+import { checkLatch, nameOf, stopMotor } from '../stop';
 import type { Controlled, Description, Mode } from '../wire';
 import { Commands } from './commands';
 import { Faults } from './values';
@@ -48,13 +48,14 @@ export function Control({ line, motor, description }: Props) {
   const chosen = useSignal<Mode>(description.modes[0]?.mode ?? 'speed');
   const isHold = useSignal(false);
   const mode = description.modes.find((one) => one.mode === chosen.value);
-  const { start, acknowledge } = COMMANDS[description.protocol];
+  const { start, title, hint, acknowledge } = COMMANDS[description.protocol];
   const has = (name: string) => description.commands.some((command) => command.name === name);
   const why = isViewer ? 'viewer' : undefined;
 
   const act = (command: string, text: string) =>
     attempt(async () => {
       lapsed.value = null;
+      if (command === start) checkLatch();
       await ask({ ask: 'act', line, motor, command, values: {}, hold: false });
       return text;
     });
@@ -66,9 +67,10 @@ export function Control({ line, motor, description }: Props) {
           type="button"
           disabled={!mayMove || isHold.value || !has(start)}
           aria-describedby={why}
-          onClick={() => act(start, 'Started: the drive acknowledged it.')}
+          title={hint}
+          onClick={() => act(start, `${title}: the drive acknowledged it.`)}
         >
-          Start
+          {title}
         </button>
         <button type="button" class="stop" onClick={() => attempt(() => stopMotor(line, motor))}>
           Stop
@@ -177,6 +179,7 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
   const run = async (hold: boolean) => {
     motion.forget();
     lapsed.value = null;
+    checkLatch();
     onRun();
     const to = numberOf(target.value ?? '', 'Target');
     const perSecond = numberOf(rate.value, rateLabel);

@@ -3,13 +3,14 @@
 mod asking;
 mod lines;
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink_telemetry::line::Stopped;
-use motorlink_telemetry::share::message::{self, Answer, Ask, Event};
+use motorlink_telemetry::share::message::{self, Answer, Ask, Event, StoppedMotor};
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
@@ -120,11 +121,14 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
             let Answer::Stop { motors } = share.stop().map_err(failed)? else {
                 return Err(failed(io::Error::other("it gives another answer")));
             };
-            for one in &motors {
+            for one in motors.iter().filter(|one| !one.absent) {
                 let result = one.failure.as_ref().map_or(Ok(()), Err);
                 tell_stop(&one.motor.line, one.motor.motor, result, args.json)?;
             }
-            match motors.iter().any(|one| one.failure.is_some()) {
+            tell_absent(&motors, args.json)?;
+            // Where nothing answers, silence does not show that no motor is there.
+            let is_silent = !motors.is_empty() && motors.iter().all(|one| one.absent);
+            match is_silent || motors.iter().any(may_turn) {
                 true => Err(Failure::link(UNCONFIRMED).trying(advice::STOP_AGAIN)),
                 false => Ok(()),
             }
@@ -194,6 +198,40 @@ fn tell_stopped(
         Motor::Rmd(id) => id.number(),
     };
     tell_stop(line, motor, result.as_ref().copied(), json)
+}
+
+fn may_turn(one: &StoppedMotor) -> bool {
+    one.failure.is_some() && !one.absent
+}
+
+/// Says where no motor was found.
+fn tell_absent(motors: &[StoppedMotor], json: bool) -> Result<(), Failure> {
+    let mut lines: BTreeMap<&str, Vec<u8>> = BTreeMap::new();
+    for one in motors.iter().filter(|one| one.absent) {
+        lines.entry(&one.motor.line).or_default().push(one.motor.motor);
+    }
+    for (line, numbers) in lines {
+        let message = format!("{line}: no motor was found at {}", ranges(&numbers));
+        match json {
+            true => {
+                let event = json!({"event": "no-motor", "line": line, "message": message});
+                output::print_line(&event)?;
+            }
+            false => output::print_line(&message)?,
+        }
+    }
+    Ok(())
+}
+
+/// Sorted numbers, such as `3, 5 to 7`.
+fn ranges(numbers: &[u8]) -> String {
+    let parts = numbers.chunk_by(|one, next| one.checked_add(1) == Some(*next));
+    let words = parts.filter_map(|part| match part {
+        [] => None,
+        [one] => Some(one.to_string()),
+        [first, .., last] => Some(format!("{first} to {last}")),
+    });
+    words.collect::<Vec<_>>().join(", ")
 }
 
 fn tell_stop(

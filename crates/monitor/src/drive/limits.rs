@@ -2,7 +2,7 @@
 
 use motorlink_proto::rmd;
 use motorlink_proto::st::register::Unit;
-use motorlink_proto::st::{self, Account, Counters, Effect, Ramp};
+use motorlink_proto::st::{self, Account, Counters, Effect, LimitError, Ramp};
 use motorlink_proto::units::{CentiDegrees, IqCommand, Quantity, Rounding, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::signal::Motor;
@@ -87,7 +87,7 @@ impl Limited {
             Request::St(motor, request) => {
                 let seen = self.seen();
                 let request = request.request();
-                self.account.check(seen, *motor, &request).map_err(|why| usage(why.to_string()))
+                self.account.check(seen, *motor, &request).map_err(|why| usage(words(why)))
             }
             Request::Rmd(_, data) => match self.rmd.check(data) {
                 Ok(()) => Ok(Effect::None),
@@ -119,6 +119,17 @@ impl Limited {
 
     fn seen(&self) -> Counters {
         Counters { losses: self.losses, ..Counters::default() }
+    }
+}
+
+/// Why a request to an ST drive is not sent, and what a page can do.
+fn words(why: LimitError) -> String {
+    match why {
+        LimitError::NoRamp { limit_rpm } => format!(
+            "under the limit of {limit_rpm} rpm: use Run to target, or set a ramp within the limit first; \
+             nothing was sent"
+        ),
+        why => why.to_string(),
     }
 }
 

@@ -533,9 +533,14 @@ pub struct StoppedMotor {
     /// The motor.
     #[serde(flatten)]
     pub motor: MotorName,
-    /// Why it may still be turning; without it the drive confirmed the stop.
+    /// Why the stop was not confirmed; without it the drive confirmed it. The motor may still be turning,
+    /// unless `absent`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+    /// No motor was found there: the drive says that it has none, or nothing has ever answered and no
+    /// program commanded it to move.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub absent: bool,
 }
 
 /// How often a signal is read.

@@ -279,7 +279,7 @@ impl Hub {
         let request = self.lines[&line].request(motor.motor, bytes, segments);
         let (request, configures) = request.map_err(usage)?;
         let motor = request.motor();
-        let motion = Motion::of(&request);
+        let (motion, moves) = (Motion::of(&request), may_move(&request));
         // A stop is never too old.
         let time_to_live = match motion {
             Motion::Stops => Micros(0),
@@ -291,14 +291,14 @@ impl Hub {
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
-            held.follow((motor, session), motion, may_move(&request), continues)
+            held.follow((motor, session), motion, moves, continues)
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
         held.known.extend(motor);
         if let (Some(motor), Motion::Starts) = (motor, motion) {
             held.starting.push((motor, session));
         }
-        let sent = Sent { motor, motion, configures };
+        let sent = Sent { motor, motion, moves, configures };
         let ended_with = move |result| tell(Work::Command(sent, result));
         let begun = match motion {
             Motion::Stops => held.remote().stop_then(name, request, ended_with),

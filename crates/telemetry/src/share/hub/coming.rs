@@ -230,7 +230,8 @@ impl Hub {
             let message = format!("{name}, motor {number}: {words}");
             self.say_of((Some(name), Some(number)), event, by, message);
             let motor = MotorName { line: name.to_owned(), motor: number };
-            motors.push(StoppedMotor { motor, failure: result.err().map(|it| it.to_string()) });
+            let failure = result.err().map(|it| it.to_string());
+            motors.push(StoppedMotor { motor, failure, absent: false });
         }
         let message = format!("{name}: {by} closed {port}");
         self.say_of((Some(name), None), Happening::Closed, by, message);

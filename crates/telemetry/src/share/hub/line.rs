@@ -12,12 +12,13 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
+use super::may_be_executed;
 use super::place::{SessionId, seconds, wall_now};
 use crate::acquisition::Tally;
-use crate::event::What;
+use crate::event::{CommandError, What};
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
-use crate::runner::{Remote, Runner};
+use crate::runner::{CommandResult, Remote, Runner};
 use crate::share::message::{Answer, Event, Happening, Line};
 use crate::share::opening::Opened;
 use crate::share::wire::{self, Part, Tap};
@@ -55,6 +56,10 @@ pub struct Held {
     pub(super) known: BTreeSet<Motor>,
     /// The motors that have answered.
     pub(super) heard: BTreeSet<Motor>,
+    /// The motors that programs commanded to move, unless that was refused.
+    moved: BTreeSet<Motor>,
+    /// Numbers for which the drive says that it has no such motor.
+    absent: BTreeSet<Motor>,
     /// The motors that did not confirm a stop, and who asked for it.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
 }
@@ -101,6 +106,8 @@ impl Held {
             sequences: BTreeSet::new(),
             known: BTreeSet::new(),
             heard: BTreeSet::new(),
+            moved: BTreeSet::new(),
+            absent: BTreeSet::new(),
             unstopped: BTreeMap::new(),
             runner: Runner::start(name, acquisition)?,
         })
@@ -109,6 +116,7 @@ impl Held {
     /// A motor has confirmed a stop: no program owns it any more.
     pub(super) fn stopped(&mut self, motor: Motor) {
         self.heard.insert(motor);
+        self.absent.remove(&motor);
         self.owners.remove(&motor);
         self.unstopped.remove(&motor);
     }
@@ -144,10 +152,33 @@ impl Held {
         self.sequences.retain(|(other, _)| *other != motor);
     }
 
+    /// The end of a command. `moves`: the motor may turn after it.
+    pub(super) fn ended(&mut self, motor: Motor, moves: bool, result: &CommandResult) {
+        match result {
+            Ok(_) => {
+                self.heard.insert(motor);
+                self.absent.remove(&motor);
+            }
+            Err(error) if error.is_of_no_motor() => drop(self.absent.insert(motor)),
+            Err(_) => {}
+        }
+        // One that was too old waited for a motor that did not answer: somebody knows that it is there.
+        let is_for_a_motor =
+            |error| may_be_executed(error) || matches!(error, CommandError::Expired);
+        if moves && result.as_ref().err().is_none_or(is_for_a_motor) {
+            self.moved.insert(motor);
+        }
+    }
+
     /// Whether a program turned a motor, or tried to.
     pub(super) fn may_turn(&self, motor: Motor) -> bool {
         let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
-        is_starting || self.owners.contains_key(&motor) || self.unstopped.contains_key(&motor)
+        is_starting || self.moved.contains(&motor)
+    }
+
+    /// Whether the drive says that it has no such motor, and no program turned it.
+    pub(super) fn is_absent(&self, motor: Motor) -> bool {
+        self.absent.contains(&motor) && !self.may_turn(motor)
     }
 
     /// What its port occupies.
@@ -194,7 +225,11 @@ impl Held {
             let motors = self.owners.keys().chain(self.unstopped.keys());
             self.words.retries(&event.what, motors, retry);
             match &event.what {
-                What::Lost(_) => doubts.push(None),
+                What::Lost(_) => {
+                    doubts.push(None);
+                    // It may be another drive after that.
+                    self.absent.clear();
+                }
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
@@ -202,6 +237,12 @@ impl Held {
                 _ => {}
             }
             let told = self.words.of(self.speaks, &event.what);
+            if let (What::StopFailed(_, why), Some(motor)) =
+                (&event.what, told.as_ref().and_then(|told| told.motor))
+                && why.is_of_no_motor()
+            {
+                self.absent.insert(motor);
+            }
             let told = told.filter(|told| !self.is_of_no_motor(told));
             events.extend(told.map(|told| self.message(event.time, told)));
         }
@@ -227,14 +268,13 @@ impl Held {
         }
     }
 
-    /// Whether it is the stop of an ID that never answered, and that no program turned: there may be no
-    /// motor. Only the program that asked for the stop gets the failure.
+    /// Whether it is the stop of a number that the drive does not have, or of an ID that never answered and
+    /// that no program turned. Only the program that asked for the stop gets the failure.
     fn is_of_no_motor(&self, told: &Told) -> bool {
         let is_of_stop = matches!(told.event, Happening::Stopping | Happening::StopFailed);
         let Some(motor) = told.motor.filter(|_| is_of_stop) else { return false };
-        let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
-        let is_turned = is_starting || self.owners.contains_key(&motor);
-        self.speaks == Speaks::Rmd && !self.heard.contains(&motor) && !is_turned
+        let is_unheard = self.speaks == Speaks::Rmd && !self.heard.contains(&motor);
+        self.is_absent(motor) || is_unheard && !self.may_turn(motor)
     }
 
     /// The motor, if replies say which motor they are from; `None` means all motors of the line.

@@ -20,7 +20,7 @@ use super::message::{self, Event, Happening, MotorName, Reason, SignalName, Sign
 use super::words;
 use crate::acquisition::Rate;
 use crate::event::CommandError;
-use crate::line::{LineError, Reply, Stopped};
+use crate::line::{Reply, Stopped};
 use crate::runner::{CommandResult, Ended};
 use crate::signal::Motor;
 use jobs::{JobId, Jobs};
@@ -104,6 +104,8 @@ struct Sent {
     /// `None`: it is about the drive.
     motor: Option<Motor>,
     motion: Motion,
+    /// Whether the motor may turn after it.
+    moves: bool,
     configures: Option<Configures>,
 }
 
@@ -324,11 +326,13 @@ impl Hub {
             }
             Work::Stop { part, motor, by, result } => {
                 self.stop_ended(line, motor, by, &result);
+                let is_absent = self.lines.get(&line).is_some_and(|held| held.is_absent(motor));
                 let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
                     return;
                 };
                 let motor = MotorName { line: name.to_string(), motor: motor.number() };
-                session.stopped(part, motor, result.err().map(|error| error.to_string()));
+                let failure = result.err().map(|error| error.to_string());
+                session.stopped(part, motor, failure, is_absent);
             }
             Work::Unheard(part, motor) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
@@ -360,7 +364,7 @@ impl Hub {
             Err(error) if may_be_executed(error) => {
                 held.unstopped.insert(motor, by);
             }
-            Err(_) => {}
+            Err(_) => held.ended(motor, false, result),
         }
         // The end of these is an event.
         let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
@@ -377,10 +381,10 @@ impl Hub {
         sent: Sent,
         result: CommandResult,
     ) {
-        let Sent { motor, motion, configures } = sent;
+        let Sent { motor, motion, moves, configures } = sent;
         if let Some(motor) = motor {
-            if let Some(held) = self.lines.get_mut(&line).filter(|_| result.is_ok()) {
-                held.heard.insert(motor);
+            if let Some(held) = self.lines.get_mut(&line) {
+                held.ended(motor, moves, &result);
             }
             self.command_ended(session, line, motor, motion, &result);
             self.told_of(line, motor, &result);
@@ -401,7 +405,8 @@ impl Hub {
                 }
             }
             Err(error) => {
-                session.refuse_with(id, reason(&error), error.to_string(), code(&error));
+                let code = error.code().map(u8::from);
+                session.refuse_with(id, reason(&error), error.to_string(), code);
             }
         }
     }
@@ -531,16 +536,6 @@ fn reason(error: &CommandError) -> Reason {
         CommandError::Line(error) if error.is_unconfirmed() => Reason::Unconfirmed,
         CommandError::Line(error) if error.is_silence() => Reason::Silent,
         CommandError::Closed | CommandError::Ended | CommandError::Line(_) => Reason::Line,
-    }
-}
-
-/// The error code of a drive.
-fn code(error: &CommandError) -> Option<u8> {
-    match error {
-        CommandError::Line(LineError::St(motorlink::st::Error::Refused { code, .. })) => {
-            Some(u8::from(*code))
-        }
-        _ => None,
     }
 }
 

@@ -204,11 +204,19 @@ impl Session {
         self.last_part
     }
 
-    /// A motor took the stop of a request, or did not.
-    pub(super) fn stopped(&mut self, part: Part, motor: MotorName, failure: Option<String>) {
+    /// A motor took the stop of a request, or did not. `is_absent`: the drive says that it has none.
+    pub(super) fn stopped(
+        &mut self,
+        part: Part,
+        motor: MotorName,
+        failure: Option<String>,
+        is_absent: bool,
+    ) {
         if let Some(gathering) = self.gathering.get_mut(&part) {
-            gathering.unheard.remove(&motor);
-            gathering.stopped.push(StoppedMotor { motor, failure });
+            let is_unheard = gathering.unheard.remove(&motor);
+            let absent = failure.is_some() && (is_absent || is_unheard);
+            let failure = failure.map(|why| if is_unheard { UNHEARD.to_owned() } else { why });
+            gathering.stopped.push(StoppedMotor { motor, failure, absent });
             gathering.missing -= 1;
             self.gathered(part);
         }
@@ -244,8 +252,10 @@ impl Session {
             return;
         };
         self.pending -= 1;
-        let failure = || Some(UNHEARD.to_owned());
-        stopped.extend(unheard.into_iter().map(|motor| StoppedMotor { motor, failure: failure() }));
+        stopped.extend(unheard.into_iter().map(|motor| {
+            let failure = Some(UNHEARD.to_owned());
+            StoppedMotor { motor, failure, absent: true }
+        }));
         stopped.sort_by(|one, other| one.motor.cmp(&other.motor));
         self.answer(
             id,

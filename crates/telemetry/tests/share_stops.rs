@@ -1,0 +1,150 @@
+//! Whether a motor that does not confirm a stop may turn, or no motor is there.
+
+mod asking;
+mod drives;
+mod shared;
+
+use std::collections::BTreeMap;
+use std::os::fd::BorrowedFd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use asking::Asker;
+use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
+use motorlink_telemetry::share::message::*;
+use shared::Share;
+
+/// RMD motors have this time for a reply. Most of the stops here wait for it several times.
+const SHORT: Duration = Duration::from_millis(500);
+
+/// The ID of no motor.
+const NOBODY: u8 = 20;
+
+fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
+    Ask::Command {
+        line: line.to_owned(),
+        motor,
+        bytes: bytes.to_vec(),
+        time_to_live: 10.0,
+        continues: false,
+    }
+}
+
+/// GET_REG of STATUS.
+const READ_STATUS: [u8; 2] = [2, 2];
+/// Reads the state of an RMD motor.
+const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+/// Turns it with 10 °/s.
+const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
+
+/// Stops all motors: whether each confirmed, may turn or is absent.
+fn stop_all(program: &mut Asker) -> BTreeMap<(String, u8), &'static str> {
+    let Ok(Answer::Stop { motors }) = program.ask(Ask::Stop { motor: None }) else { panic!() };
+    let taken = |one: &StoppedMotor| match (&one.failure, one.absent) {
+        (None, false) => "confirmed",
+        (Some(_), true) => "absent",
+        (Some(_), false) => "may turn",
+        (None, true) => panic!("{one:?}"),
+    };
+    motors.iter().map(|one| ((one.motor.line.clone(), one.motor.motor), taken(one))).collect()
+}
+
+fn motors(line: &str, all: &[(u8, &'static str)]) -> BTreeMap<(String, u8), &'static str> {
+    all.iter().map(|(motor, how)| ((line.to_owned(), *motor), *how)).collect()
+}
+
+#[test]
+fn an_id_that_was_only_searched_is_absent_at_every_stop() {
+    let share = Share::with("stops-searched", SHORT, |link| link);
+    let mut program = Asker::join(&share.path, "searches");
+    program.ask(command("rmd0", 1, &READ)).unwrap();
+    program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
+    // The first stop fails before the next one.
+    let nobody = MotorName { line: "rmd0".to_owned(), motor: NOBODY };
+    let Ok(Answer::Stop { motors: stopped }) = program.ask(Ask::Stop { motor: Some(nobody) })
+    else {
+        panic!()
+    };
+    assert!(stopped[0].failure.is_some(), "{stopped:?}");
+    for _ in 0..2 {
+        assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
+    }
+    // A program that moved it knows better.
+    program.ask(command("rmd0", NOBODY, &TURN)).unwrap_err();
+    assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "may turn")]));
+}
+
+#[test]
+fn ids_that_never_answered_are_absent_where_no_motor_confirms() {
+    let share = Share::with("stops-nobody", SHORT, |link| link);
+    let mut program = Asker::join(&share.path, "searches");
+    program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
+    assert_eq!(stop_all(&mut program), motors("rmd0", &[(NOBODY, "absent")]));
+}
+
+#[test]
+fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
+    let share = Share::new("stops-missing");
+    let mut program = Asker::join(&share.path, "searches");
+    program.ask(command("st0", 1, &READ_STATUS)).unwrap();
+    program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
+    for _ in 0..2 {
+        assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed"), (5, "absent")]));
+    }
+    for _ in 0..2 {
+        program.event(Happening::Stopped);
+    }
+    let is_stop = |event: &&Event| event.motor == Some(5) && event.event != Happening::Commanded;
+    let told: Vec<_> = program.events.iter().filter(is_stop).collect();
+    assert!(told.is_empty(), "{told:?}");
+}
+
+/// A line that can be cut.
+struct Cable {
+    link: Box<dyn EventBytes>,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Link for Cable {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
+impl ByteLink for Cable {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        if self.is_cut.load(Ordering::SeqCst) { Ok(()) } else { self.link.write(bytes) }
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.link.read(buffer, timeout)
+    }
+}
+
+impl Evented for Cable {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.link.flush()
+    }
+}
+
+#[test]
+fn a_motor_that_answered_and_is_silent_now_may_turn() {
+    let is_cut = Arc::new(AtomicBool::new(false));
+    let cut = Arc::clone(&is_cut);
+    let share = Share::with("stops-silent", SHORT, move |link| {
+        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+    });
+    let mut program = Asker::join(&share.path, "reads");
+    program.ask(command("st0", 1, &READ_STATUS)).unwrap();
+    program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
+    cut.store(true, Ordering::SeqCst);
+    for _ in 0..2 {
+        assert_eq!(stop_all(&mut program), motors("st0", &[(1, "may turn"), (5, "absent")]));
+    }
+    assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
+}
