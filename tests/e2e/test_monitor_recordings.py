@@ -171,11 +171,7 @@ def test_a_killed_server_leaves_what_it_recorded(begin, folder, run):
 def limited(size):
     """A file may have this size; more is an error, as on a full disk."""
 
-    def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    return limit
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(begin, folder):

@@ -243,11 +243,7 @@ def test_a_signal_before_the_start_keeps_a_file_that_exists(start, tmp_path):
 def limited(size):
     """A file may have this size; more is an error, as on a full disk."""
 
-    def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    return limit
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_motors(motorlink, run, sim, tmp_path):

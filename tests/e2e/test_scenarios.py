@@ -4,7 +4,6 @@ import csv
 import math
 import os
 import resource
-import signal
 import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
@@ -361,7 +360,6 @@ def test_a_failed_write_keeps_the_old_output(motorlink, write, tmp_path):
     command = [motorlink, "sim", "run", write(""), "--csv", old]
 
     def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
 
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, preexec_fn=limit)

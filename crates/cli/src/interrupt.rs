@@ -22,10 +22,11 @@ const INTERRUPTED_CODE: i32 = 130;
 /// Sent by Ctrl-C, by supervisors, and when a terminal is closed.
 const ENDING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 /// Other signals that end a program by default, except those for crashes.
-const KILLING: [i32; 9] =
-    [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGXFSZ];
+const KILLING: [i32; 8] = [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU];
 /// Those of Linux: SIGSTKFLT, SIGPWR and the real-time signals.
 const LINUX: [RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
+/// A file has the size of `ulimit -f`. The write fails then, and whoever writes says so.
+const FILE_TOO_LARGE: i32 = SIGXFSZ;
 /// Those that suspend one.
 const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 
@@ -43,11 +44,12 @@ static END: Mutex<Option<Box<dyn Fn() + Send>>> = Mutex::new(None);
 
 /// Handles the signals. They end the process at once until [`take_over`].
 pub fn install() {
-    let listening = Signals::new(obeyed(&ENDING)).and_then(|mut signals| {
-        let handle = signals.handle();
-        std::thread::Builder::new().spawn(move || signals.forever().for_each(obey))?;
-        Ok(handle)
-    });
+    let listening =
+        Signals::new(obeyed(&[&ENDING[..], &[FILE_TOO_LARGE]].concat())).and_then(|mut signals| {
+            let handle = signals.handle();
+            std::thread::Builder::new().spawn(move || signals.forever().for_each(obey))?;
+            Ok(handle)
+        });
     match listening {
         Ok(handle) => drop(HANDLE.set(handle)),
         Err(error) => {
@@ -117,6 +119,9 @@ fn at_end() -> MutexGuard<'static, Option<String>> {
 }
 
 fn obey(signal: i32) {
+    if signal == FILE_TOO_LARGE {
+        return;
+    }
     if SUSPENDING.contains(&signal) {
         return note(
             "not suspended: motors depend on this program; to run it in the background start it with `&`",
