@@ -166,6 +166,21 @@ def test_after_the_kill_of_a_share_programs_see_the_end_and_a_new_one_takes_its_
     assert Client(share.path, "y").ask("lines")["kind"] == "answer"
 
 
+def test_a_new_share_stops_all_motors_that_one_before_it_turned(share, drives, start):
+    process = program(TURNS, share, "turning")
+    share.process.send_signal(signal.SIGKILL)
+    share.wait()
+    process.communicate()
+    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--timeout", "1s", "--json"]
+    start("share", *words, "--at", f"unix:{share.path}").line(0)
+    # Nobody has read or commanded a motor of it.
+    operator = Client(share.path, "operator")
+    motors = operator.ask("stop")["motors"]
+    confirmed = {(it["line"], it["motor"]) for it in motors if "failure" not in it}
+    assert confirmed >= {("st0", 1), ("rmd0", 2)}, motors
+    eventually(lambda: are_still(operator), "motors at rest")
+
+
 def test_a_stop_while_the_port_is_gone_is_repeated_when_it_is_back(sim, run, start, tmp_path):
     drives = sim(st=("tcp",), rmd=())
     cable, path = Plug(drives.st_address), tmp_path / "share"

@@ -331,15 +331,21 @@ impl Hub {
         motor: Option<&MotorName>,
     ) -> Result<Option<Answer>, Refused> {
         let is_all = motor.is_none();
-        let motors: Vec<(usize, Motor)> = match motor {
-            Some(motor) => vec![self.motor(motor)?],
+        let (mut motors, mut others): (Vec<(usize, Motor)>, _) = match motor {
+            Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
                 let lines = self.lines.iter();
-                lines
-                    .flat_map(|(line, held)| held.known.iter().map(move |motor| (*line, *motor)))
-                    .collect()
+                let all =
+                    lines.flat_map(|(line, held)| held.stoppable().map(move |it| (*line, it)));
+                all.partition(|(line, motor)| self.lines[line].known.contains(motor))
             }
         };
+        if motors.is_empty() {
+            std::mem::swap(&mut motors, &mut others);
+        }
+        for (line, motor) in others {
+            self.stop(line, motor, session, None, name);
+        }
         if motors.is_empty() {
             return Ok(Some(Answer::Stop { motors: Vec::new() }));
         }
@@ -347,7 +353,7 @@ impl Hub {
         let part = asker.gather(id, motors.len());
         for (line, motor) in motors {
             let held = &self.lines[&line];
-            if is_all && !held.may_turn(motor) {
+            if is_all && held.known.contains(&motor) && !held.may_turn(motor) {
                 let tell = self.teller(session, None, line);
                 let task = move |engine: &mut Acquisition| {
                     if !engine.has_answered(&line::stop(motor)) {

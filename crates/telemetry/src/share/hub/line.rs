@@ -181,6 +181,19 @@ impl Held {
         self.absent.contains(&motor) && !self.may_turn(motor)
     }
 
+    /// The motors that a stop of all motors is sent to. If none was read or commanded, motors may turn
+    /// that a share before this one turned: then it is sent to all that the line can have.
+    pub(super) fn stoppable(&self) -> impl Iterator<Item = Motor> {
+        let any = self.known.is_empty().then_some(1..=u8::MAX).into_iter().flatten();
+        self.known.iter().copied().chain(any.filter_map(|number| self.speaks.motor(number)))
+    }
+
+    /// Whether no program has read, commanded or turned it, and it has never answered.
+    pub(super) fn is_unheard(&self, motor: Motor) -> bool {
+        let is_known = self.known.contains(&motor) || self.owners.contains_key(&motor);
+        !is_known && !self.heard.contains(&motor)
+    }
+
     /// What its port occupies.
     pub(super) fn place(&self) -> String {
         self.port.place()

@@ -326,7 +326,10 @@ impl Hub {
             }
             Work::Stop { part, motor, by, result } => {
                 self.stop_ended(line, motor, by, &result);
-                let is_absent = self.lines.get(&line).is_some_and(|held| held.is_absent(motor));
+                let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
+                let is_absent = self.lines.get(&line).is_some_and(|held| {
+                    held.is_absent(motor) || is_silent && held.is_unheard(motor)
+                });
                 let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
                     return;
                 };
