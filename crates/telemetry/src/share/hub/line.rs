@@ -12,8 +12,8 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
-use super::may_be_executed;
 use super::place::{SessionId, seconds, wall_now};
+use super::reasons::may_be_executed;
 use crate::acquisition::Tally;
 use crate::event::{CommandError, What};
 use crate::line::{Request, Stopped, may_move};

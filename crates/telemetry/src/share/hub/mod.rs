@@ -8,6 +8,7 @@ mod feed;
 mod jobs;
 mod line;
 mod place;
+mod reasons;
 mod session;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -26,6 +27,7 @@ use crate::signal::Motor;
 use jobs::{JobId, Jobs};
 use line::{Configures, Lines, Motion};
 use place::wall_now;
+use reasons::{may_be_executed, reason};
 use session::{Part, Session};
 
 pub use line::Held;
@@ -526,25 +528,6 @@ fn answer(reply: Reply) -> message::Answer {
         Reply::Confirmed => Vec::new(),
     };
     message::Answer::Command { bytes }
-}
-
-fn reason(error: &CommandError) -> Reason {
-    match error {
-        CommandError::Expired => Reason::Expired,
-        CommandError::Overtaken => Reason::Overtaken,
-        CommandError::Displaced => Reason::Displaced,
-        CommandError::Latched(_) => Reason::Latched,
-        CommandError::TooMany => Reason::Busy,
-        CommandError::Line(error) if !error.is_line_failure() => Reason::Refused,
-        CommandError::Line(error) if error.is_unconfirmed() => Reason::Unconfirmed,
-        CommandError::Line(error) if error.is_silence() => Reason::Silent,
-        CommandError::Closed | CommandError::Ended | CommandError::Line(_) => Reason::Line,
-    }
-}
-
-/// Whether a drive may have executed a command that failed.
-fn may_be_executed(error: &CommandError) -> bool {
-    matches!(reason(error), Reason::Displaced | Reason::Silent | Reason::Unconfirmed | Reason::Line)
 }
 
 impl From<Ended> for CommandError {
