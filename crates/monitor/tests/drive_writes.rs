@@ -223,7 +223,10 @@ async fn a_restore_needs_a_motor_at_rest_and_a_file_for_it() {
     world.reaches("rmd2.speed_dps", |dps| dps > 100.0).await;
     let (reason, message) = page.refused(restore(rmd(2), &file)).await;
     assert_eq!(reason, Reason::Refused);
-    assert!(message.contains("turns at") && message.ends_with("nothing was written"), "{message}");
+    assert!(
+        message.contains("turns at") && message.ends_with("nothing was written; stop it first"),
+        "{message}"
+    );
     page.act(rmd(2), "off", &[]).await.unwrap();
     let end = Instant::now() + world::LIMIT;
     while let Err(why) = page.ask(restore(rmd(2), &file)).await {
