@@ -37,6 +37,22 @@ test('frames come live, can be paused, searched and saved', async ({ bench, live
   expect(file.at(-1)).toMatch(/^\d+\.\d{6},from-drive,1?2?,ok,/);
 });
 
+test('a phone shows the meaning of frames in rows of one height, and stays live', async ({ bench, live }) => {
+  await live.setViewportSize({ width: 390, height: 844 });
+  await bench.read();
+  await open(live, 'Wire');
+  await expect.poll(() => count(live)).toBeGreaterThan(100);
+  await expect(live.getByText(/^Live\./)).toBeVisible();
+  const cut = await region(live).evaluate((box) => {
+    const words = [...box.querySelectorAll('td span')].find((one) => one.textContent === 'GET_REG SPEED_MEAS, motor 1')!;
+    return words.scrollHeight - words.clientHeight;
+  });
+  expect(cut).toBeLessThanOrEqual(0);
+  const heights = await region(live).evaluate((box) =>
+    [...box.querySelectorAll('tbody tr:not(.space)')].map((row) => Math.round(row.getBoundingClientRect().height)));
+  expect(new Set(heights)).toEqual(new Set([44]));
+});
+
 test('the frames around an instant are shown, the nearest is marked', async ({ bench, live }) => {
   await bench.read();
   await open(live, 'Wire');

@@ -115,7 +115,7 @@ export default function Wire() {
         </label>
       </div>
       <p class="load">
-        {t === null ? (paused.value ? 'Paused. Before: ' : 'Live. ') : `From ${AROUND} s before ${timeOf(t)} s to ${AROUND} s after. `}
+        {t === null ? (paused.value ? 'Paused. ' : 'Live. ') : `From ${AROUND} s before ${timeOf(t)} s to ${AROUND} s after. `}
         {isLoading.value ? 'Loading …' : told(load.value)}
       </p>
       {gaps.value > 0 && <p class="warn">! Some frames between these are missing: the share has forgotten them.</p>}
@@ -282,7 +282,9 @@ function Row({ frame, index, isChosen, isMarked, onChosen }: RowProps) {
       <td>{frame.motor ?? ''}</td>
       <td>{trouble && <span class={frame.result === 'foreign' ? 'muted' : 'bad'}>! {trouble}</span>}</td>
       <td class="mono">{bytesOf(frame)}</td>
-      <td>{frame.words}</td>
+      <td>
+        <span>{frame.words}</span>
+      </td>
     </tr>
   );
 }
