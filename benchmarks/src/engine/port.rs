@@ -166,7 +166,7 @@ impl Port {
             match subscription.wait(PATIENCE).ok_or("no stop is confirmed")? {
                 Record::Event(event) => match &event.what {
                     What::Stopped(_) => confirmed += 1,
-                    What::StopFailed(_, why) => return Err(why.as_ref().into()),
+                    What::StopFailed(_, why) => return Err(why.to_string().into()),
                     _ => {}
                 },
                 Record::Values(_) | Record::Lost(_) => {}

@@ -15,7 +15,8 @@ use motorlink_telemetry::share::message::{self as share, MotorName};
 use serde::{Deserialize, Serialize};
 
 pub use drives::{
-    Command, Controlled, Description, Difference, Fault, Field, Overview, Register, State, Value,
+    Command, Controlled, Description, Difference, Fault, Field, Mode, Overview, Register, State,
+    Value,
 };
 pub use recordings::{
     Condition, Phase, Recorded, RecordedEvent, RecordedSignal, RecordingContent, RecordingFile,
@@ -184,19 +185,6 @@ pub enum Ask {
 
 fn is_false(value: &bool) -> bool {
     !value
-}
-
-/// What is controlled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub enum Mode {
-    /// The speed: rpm of an ST motor, °/s of an RMD motor.
-    Speed,
-    /// The current that makes torque: digits of an ST motor, A of an RMD motor.
-    Torque,
-    /// The angle of an RMD motor, in degrees from its zero.
-    Position,
 }
 
 /// What pages may ask of a motor at most.

@@ -87,22 +87,6 @@ impl Act {
     }
 }
 
-/// Sends a request that may move the motor, if the limits permit it.
-pub(super) async fn send(
-    control: &Control,
-    exchanges: &Exchanges<'_>,
-    request: &Request,
-) -> Result<Vec<u8>, Refusal> {
-    control.limited(exchanges.target, |limited| {
-        let effect = limited.check(request)?;
-        limited.sent(request, effect);
-        Ok::<(), Refusal>(())
-    })?;
-    let reply = exchanges.request(request).await;
-    control.limited(exchanges.target, |limited| limited.ended(reply.is_ok()));
-    reply
-}
-
 /// Checks that a START_MOTOR had an effect: a drive acknowledges it in any case.
 pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
     let mut starting = Starting::default();

@@ -8,7 +8,6 @@ use motorlink_telemetry::share::message::{MotorName, Reason};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 
-use super::act;
 use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
 use super::target::{Target, refusal};
@@ -158,13 +157,29 @@ impl<'a, M: Motion> Permitted<'a, M> {
         loop {
             exchanges.touch().await?;
             self.check().await?;
-            match act::send(control, &exchanges.continues(), request).await {
+            match send(control, &exchanges.continues(), request).await {
                 // A stop, or a command of another program: the check tells.
                 Err(why) if why.reason == Reason::Overtaken && attempt < ATTEMPTS => attempt += 1,
                 ended => return ended,
             }
         }
     }
+}
+
+/// Sends a request that may move the motor, if the limits permit it.
+pub(super) async fn send(
+    control: &Control,
+    exchanges: &Exchanges<'_>,
+    request: &Request,
+) -> Result<Vec<u8>, Refusal> {
+    control.limited(exchanges.target, |limited| {
+        let effect = limited.check(request)?;
+        limited.sent(request, effect);
+        Ok::<(), Refusal>(())
+    })?;
+    let reply = exchanges.request(request).await;
+    control.limited(exchanges.target, |limited| limited.ended(reply.is_ok()));
+    reply
 }
 
 fn overtaken() -> Refusal {

@@ -22,8 +22,8 @@ use motorlink_telemetry::signal::Motor;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
-use super::act::{send, started};
-use super::control::{Control, Motion, Permitted, Running};
+use super::act::started;
+use super::control::{Control, Motion, Permitted, Running, send};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::Mode;

@@ -7,8 +7,7 @@ use motorlink_proto::st::{
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
 
-use super::act::send;
-use super::control::{Control, Motion, Permitted};
+use super::control::{Control, Motion, Permitted, send};
 use super::exchange::Exchanges;
 use super::registers::{self, Place};
 use super::settings;

@@ -3,8 +3,6 @@
 use motorlink_telemetry::share::message::Protocol;
 use serde::{Deserialize, Serialize};
 
-use super::Mode;
-
 /// What the drives of a line have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -174,4 +172,17 @@ pub struct Difference {
     pub wears_rom: bool,
     /// Why it cannot be written; `null`: it can.
     pub fixed: Option<String>,
+}
+
+/// What is controlled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Mode {
+    /// The speed: rpm of an ST motor, °/s of an RMD motor.
+    Speed,
+    /// The current that makes torque: digits of an ST motor, A of an RMD motor.
+    Torque,
+    /// The angle of an RMD motor, in degrees from its zero.
+    Position,
 }
