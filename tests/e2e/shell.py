@@ -69,7 +69,8 @@ class Shell:
     it."""
 
     def __init__(self, folder, **variables):
-        self.folder, self.variables = folder, variables
+        # Simulated motors answer late on a loaded machine.
+        self.folder, self.variables = folder, {"MOTORLINK_RMD_TIMEOUT": "200ms", **variables}
         self.background = []
 
     def __enter__(self):
