@@ -173,7 +173,7 @@ def test_a_new_share_stops_all_motors_that_one_before_it_turned(share, drives, s
     process.communicate()
     words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--timeout", "1s", "--json"]
     start("share", *words, "--at", f"unix:{share.path}").line(0)
-    # Nobody has read or commanded a motor of it.
+    # No program has read or commanded a motor of this share.
     operator = Client(share.path, "operator")
     motors = operator.ask("stop")["motors"]
     confirmed = {(it["line"], it["motor"]) for it in motors if "failure" not in it}

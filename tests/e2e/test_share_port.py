@@ -167,7 +167,7 @@ def test_a_stop_of_all_says_where_no_motor_was_found_and_is_no_error_for_it(shar
     for motor in (20, 21):
         run("rmd", "-p", share.rmd, "--id", motor, "status").ended(3)
     run("st", "-p", share.st, "-m", 5, "status").ended(1)
-    # The first stop fails where nobody answers: the second one knows no more.
+    # What the first stop learned does not change the answer to the second one.
     for _ in range(2):
         done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(0)
         assert "rmd0, motor 1: it confirmed the stop" in done.out

@@ -102,8 +102,8 @@ async function world(protocol: 'st' | 'rmd', guarded: boolean): Promise<World> {
 }
 
 /**
- * Time until STOP is on the wire, and until the motor stands still, ms. `null`: not within 20 s. Instead of
- * both `null`: the motor did not turn when the event was to happen.
+ * Time until STOP is on the wire, and until the motor stands still, ms. A time is `null` after 20 s. The
+ * result is `null` if the motor stopped before the event.
  */
 async function run({ protocol = 'st', guarded = false, event, from }: Case) {
   const { motor, speed, stop: wanted } = KINDS[protocol];

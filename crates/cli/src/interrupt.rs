@@ -25,7 +25,7 @@ const ENDING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 const KILLING: [i32; 8] = [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU];
 /// Those of Linux: SIGSTKFLT, SIGPWR and the real-time signals.
 const LINUX: [RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
-/// A file has the size of `ulimit -f`. The write fails then, and whoever writes says so.
+/// A file has the size of `ulimit -f`. The write fails, too, and that is reported.
 const FILE_TOO_LARGE: i32 = SIGXFSZ;
 /// Those that suspend one.
 const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];

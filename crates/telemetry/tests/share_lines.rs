@@ -4,21 +4,11 @@ mod asking;
 mod drives;
 mod shared;
 
-use asking::Asker;
+use asking::{Asker, command};
 use drives::served;
 use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
 use shared::Share;
-
-fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
-    Ask::Command {
-        line: line.to_owned(),
-        motor,
-        bytes: bytes.to_vec(),
-        time_to_live: 10.0,
-        continues: false,
-    }
-}
 
 #[test]
 fn a_line_counts_its_exchanges_and_what_went_wrong() {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use asking::Asker;
+use asking::{Asker, command};
 use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
 use motorlink_telemetry::share::message::*;
 use shared::Share;
@@ -20,16 +20,6 @@ const SHORT: Duration = Duration::from_millis(500);
 
 /// The ID of no motor.
 const NOBODY: u8 = 20;
-
-fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
-    Ask::Command {
-        line: line.to_owned(),
-        motor,
-        bytes: bytes.to_vec(),
-        time_to_live: 10.0,
-        continues: false,
-    }
-}
 
 /// GET_REG of STATUS.
 const READ_STATUS: [u8; 2] = [2, 2];

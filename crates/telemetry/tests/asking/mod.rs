@@ -87,3 +87,14 @@ impl Asker {
         }
     }
 }
+
+/// A command of a program that is patient.
+pub fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
+    Ask::Command {
+        line: line.to_owned(),
+        motor,
+        bytes: bytes.to_vec(),
+        time_to_live: 10.0,
+        continues: false,
+    }
+}
