@@ -438,6 +438,19 @@ def test_an_address_of_the_network_needs_a_word(start):
         assert page.ask("lines")["kind"] == "answer"
 
 
+@pytest.mark.parametrize(("words", "reason"), [([], "forbidden"), (["--open-addresses"], "line")])
+def test_pages_from_the_network_connect_to_no_address_without_a_word(start, words, reason):
+    # Nobody listens there.
+    port = {"port": "slcan:tcp:127.0.0.1:1", "protocol": "rmd"}
+    own = Site(json.loads(start("monitor", "--listen", "127.0.0.1:0", "--json").line(0)))
+    listen = ["--listen", "0.0.0.0:0", "--insecure"]
+    open_ = Site(json.loads(start("monitor", *listen, *words, "--json").line(0)))
+    for site, wanted in ((own, "line"), (open_, reason)):
+        with site.page() as page:
+            for ask in ("open", "scan"):
+                assert page.ask(ask, **port)["reason"] == wanted, ask
+
+
 def test_the_usual_port_may_be_taken(start):
     first, second = (start("monitor", "--json") for _ in range(2))
     ports = {Site(json.loads(one.line(0))).port for one in (first, second)}

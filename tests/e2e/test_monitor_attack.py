@@ -115,6 +115,8 @@ def test_a_viewer_sees_and_stops_and_does_nothing_else(site):
         ("limit", {**motor, "mode": "speed", "most": None}),
         ("restore", {**motor, "text": "", "to_rom": False}),
         ("latch", {}), ("release", {}),
+        ("open", {"port": "/dev/ttyUSB0", "protocol": "st"}), ("close", {"line": "st0"}),
+        ("scan", {"port": "/dev/ttyUSB0", "protocol": "st"}),
         ("command", {**motor, "bytes": [3, 1], "time_to_live": 1.0}),
         ("confirm", motor), ("hello", {"protocol": 1, "name": "x"}),
     ]

@@ -102,7 +102,7 @@ interface Pending {
 }
 
 const SHARE_ASKS: ReadonlySet<string> = new Set<ShareRequest['ask']>([
-  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'frames', 'ports', 'open', 'close', 'stop', 'latch', 'release',
+  'lines', 'signals', 'subscribe', 'unsubscribe', 'rates', 'frames', 'ports', 'scan', 'open', 'close', 'stop', 'latch', 'release',
 ]);
 
 const pending = new Map<number, Pending>();

@@ -232,6 +232,8 @@ range: [number, number, number],
  */
 words: Array<string>, };
 
+export type Finding = "drive" | "refuses" | "garbage" | "foreign" | "echo" | "silence" | "impossible" | "later";
+
 export type FoundPort = { 
 /**
  * Its name, as `open` takes it.
@@ -282,7 +284,7 @@ motor: number,
  */
 columns: Array<Column>, };
 
-export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "later";
+export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "scanned" | "later";
 
 export type Limit = { 
 /**
@@ -854,7 +856,23 @@ motor: number, } | { "ask": "stop",
 /**
  * The motor; all motors that were started or read, without it.
  */
-motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "open", 
+motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "scan", 
+/**
+ * The port, as `open` takes it.
+ */
+port: string, 
+/**
+ * What its drives may speak.
+ */
+protocol: Protocol, 
+/**
+ * The rate: baud of a serial line, bit/s of a CAN bus. That of the port's name without it.
+ */
+rate?: number | null, 
+/**
+ * How long to wait for each reply, in seconds; a short time without it.
+ */
+timeout?: number | null, } | { "ask": "open", 
 /**
  * The port, as `-p` takes it: a device, a CAN interface, an adapter or a TCP address.
  */
@@ -944,7 +962,31 @@ rates: Array<SignalRate>, } | { "to": "ports",
 /**
  * Those that can be found without opening them.
  */
-ports: Array<FoundPort>, } | { "to": "open", 
+ports: Array<FoundPort>, } | { "to": "scan", 
+/**
+ * The port at this rate, as `open` takes it.
+ */
+port: string, 
+/**
+ * The rate. Missing if the port cannot choose it.
+ */
+rate?: number | null, 
+/**
+ * What answered.
+ */
+finding: Finding, 
+/**
+ * The same in words.
+ */
+text: string, 
+/**
+ * The IDs of the RMD motors that replied.
+ */
+motors?: Array<number>, 
+/**
+ * The rates that the port can choose, the most frequent first.
+ */
+rates: Array<number>, } | { "to": "open", 
 /**
  * The name of the new line.
  */

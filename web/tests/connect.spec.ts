@@ -1,6 +1,7 @@
 // Ports of the computer, and lines that are opened and closed while the server runs.
 import AxeBuilder from '@axe-core/playwright';
 import type { Page } from '@playwright/test';
+import { type AddressInfo, connect, createServer } from 'node:net';
 import { Bench, card, expect, open, test as base } from './bench';
 
 /** A monitor with the ST drive alone. */
@@ -19,13 +20,42 @@ const test = base.extend<{ bench: Bench }>({
 
 const line = (page: Page, name: string) => page.getByRole('article', { name: `Line ${name}` });
 
-async function enter(page: Page, port: string, protocol: string) {
+async function fill(page: Page, port: string, protocol: string, timeout = 2000) {
   const form = page.getByRole('form', { name: 'Open a port' });
   await form.getByRole('textbox', { name: 'Port' }).fill(port);
   await form.getByRole('combobox', { name: 'Protocol' }).selectOption(protocol);
-  await form.getByRole('textbox', { name: /^Reply timeout/ }).fill('2000');
+  await form.getByRole('textbox', { name: /^Reply timeout/ }).fill(String(timeout));
+  return form;
+}
+
+async function enter(page: Page, port: string, protocol: string) {
+  const form = await fill(page, port, protocol);
   await form.getByRole('button', { name: 'Open' }).click();
-  return form.getByRole('status');
+  return form.getByRole('status').last();
+}
+
+/** A CAN adapter behind TCP whose bus has 500 kbit/s: at other bit rates no frame passes. */
+async function slowBus(drives: number) {
+  const server = createServer((host) => {
+    const bus = connect(drives, '127.0.0.1');
+    let isRight = false;
+    let text = '';
+    host.on('data', (bytes) => {
+      text += bytes.toString('latin1');
+      const lines = text.split('\r');
+      text = lines.pop()!;
+      for (const line of lines) {
+        if (line.startsWith('S')) isRight = line === 'S6';
+        if (isRight || !line.startsWith('t')) bus.write(`${line}\r`);
+      }
+    });
+    bus.on('data', (bytes) => host.write(bytes));
+    for (const [one, other] of [[host, bus], [bus, host]] as const) {
+      one.on('close', () => other.destroy()).on('error', () => other.destroy());
+    }
+  });
+  await new Promise<void>((done) => server.listen(0, '127.0.0.1', done));
+  return { port: (server.address() as AddressInfo).port, close: () => server.close() };
 }
 
 test('a line is opened, turned, and closed, which stops its motors', async ({ bench, page }) => {
@@ -95,5 +125,64 @@ test('a viewer sees lines come and go, and opens none', async ({ bench, page, br
     await expect(line(viewer, 'rmd0')).toContainText('1234');
   } finally {
     await context.close();
+  }
+});
+
+test('a scan finds an ST drive, and the form opens it', async ({ bench, page }) => {
+  const more = new Bench();
+  try {
+    const port = await more.listen('st');
+    await page.goto(bench.url);
+    await open(page, 'Ports');
+    const form = await fill(page, `tcp:127.0.0.1:${port}`, 'st');
+    await form.getByRole('button', { name: 'Scan' }).click();
+    await expect(form.getByRole('status').first()).toHaveText(/^✓ Found: ST MC SDK 5\.4\.4\. Open opens it as tcp:/);
+    await expect(form.getByRole('list', { name: 'What answered' })).toHaveText('ST MC SDK 5.4.4');
+    await form.getByRole('button', { name: 'Open' }).click();
+    await expect(line(page, 'st1')).toContainText(`tcp:127.0.0.1:${port}`);
+    await form.getByRole('button', { name: 'Scan' }).click();
+    await expect(form.getByRole('status').first()).toContainText('is open already: it is the line st1');
+    await open(page, 'Events');
+    await expect(page.getByText(/asked what answers on tcp:.*ST MC SDK/)).toBeVisible();
+  } finally {
+    await more.end();
+  }
+});
+
+test('a scan finds the bit rate and the motors of a bus, after a question', async ({ bench, page }) => {
+  const more = new Bench();
+  const bus = await slowBus(await more.listen('rmd'));
+  try {
+    await page.goto(bench.url);
+    await open(page, 'Ports');
+    const form = await fill(page, `slcan:tcp:127.0.0.1:${bus.port}`, 'rmd', 300);
+    const scan = form.getByRole('button', { name: 'Scan' });
+    const said = form.getByRole('status').first();
+    const dialog = page.getByRole('dialog', { name: 'Try other bit rates?' });
+    await scan.click();
+    await expect(dialog).toBeVisible();
+    expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+    await dialog.getByRole('button', { name: 'Cancel' }).click();
+    await expect(said).toHaveText('No motor answered. Other bit rates were not tried.');
+
+    await scan.click();
+    await dialog.getByRole('button', { name: 'Try them' }).click();
+    await form.getByRole('button', { name: 'End the scan' }).click();
+    await expect(said).toHaveText(/^The scan was ended after [12] of 9 rates\.$/);
+
+    await scan.click();
+    await dialog.getByRole('button', { name: 'Try them' }).click();
+    const found = form.getByRole('list', { name: 'What answered' }).getByRole('listitem');
+    await expect(found).toHaveText([
+      '1000 kbit/ssilence', '800 kbit/ssilence', '500 kbit/smotors 1, 2, 3, 4',
+    ]);
+    await expect(form.getByRole('textbox', { name: 'Port' })).toHaveValue(/\?bitrate=500000$/);
+    expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+    await form.getByRole('button', { name: 'Open' }).click();
+    await open(page, 'Motors');
+    await expect(card(page, 'rmd0/4')).toBeVisible();
+  } finally {
+    bus.close();
+    await more.end();
   }
 });

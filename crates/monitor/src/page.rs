@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
+use motorlink::port::PortName;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{self as share, Event, Happening, MotorName, Reason};
@@ -24,7 +25,7 @@ const REQUESTS: usize = 64;
 /// A page that is connected.
 pub struct Page {
     name: String,
-    role: Role,
+    may: May,
     clock: Clock,
     link: Arc<Link>,
     control: Mutex<Control>,
@@ -37,6 +38,15 @@ pub struct Page {
     recordings: Arc<Recordings>,
     requests: Arc<Semaphore>,
     out: mpsc::Sender<String>,
+}
+
+/// What a page may do.
+#[derive(Debug, Clone, Copy)]
+pub struct May {
+    /// Whose page it is.
+    pub role: Role,
+    /// Whether operators open lines at addresses in a network.
+    pub opens_addresses: bool,
 }
 
 /// What moves motors.
@@ -55,7 +65,7 @@ impl Page {
     /// A page of this name. `out` takes the texts for it.
     pub fn new(
         name: String,
-        role: Role,
+        may: May,
         deadline: Micros,
         link: Arc<Link>,
         recordings: Arc<Recordings>,
@@ -64,7 +74,7 @@ impl Page {
         let man = DeadMan::new(deadline, Arc::clone(link.stops()));
         Page {
             name,
-            role,
+            may,
             clock: Clock::running(),
             link,
             control: Mutex::new(Control { man, drive: None, opened: 0.0 }),
@@ -175,8 +185,10 @@ impl Page {
             | Ask::Ports
             | Ask::Frames { .. } => {}
             Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
-            Ask::Latch | Ask::Release | Ask::Open { .. } | Ask::Close { .. } => {
+            Ask::Latch | Ask::Release | Ask::Close { .. } => self.check_operator()?,
+            Ask::Scan { port, .. } | Ask::Open { port, .. } => {
                 self.check_operator()?;
+                self.check_port(port)?;
             }
             Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
                 let message = "a page may not send this request".to_owned();
@@ -291,12 +303,25 @@ impl Page {
     }
 
     fn check_operator(&self) -> Result<(), Refusal> {
-        match self.role {
+        match self.may.role {
             Role::Operator => Ok(()),
             Role::Viewer => Err(refusal(
                 Reason::Forbidden,
                 "a viewer may see everything and stop, nothing else",
             )),
+        }
+    }
+
+    /// Whether this page may open this port. The share refuses what is no port.
+    fn check_port(&self, port: &str) -> Result<(), Refusal> {
+        let is_address = port.parse::<PortName>().is_ok_and(|port| port.is_address());
+        match is_address && !self.may.opens_addresses {
+            true => Err(refusal(
+                Reason::Forbidden,
+                "this monitor is open to the network, so its pages connect to no network address; start it \
+                 with --open-addresses, or give it the port with -p",
+            )),
+            false => Ok(()),
         }
     }
 

@@ -9,7 +9,7 @@
 //! | list the ports of this machine | [`list::ports`] |
 //! | stop motors at the end of a scope, on errors and panics | [`st::StopOnDrop`], [`rmd::StopOnDrop`] |
 //! | limit speeds and currents | [`st::Limits`], [`rmd::Limits`] |
-//! | find the baud rate of an ST drive | [`st::scan_baud`] |
+//! | find the baud rate of an ST drive | [`st::scan`] |
 //! | write settings to a file, compare and restore them | [`settings`] |
 //! | stop the motors of another program when it ends | [`relay::Relay`] |
 #![forbid(unsafe_code)]

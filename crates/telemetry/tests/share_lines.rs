@@ -135,6 +135,67 @@ fn one_of_two_programs_that_open_the_same_port_gets_it() {
     assert_eq!(one.names(), ["st0", "rmd0", "st1"]);
 }
 
+fn scan(port: &str, protocol: Protocol, rate: Option<u32>) -> Ask {
+    Ask::Scan { port: port.to_owned(), protocol, rate, timeout: Some(1.0) }
+}
+
+fn scanned(answer: Result<Answer, Refusal>) -> (Finding, Vec<u8>, Option<u32>, String) {
+    match answer {
+        Ok(Answer::Scan { port, rate, finding, motors, .. }) => (finding, motors, rate, port),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_scan_says_what_answers_and_leaves_the_port_free() {
+    let share = Share::new("scan");
+    let (_bench, _serving, st, rmd) = served("scan-more");
+    let can = format!("slcan:{rmd}");
+    let mut program = Asker::join(&share.path, "scans");
+    let mut other = Asker::join(&share.path, "sees");
+    // A pty has no rate.
+    let (finding, motors, rate, port) = scanned(program.ask(scan(&st, Protocol::St, None)));
+    assert_eq!((finding, motors, rate), (Finding::Drive, vec![], None));
+    let event = other.event(Happening::Scanned);
+    assert_eq!(event.by.as_deref(), Some("scans"));
+    assert!(event.message.contains(&port) && event.message.contains("MC SDK"), "{event:?}");
+    let (reason, why) = refused(program.ask(scan(&st, Protocol::St, Some(9600))));
+    assert!(reason == Reason::Usage && why.ends_with("has no rate that can be chosen"), "{why}");
+
+    let Ok(Answer::Scan { finding, motors, rate, rates, .. }) =
+        program.ask(scan(&can, Protocol::Rmd, None))
+    else {
+        panic!("no answer")
+    };
+    assert_eq!((finding, motors, rate), (Finding::Drive, vec![1, 2, 3, 4], Some(1_000_000)));
+    assert_eq!(&rates[..3], [1_000_000, 800_000, 500_000]);
+    let slower = scanned(program.ask(scan(&can, Protocol::Rmd, Some(500_000))));
+    assert_eq!((slower.2, slower.3), (Some(500_000), format!("{can}?bitrate=500000")));
+    let (_, why) = refused(program.ask(scan(&can, Protocol::Rmd, Some(1))));
+    assert!(why.contains("has no rate 1; its rates are 1000000, "), "{why}");
+
+    // What is found is opened; then it is the line's alone.
+    assert_eq!(opened(program.ask(open(&port, Protocol::St))), "st1");
+    let (_, why) = refused(program.ask(scan(&st, Protocol::St, None)));
+    assert!(why.ends_with("is open already: it is the line st1"), "{why}");
+}
+
+#[test]
+fn a_port_that_is_scanned_is_busy() {
+    let share = Share::new("scan-busy");
+    let (_bench, _serving, _, rmd) = served("scan-busy-more");
+    let mut program = Asker::join(&share.path, "one");
+    let mut other = Asker::join(&share.path, "two");
+    // Addresses without a motor are silent for so long.
+    let begun = program.send(scan(&format!("slcan:{rmd}"), Protocol::Rmd, None));
+    let first = program.names();
+    assert_eq!(first, ["st0", "rmd0"], "the share answers meanwhile");
+    let (reason, why) = refused(other.ask(open(&format!("slcan:{rmd}"), Protocol::Rmd)));
+    assert_eq!(reason, Reason::Busy);
+    assert!(why.starts_with("one scans slcan:"), "{why}");
+    assert_eq!(scanned(program.end_of(begun)).1, [1, 2, 3, 4]);
+}
+
 #[test]
 fn only_devices_are_opened() {
     motorlink_testbench::register();
@@ -173,6 +234,8 @@ fn only_devices_are_opened() {
     ] {
         let (reason, why) = refused(program.ask(open(&port, Protocol::St)));
         assert!(reason == Reason::Usage && why.contains("is not opened"), "{port}: {why}");
+        let again = refused(program.ask(scan(&port, Protocol::St, None)));
+        assert_eq!(again, (reason, why));
     }
     for port in ["", "x", "\u{1b}[2J", &"a".repeat(600)] {
         assert_eq!(refused(program.ask(open(port, Protocol::St))).0, Reason::Usage, "{port:?}");
@@ -192,6 +255,7 @@ fn only_devices_are_opened() {
     }
     // No program serves this port.
     assert_eq!(refused(program.ask(open("tcp:127.0.0.1:1", Protocol::St))).0, Reason::Line);
+    assert_eq!(refused(program.ask(scan("tcp:127.0.0.1:1", Protocol::St, None))).0, Reason::Line);
     assert_eq!(program.names(), ["st0", "rmd0"]);
     assert!(matches!(program.ask(Ask::Ports), Ok(Answer::Ports { .. })));
 }

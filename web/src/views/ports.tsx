@@ -6,7 +6,7 @@ import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, sear
 import { nameOf } from '../stop';
 import type { Line, LineCounts } from '../wire';
 import { Said, useSaid } from '../parts';
-import { CloseLine, Connect } from './connect';
+import { CloseLine, Connect } from '../connect/connect';
 import './ports.css';
 
 /** The time between two looks at the counts, in ms. */

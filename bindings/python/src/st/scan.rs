@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use motorlink::port::{PortError, PortName};
-use motorlink::st::{Error, ScanResult, scan_baud};
+use motorlink::st::{Error, ScanResult, scan};
+use motorlink_telemetry::share::message::Finding;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -38,19 +39,19 @@ pub(crate) fn st_scan_baud(
     timeout: f64,
 ) -> PyResult<Py<PyAny>> {
     let (port, timeout): (_, Duration) = (line(py, port)?, span(py, "a timeout", timeout)?);
-    let result = py.detach(|| scan_baud(&port, baud, timeout));
+    let port = port.at_baud(baud).unwrap_or(port);
+    let result = py.detach(|| scan(&port, timeout));
     let mut board = py.None();
-    let kind = match result {
-        Ok(ScanResult::Drive(info)) => {
-            board = values::board_info(py, (PyTuple::new(py, info.version)?, info.name))?;
-            "drive"
+    let finding = match result {
+        Ok(result) => {
+            if let ScanResult::Drive(info) = &result {
+                let version = PyTuple::new(py, info.version)?;
+                board = values::board_info(py, (version, &info.name))?;
+            }
+            Finding::from(&result)
         }
-        Ok(ScanResult::Refuses(_)) => "refuses",
-        Ok(ScanResult::Garbage) => "garbage",
-        Ok(ScanResult::Echo) => "echo",
-        Ok(ScanResult::Silence) => "silence",
-        Err(Error::Port(PortError::BaudRefused { .. })) => "impossible",
+        Err(Error::Port(PortError::BaudRefused { .. })) => Finding::Impossible,
         Err(error) => return Err(st_error(py, &error)),
     };
-    values::st_scan_result(py, (baud, kind, board))
+    values::st_scan_result(py, (baud, finding.word(), board))
 }

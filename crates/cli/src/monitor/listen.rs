@@ -34,6 +34,10 @@ pub struct Listen {
     /// Listen on an address of the network without TLS. Anybody there can read the tokens
     #[arg(long)]
     insecure: bool,
+    /// Let operators open lines at any TCP address that this computer reaches. Without --listen, or
+    /// with a --listen of this computer alone, they may
+    #[arg(long)]
+    open_addresses: bool,
 }
 
 impl Listen {
@@ -85,6 +89,12 @@ impl Listen {
             None if ip.is_ipv6() => format!("[{ip}]"),
             None => ip.to_string(),
         }
+    }
+
+    /// Whether pages open lines at addresses in a network. Who can connect from another computer would
+    /// reach what this one reaches.
+    pub fn opens_addresses(&self) -> bool {
+        self.open_addresses || self.listen.unwrap_or(USUAL).ip().is_loopback()
     }
 
     pub fn names(&self) -> Vec<String> {

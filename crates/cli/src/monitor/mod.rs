@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use motorlink_monitor::message::Role;
-use motorlink_monitor::server::{self, Options, Tls};
+use motorlink_monitor::server::{self, Options, Settings, Tls};
 use motorlink_telemetry::share::message::{Answer, Ask, Line};
 use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::server::Server;
@@ -176,21 +176,15 @@ fn start(
     separate_share: bool,
     web: Web,
 ) -> Result<server::Server, Failure> {
-    let names = args.listen.names();
-    let (deadline, program) = (args.deadline, PROGRAM.to_owned());
-    let recordings = args.recordings.clone();
-    let Web { listener, tls, foxglove } = web;
-    let options = Options {
-        listener,
-        tls,
-        names,
-        foxglove,
-        share,
+    let settings = Settings {
         separate_share,
-        recordings,
-        deadline,
-        program,
+        opens_addresses: args.listen.opens_addresses(),
+        deadline: args.deadline,
+        program: PROGRAM.to_owned(),
     };
+    let (names, recordings) = (args.listen.names(), args.recordings.clone());
+    let Web { listener, tls, foxglove } = web;
+    let options = Options { listener, tls, names, foxglove, share, recordings, settings };
     Ok(server::Server::start(options)?)
 }
 

@@ -2,14 +2,15 @@
 
 use std::time::Duration;
 
-use indicatif::ProgressBar;
-use motorlink::port::{PortError, PortName};
-use motorlink::st::{BAUD_RATES, Error, ScanResult, scan_baud};
+use motorlink::port::PortName;
+use motorlink::st::BAUD_RATES;
+use motorlink_telemetry::share::message::{Finding, Protocol};
+use motorlink_telemetry::share::scan::{Found, scan};
 
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::Line;
-use crate::output::{Printer, note};
+use crate::output::note;
 
 pub fn run(
     connection: &Connection,
@@ -37,19 +38,12 @@ pub fn run(
         if has_rate {
             bar.set_message(format!("{rate} baud"));
         }
-        let finding = scan_baud(port, rate, patience);
+        let at_rate = port.at_baud(rate).unwrap_or_else(|| port.clone());
+        let found = scan(&at_rate, Protocol::St, Some(patience))?;
         bar.inc(1);
-        if let Err(Error::Port(error @ PortError::BaudRefused { .. })) = &finding {
-            bar.suspend(|| {
-                let text = place.shown("not possible on this port");
-                output.result(text, place.found("impossible", &error.to_string()))
-            })?;
-            continue;
-        }
-        let finding = finding?;
-        echoes |= matches!(finding, ScanResult::Echo);
-        is_found |= matches!(finding, ScanResult::Drive(_) | ScanResult::Refuses(_));
-        report(&bar, output, &place, &finding)?;
+        echoes |= found.finding == Finding::Echo;
+        is_found |= matches!(found.finding, Finding::Drive | Finding::Refuses);
+        bar.suspend(|| output.result(place.shown(&found.text), place.found(&found)))?;
     }
     bar.finish_and_clear();
     if is_found {
@@ -64,27 +58,6 @@ pub fn run(
         "no drive answered on {port}; is it powered, are RX and TX crossed, does another program \
          hold the port?"
     )))
-}
-
-fn report(
-    bar: &ProgressBar,
-    output: Printer,
-    place: &Place<'_>,
-    finding: &ScanResult,
-) -> Result<(), Failure> {
-    let (word, text) = match finding {
-        ScanResult::Drive(info) => {
-            let [major, minor, patch] = info.version;
-            ("drive", format!("{} {major}.{minor}.{patch}", info.name))
-        }
-        ScanResult::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
-        ScanResult::Garbage => {
-            ("garbage", "bytes that are no reply: is it another rate?".to_owned())
-        }
-        ScanResult::Echo => ("echo", "each sent byte is received again".to_owned()),
-        ScanResult::Silence => ("silence", "silence".to_owned()),
-    };
-    bar.suspend(|| output.result(place.shown(&text), place.found(word, &text)))
 }
 
 /// Where a drive is looked for.
@@ -104,13 +77,13 @@ impl Place<'_> {
     }
 
     /// What was found, for programs.
-    fn found(&self, finding: &str, text: &str) -> Line {
+    fn found(&self, Found { finding, text, .. }: &Found) -> Line {
         let line = Line::about(&self.port.to_string(), None);
         let line = match self.rate {
             Some(rate) => line.with("baud", rate),
             None => line,
         };
-        line.with("finding", finding).with("text", text)
+        line.with("finding", finding.word()).with("text", text.as_str())
     }
 }
 
@@ -126,7 +99,9 @@ mod tests {
         let at = |rate| Place { port: &port, rate };
         assert_eq!(at(Some(9600)).shown("silence"), "    9600 baud  silence");
         assert_eq!(at(None).shown("silence"), "silence");
-        let baud = |rate| Value::from(at(rate).found("silence", "")).get("baud").cloned();
+        let silence =
+            Found { finding: Finding::Silence, text: "silence".to_owned(), motors: vec![] };
+        let baud = |rate| Value::from(at(rate).found(&silence)).get("baud").cloned();
         assert_eq!([baud(Some(9600)), baud(None)], [Some(9600.into()), None]);
     }
 }

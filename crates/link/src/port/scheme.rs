@@ -122,6 +122,11 @@ pub trait Port: fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether it leads to an address in a network.
+    fn is_address(&self) -> bool {
+        false
+    }
+
     /// What it occupies: the same for all names and options of a device.
     fn place(&self) -> String {
         self.body()
@@ -158,6 +163,22 @@ pub trait CanPort {
 
     /// Opens the port for an event loop, on the machine's clock.
     fn open_event(&self) -> Result<Box<dyn EventCan>, PortError>;
+
+    /// The bit rate in bit/s; `None` if the port cannot choose it.
+    fn bitrate(&self) -> Option<u32> {
+        None
+    }
+
+    /// The bit rates that the port can choose, in bit/s, the highest first.
+    fn bitrates(&self) -> Vec<u32> {
+        Vec::new()
+    }
+
+    /// The same port at another of its [bit rates](Self::bitrates). Close the open one before this is
+    /// opened.
+    fn at_bitrate(&self, _bitrate: u32) -> Option<PortName> {
+        None
+    }
 
     /// Whether it accepts frames no faster than the bus transmits them. Other ports buffer more.
     fn is_paced(&self) -> bool {
@@ -207,6 +228,11 @@ impl PortName {
         self.0.is_device()
     }
 
+    /// As [`Port::is_address`].
+    pub fn is_address(&self) -> bool {
+        self.0.is_address()
+    }
+
     /// As [`Port::place`].
     pub fn place(&self) -> String {
         self.0.place()
@@ -220,6 +246,11 @@ impl PortName {
     /// As [`LinePort::at_baud`].
     pub fn at_baud(&self, baud: u32) -> Option<PortName> {
         self.as_line()?.at_baud(baud)
+    }
+
+    /// As [`CanPort::at_bitrate`].
+    pub fn at_bitrate(&self, bitrate: u32) -> Option<PortName> {
+        self.as_can()?.at_bitrate(bitrate)
     }
 
     /// As [`Port::body`].

@@ -46,10 +46,18 @@ pub struct Options {
     pub foxglove: Option<TcpListener>,
     /// The socket of the share.
     pub share: PathBuf,
-    /// Whether the share is another process, which lives on if this one is killed.
-    pub separate_share: bool,
     /// The folder of recordings. The first recording makes it.
     pub recordings: PathBuf,
+    /// What pages may do, and what they are told.
+    pub settings: Settings,
+}
+
+/// What pages may do, and what they are told.
+pub struct Settings {
+    /// Whether the share is another process, which lives on if this one is killed.
+    pub separate_share: bool,
+    /// Whether pages may open lines at addresses in a network.
+    pub opens_addresses: bool,
     /// How long a page may give no sign of life until its motors stop.
     pub deadline: Duration,
     /// The name and version of this program.
@@ -70,24 +78,12 @@ impl Server {
     /// # Errors
     /// The system gives no threads, sockets or random numbers.
     pub fn start(options: Options) -> io::Result<Self> {
-        let Options {
-            listener,
-            tls,
-            names,
-            foxglove,
-            share,
-            separate_share,
-            recordings,
-            deadline,
-            program,
-        } = options;
+        let Options { listener, tls, names, foxglove, share, recordings, settings } = options;
         let address = listener.local_addr()?;
         let bare_address = foxglove.as_ref().map(TcpListener::local_addr).transpose()?;
         let door = Door::new(address.port(), tls.is_some(), names)?;
         let recordings = Recordings::new(recordings, share.clone());
-        let state =
-            State::new(door, Link::new(share), separate_share, recordings, deadline, program)?;
-        let state = Arc::new(state);
+        let state = Arc::new(State::new(door, Link::new(share), recordings, settings)?);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("monitor")

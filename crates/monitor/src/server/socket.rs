@@ -13,11 +13,12 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
+use super::Settings;
 use super::link::{AGAIN, Link};
 use super::state::State;
 use crate::alive::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
-use crate::page::{Broken, Page, encode};
+use crate::page::{Broken, May, Page, encode};
 use crate::program::{Listener, Program};
 use crate::socket::{Budget, PATIENCE, Sink, close};
 
@@ -57,20 +58,22 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
         Err(error) => (None, own_name.clone(), Some(error.to_string())),
     };
     let (out, outgoing) = mpsc::channel(WAITING);
-    let deadline = Micros::from(state.deadline);
+    let Settings { separate_share, opens_addresses, deadline, program } = &state.settings;
+    let may = May { role, opens_addresses: *opens_addresses };
     let (link, recordings) = (Arc::clone(&state.link), Arc::clone(&state.recordings));
-    let page = Arc::new(Page::new(name.clone(), role, deadline, link, recordings, out));
+    let page =
+        Arc::new(Page::new(name.clone(), may, Micros::from(*deadline), link, recordings, out));
     state.pages().insert(name.clone(), Arc::clone(&page));
     let watched = Arc::clone(&page);
     let watch = tokio::spawn(async move { watched.watch().await }).abort_handle();
     let _present =
         Present { state: &state, page: Arc::clone(&page), name: name.clone(), tasks: vec![watch] };
     let mut first = vec![encode(&Text::Welcome(Welcome {
-        server: state.program.clone(),
+        server: program.clone(),
         name,
         role,
-        deadline: state.deadline.as_secs_f64() * 1e3,
-        separate_share: state.separate_share,
+        deadline: deadline.as_secs_f64() * 1e3,
+        separate_share: *separate_share,
         run: state.run.clone(),
     }))];
     if lost.is_some() {

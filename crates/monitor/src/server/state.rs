@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
+use super::Settings;
 use super::door::{Door, random_word};
 use super::link::Link;
 use crate::foxglove::Viewers;
@@ -21,10 +21,8 @@ const PAGES: usize = 32;
 pub struct State {
     pub door: Door,
     pub link: Arc<Link>,
-    pub separate_share: bool,
+    pub settings: Settings,
     pub recordings: Arc<Recordings>,
-    pub deadline: Duration,
-    pub program: String,
     pub run: String,
     /// Programs that show the same data.
     pub viewers: Arc<Viewers>,
@@ -41,20 +39,16 @@ impl State {
     pub fn new(
         door: Door,
         link: Link,
-        separate_share: bool,
         recordings: Recordings,
-        deadline: Duration,
-        program: String,
+        settings: Settings,
     ) -> io::Result<Self> {
         let (link, run) = (Arc::new(link), random_word()?);
-        let viewers = Viewers::new(Arc::clone(&link), program.clone(), run.clone());
+        let viewers = Viewers::new(Arc::clone(&link), settings.program.clone(), run.clone());
         Ok(State {
             door,
             link,
-            separate_share,
+            settings,
             recordings: Arc::new(recordings),
-            deadline,
-            program,
             run,
             viewers: Arc::new(viewers),
             pages: Mutex::default(),

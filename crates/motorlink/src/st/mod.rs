@@ -43,6 +43,6 @@ pub use motorlink_proto::st::{
     Implausible, Reading, UnknownRegister, ValueError, find_register, parse_value,
 };
 pub use options::Options;
-pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan_baud};
+pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan};
 pub use session::Exchanged;
 pub use stop_on_drop::{StopOnDrop, Stopped};

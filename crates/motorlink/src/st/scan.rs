@@ -1,5 +1,6 @@
-//! Which baud rate does the drive speak?
+//! The search for the baud rate of a drive.
 
+use std::fmt;
 use std::time::Duration;
 
 use motorlink_link::port::{PortError, PortName};
@@ -14,7 +15,7 @@ pub const BAUD_RATES: [u32; 9] =
 /// How long a drive has to answer a question of a scan, unless the user says otherwise.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// What a rate was answered with.
+/// What answered at a rate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ScanResult {
     /// A drive that speaks the protocol.
@@ -29,14 +30,29 @@ pub enum ScanResult {
     Silence,
 }
 
-/// Asks for the board information at one rate, where the port has one, twice; waits `patience` for each answer.
+impl fmt::Display for ScanResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ScanResult::Drive(info) => {
+                let [major, minor, patch] = info.version;
+                write!(f, "{} {major}.{minor}.{patch}", info.name)
+            }
+            ScanResult::Refuses(code) => write!(f, "a drive that answers {code}"),
+            ScanResult::Garbage => f.write_str("bytes that are no reply: is it another rate?"),
+            ScanResult::Echo => f.write_str("each sent byte is received again"),
+            ScanResult::Silence => f.write_str("silence"),
+        }
+    }
+}
+
+/// Opens a port, asks for the board information twice, and waits `patience` for each answer.
+/// [`PortName::at_baud`] gives the port at each of [`BAUD_RATES`].
 ///
 /// # Errors
 /// What keeps the port from being opened.
-pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanResult, Error> {
-    let port = port.at_baud(baud).unwrap_or_else(|| port.clone());
+pub fn scan(port: &PortName, patience: Duration) -> Result<ScanResult, Error> {
     let options = Options { timeout: patience, recovery: Recovery::Pad, ..Options::default() };
-    let open = |profile| Client::open(&port, Options { profile, ..options });
+    let open = |profile| Client::open(port, Options { profile, ..options });
     // The board information is the same in each profile.
     let is_open = |opened: &Result<_, Error>| {
         !matches!(opened, Err(Error::Port(PortError::HeldInProfile { .. })))

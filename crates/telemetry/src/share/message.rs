@@ -115,6 +115,19 @@ pub enum Ask {
     Rates,
     /// The ports that the computer of the share has.
     Ports,
+    /// Opens a port that no line has, asks what answers there at one rate, and closes it.
+    Scan {
+        /// The port, as `open` takes it.
+        port: String,
+        /// What its drives may speak.
+        protocol: Protocol,
+        /// The rate: baud of a serial line, bit/s of a CAN bus. That of the port's name without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rate: Option<u32>,
+        /// How long to wait for each reply, in seconds; a short time without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        timeout: Option<f64>,
+    },
     /// Opens a port as a new line.
     Open {
         /// The port, as `-p` takes it: a device, a CAN interface, an adapter or a TCP address.
@@ -302,6 +315,23 @@ pub enum Answer {
         /// Those that can be found without opening them.
         ports: Vec<FoundPort>,
     },
+    /// To scan.
+    Scan {
+        /// The port at this rate, as `open` takes it.
+        port: String,
+        /// The rate. Missing if the port cannot choose it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rate: Option<u32>,
+        /// What answered.
+        finding: Finding,
+        /// The same in words.
+        text: String,
+        /// The IDs of the RMD motors that replied.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        motors: Vec<u8>,
+        /// The rates that the port can choose, the most frequent first.
+        rates: Vec<u32>,
+    },
     /// To open.
     Open {
         /// The name of the new line.
@@ -326,6 +356,30 @@ pub enum Answer {
         /// What the line carried from the first one of these frames to the last.
         load: WireLoad,
     },
+}
+
+/// What answered at a rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Finding {
+    /// A drive of the protocol.
+    Drive,
+    /// An ST drive that refuses to say its name.
+    Refuses,
+    /// Bytes that are no reply.
+    Garbage,
+    /// Motors of another protocol, or motors that another program commands.
+    Foreign,
+    /// What was sent.
+    Echo,
+    /// Nothing.
+    Silence,
+    /// The port cannot have the rate.
+    Impossible,
+    /// A finding of a later version.
+    #[serde(other)]
+    Later,
 }
 
 /// A port of the computer of a share.
@@ -638,6 +692,8 @@ pub enum Happening {
     Opened,
     /// A line was closed.
     Closed,
+    /// It was asked what answers on a port that no line has.
+    Scanned,
     /// An event of a later version.
     #[serde(other)]
     Later,
@@ -646,9 +702,21 @@ pub enum Happening {
 impl Happening {
     /// One word for programs, as in the messages, with `_`: `stop_failed`.
     pub fn slug(self) -> String {
-        let word = serde_json::to_value(self).ok();
-        word.and_then(|word| Some(word.as_str()?.replace('-', "_"))).unwrap_or_default()
+        word(self).replace('-', "_")
     }
+}
+
+impl Finding {
+    /// One word for programs, as in the messages.
+    pub fn word(self) -> String {
+        word(self)
+    }
+}
+
+/// The word of a message.
+fn word(word: impl Serialize) -> String {
+    let word = serde_json::to_value(word).ok();
+    word.and_then(|word| Some(word.as_str()?.to_owned())).unwrap_or_default()
 }
 
 /// Why a request was not carried out.

@@ -4,7 +4,8 @@
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port.
-//! [`opening`] opens the ports of lines. [`words`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
+//! [`opening`] opens the ports of lines, [`scan`] asks what answers on others. [`words`] makes sentences
+//! of the events of an engine. [`wire`] keeps the frames of a line.
 
 pub mod data;
 pub mod dialogue;
@@ -13,6 +14,7 @@ pub mod hub;
 pub mod message;
 pub mod opening;
 pub mod port;
+pub mod scan;
 pub mod server;
 pub mod stream;
 pub mod wire;

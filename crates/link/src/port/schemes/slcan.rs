@@ -73,7 +73,7 @@ fn bitrates() -> String {
 }
 
 /// An adapter and its bus.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Adapter {
     /// The port of the adapter.
     line: PortName,
@@ -120,6 +120,10 @@ impl Port for Adapter {
         self.line.is_device()
     }
 
+    fn is_address(&self) -> bool {
+        self.line.is_address()
+    }
+
     fn place(&self) -> String {
         self.line.place()
     }
@@ -136,5 +140,18 @@ impl CanPort for Adapter {
         let line = self.line()?;
         let link = SlcanLink::open(line.open_event()?, line.label(), self.bitrate)?;
         Ok(if self.echo { Box::new(EchoCanceller::new(link)) } else { Box::new(link) })
+    }
+
+    fn bitrate(&self) -> Option<u32> {
+        Some(self.bitrate.bits_per_second())
+    }
+
+    fn bitrates(&self) -> Vec<u32> {
+        Bitrate::ALL.iter().rev().map(|rate| rate.bits_per_second()).collect()
+    }
+
+    fn at_bitrate(&self, bitrate: u32) -> Option<PortName> {
+        let bitrate = Bitrate::from_bits_per_second(bitrate)?;
+        Some(PortName::new(Adapter { bitrate, ..self.clone() }))
     }
 }

@@ -109,6 +109,10 @@ impl Port for TcpBytes {
     fn is_device(&self) -> bool {
         self.clock.is_none()
     }
+
+    fn is_address(&self) -> bool {
+        true
+    }
 }
 
 impl LinePort for TcpBytes {

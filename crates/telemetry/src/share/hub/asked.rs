@@ -179,6 +179,10 @@ impl Hub {
             }
             Ask::Rates => self.rates(session, id),
             Ask::Ports => self.list_ports(session, name, id),
+            Ask::Scan { port, protocol, rate, timeout } => {
+                let order = self.order(&port, protocol, None, timeout)?;
+                self.scan_port(session, name, id, order, rate)
+            }
             Ask::Open { port, protocol, profile, timeout } => {
                 let order = self.order(&port, protocol, profile.as_deref(), timeout)?;
                 self.open_line(session, name, id, order)

@@ -8,7 +8,7 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 
 use super::asked::{Refused, usage};
-use super::jobs::{Asker, Does, End, Job, JobId, found_ports};
+use super::jobs::{Asker, Does, End, Job, JobId, Scanned, found_ports};
 use super::line::Held;
 use super::place::SessionId;
 use super::{Hub, News};
@@ -18,6 +18,7 @@ use crate::share::message::{
     Reason, StoppedMotor,
 };
 use crate::share::opening::{OpenError, Opened, Wish};
+use crate::share::scan::{self, Found};
 
 /// The shortest time for a reply, in seconds.
 const SHORTEST_TIMEOUT: f64 = 1e-3;
@@ -92,11 +93,39 @@ impl Hub {
         }
         match self.jobs.at(&place) {
             Some(job) => {
-                let does = if job.does(Does::Opens) { "opens" } else { "closes" };
-                Err((Reason::Busy, format!("{} {does} {port} at this moment", job.asker.by)))
+                let (by, does) = (&job.asker.by, job.verb());
+                Err((Reason::Busy, format!("{by} {does} {port} at this moment")))
             }
             None => Ok(port),
         }
+    }
+
+    /// Asks what answers on a port at a rate.
+    pub(super) fn scan_port(
+        &mut self,
+        session: SessionId,
+        by: &Arc<str>,
+        id: u32,
+        Order { wish, protocol }: Order,
+        rate: Option<u32>,
+    ) -> Result<Option<Answer>, Refused> {
+        let rates = scan::rates(&wish.port, protocol);
+        let port = match rate {
+            None => wish.port.clone(),
+            Some(rate) => scan::at_rate(&wish.port, protocol, rate).ok_or_else(|| {
+                let known = rates.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+                usage(match rates.is_empty() {
+                    true => format!("{} has no rate that can be chosen", wish.port),
+                    false => format!("{} has no rate {rate}; its rates are {known}", wish.port),
+                })
+            })?,
+        };
+        let place = Some((port.place(), Does::Scans));
+        self.begin(session, by, id, place, move || {
+            let found = scan::scan(&port, protocol, wish.timeout);
+            let rate = scan::rate_of(&port, protocol);
+            End::Scanned(Scanned { port, rate, rates, found })
+        })
     }
 
     /// Opens a line, also if the program leaves meanwhile.
@@ -139,7 +168,10 @@ impl Hub {
     fn check_jobs(&self) -> Result<(), Refused> {
         match self.jobs.are_many() {
             false => Ok(()),
-            true => Err((Reason::Busy, "the share opens or closes too many ports now".to_owned())),
+            true => Err((
+                Reason::Busy,
+                "the share scans, opens or closes too many ports now".to_owned(),
+            )),
         }
     }
 
@@ -171,6 +203,7 @@ impl Hub {
         };
         let answer = match end {
             Some(End::Listed(ports)) => Ok(self.listed(ports)),
+            Some(End::Scanned(scanned)) => self.scanned(&by, scanned),
             Some(End::Opened(opened)) => self.opened(&by, *opened),
             Some(End::Closed(name, port, stopped)) => Ok(self.closed(&by, &name, &port, stopped)),
             None => Err((Reason::Line, "the share has a fault".to_owned())),
@@ -189,6 +222,18 @@ impl Hub {
             FoundPort { line: held.map(|held| held.name.clone()), ..port }
         };
         Answer::Ports { ports: ports.into_iter().map(with_line).collect() }
+    }
+
+    fn scanned(
+        &mut self,
+        by: &Arc<str>,
+        Scanned { port, rate, rates, found }: Scanned,
+    ) -> Result<Answer, Refused> {
+        let Found { finding, text, motors } =
+            found.map_err(|error| (Reason::Line, error.to_string()))?;
+        let port = port.to_string();
+        self.say(Happening::Scanned, by, format!("{by} asked what answers on {port}: {text}"));
+        Ok(Answer::Scan { port, rate, finding, text, motors, rates })
     }
 
     fn opened(

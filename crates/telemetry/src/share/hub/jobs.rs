@@ -1,4 +1,5 @@
-//! What takes longer than the hub may wait: ports that are listed, opened and closed, in threads.
+//! What takes longer than the hub may wait: ports that are listed, scanned, opened and closed, in
+//! threads.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -12,6 +13,7 @@ use super::place::SessionId;
 use crate::line::Stopped;
 use crate::share::message::{FoundPort, Protocol};
 use crate::share::opening::{OpenError, Opened};
+use crate::share::scan::Found;
 
 /// Jobs at the same time.
 const MOST_JOBS: usize = 8;
@@ -45,6 +47,7 @@ pub(super) struct Job {
 /// What a job does with a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Does {
+    Scans,
     Opens,
     Closes,
 }
@@ -52,8 +55,18 @@ pub(super) enum Does {
 /// What a job came to.
 pub(super) enum End {
     Listed(Vec<(FoundPort, String)>),
+    Scanned(Scanned),
     Opened(Box<Result<Opened, OpenError>>),
     Closed(String, PortName, Vec<Stopped>),
+}
+
+/// A port that was scanned.
+pub(super) struct Scanned {
+    /// At the rate of the scan.
+    pub(super) port: PortName,
+    pub(super) rate: Option<u32>,
+    pub(super) rates: Vec<u32>,
+    pub(super) found: Result<Found, OpenError>,
 }
 
 /// Says that the thread of a job ends, also if it panics.
@@ -122,6 +135,16 @@ impl Job {
     /// What it came to; `None` if it panicked.
     pub(super) fn end(self) -> (Asker, Option<End>) {
         (self.asker, self.thread.join().ok())
+    }
+
+    /// What it does with its port, in a word.
+    pub(super) fn verb(&self) -> &'static str {
+        match self.place {
+            Some((_, Does::Scans)) => "scans",
+            Some((_, Does::Opens)) => "opens",
+            Some((_, Does::Closes)) => "closes",
+            None => "uses",
+        }
     }
 
     pub(super) fn does(&self, what: Does) -> bool {

@@ -1,21 +1,18 @@
 // Ports that the computer of the server has, and those that are opened as new lines.
 import { useSignal } from '@preact/signals';
 import { useCallback, useEffect, useId } from 'preact/hooks';
-import { ask, welcome } from '../link';
+import { welcome } from '../link';
 import { Said, useSaid } from '../parts';
 import { Confirm } from '../registers/confirm';
 import type { FoundPort, Protocol, StoppedMotor } from '../wire';
+import './connect.css';
+import { askPorts } from './ask';
+import { Scan } from './results';
+import type { Wanted } from './scan';
 
 const PROFILES = ['spec', 'mcsdk-5.4'] as const;
 
 const isOperator = () => welcome.value?.role === 'operator';
-
-/** What a share of an earlier version says is for programs. */
-function told(why: unknown): never {
-  const text = (why as Error).message;
-  if (!text.includes('unknown variant')) throw why;
-  throw new Error('This share is of an earlier version: it has the ports of its start only.');
-}
 
 /** How motors took the end of their line. */
 export function closedText(line: string, motors: readonly StoppedMotor[]): string {
@@ -56,19 +53,21 @@ function OpenForm({ port, protocol, opened }: {
   const timeout = useSignal('');
   const { said, attempt, isBusy } = useSaid();
   const id = useId();
+  const wanted = (): Wanted => {
+    const ms = timeout.value.trim() === '' ? null : Number(timeout.value);
+    if (ms !== null && !(ms >= 1 && ms <= 60_000)) throw new Error('A reply timeout is 1 to 60000 ms.');
+    return { port: port.value.trim(), protocol: protocol.value, timeout: ms === null ? null : ms / 1000 };
+  };
   const open = () =>
     attempt(async () => {
-      const ms = timeout.value.trim() === '' ? null : Number(timeout.value);
-      if (ms !== null && !(ms >= 1 && ms <= 60_000)) throw new Error('A reply timeout is 1 to 60000 ms.');
-      const { line } = await ask({
+      const one = wanted();
+      const { line } = await askPorts({
         ask: 'open',
-        port: port.value.trim(),
-        protocol: protocol.value,
-        profile: protocol.value === 'st' ? profile.value : null,
-        timeout: ms === null ? null : ms / 1000,
-      }).catch(told);
+        ...one,
+        profile: one.protocol === 'st' ? profile.value : null,
+      });
       opened();
-      return `${port.value.trim()} is open: it is the line ${line}.`;
+      return `${one.port} is open: it is the line ${line}.`;
     });
   return (
     <form
@@ -92,7 +91,8 @@ function OpenForm({ port, protocol, opened }: {
         />
       </label>
       <p class="muted wide" id={`${id}-hint`}>
-        As -p takes it: /dev/ttyACM0, /dev/ttyUSB0?baud=9600, slcan:/dev/ttyACM1, socketcan:can0, tcp:HOST:PORT
+        As -p takes it: /dev/ttyACM0, /dev/ttyUSB0?baud=9600, slcan:/dev/ttyACM1, socketcan:can0, tcp:HOST:PORT.
+        Scan asks what answers there, at each rate that the port can choose.
       </p>
       <label>
         Protocol
@@ -126,6 +126,7 @@ function OpenForm({ port, protocol, opened }: {
       <button type="submit" disabled={isBusy || !port.value.trim()}>
         {isBusy ? 'Opening …' : 'Open'}
       </button>
+      <Scan wanted={wanted} isReady={port.value.trim() !== ''} use={(found) => (port.value = found)} />
       <Said said={said} />
     </form>
   );
@@ -141,7 +142,7 @@ export function Connect() {
   const look = useCallback(
     () =>
       void attempt(async () => {
-        ports.value = (await ask({ ask: 'ports' }).catch(told)).ports;
+        ports.value = (await askPorts({ ask: 'ports' })).ports;
       }),
     [],
   );
@@ -185,7 +186,7 @@ export function Connect() {
 export function CloseLine({ line, closed }: { line: string; closed: (what: () => Promise<string>) => void }) {
   const isAsked = useSignal(false);
   if (!isOperator()) return null;
-  const close = () => closed(async () => closedText(line, (await ask({ ask: 'close', line }).catch(told)).motors));
+  const close = () => closed(async () => closedText(line, (await askPorts({ ask: 'close', line })).motors));
   return (
     <>
       <button type="button" onClick={() => (isAsked.value = true)}>
