@@ -854,7 +854,7 @@ line: string,
  */
 motor: number, } | { "ask": "stop", 
 /**
- * The motor; all motors that were started or read, without it.
+ * The motor; all motors that the lines can have, without it.
  */
 motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "scan", 
 /**

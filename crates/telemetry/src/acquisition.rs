@@ -62,6 +62,8 @@ pub struct Acquisition {
     consumers: BTreeMap<ConsumerId, Consumer>,
     /// Events that are told once the stops that they are about have gone out.
     untold: Vec<Arc<Event>>,
+    /// The stops as a precaution that no drive has confirmed. They are told once a drive confirms them.
+    precautions: BTreeMap<CommandId, (Arc<str>, Request)>,
     last_consumer: u64,
     tally: Tally,
     /// Who stopped the motors.
@@ -139,6 +141,7 @@ impl Acquisition {
             last_poll: 0,
             consumers: BTreeMap::new(),
             untold: Vec::new(),
+            precautions: BTreeMap::new(),
             last_consumer: 0,
             tally: Tally::default(),
             latch: None,
@@ -244,6 +247,18 @@ impl Acquisition {
         }
         let what = What::Stopping(id, Arc::clone(by), request);
         self.untold.push(Arc::new(Event { time: now, what }));
+        id
+    }
+
+    /// Stops a motor of which nothing is known, in case that it exists: behind all other stops. Events
+    /// tell of it only if the motor confirms it. It withdraws no commands.
+    pub fn stop_as_precaution(&mut self, by: &Arc<str>, request: Request) -> CommandId {
+        let lane = self.line.lane(&request);
+        let told = (Arc::clone(by), request.clone());
+        let by = Arc::clone(by);
+        let command = Arc::new(Command { by, request, is_stop: true, deadline: None });
+        let id = self.schedule.stop_as_precaution(self.clock.now(), lane, command);
+        self.precautions.insert(id, told);
         id
     }
 
@@ -477,6 +492,9 @@ impl Acquisition {
             }
             Some(Verdict::Command(id)) => ended(id, result.map_err(CommandError::Line)),
             Some(Verdict::Stopped(id)) => {
+                if let Some((by, request)) = self.precautions.remove(&id) {
+                    self.tell(What::Stopping(id, by, request));
+                }
                 self.tell(What::Stopped(id));
                 ended(id, result.map_err(CommandError::Line));
             }
@@ -501,7 +519,9 @@ impl Acquisition {
     }
 
     fn stop_failed(&mut self, id: CommandId, why: &CommandError) {
-        self.tell(What::StopFailed(id, Arc::new(why.clone())));
+        if self.precautions.remove(&id).is_none() {
+            self.tell(What::StopFailed(id, Arc::new(why.clone())));
+        }
     }
 
     /// The port is closed. Gives no time: its back-off is in [`retry_in`](Self::retry_in).

@@ -256,6 +256,23 @@ impl Remote {
         })
     }
 
+    /// As [`stop_then`](Self::stop_then), with [`Acquisition::stop_as_precaution`].
+    ///
+    /// # Errors
+    /// The engine has ended. If it ends later, `ended` receives that it has.
+    pub fn stop_as_precaution_then(
+        &self,
+        by: &Arc<str>,
+        request: Request,
+        ended: impl FnOnce(CommandResult) + Send + 'static,
+    ) -> Result<(), Ended> {
+        let by = Arc::clone(by);
+        self.send(move |Engine { acquisition, waiting }| {
+            let id = acquisition.stop_as_precaution(&by, request);
+            waiting.insert(id, Box::new(ended));
+        })
+    }
+
     fn wait(begin: impl FnOnce(Ending) -> Result<(), Ended>) -> Result<CommandResult, Ended> {
         let (sender, receiver) = mpsc::channel();
         // Whoever asked may have gone.

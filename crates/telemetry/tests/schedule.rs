@@ -1,5 +1,6 @@
 //! The schedule on virtual time: drift, fairness, overload, stops, silence, a line that goes away.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use motorlink_proto::time::{Instant, Micros};
@@ -366,6 +367,88 @@ fn a_stop_is_repeated_until_it_is_confirmed() {
     );
 }
 
+/// The stops that begin: when, and which.
+fn stops<'a>(
+    sent: &'a RefCell<Vec<(Instant, &'static str)>>,
+    mut answer: impl FnMut(&str) -> (Micros, Outcome) + 'a,
+) -> impl FnMut(Instant, Lane, &Job<&'static str>) -> (Micros, Outcome) + 'a {
+    move |now, _, job| {
+        let Job::Stop { command, .. } = job else { panic!("{job:?}") };
+        sent.borrow_mut().push((now, *command));
+        answer(command)
+    }
+}
+
+#[test]
+fn stops_go_ahead_of_precautions_on_every_lane() {
+    for rules in [SERIAL, BUS] {
+        let sent = RefCell::default();
+        let mut lost = 3;
+        let mut line = Line::new(
+            rules,
+            stops(&sent, |name| match name {
+                "known" if lost > 0 => {
+                    lost -= 1;
+                    (Micros(1_000), Outcome::Failed)
+                }
+                "known" => (Micros(1_000), Outcome::Answered),
+                _ => (Micros(1_000), Outcome::Refused),
+            }),
+        );
+        let lanes = if rules.window == 1 { [0, 0, 0] } else { [1, 2, 3] };
+        for lane in &lanes[..2] {
+            line.schedule.stop_as_precaution(line.now, Lane(*lane), "other");
+        }
+        line.schedule.stop(line.now, Lane(lanes[2]), "known", |_| true);
+        line.run(SECOND);
+        drop(line);
+        let names: Vec<_> = sent.borrow().iter().map(|(_, name)| *name).collect();
+        let expected = match rules.window {
+            1 => ["known", "known", "known", "known", "other", "other"],
+            _ => ["known", "other", "other", "known", "known", "known"],
+        };
+        assert_eq!(names, expected);
+    }
+}
+
+#[test]
+fn precautions_on_a_silent_line_delay_a_stop_by_one_exchange_and_end_soon() {
+    for pressed in (SECOND..12 * SECOND).step_by(300_000) {
+        let sent = RefCell::default();
+        let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
+        line.schedule.stop(line.now, Lane(0), "known", |_| true);
+        for _ in 0..6 {
+            line.schedule.stop_as_precaution(line.now, Lane(0), "other");
+        }
+        line.run(pressed);
+        line.schedule.stop(line.now, Lane(0), "again", |_| true);
+        line.run(20 * SECOND);
+        drop(line);
+        let sent = sent.into_inner();
+        let (at, _) = sent.iter().find(|(_, name)| *name == "again").unwrap();
+        assert!(at.0 - pressed <= SECOND, "{pressed}: {sent:?}");
+        // Each precaution is sent once here. The others are sent four times.
+        assert_eq!(sent.len(), 4 + 6 + 4, "{pressed}: {sent:?}");
+    }
+}
+
+#[test]
+fn a_precaution_is_repeated_until_it_is_confirmed() {
+    let (sent, mut lost) = (RefCell::default(), 10);
+    let mut line = Line::new(
+        SERIAL,
+        stops(&sent, |_| {
+            lost -= 1;
+            (Micros(1_000), if lost < 0 { Outcome::Answered } else { Outcome::Failed })
+        }),
+    );
+    let id = line.schedule.stop_as_precaution(line.now, Lane(0), "other");
+    line.run(SECOND);
+    assert!(line.at(&Event::Over(Verdict::Stopped(id))).is_some(), "{:?}", line.events);
+    drop(line);
+    assert_eq!(sent.into_inner().len(), 11);
+}
+
 #[test]
 fn a_refused_stop_is_not_repeated() {
     let mut line = Line::new(SERIAL, |_, _, _: &Job<_>| (Micros(1_000), Outcome::Refused));
@@ -483,7 +566,7 @@ proptest! {
     /// Whatever happens, a lane has one exchange, and the window is kept.
     #[test]
     fn a_lane_has_one_exchange_at_a_time(
-        steps in proptest::collection::vec((0u8..8, 0u8..4, 0u64..200_000), 1..200),
+        steps in proptest::collection::vec((0u8..9, 0u8..4, 0u64..200_000), 1..200),
         window in 1usize..5,
         preempts: bool,
     ) {
@@ -505,6 +588,7 @@ proptest! {
                     schedule.closed(now);
                 }
                 4 => schedule.reopened(now),
+                8 => drop(schedule.stop_as_precaution(now, lane, "precaution")),
                 5 => {
                     let outcome = [Outcome::Answered, Outcome::Refused, Outcome::Failed][number as usize % 3];
                     if let Some(at) = under_way.iter().position(|busy| *busy == lane) {

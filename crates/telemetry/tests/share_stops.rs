@@ -12,8 +12,9 @@ use std::time::Duration;
 
 use asking::{Asker, command};
 use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
+use motorlink_proto::st::{Command, Frame, MAX_FRAME, Ramp, Request};
 use motorlink_telemetry::share::message::*;
-use shared::Share;
+use shared::{LIMIT, Share};
 
 /// RMD motors have this time for a reply. Most of the stops here wait for it several times.
 const SHORT: Duration = Duration::from_millis(500);
@@ -137,4 +138,62 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
         assert_eq!(stop_all(&mut program), motors("st0", &[(1, "may turn"), (5, "absent")]));
     }
     assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
+}
+
+/// Sends a request to motor 2 as a program that had the port before the share, and awaits the reply.
+fn before_the_share(link: &mut dyn EventBytes, request: Request<'_>) {
+    let mut bytes = [0; MAX_FRAME];
+    link.write(Frame::command(2, &request, &mut bytes).unwrap()).unwrap();
+    while link.flush().unwrap() {}
+    // The acknowledge has no payload.
+    let mut reply = 0;
+    while reply < 3 {
+        reply += link.read(&mut bytes, Some(LIMIT)).unwrap();
+    }
+}
+
+/// The next motor of st0 that confirms a stop.
+fn stopped_on_st0(program: &mut Asker) -> Option<u8> {
+    loop {
+        let event = program.event(Happening::Stopped);
+        if event.line.as_deref() == Some("st0") {
+            return event.motor;
+        }
+    }
+}
+
+#[test]
+fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
+    let share = Share::with("stops-restart", SHORT, |mut link| {
+        let ramp = Ramp { speed_rpm: 1000, duration_ms: 100 };
+        before_the_share(&mut *link, Request::SetRamp(ramp));
+        before_the_share(&mut *link, Request::ExecuteCommand(Command::StartMotor));
+        link
+    });
+    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    let mut program = Asker::join(&share.path, "reads");
+    program.ask(command("st0", 1, &READ_STATUS)).unwrap();
+    assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed")]));
+    share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
+    assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
+
+    // The drive has said which motors it does not have. They get no further stop, and no event.
+    let stops = |program: &mut Asker, motor| {
+        let (from, to, after) = (Some(0.0), None, None);
+        let ask = Ask::Frames { line: "st0".to_owned(), from, to, after, most: 1000 };
+        let Ok(Answer::Frames { frames, .. }) = program.ask(ask) else { panic!() };
+        let is_stop =
+            |frame: &&WireFrame| frame.motor == Some(motor) && frame.words.contains("STOP_MOTOR");
+        frames.iter().filter(is_stop).count()
+    };
+    while stops(&mut program, 7) == 0 {}
+    assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed")]));
+    assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
+    assert_eq!([1, 2, 3, 7].map(|motor| stops(&mut program, motor)), [2, 2, 1, 1]);
+    // The drive has motors 1 and 2, the bus has 1 to 4.
+    let is_of_no_motor = |event: &&Event| {
+        event.motor > Some(if event.line.as_deref() == Some("st0") { 2 } else { 4 })
+    };
+    let told: Vec<_> = program.events.iter().filter(is_of_no_motor).collect();
+    assert!(told.is_empty(), "{told:?}");
 }

@@ -60,7 +60,7 @@ pub struct Args {
 /// What a running share is asked for.
 #[derive(clap::Subcommand, Clone, Copy)]
 enum AskFor {
-    /// Stop all motors that were started or read through the share
+    /// Stop all motors on the lines of the share
     Stop,
     /// Refuse motion of all programs until it is released
     Latch,

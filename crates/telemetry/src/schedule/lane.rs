@@ -17,6 +17,8 @@ const PAUSE: Micros = Micros::from_millis(500);
 struct Stop<C> {
     id: CommandId,
     command: C,
+    /// It waits until the lane has no other stops.
+    is_precaution: bool,
     attempts: u32,
     not_before: Instant,
     give_up: Instant,
@@ -76,9 +78,15 @@ impl<C: Clone> LaneState<C> {
         overtaken
     }
 
-    pub(super) fn add_stop(&mut self, now: Instant, id: CommandId, command: C) {
-        let give_up = now + STOP_TIME;
-        self.stops.push_back(Stop { id, command, attempts: 0, not_before: now, give_up });
+    pub(super) fn add_stop(
+        &mut self,
+        now: Instant,
+        id: CommandId,
+        command: C,
+        is_precaution: bool,
+    ) {
+        let (not_before, give_up) = (now, now + STOP_TIME);
+        self.stops.push_back(Stop { id, command, is_precaution, attempts: 0, not_before, give_up });
     }
 
     /// Takes out a command whose time is over, or on a closed line a stop.
@@ -113,7 +121,9 @@ impl<C: Clone> LaneState<C> {
     }
 
     fn unsent_stop(&self) -> Option<usize> {
-        self.stops.iter().position(|stop| stop.attempts == 0)
+        let has_others = self.stops.iter().any(|stop| !stop.is_precaution);
+        let is_next = |stop: &Stop<C>| stop.attempts == 0 && !(stop.is_precaution && has_others);
+        self.stops.iter().position(is_next)
     }
 
     /// When a stop is repeated.
@@ -125,6 +135,11 @@ impl<C: Clone> LaneState<C> {
     /// Whether a stop waits that may begin at this time.
     pub(super) fn is_stop_due(&self, now: Instant) -> bool {
         self.due_stop(now).is_some()
+    }
+
+    /// Whether the stop that may begin at this time is a precaution.
+    pub(super) fn is_precaution_due(&self, now: Instant) -> Option<bool> {
+        Some(self.stops[self.due_stop(now)?].is_precaution)
     }
 
     /// Whether a stop may begin: nothing is under way, or what gives way to it.
@@ -239,7 +254,9 @@ impl<C: Clone> LaneState<C> {
 
     fn judge_stop(&mut self, now: Instant, id: CommandId, outcome: Outcome) -> Verdict {
         let Some(mut stop) = self.stops.pop_front() else { return Verdict::StopFailed(id) };
-        let is_given_up = stop.attempts >= STOP_ATTEMPTS && now >= stop.give_up;
+        // Precautions must not occupy a silent line for several timeouts each.
+        let has_tried = stop.is_precaution || stop.attempts >= STOP_ATTEMPTS;
+        let is_given_up = has_tried && now >= stop.give_up;
         match outcome {
             Outcome::Answered => return Verdict::Stopped(id),
             Outcome::Refused | Outcome::GivenUp => return Verdict::StopFailed(id),

@@ -20,7 +20,8 @@
 //!
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
 //! ahead of it, and none that was not sent yet. In a lane that is brought in sync each stop is sent
-//! ahead, one after the other.
+//! ahead, one after the other. A stop as a precaution is for a motor that may not exist. It never goes
+//! ahead of other stops, and those of its lane end before it begins.
 //!
 //! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
 //! little of the line.
@@ -234,8 +235,16 @@ impl<C: Clone> Schedule<C> {
         let id = self.new_id();
         let state = self.lanes.entry(lane).or_default();
         let overtaken = state.overtake(keep);
-        state.add_stop(now, id, command);
+        state.add_stop(now, id, command, false);
         (id, overtaken)
+    }
+
+    /// Queues a stop as a precaution: behind all other stops, ahead of all commands and polls. It is
+    /// repeated for [`STOP_TIME`](motorlink::STOP_TIME), or sent once if it comes later.
+    pub fn stop_as_precaution(&mut self, now: Instant, lane: Lane, command: C) -> CommandId {
+        let id = self.new_id();
+        self.lanes.entry(lane).or_default().add_stop(now, id, command, true);
+        id
     }
 
     /// Takes out the commands that wait and do not pass `keep`: they are not sent any more.
@@ -274,23 +283,20 @@ impl<C: Clone> Schedule<C> {
 
     fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
         let preempts = self.rules.stop_preempts;
-        for (&lane, state) in &mut self.lanes {
-            if !state.may_stop(preempts) {
-                continue;
-            }
-            if let Some((id, command)) = state.next_stop(now) {
-                let displaced = state.under_way.take();
-                match displaced {
-                    Some(displaced) => self.load.over(now, displaced.since),
-                    None => self.under_way += 1,
-                }
-                state.begin(now, Kind::Stop(id));
-                self.load.began(now);
-                let displaced = displaced.map(UnderWay::displaced);
-                return Some((lane, Job::Stop { id, command, displaced }));
-            }
+        let ready = self.lanes.iter().filter(|(_, state)| state.may_stop(preempts));
+        let due = ready.filter_map(|(lane, state)| Some((state.is_precaution_due(now)?, *lane)));
+        let (_, lane) = due.min()?;
+        let state = self.lanes.get_mut(&lane)?;
+        let (id, command) = state.next_stop(now)?;
+        let displaced = state.under_way.take();
+        match displaced {
+            Some(displaced) => self.load.over(now, displaced.since),
+            None => self.under_way += 1,
         }
-        None
+        state.begin(now, Kind::Stop(id));
+        self.load.began(now);
+        let displaced = displaced.map(UnderWay::displaced);
+        Some((lane, Job::Stop { id, command, displaced }))
     }
 
     fn next_command(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {

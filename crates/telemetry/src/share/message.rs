@@ -103,7 +103,7 @@ pub enum Ask {
     },
     /// Stops a motor, or all, ahead of all commands.
     Stop {
-        /// The motor; all motors that were started or read, without it.
+        /// The motor; all motors that the lines can have, without it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motor: Option<MotorName>,
     },

@@ -348,9 +348,6 @@ impl Hub {
         if motors.is_empty() {
             std::mem::swap(&mut motors, &mut others);
         }
-        for (line, motor) in others {
-            self.stop(line, motor, session, None, name);
-        }
         if motors.is_empty() {
             return Ok(Some(Answer::Stop { motors: Vec::new() }));
         }
@@ -369,6 +366,9 @@ impl Hub {
                 let _ = held.remote().post(task);
             }
             self.stop(line, motor, session, Some(part), name);
+        }
+        for (line, motor) in others {
+            self.stop(line, motor, session, None, name);
         }
         Ok(None)
     }

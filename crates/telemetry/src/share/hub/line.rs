@@ -60,6 +60,8 @@ pub struct Held {
     moved: BTreeSet<Motor>,
     /// Numbers for which the drive says that it has no such motor.
     absent: BTreeSet<Motor>,
+    /// The motors whose stop as a precaution is under way.
+    pub(super) precautions: BTreeSet<Motor>,
     /// The motors that did not confirm a stop, and who asked for it.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
 }
@@ -108,6 +110,7 @@ impl Held {
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
             absent: BTreeSet::new(),
+            precautions: BTreeSet::new(),
             unstopped: BTreeMap::new(),
             runner: Runner::start(name, acquisition)?,
         })
@@ -181,11 +184,12 @@ impl Held {
         self.absent.contains(&motor) && !self.may_turn(motor)
     }
 
-    /// The motors that a stop of all motors is sent to. If none was read or commanded, motors may turn
-    /// that a share before this one turned: then it is sent to all that the line can have.
+    /// The motors that a stop of all motors is sent to: all that the line can have, because a share
+    /// before this one may have turned any of them. Numbers that the drive does not have are left out,
+    /// unless somebody asked for them.
     pub(super) fn stoppable(&self) -> impl Iterator<Item = Motor> {
-        let any = self.known.is_empty().then_some(1..=u8::MAX).into_iter().flatten();
-        self.known.iter().copied().chain(any.filter_map(|number| self.speaks.motor(number)))
+        let all = (1..=u8::MAX).filter_map(|number| self.speaks.motor(number));
+        all.filter(|motor| self.known.contains(motor) || !self.absent.contains(motor))
     }
 
     /// Whether no program has read, commanded or turned it, and it has never answered.

@@ -363,6 +363,7 @@ impl Hub {
     /// A stop is over. If the motor did not confirm it, it is repeated.
     fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
         let Some(held) = self.lines.get_mut(&line) else { return };
+        held.precautions.remove(&motor);
         let is_owned = held.owners.contains_key(&motor);
         match result {
             Ok(_) => held.stopped(motor),
@@ -493,9 +494,15 @@ impl Hub {
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
         let asker = Arc::clone(by);
-        let begun = held.remote().stop_then(by, line::stop(motor), move |result| {
-            tell(Work::Stop { part, motor, by: asker, result });
-        });
+        let ended = move |result| tell(Work::Stop { part, motor, by: asker, result });
+        let begun = if part.is_some() || !held.is_unheard(motor) {
+            held.remote().stop_then(by, line::stop(motor), ended)
+        } else if held.precautions.insert(motor) {
+            held.remote().stop_as_precaution_then(by, line::stop(motor), ended)
+        } else {
+            // The one that is under way is repeated.
+            return;
+        };
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
             let name = held.name.as_str().into();
