@@ -912,7 +912,11 @@ after?: number | null,
 /**
  * How many at most.
  */
-most: number, });
+most: number, } | { "ask": "leave", 
+/**
+ * The reason, for the log.
+ */
+why: string, });
 
 export type ShareText = { "kind": "answer", 
 /**

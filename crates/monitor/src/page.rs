@@ -190,7 +190,7 @@ impl Page {
                 self.check_operator()?;
                 self.check_port(port)?;
             }
-            Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } => {
+            Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } | Ask::Leave { .. } => {
                 let message = "a page may not send this request".to_owned();
                 return Err(Refusal { reason: Reason::Forbidden, message, code: None });
             }

@@ -145,14 +145,14 @@ impl Program {
 
     /// Ends the connection at once: the share stops the motors that it turned.
     pub fn close(&self) {
-        self.close_because(ended());
+        self.shared.close(ended());
     }
 
-    /// As [`close`](Self::close). Requests without an answer get this one.
+    /// As [`close`](Self::close), and the log of the share has the reason if it can be written at once.
+    /// Requests without an answer get this one.
     pub fn close_because(&self, why: Refusal) {
-        // It has ended already.
-        let _ = shutdown(&self.shared.socket, Shutdown::Both);
-        self.shared.end(why);
+        self.shared.give_reason(&why.message);
+        self.shared.close(why);
     }
 
     /// Whether both ask through the same connection.
@@ -222,14 +222,30 @@ impl Listener {
 impl Drop for Listener {
     fn drop(&mut self) {
         // Copies of the program keep the socket open.
-        let _ = shutdown(&self.shared.socket, Shutdown::Both);
-        self.shared.end(ended());
+        self.shared.close(ended());
     }
 }
 
 impl Shared {
     fn pending(&self) -> std::sync::MutexGuard<'_, Pending> {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says why this program leaves. The end of the connection does not wait for it.
+    fn give_reason(&self, why: &str) {
+        // Within another request the share would not find it.
+        let Ok(writer) = self.writer.try_lock() else { return };
+        let leave = Request { id: OWN_IDS - 1, ask: Ask::Leave { why: why.to_owned() } };
+        let mut bytes = Vec::new();
+        if frame::append(Kind::Text, &message::encode(&leave), &mut bytes).is_ok() {
+            let _ = writer.try_write(&bytes);
+        }
+    }
+
+    fn close(&self, why: Refusal) {
+        // It has ended already.
+        let _ = shutdown(&self.socket, Shutdown::Both);
+        self.end(why);
     }
 
     /// No request gets an answer any more.

@@ -383,6 +383,43 @@ fn the_motors_of_a_program_that_goes_stop_and_no_others() {
 }
 
 #[test]
+fn a_program_that_leaves_says_why_its_motors_stop() {
+    let share = Share::new("leaves");
+    let (mut watcher, mut page) = (share.join("watcher"), share.join("page 4 (control)"));
+    let leave = |why: &str| Ask::Leave { why: why.to_owned() };
+    for why in ["", &"x".repeat(201), "line\nline"] {
+        assert_eq!(page.ask(leave(why)).unwrap_err().0, Reason::Usage);
+    }
+    page.turn(1, 360);
+    page.start_st();
+    share.reaches("rmd1.speed_dps", |dps| dps > 300.0);
+    page.send(leave("the page gave no sign of life for 300 ms"));
+    // The share closes the connection.
+    while !matches!(page.receive(), Got::End) {}
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+    let left = watcher.await_event(Happening::Left);
+    assert_eq!(left.by.as_deref(), Some("page 4 (control)"));
+    assert_eq!(left.message, "page 4 (control) left: the page gave no sign of life for 300 ms");
+    let mut stopping = [(); 2].map(|()| watcher.await_event(Happening::Stopping).message);
+    stopping.sort();
+    let why = "page 4 (control) has left: the page gave no sign of life for 300 ms";
+    let expected = ["rmd0", "st0"];
+    assert_eq!(
+        stopping,
+        expected.map(|line| format!("{line}, motor 1: the share stops it, because {why}"))
+    );
+
+    // Without a reason there is none.
+    let mut other = share.join("other");
+    other.turn(1, 360);
+    drop(other);
+    assert_eq!(watcher.await_event(Happening::Left).message, "other left");
+    let stopping = watcher.await_event(Happening::Stopping).message;
+    assert_eq!(stopping, "rmd0, motor 1: the share stops it, because other has left");
+}
+
+#[test]
 fn refused_starts_take_a_motor_from_nobody() {
     let share = Share::new("refused");
     let mut operator = share.join("operator");

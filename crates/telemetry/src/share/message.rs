@@ -15,6 +15,8 @@ pub const LONGEST_PORT: usize = 512;
 pub const LONGEST_TIMEOUT: f64 = 60.0;
 /// The longest name of a program, in bytes.
 pub const LONGEST_NAME: usize = 64;
+/// The longest reason of a program that leaves, in bytes.
+pub const LONGEST_WHY: usize = 200;
 /// The most records that wait for a program in one subscription.
 pub const LONGEST_QUEUE: u32 = 100_000;
 /// The most signals of one subscription.
@@ -162,6 +164,11 @@ pub enum Ask {
         after: Option<u64>,
         /// How many at most.
         most: u32,
+    },
+    /// Ends the connection at once, as closing it does. It has no answer.
+    Leave {
+        /// The reason, for the log.
+        why: String,
     },
 }
 

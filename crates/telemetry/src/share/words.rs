@@ -69,6 +69,8 @@ pub struct Told {
 #[derive(Debug, Default)]
 pub struct Words {
     stops: HashMap<CommandId, (Option<Motor>, Arc<str>)>,
+    /// Why programs left whose motors the share stops next.
+    reasons: HashMap<(Motor, Arc<str>), String>,
 }
 
 impl Words {
@@ -84,6 +86,11 @@ impl Words {
             What::Answers(motor) => retry.extend(motors.filter(|it| *it == motor)),
             _ => {}
         }
+    }
+
+    /// The event of the next stop of a motor by the share has this reason. `by` is from [`after`].
+    pub(super) fn explain(&mut self, motor: Motor, by: &Arc<str>, why: &str) {
+        self.reasons.insert((motor, Arc::clone(by)), why.to_owned());
     }
 
     /// The event with its sentence. Reads and confirmations are none.
@@ -120,7 +127,12 @@ impl Words {
             What::Unanswered(..) | What::Confirmed(..) | What::Commanded(..) => None,
             What::Stopping(id, by, request) => {
                 self.stops.insert(*id, (request.motor(), Arc::clone(by)));
-                let message = stops(by);
+                let reason = request.motor().map(|motor| (motor, Arc::clone(by)));
+                let reason = reason.and_then(|key| self.reasons.remove(&key));
+                let message = match reason {
+                    Some(why) => format!("{}: {why}", stops(by)),
+                    None => stops(by),
+                };
                 event(Happening::Stopping, request.motor(), Some(by), message)
             }
             What::Stopped(id) => {

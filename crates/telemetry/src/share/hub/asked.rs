@@ -20,7 +20,7 @@ use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
 use crate::share::message::{
     self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
-    MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
+    LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
 };
 use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
@@ -93,7 +93,7 @@ impl Hub {
             let message = format!("this share speaks version {VERSION}, the program {protocol}");
             return Err((Reason::Version, message));
         }
-        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(is_printable) {
+        if !is_text(name, LONGEST_NAME) {
             return Err(usage(format!("a name has 1 to {LONGEST_NAME} bytes that can be printed")));
         }
         let is_taken = |name: &str| {
@@ -121,7 +121,8 @@ impl Hub {
         ask: Ask,
         waited: Micros,
     ) -> Result<Option<Answer>, Refused> {
-        let may_stop = matches!(ask, Ask::Stop { .. } | Ask::Latch | Ask::Command { .. });
+        let may_stop =
+            matches!(ask, Ask::Stop { .. } | Ask::Latch | Ask::Command { .. } | Ask::Leave { .. });
         if !may_stop {
             self.check_busy(session)?;
         }
@@ -198,6 +199,15 @@ impl Hub {
                 }
                 let (from, to) = (from.map(instant).transpose()?, to.map(instant).transpose()?);
                 Ok(Some(self.lines[&line].frames(Part { from, to, after, most })))
+            }
+            Ask::Leave { why } => {
+                if !is_text(&why, LONGEST_WHY) {
+                    return Err(usage(format!(
+                        "a reason has 1 to {LONGEST_WHY} bytes that can be printed"
+                    )));
+                }
+                self.leave_because(session, Some(&why));
+                Ok(None)
             }
         }
     }
@@ -431,6 +441,7 @@ fn refused(error: &CommandError) -> Refused {
     (reason(error), error.to_string())
 }
 
-fn is_printable(character: char) -> bool {
-    motorlink_link::is_printable(character)
+/// Whether a text has 1 to `longest` bytes, and all characters can be printed.
+fn is_text(text: &str, longest: usize) -> bool {
+    (1..=longest).contains(&text.len()) && text.chars().all(motorlink_link::is_printable)
 }

@@ -45,7 +45,7 @@ pub struct Held {
     /// One moment by both clocks.
     anchor: (Instant, f64),
     events: Subscription,
-    words: Words,
+    pub(super) words: Words,
     /// Who turned a motor last. They may have left; then its stop is not confirmed.
     pub(super) owners: BTreeMap<Motor, SessionId>,
     /// Starts that the engine has not finished, and who sent them.

@@ -149,6 +149,11 @@ impl Hub {
 
     /// A program has gone. The motors that it turned last are stopped.
     pub fn leave(&mut self, id: SessionId) {
+        self.leave_because(id, None);
+    }
+
+    /// As [`leave`](Self::leave), with the reason that the program gave.
+    fn leave_because(&mut self, id: SessionId, why: Option<&str>) {
         let Some(session) = self.sessions.remove(&id) else { return };
         for held in self.lines.values_mut() {
             held.sequences.retain(|(_, program)| *program != id);
@@ -157,10 +162,14 @@ impl Hub {
             feed.end(&self.lines);
         }
         let Some(name) = session.name else { return };
-        self.say(Happening::Left, &name, format!("{name} left"));
+        let left = why.map_or_else(|| format!("{name} left"), |why| format!("{name} left: {why}"));
+        self.say(Happening::Left, &name, left);
         let by = words::after(&name);
         for line in self.numbers() {
             for motor in self.orphans(line, id) {
+                if let Some((why, held)) = why.zip(self.lines.get_mut(&line)) {
+                    held.words.explain(motor, &by, why);
+                }
                 self.stop(line, motor, id, None, &by);
             }
         }
