@@ -5,6 +5,7 @@ import math
 import socket
 import time
 from contextlib import ExitStack
+from operator import attrgetter
 from urllib.parse import urlsplit
 
 import pytest
@@ -21,6 +22,10 @@ from sharing import Client
 SIGNALS = "/st0/motor1/signals"
 USUAL = ["/joint_states", "/diagnostics", "/events", SIGNALS, "/st0/motor1/signals_2_hz", "/rmd0/motor3/signals"]
 DOORS = ["foxglove_url", "foxglove_url_without_token"]
+#: The most bytes of messages that wait for a viewer, and what the systems and its library store besides.
+WAITING, STORED = 1 << 20, 1 << 17
+#: A viewer that hardly reads takes one message while this many come.
+TO_ONE = 20
 
 
 @pytest.fixture
@@ -174,27 +179,69 @@ def narrow(url):
     stream = socket.socket()
     stream.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stream.connect((parts.hostname, parts.port))
-    return Viewer(url, sock=stream, max_queue=1)
+    # The replies to pings of the library would wait behind messages that it has not read.
+    return Viewer(url, sock=stream, max_queue=1, ping_interval=None)
 
 
-def test_a_viewer_that_hardly_reads_is_told_or_disconnected_and_delays_nobody(ready):
+def test_a_viewer_that_hardly_reads_loses_the_oldest_is_told_how_many_and_delays_nobody(ready):
     with Viewer(ready[DOORS[0]]) as other, narrow(ready[DOORS[1]]) as slow:
-        other.subscribe(SIGNALS)
         for topic in USUAL:
             other.until(lambda topic=topic: topic in other.channels)
-        for topic in other.channels:
+        for topic in list(other.channels):
+            other.subscribe(topic)
+        usual = set(other.topics.values()) - {"/events"}
+        other.until(lambda: {it.topic for it in other.messages} >= usual)
+        for topic in other.topics.values():
             slow.subscribe(topic)
-        while not slow.statuses:
+        # Subscriptions begin one after the other.
+        slow.until(lambda: {it.topic for it in slow.messages} >= usual)
+        slow.messages.clear()
+        key = attrgetter("topic", "time", "data")
+        #: What the slow viewer is told: how many messages are lost, and how many it has read before.
+        told = []
+
+        def read():
+            slow.receive()
+            for level, text in slow.statuses[len(told):]:
+                assert level == 1 and text.endswith(" messages are lost here: this viewer is too slow"), text
+                told.append((int(text.split()[0]), len(slow.messages)))
+
+        while len(told) < 2:
             seen = len(other.messages)
-            other.until(lambda seen=seen: len(other.messages) > seen)
-            try:
-                slow.receive()
-            except ConnectionClosed:
-                break
-        assert all(level == 1 and "messages are lost here" in text for level, text in slow.statuses)
+            other.until(lambda seen=seen: len(other.messages) >= seen + TO_ONE)
+            read()
+            other.catch_up()
+        # Now it reads all that waited for it.
+        waited_from, until = len(slow.messages), len(other.messages)
+        known = set(map(key, other.messages))
+        while key(slow.messages[-1]) in known:
+            read()
+        last = key(slow.messages[-1])
+        other.until(lambda: key(other.messages[-1]) == last)
+        other.until(lambda: abs(other.messages[-1].time / 1e9 - time.time()) < 2)
         assert not other.statuses
-        assert abs(other.messages[-1].time / 1e9 - time.time()) < 2
         assert not any(b.time - a.time > 1e9 for a, b in zip(other.messages, other.messages[1:]))
+
+        numbers = {key(it): number for number, it in enumerate(other.messages)}
+        arrived = [numbers[key(it)] for it in slow.messages]
+        assert arrived == sorted(set(arrived))
+
+        def size(some):
+            return sum(len(other.messages[it].data) for it in some)
+
+        # What waits is bounded, and the newest of it is complete.
+        assert size(it for it in arrived[waited_from:] if it < until) <= WAITING + STORED
+        newest = until
+        while size(range(newest, until)) < WAITING // 2:
+            newest -= 100
+        assert set(arrived) >= set(range(newest, until))
+
+        def lost(count):
+            """How many messages are missing among the first ones that arrived."""
+            return arrived[count - 1] - arrived[0] + 1 - count
+
+        for number, (_, count) in enumerate(told, 1):
+            assert lost(count) <= sum(said for said, _ in told[:number]) <= lost(count + 1), (told, number)
 
 
 WRONG = [

@@ -13,7 +13,7 @@ use super::viewers::{Viewer, Viewers};
 use crate::socket::{Budget, PATIENCE, Sink, close};
 
 /// How much is handed to the system at once, in bytes: a viewer that takes this in time is there.
-pub const PACKED: usize = 1 << 12;
+pub const PACKED: usize = 1 << 10;
 
 /// Serves a viewer until it goes.
 pub async fn serve(viewers: Arc<Viewers>, socket: WebSocket) {

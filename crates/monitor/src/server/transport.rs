@@ -8,6 +8,7 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use rustix::net::sockopt::set_socket_send_buffer_size;
+use socket2::SockRef;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
@@ -24,6 +25,9 @@ const ARRIVAL: Duration = Duration::from_secs(5);
 const EXCHANGE: Duration = Duration::from_secs(30);
 /// What the system stores for a browser that does not read, in bytes: beats wait behind it.
 const STORED: usize = 1 << 15;
+/// The part of it that may wait to be sent, in bytes. The system takes more when half of it has gone
+/// out. With more, a viewer that reads slowly looks like one that reads nothing.
+const UNSENT: u32 = 1 << 12;
 /// The pause after a connection that could not be taken.
 const PAUSE: Duration = Duration::from_millis(50);
 
@@ -78,6 +82,7 @@ async fn connected(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) 
     // The connection works without these, too.
     let _ = stream.set_nodelay(true);
     let _ = set_socket_send_buffer_size(&stream, STORED);
+    let _ = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
     match tls {
         None => exchange(stream, router).await,
         Some(tls) => {
