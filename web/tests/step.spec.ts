@@ -80,3 +80,13 @@ test('a viewer moves nothing', async ({ bench, page }) => {
   await expect(page.getByText('A viewer cannot move motors.')).toBeVisible();
   await expect(page.getByRole('button', { name: 'Apply the step' })).toBeDisabled();
 });
+
+test('a motor that lost its power on the way to the start is not started again', async ({ live, bench }) => {
+  await setUp(live, 'st0/1', 1000, 1500);
+  await apply(live);
+  await expect.poll(() => bench.speed('st', 1), { timeout: 30_000 }).toBeGreaterThan(300);
+  await bench.drives.tell({ command: 'power-cycle', port: `pty:${bench.folder}/st0` });
+  await expect(live.getByText(/^! .*Stopped: the motor confirmed it/)).toBeVisible({ timeout: 60_000 });
+  expect(await bench.truth('st', 1)).toMatchObject({ status: 'IDLE' });
+  await expect(live.getByText('No step was recorded yet.')).toBeVisible();
+});

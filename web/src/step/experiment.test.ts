@@ -233,6 +233,15 @@ describe('what ends a step stops the motor', () => {
     expect(bench.stops).toBe(1);
   });
 
+  it('when the motor lost its power on the way to the start: the step does not start it again', async () => {
+    bench.onWait = () => {
+      if (progress.at(-1)?.startsWith('Waiting')) [bench.target, bench.rate] = [0, Infinity];
+    };
+    await expect(experiment().run()).rejects.toThrow('The motor is at 0.0 rpm, not at 500: it may have lost its power. Stopped');
+    expect(bench.asked).not.toContain('run 1000');
+    expect(bench.stops).toBe(1);
+  });
+
   it('when values end', async () => {
     bench.onWait = () => {
       if (progress.at(-1)?.startsWith('Recording')) bench.onRows = null;

@@ -42,6 +42,8 @@ const KEPT = 2;
 /** A value is steady if it is over this time. */
 const STEADY = 0.5;
 const STEADY_SAMPLES = 20;
+/** Beside noise, a steady value changes by at most this part of the way. */
+const STEADY_PART = 0.02;
 /** It has to be steady within this time after the reference is there. */
 const PATIENCE = 15;
 /** The server streams references with this time between them, in seconds, or less. */
@@ -185,7 +187,7 @@ export class Experiment {
     }
     this.onProgress('Waiting until the value is steady.');
     const arrived = this.last?.t ?? 0;
-    const tolerance = 0.02 * Math.abs(to - from);
+    const tolerance = STEADY_PART * Math.abs(to - from);
     const isSteady = () => {
       const now = this.last?.t ?? 0;
       if (now - arrived < STEADY) return false;
@@ -203,7 +205,9 @@ export class Experiment {
   private async step(): Promise<Applied> {
     const { to, from, approach, controlled } = this.plan;
     // Enough for the record before the step.
-    await this.pause(BEFORE);
+    const steady = this.last!.t;
+    await this.until(() => this.last!.t >= steady + BEFORE, BEFORE + 5, NO_MORE);
+    this.checkStart(since(this.samples, steady));
     this.onProgress('Applying the step.');
     this.isRecording = true;
     const known = new Set(this.rig.events());
@@ -211,6 +215,18 @@ export class Experiment {
     await this.command(to, controlled.mode === 'position' ? approach : Math.abs(to - from) * AT_ONCE);
     await this.until(() => this.last!.t > before.t, 5, NO_MORE);
     return { known, before: before.t, after: this.last!.t + NEXT_REFERENCE };
+  }
+
+  /**
+   * A motor that stopped on the way, after a fault or a loss of its power, is steady, too. The step would start
+   * it again. The current of a motor that turns freely need not be the reference.
+   */
+  private checkStart(samples: readonly Sample[]) {
+    const { from, to, controlled } = this.plan;
+    if (controlled.mode === 'torque' || from === 0) return;
+    const measured = mean(samples.map(({ y }) => y).filter((y) => !Number.isNaN(y)));
+    if (Math.abs(measured - from) <= Math.abs(from) / 2 + STEADY_PART * Math.abs(to - from)) return;
+    throw new Error(`The motor is at ${measured.toFixed(1)} ${controlled.unit}, not at ${from}: it may have lost its power.`);
   }
 
   /** On a bad line, replies that came twice or late answer other requests. `later`: events were lost. */
