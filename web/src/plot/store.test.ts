@@ -216,6 +216,20 @@ describe('a clock that was set', () => {
     expect(breaks(curve!)).toBe(1);
     expect(curve!.samples.newest).toBeCloseTo(100 + 101 + 0.09, 6);
     expect(store.lineTime('st0', curve!.samples.newest)).toBeCloseTo(0.09, 6);
+    // Earlier samples keep the time that the line had then, for the wire at a cursor and for CSV.
+    expect(store.lineTime('st0', curve!.samples.oldest)).toBeCloseTo(100, 6);
+    expect(store.lineTime('st0', curve!.samples.oldest - 5)).toBeCloseTo(95, 6);
+  });
+
+  it('back and forth leads to the time of the line that the samples have', () => {
+    share.send(100, { A: [1] });
+    for (const [t, by] of [[101, -50], [102, 80], [103, -90]] as const) {
+      share.wall += by;
+      share.send(t, { A: ramp(2) });
+    }
+    const { samples } = store.curves[0]!;
+    expect(store.lineTime('st0', samples.newest)).toBeCloseTo(103.01, 6);
+    expect(store.lineTime('st0', samples.oldest)).toBeCloseTo(103, 6);
   });
 
   it('back forgets what would lie in the future', () => {

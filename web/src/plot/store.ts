@@ -117,6 +117,12 @@ interface Subscription {
   end: () => void;
 }
 
+/** What is added to times of a line from this time of the curves on. */
+interface Offset {
+  from: number;
+  offset: number;
+}
+
 interface Doubt {
   since: number;
   until: number;
@@ -126,7 +132,8 @@ export class Store {
   private known = new Map<string, Curve>();
   private readonly subscriptions = new Map<number, Subscription>();
   private readonly byColumns = new WeakMap<object, (Curve | undefined)[]>();
-  private readonly offsets = new Map<string, number>();
+  /** Of each line, in the order of time: samples before a clock was set keep the offset that they got. */
+  private readonly offsets = new Map<string, Offset[]>();
   private readonly doubts = new Map<string, Doubt>();
   /** Changes with the set of curves: groups look their curves up again. */
   private generation: object = {};
@@ -155,7 +162,7 @@ export class Store {
 
   /** The time of a line's clock at `x`. */
   lineTime(line: string, x: number): number {
-    return x - (this.offsets.get(line) ?? NaN);
+    return x - (this.offsets.get(line)?.findLast(({ from }) => from <= x)?.offset ?? NaN);
   }
 
   /** Reads these signals, and no others. Those that were read before keep their samples. */
@@ -271,9 +278,12 @@ export class Store {
   /** What is added to times of a line. It stays the same until the clock is set: curves do not tremble. */
   private offset(line: string, t: number): number {
     const now = this.source.wallAt(line, t) - t - this.origin;
-    const before = this.offsets.get(line) ?? NaN;
+    const known = this.offsets.get(line) ?? [];
+    const before = known.at(-1)?.offset ?? NaN;
     if (isNaN(now) || Math.abs(now - before) < CLOCK_SET) return before;
-    this.offsets.set(line, now);
+    // A clock that was set back leaves no earlier samples after this time.
+    const earlier = known.filter(({ from }) => from < t + now);
+    this.offsets.set(line, [...earlier, { from: earlier.length ? t + now : -Infinity, offset: now }]);
     if (!isNaN(before)) this.interrupt(line);
     return now;
   }
@@ -291,7 +301,7 @@ export class Store {
     const before = this.doubts.get(key);
     const from = before && before.until >= since ? Math.min(before.since, since) : since;
     this.doubts.set(key, { since: from, until: Math.max(until, before?.until ?? until) });
-    const offset = this.offsets.get(line);
+    const offset = this.offsets.get(line)?.at(-1)?.offset;
     if (offset === undefined) return;
     for (const curve of this.known.values()) {
       if (curve.line !== line || curve.motor !== motor) continue;
