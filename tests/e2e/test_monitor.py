@@ -113,9 +113,12 @@ def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(s
             page.draws = False
         else:
             page.late = 3.0
-        assert page.lapsed() == "the page gave no sign of life for 2000 ms"
+        why = "the page gave no sign of life for 2000 ms"
+        assert page.lapsed() == why
         rests(watcher)
         turns_on()
+        control = f"{page.welcome['name']} (control)"
+        assert watcher.until(event("left", by=control))["message"] == f"{control} left: {why}"
         answer = page.act("st0", 1, "START_MOTOR")
         assert (answer["kind"], answer["reason"]) == ("refusal", "lapsed")
         page.forget()
@@ -365,6 +368,8 @@ def test_pages_are_told_that_the_share_is_lost_and_back(serve, share):
             for one in (page, late):
                 one.until(lambda it: is_kind(it, "share") and it["lost"] is None)
                 assert one.ask("lines")["kind"] == "answer"
+        # The stop from before was sent.
+        assert page.ask("release")["kind"] == "answer"
         watcher = Client(share.path, "watcher")
         eventually(lambda: page.act("st0", 1, "START_MOTOR")["kind"] == "answer", "drives of the new share")
         page.turn()

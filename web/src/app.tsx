@@ -9,7 +9,7 @@ import { RecordButton } from './record-button';
 import { release, stopAll, stopReport } from './stop';
 import { VIEWS, load, view } from './views';
 
-const PHASES = { sent: 'warn', stopped: 'ok', unconfirmed: 'bad', unreachable: 'bad' } as const;
+const PHASES = { sent: 'warn', stopped: 'ok', unconfirmed: 'bad', refused: 'bad', unreachable: 'bad' } as const;
 const SIGNS = { ok: '✓', warn: '…', bad: '!' } as const;
 
 /** Acts when it is pressed, not when it is released. */

@@ -13,6 +13,7 @@ let welcome: Signal<object | null>;
 let posted: { done: (response: Response) => void; failed: (why: Error) => void }[];
 let latchedBy: Signal<string | null>;
 let held: Signal<boolean>;
+let shareLost: Signal<string | null>;
 let entries: Signal<object[]>;
 const sayAlive = vi.fn();
 
@@ -34,6 +35,7 @@ beforeEach(async () => {
   // The module of the last test still follows its own.
   welcome = signal({});
   latchedBy = signal(null);
+  shareLost = signal(null);
   entries = signal([{ number: 1, event: 'stopped', line: 'st0', motor: 1 }]);
   held = signal(true);
   vi.doMock('./link', () => ({
@@ -42,6 +44,7 @@ beforeEach(async () => {
     held,
     latchedBy,
     sayAlive,
+    shareLost,
     welcome,
     state: {
       get value() {
@@ -200,13 +203,31 @@ describe('stop all', () => {
     expect(stop.checkLatch).toThrow('Motion is latched: press Release.');
   });
 
-  it('gives the reason of a server that cannot stop', async () => {
-    stop.stopAll();
-    asked[0]!.failed(new Refused('line', 'the share is lost'));
-    await pass(0);
-    posted[0]!.done(new Response('the share is lost', { status: 503 }));
-    await pass(0);
-    expect(report()).toMatchObject({ phase: 'unconfirmed', message: expect.stringContaining('the share is lost') });
+  it('gives the reason of a server that cannot stop, and what it does when the share is back', async () => {
+    const lost = 'the share is lost: it has ended. If it is back within 10 s, the stop is sent';
+    for (const isLast of [true, false]) {
+      shareLost.value = 'it has ended';
+      asked = [];
+      posted = [];
+      stop.stopAll();
+      // The second way has begun, and the answers come in either order.
+      await pass(200);
+      const byHttp = () => posted[0]!.done(new Response(lost, { status: 503 }));
+      if (!isLast) byHttp();
+      await pass(0);
+      asked[0]!.failed(new Refused('line', lost));
+      await pass(0);
+      if (isLast) byHttp();
+      await pass(2000);
+      expect(report()).toEqual({
+        phase: 'refused',
+        message: `The motors may still be turning. The server could not stop them: ${lost}.`,
+      });
+      shareLost.value = null;
+      asked[1]!.done({ motors: ALL });
+      await pass(0);
+      expect(report()).toEqual({ phase: 'stopped', message: 'Stopped: 4 of 4 motors confirmed.' });
+    }
   });
 
   it('reports the newest stop only, and forgets it when its latch is released', async () => {

@@ -1,11 +1,11 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
-import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, state, welcome } from './link';
+import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, shareLost, state, welcome } from './link';
 import type { StoppedMotor } from './wire';
 
 export interface StopReport {
-  /** `stopped`: every motor that was found confirmed it. */
-  phase: 'sent' | 'stopped' | 'unconfirmed' | 'unreachable';
+  /** `stopped`: every motor that was found confirmed it. `refused`: the server answers, but cannot stop them now. */
+  phase: 'sent' | 'stopped' | 'unconfirmed' | 'refused' | 'unreachable';
   message: string;
   /** Each motor that did not confirm, and why. */
   failures?: readonly string[];
@@ -44,25 +44,29 @@ function send() {
   sayAlive();
   stopReport.value = { phase: 'sent', message: 'Stop sent. No motor has confirmed it yet.' };
 
-  let isAnswered = false;
+  let isOver = false;
   let isTriedByHttp = false;
+  /** Why the server does not stop them. */
+  let refusal: Refused | undefined;
   /** Ways that may still bring an answer. */
   let ways = 0;
   const tell = (report: StopReport) => {
     if (number === last) stopReport.value = report;
   };
   const answered = (stopped: readonly StoppedMotor[]) => {
-    isAnswered = true;
+    isOver = true;
     tell(confirmed(stopped));
   };
   const failed = (why: Error) => {
     ways -= 1;
-    if (isAnswered) return;
-    if (!isTriedByHttp) byHttp();
-    else if (ways === 0) tell(why instanceof Refused && why.reason !== 'line' ? refused(why) : unreachable());
+    if (isOver) return;
+    if (why instanceof Refused && why.reason !== 'line') refusal = why;
+    if (!isTriedByHttp) return byHttp();
+    isOver = ways === 0;
+    if (isOver) tell(refusal ? refused(refusal) : unreachable());
   };
   const byHttp = () => {
-    if (isTriedByHttp || isAnswered) return;
+    if (isTriedByHttp || isOver) return;
     isTriedByHttp = true;
     ways += 1;
     postStopAll().then(answered, failed);
@@ -74,7 +78,7 @@ function send() {
     if (!isLatchedSince()) byHttp();
   }, SECOND_WAY);
   setTimeout(() => {
-    if (isAnswered || isLatchedSince()) return;
+    if (isOver || isLatchedSince()) return;
     byHttp();
     tell(unreachable());
   }, UNREACHED);
@@ -87,8 +91,8 @@ async function postStopAll(): Promise<StoppedMotor[]> {
 }
 
 function refused(why: Refused): StopReport {
-  const message = `The server could not stop the motors: ${why.message}. They may still be turning.`;
-  return { phase: 'unconfirmed', message };
+  const message = `The motors may still be turning. The server could not stop them: ${why.message}.`;
+  return { phase: 'refused', message };
 }
 
 function unreachable(): StopReport {
@@ -228,7 +232,16 @@ entries.subscribe(() => {
       : { phase: 'sent', message: `${WAITING} ${count} of ${found.length} did.` };
 });
 
-welcome.subscribe((who) => {
+/** Sends a stop again that ended so. */
+function sendAfter(phase: StopReport['phase']) {
   const isLate = performance.now() - pressedAt > AGAIN;
-  if (who && stopReport.peek()?.phase === 'unreachable' && !isLate) send();
+  if (stopReport.peek()?.phase === phase && !isLate) send();
+}
+
+welcome.subscribe((who) => {
+  if (who) sendAfter('unreachable');
+});
+// The server has sent it before. This one has an answer, which says what the motors did.
+shareLost.subscribe((why) => {
+  if (why === null) sendAfter('refused');
 });

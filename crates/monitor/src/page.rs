@@ -211,7 +211,14 @@ impl Page {
                 tasks.spawn(async move {
                     let stopped = match view {
                         Ok(view) => stop_all(&view).await,
-                        Err(_) => page.link.stop_all().await,
+                        Err(lost) => Err(lost),
+                    };
+                    let stopped = match stopped {
+                        // The server keeps the stop until the share is back.
+                        Err(refusal) if refusal.reason == Reason::Line => {
+                            page.link.stop_all().await
+                        }
+                        stopped => stopped,
                     };
                     page.answer(id, stopped.map(|motors| Answer::StopAll { motors })).await;
                 });

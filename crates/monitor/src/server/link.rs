@@ -2,15 +2,15 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::frame::Kind;
 use motorlink_telemetry::share::message::{
-    Answer, Ask, Event, Happening, Line, Reason, StoppedMotor, Text, decode,
+    Answer, Ask, Event, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
 };
-use tokio::sync::watch;
-use tokio::time::{sleep, timeout};
+use tokio::sync::{Mutex as AsyncMutex, watch};
+use tokio::time::{Instant, sleep, timeout};
 
 use crate::alive::Stops;
 use crate::drive::Drives;
@@ -24,12 +24,18 @@ const HELLO: Duration = Duration::from_secs(5);
 const OPENED: Duration = Duration::from_secs(1);
 /// The pause between two attempts to connect.
 pub const AGAIN: Duration = Duration::from_millis(250);
+/// How long a stop waits for a share that is lost.
+const PENDING: Duration = Duration::from_secs(10);
 
 /// A share that may end and be started again.
 pub struct Link {
     path: PathBuf,
     /// The stops of all pages.
     stops: Arc<Mutex<Stops>>,
+    /// When a stop of all motors was asked for that the share did not get.
+    pending: Mutex<Option<Instant>>,
+    /// One connection at a time sends it. The others wait: none can move a motor before it.
+    sending: AsyncMutex<()>,
     /// `None` until the first attempt to connect has ended.
     joined: watch::Sender<Option<Result<Joined, String>>>,
 }
@@ -44,7 +50,13 @@ struct Joined {
 impl Link {
     /// The share at a path. [`keep`](Self::keep) connects to it.
     pub fn new(path: PathBuf) -> Self {
-        Link { path, stops: Arc::default(), joined: watch::Sender::new(None) }
+        Link {
+            path,
+            stops: Arc::default(),
+            pending: Mutex::default(),
+            sending: AsyncMutex::default(),
+            joined: watch::Sender::new(None),
+        }
     }
 
     /// The stops of all pages.
@@ -57,13 +69,38 @@ impl Link {
         &self.path
     }
 
-    /// Connects a program of this name. Gives the name that events have, too.
+    /// Connects a program of this name, after a stop that the share did not get. Gives the name that
+    /// events have, too.
     ///
     /// # Errors
     /// No share is there, or it refuses.
     pub async fn connect(&self, name: &str) -> io::Result<(Program, Listener, String)> {
+        self.send_pending_stop().await?;
+        self.open(name).await
+    }
+
+    async fn open(&self, name: &str) -> io::Result<(Program, Listener, String)> {
         let connected = timeout(HELLO, Program::connect(&self.path, name)).await;
         connected.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
+    }
+
+    /// Latches the share and stops all motors if that was asked for while the share was lost.
+    async fn send_pending_stop(&self) -> io::Result<()> {
+        let _sending = self.sending.lock().await;
+        let asked = *self.pending();
+        let Some(asked) = asked.filter(|asked| asked.elapsed() < PENDING) else { return Ok(()) };
+        let (program, mut listener, _) = self.open(NAME).await?;
+        for (id, ask) in [(1, Ask::Latch), (2, Ask::Stop { motor: None })] {
+            program.pass(&Request { id, ask }).await?;
+        }
+        // The share takes the requests of a program in their order: it has the stop when it answers.
+        lines(&program, &mut listener).await?;
+        self.pending().take_if(|latest| *latest == asked);
+        Ok(())
+    }
+
+    fn pending(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Connects again and again.
@@ -83,6 +120,8 @@ impl Link {
                     let lost = loop {
                         let joined = Joined { program: program.clone(), drives: drives.clone() };
                         self.joined.send_replace(Some(Ok(joined)));
+                        // A stop may have been asked for just before. If this fails, the share is lost again.
+                        let _ = self.send_pending_stop().await;
                         match next_lines(&program, &mut listener).await {
                             Ok(next) => (lines, drives) = (next.clone(), drives.with_lines(next)),
                             Err(error) => break error,
@@ -142,13 +181,25 @@ impl Link {
         let _ = changes.wait_for(is_other).await;
     }
 
-    /// Latches the share, then stops all motors.
+    /// Latches the share, then stops all motors. If the share is lost, that is done when it is back within
+    /// [`PENDING`].
     ///
     /// # Errors
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
         self.stops.lock().unwrap_or_else(PoisonError::into_inner).count(None);
-        stop_all(&self.get().await?.program).await
+        let asked = Instant::now();
+        // Before the look at the connection: one that is made at this moment sends it.
+        *self.pending() = Some(asked);
+        let program = self.get().await.map_err(until_back)?.program;
+        self.pending().take_if(|latest| *latest == asked);
+        match stop_all(&program).await {
+            Err(refusal) if refusal.reason == Reason::Line => {
+                *self.pending() = Some(asked);
+                Err(until_back(lost("the connection has ended")))
+            }
+            stopped => stopped,
+        }
     }
 
     /// What there is of the share, after the first attempt to connect.
@@ -211,6 +262,12 @@ pub async fn stop_all(program: &Program) -> Result<Vec<StoppedMotor>, Refusal> {
         Answer::Stop { motors } => Ok(motors),
         _ => Err(lost("it gives another answer")),
     }
+}
+
+/// That the share is lost, and what becomes of a stop.
+fn until_back(Refusal { message, .. }: Refusal) -> Refusal {
+    let again = format!("If it is back within {} s, the stop is sent", PENDING.as_secs());
+    Refusal { message: format!("{message}. {again}"), reason: Reason::Line, code: None }
 }
 
 /// Nothing can be asked of the share.

@@ -1,0 +1,112 @@
+//! The connection of the server to a share that ends and is started again.
+
+mod world;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink_monitor::program::{Listener, Program};
+use motorlink_monitor::server::link::Link;
+use motorlink_proto::st::Profile;
+use motorlink_telemetry::share::message::{Answer, Ask, Reason};
+use tokio::time::timeout;
+use world::{LIMIT, World};
+
+const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
+const STOP: u8 = 0x81;
+
+fn turn() -> Ask {
+    let (line, bytes) = ("rmd0".to_owned(), TURN.to_vec());
+    Ask::Command { line, motor: 1, bytes, time_to_live: 10.0, continues: false }
+}
+
+/// A link whose share has ended.
+async fn lost(name: &str) -> Arc<Link> {
+    let world = World::new(name, Profile::Spec);
+    let link = Arc::new(Link::new(world.path.clone()));
+    let kept = Arc::clone(&link);
+    tokio::spawn(async move { kept.keep().await });
+    joins(&link, true).await;
+    drop(world);
+    joins(&link, false).await;
+    link
+}
+
+/// Waits until the server itself is connected to the share, or is not.
+async fn joins(link: &Link, is_joined: bool) {
+    let joins = async {
+        while link.drives().await.is_ok() != is_joined {
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(LIMIT, joins).await.unwrap();
+}
+
+/// The first connection of a page to the share that was started again.
+async fn connected(link: &Link) -> Program {
+    let connected = async {
+        loop {
+            if let Ok((program, listener, _)) = link.connect("page 1 (control)").await {
+                tokio::spawn(listen(listener));
+                return program;
+            }
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(LIMIT, connected).await.unwrap()
+}
+
+async fn listen(mut listener: Listener) {
+    while listener.next().await.is_ok() {}
+}
+
+async fn latched_by(program: &Program) -> Option<String> {
+    match program.ask(Ask::Lines).await {
+        Ok(Answer::Lines { latched_by, .. }) => latched_by,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[tokio::test]
+async fn a_stop_that_a_lost_share_did_not_get_is_sent_before_a_page_can_move_a_motor() {
+    let link = lost("link-stop").await;
+    let refusal = link.stop_all().await.unwrap_err();
+    assert_eq!(refusal.reason, Reason::Line);
+    assert!(
+        refusal.message.starts_with("the share is lost: ")
+            && refusal.message.ends_with(". If it is back within 10 s, the stop is sent"),
+        "{}",
+        refusal.message
+    );
+
+    let world = World::new("link-stop", Profile::Spec);
+    let page = connected(&link).await;
+    assert_eq!(page.ask(turn()).await.unwrap_err().reason, Reason::Latched);
+    let stopped = async {
+        while world.rmd_motion(1).is_empty() {
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(LIMIT, stopped).await.unwrap();
+    assert_eq!(world.rmd_motion(1)[0][0], STOP);
+
+    // It is sent once.
+    assert!(matches!(page.ask(Ask::Release).await, Ok(Answer::Release)));
+    let other = connected(&link).await;
+    joins(&link, true).await;
+    assert_eq!(latched_by(&other).await, None);
+    assert!(matches!(other.ask(turn()).await, Ok(Answer::Command { .. })));
+}
+
+#[tokio::test]
+async fn a_stop_that_is_too_old_is_not_sent() {
+    let link = lost("link-old").await;
+    link.stop_all().await.unwrap_err();
+    tokio::time::pause();
+    tokio::time::advance(Duration::from_secs(10)).await;
+    tokio::time::resume();
+    let _world = World::new("link-old", Profile::Spec);
+    let page = connected(&link).await;
+    assert_eq!(latched_by(&page).await, None);
+    assert!(matches!(page.ask(turn()).await, Ok(Answer::Command { .. })));
+}
