@@ -73,7 +73,7 @@ fn master() -> Master {
     master
 }
 
-fn slave(last: MotorNumber) -> Slave {
+pub fn slave(last: MotorNumber) -> Slave {
     Slave::new(Profile::Spec, last)
 }
 
@@ -101,8 +101,8 @@ fn exchange(
 }
 
 /// A drive that only stores registers.
-struct Memory {
-    registers: [i32; 256],
+pub struct Memory {
+    pub registers: [i32; 256],
 }
 
 impl MotorControl for Memory {

@@ -83,7 +83,7 @@ impl Counter {
 
     /// Instructions of one repetition: the difference of a run with twice the repetitions and a run
     /// with one, so that start and end cancel.
-    fn count(&self, kernel: &str) -> Result<f64> {
+    pub fn count(&self, kernel: &str) -> Result<f64> {
         let once = Self::spawn(kernel, COUNTED)?;
         let twice = Self::spawn(kernel, 2 * COUNTED)?;
         let (once, twice) = (collected(once)?, collected(twice)?);

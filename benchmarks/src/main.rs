@@ -12,6 +12,7 @@ mod machine;
 mod python;
 mod report;
 mod result;
+mod share;
 mod simulation;
 
 use clap::{Parser, Subcommand};
@@ -50,6 +51,8 @@ enum What {
     Decode,
     /// Instructions of an ST exchange, master and slave together
     Exchange,
+    /// Instructions of an exchange of a share, with and without the frames that it keeps
+    Share,
     /// Exchanges per second through Python, compared with pyserial
     Python,
     /// Simulated drives compared with real time and with other simulators
@@ -93,6 +96,7 @@ fn main() -> Result<()> {
             &can::measure,
             &engine,
             &exchange::measure,
+            &share::measure,
             &simulation::measure,
             &decode::measure,
         ],
@@ -103,6 +107,7 @@ fn main() -> Result<()> {
         What::Decode => &[&decode::measure],
         What::DecodeLog { log } => return decode::decode(&log),
         What::Exchange => &[&exchange::measure],
+        What::Share => &[&share::measure],
         What::Python => &[&python::measure],
         What::Simulation => &[&simulation::measure],
         What::Kernel { name, count } => return repeat(&name, count),
@@ -123,7 +128,8 @@ fn main() -> Result<()> {
 
 /// Runs under the instruction counter, see [`kernel::Counter`].
 fn repeat(name: &str, count: u32) -> Result<()> {
-    let kernels = codec::kernels().chain(exchange::kernels()).chain(simulation::kernels());
+    let kernels = codec::kernels().chain(exchange::kernels()).chain(share::kernels());
+    let kernels = kernels.chain(simulation::kernels());
     let mut found = kernels.into_iter().filter(|kernel| kernel.name == name);
     found.next().ok_or_else(|| format!("no kernel is called {name}"))?.repeat(count);
     Ok(())

@@ -53,7 +53,7 @@ impl Tap {
     }
 
     /// Begins to keep, with times of this clock.
-    pub(super) fn follow(&self, clock: &Clock) {
+    pub fn follow(&self, clock: &Clock) {
         self.0.clock.get_or_init(|| clock.clone());
     }
 
