@@ -54,6 +54,9 @@ export function timeOfDay(wall: number): string {
   return Number.isFinite(wall) ? TIME.format(wall * 1000) : '–';
 }
 
+/** The name of a motor. */
+export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
+
 /** A text of a table as a sentence. */
 export function sentence(text: string): string {
   const first = text.charAt(0).toUpperCase() + text.slice(1);

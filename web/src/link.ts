@@ -1,9 +1,10 @@
 // The connection to the server: requests, subscriptions, signs of life, and what the server said last.
 import { signal } from '@preact/signals';
 import { ServerClock } from './clock';
+import { nameOf } from './format';
 import { type Rows, decode, groupOf } from './rows';
 import type {
-  Beat, Event as DriveEvent, Group, Line, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
+  Beat, Event as DriveEvent, Group, Line, Ran, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
 } from './wire';
 
 export type { Rows } from './rows';
@@ -71,6 +72,8 @@ export const closedWhy = signal<string | null>(null);
 export const shareLost = signal<string | null>(null);
 /** The recording that is made, or the last one. */
 export const recorded = signal<Recorded | null>(null);
+/** The end of the references that the server sent last to each motor, by its name in texts. */
+export const rans = signal<ReadonlyMap<string, Ran>>(new Map());
 /** Whether this page turned motors, so that its end stops them. */
 export const holds = signal(false);
 /** Time to the server and back, in ms. It grows while nothing is received. */
@@ -376,6 +379,9 @@ function heard(text: Text | ShareText) {
       held.value = false;
       // The end of what was held is no news to the person who let it go.
       if (performance.now() - releasedAt > RELEASE) lapsed.value = text.message;
+      break;
+    case 'ran':
+      rans.value = new Map(rans.value).set(nameOf(text.line, text.motor), text);
       break;
     case 'closing':
       closedWhy.value = text.message;

@@ -3,7 +3,7 @@ import type { Entry } from './link';
 
 vi.mock('./link', () => ({}));
 vi.mock('./overview', () => ({}));
-const { endOf } = await import('./motion');
+const { endOf, endOfReferences } = await import('./motion');
 
 const entry = (number: number, event: string, more: Partial<Entry> = {}): Entry => ({
   number, event, wall: 0, until: 0, times: 1, line: 'st0', motor: 1, by: 'page 1', message: event, ...more,
@@ -26,5 +26,20 @@ describe('the end of a motion', () => {
   it('is no event before it, of another motor, or of its own ramp', () => {
     const all = [entry(3, 'stopped'), entry(4, 'stopped', { motor: 2 }), entry(5, 'commanded', { by: 'page 1 (control)' })];
     expect(endOf(all, 3, 'st0', 1, 'page 1')).toBeUndefined();
+  });
+});
+
+describe('the end of references of the server', () => {
+  const ran = { line: 'rmd0', motor: 4, reference: 112.6 };
+  it('is the target', () => {
+    expect(endOfReferences({ ...ran, reference: 360 }, '°/s')).toEqual({
+      tone: 'ok', text: 'Running. The reference has reached 360 °/s.',
+    });
+  });
+  it('is a value in between, with the reason', () => {
+    const failure = 'no reply from motor 4; the motor confirmed its stop';
+    expect(endOfReferences({ ...ran, failure }, '°/s')).toEqual({
+      tone: 'bad', text: `The reference got no further than 113 °/s: ${failure}.`,
+    });
   });
 });

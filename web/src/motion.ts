@@ -1,11 +1,11 @@
 // What a card says about a motion of this page, for as long as it is true.
 import { useSignal, useSignalEffect } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
-import { sentence } from './format';
-import { type Entry, entries, lapsed, state, welcome } from './link';
+import { decimalsOf, nameOf, number, sentence } from './format';
+import { type Entry, entries, lapsed, rans, state, welcome } from './link';
 import { liveOf } from './overview';
 import type { Sentence } from './parts';
-import type { Description } from './wire';
+import type { Description, Ran } from './wire';
 
 /** Events of a motor after which the page that turned it does not run it any more. */
 const ENDS: ReadonlySet<string> = new Set(['stopping', 'stopped', 'stop-failed', 'silent']);
@@ -30,9 +30,24 @@ export function endOf(all: readonly Entry[], since: number, line: string, motor:
   });
 }
 
-/** Follows a motion, and says what ended it. */
-export function useMotion(line: string, motor: number, { overview, states }: Description, say: (now: Sentence | null) => void) {
+/** What the end of the references that the server sent came to. */
+export function endOfReferences({ reference, failure }: Ran, unit: string): Sentence {
+  const at = `${number(reference, decimalsOf(unit))} ${unit}`;
+  return failure == null
+    ? { tone: 'ok', text: `Running. The reference has reached ${at}.` }
+    : { tone: 'bad', text: `The reference got no further than ${at}: ${failure}.` };
+}
+
+/** Follows a motion, and says what ended it. `unit` is that of its reference. */
+export function useMotion(
+  line: string,
+  motor: number,
+  { overview, states }: Description,
+  unit: string,
+  say: (now: Sentence | null) => void,
+) {
   const since = useSignal<number | null>(null);
+  const isStreamed = useSignal(false);
   const hasRun = useRef(false);
   const arrival = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const forget = () => {
@@ -59,17 +74,38 @@ export function useMotion(line: string, motor: number, { overview, states }: Des
     if (!AT_REST.test(name)) hasRun.current = true;
     else if (hasRun.current) end({ tone: 'note', text: `The motor does not run any more: ${name}.` });
   });
+  useSignalEffect(() => {
+    const ran = isStreamed.value ? rans.value.get(nameOf(line, motor)) : undefined;
+    if (!ran) return;
+    isStreamed.value = false;
+    // It comes after the events of the stop, and is worth more: it has the reason.
+    if (ran.failure != null) forget();
+    say(endOfReferences(ran, unit));
+  });
   useEffect(() => () => clearTimeout(arrival.current), []);
 
+  const began = () => {
+    since.value = entries.value.at(-1)?.number ?? 0;
+  };
   return {
     /** Something else is asked of the motor. */
-    forget,
-    /** The motor runs from now on. `seconds` later its reference is where it was asked to be. */
-    begin(seconds: number, there: Sentence) {
+    forget() {
       forget();
-      since.value = entries.value.at(-1)?.number ?? 0;
+      isStreamed.value = false;
+      const rest = new Map(rans.value);
+      if (rest.delete(nameOf(line, motor))) rans.value = rest;
+    },
+    /** The motor runs from now on. The server says when its reference is at the target. */
+    begin() {
+      began();
+      isStreamed.value = true;
+    },
+    /** The drive goes to the target by itself. It does not say when it is there. */
+    beginAlone(seconds: number, to: string) {
+      began();
+      const over: Sentence = { tone: 'ok', text: `Running to ${to}. The ramp took ${number(seconds, 1)} s.` };
       // Longer times are none for a timer.
-      if (seconds < LONGEST) arrival.current = setTimeout(() => say(there), 1000 * seconds);
+      if (seconds < LONGEST) arrival.current = setTimeout(() => say(over), 1000 * seconds);
     },
   };
 }

@@ -1,5 +1,6 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
+import { nameOf } from './format';
 import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, shareLost, state, welcome } from './link';
 import type { StoppedMotor } from './wire';
 
@@ -106,8 +107,7 @@ function unreachable(): StopReport {
   };
 }
 
-/** The name of a motor in texts. */
-export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
+export { nameOf };
 
 function confirmed(stopped: readonly StoppedMotor[]): StopReport {
   // A search also asks addresses where no motor is. Their stop is sent, too.

@@ -406,6 +406,24 @@ export type Phase = "starting" | "recording" | "ending" | "ended" | "failed";
 
 export type Protocol = "st" | "rmd";
 
+export type Ran = { 
+/**
+ * The last reference that the motor acknowledged, in the unit of the run.
+ */
+reference: number, 
+/**
+ * Why it is not the target, and how the motor took the stop that followed.
+ */
+failure?: string | null, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, };
+
 export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
 
 export type Recorded = { 
@@ -1162,7 +1180,12 @@ values: Array<Value>, } | { "to": "run",
 /**
  * The first reference: the measured value, or the limit if that is less.
  */
-from: number, } | { "to": "limit" } | { "to": "limits", 
+from: number, 
+/**
+ * Whether the server sends the next references, and says by [`Text::Ran`] when they end.
+ * Otherwise the drive goes to the target on its own.
+ */
+streams: boolean, } | { "to": "limit" } | { "to": "limits", 
 /**
  * Those of all motors.
  */
@@ -1210,7 +1233,7 @@ older: number, } | { "to": "recording" } & RecordingContent) | { "kind": "lapsed
 /**
  * Why, in words.
  */
-message: string, } | { "kind": "share", 
+message: string, } | { "kind": "ran" } & Ran | { "kind": "share", 
 /**
  * Why it is lost; `null`: it is there.
  */

@@ -40,7 +40,7 @@ test.describe('stop all', () => {
     const motor = card(live, 'st0/1');
     const running = motor.getByText(/^✓ Running/);
     await spin(live, 1000);
-    await expect(motor.getByText('Running. The reference has reached 1000 rpm.')).toBeVisible();
+    await expect(motor.getByText(/^✓ Running to 1000 rpm\. The ramp took/)).toBeVisible();
     await motor.getByRole('button', { name: 'Stop', exact: true }).click();
     await expect(motor.getByText('Stopped: the motor confirmed it.')).toBeVisible();
     await expect(running).toHaveCount(0);

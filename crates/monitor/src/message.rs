@@ -222,6 +222,8 @@ pub enum Text {
         /// Why, in words.
         message: String,
     },
+    /// The references that the server sent have ended, unless a stop or another command ended them.
+    Ran(Ran),
     /// The share is lost, or there again. Nothing is known of the motors in between.
     Share {
         /// Why it is lost; `null`: it is there.
@@ -230,6 +232,20 @@ pub enum Text {
     /// The recording that is made, or the last one. It comes at the start, if there was one, and
     /// whenever something changes.
     Recorded(Recorded),
+}
+
+/// The end of references that the server sent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Ran {
+    /// The motor.
+    #[serde(flatten)]
+    pub motor: MotorName,
+    /// The last reference that the motor acknowledged, in the unit of the run.
+    pub reference: f64,
+    /// Why it is not the target, and how the motor took the stop that followed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
 /// Who the page is.
@@ -315,6 +331,9 @@ pub enum Answer {
     Run {
         /// The first reference: the measured value, or the limit if that is less.
         from: f64,
+        /// Whether the server sends the next references, and says by [`Text::Ran`] when they end.
+        /// Otherwise the drive goes to the target on its own.
+        streams: bool,
     },
     /// To limit.
     Limit,

@@ -14,7 +14,7 @@ use tokio::task::JoinSet;
 
 use crate::alive::{DeadMan, Lapse, Ticket};
 use crate::drive::Motion;
-use crate::message::{Answer, Ask, FromPage, Request, Role, Text};
+use crate::message::{Answer, Ask, FromPage, Ran, Request, Role, Text};
 use crate::program::{Listener, OWN_IDS, Program, Refusal};
 use crate::recordings::Recordings;
 use crate::server::link::{Link, lost, stop_all};
@@ -403,6 +403,16 @@ impl Motion for Permitted {
         match self.page.permit(&self.ticket, hold)? {
             Some(drive) => Ok(drive),
             None => self.page.open(&self.ticket, hold).await,
+        }
+    }
+
+    fn report(&self) -> impl FnOnce(Ran) + Send + 'static {
+        let page = Arc::clone(&self.page);
+        move |ran| {
+            // A page that takes no texts waits for it.
+            tokio::spawn(async move {
+                let _ = page.out.send(encode(&Text::Ran(ran))).await;
+            });
         }
     }
 }

@@ -17,7 +17,7 @@ fn run(motor: MotorName, mode: Mode, target: f64, rate: f64) -> Ask {
 
 async fn from(page: &Page, ask: Ask) -> f64 {
     match page.ask(ask).await {
-        Ok(Answer::Run { from }) => from,
+        Ok(Answer::Run { from, .. }) => from,
         other => panic!("{other:?}"),
     }
 }
@@ -26,7 +26,7 @@ async fn from(page: &Page, ask: Ask) -> f64 {
 async fn begun(page: &Page, ask: Ask) -> f64 {
     loop {
         match page.ask(ask.clone()).await {
-            Ok(Answer::Run { from }) => return from,
+            Ok(Answer::Run { from, .. }) => return from,
             Err(Refusal { reason: Reason::Overtaken, .. }) => {}
             other => panic!("{other:?}"),
         }

@@ -155,7 +155,7 @@ interface ReferenceProps {
 function Reference({ line, motor, mode: controlled, description, isHold, mayMove, why, onRun }: ReferenceProps) {
   const { mode, unit, measured, most } = controlled;
   const { said, attempt, say, isBusy } = useSaid();
-  const motion = useMotion(line, motor, description, say);
+  const motion = useMotion(line, motor, description, unit, say);
   const decimals = decimalsOf(unit);
   const target = useSignal<string | null>(null);
   const rate = useSignal(String(usual(unit).rate));
@@ -183,9 +183,9 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
     onRun();
     const to = numberOf(target.value ?? '', 'Target');
     const perSecond = numberOf(rate.value, rateLabel);
-    const { from } = await ask({ ask: 'run', line, motor, mode, target: to, rate: perSecond, hold });
-    const there = `Running. The reference has reached ${number(to, decimals)} ${unit}.`;
-    motion.begin(Math.abs(to - from) / perSecond, { tone: 'ok', text: there });
+    const { from, streams } = await ask({ ask: 'run', line, motor, mode, target: to, rate: perSecond, hold });
+    if (streams) motion.begin();
+    else motion.beginAlone(Math.abs(to - from) / perSecond, `${number(to, decimals)} ${unit}`);
     return `Running from ${number(from, decimals)} ${unit}.`;
   };
   // The answer may come after the release. What it started then has to stop.

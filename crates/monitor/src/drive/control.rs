@@ -11,6 +11,7 @@ use tokio::task::JoinHandle;
 use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
 use super::target::{Target, refusal};
+use crate::message::Ran;
 use crate::program::{Program, Refusal};
 
 /// How a page's motion is permitted.
@@ -18,6 +19,9 @@ pub trait Motion: Send + Sync {
     /// A session whose end stops the motors that it turned. Refuses (`lapsed`) unless the page is alive.
     /// `hold`: the motors stop as soon as nothing is held.
     fn program(&self, hold: bool) -> impl Future<Output = Result<Program, Refusal>> + Send;
+
+    /// Takes the end of references that the server sent.
+    fn report(&self) -> impl FnOnce(Ran) + Send + 'static;
 }
 
 /// What all pages share of the motors.
@@ -115,7 +119,7 @@ impl Control {
 
 /// A session that may send commands to a motor, whose replies it confirms.
 pub(super) struct Permitted<'a, M> {
-    drive: &'a M,
+    pub(super) drive: &'a M,
     hold: bool,
     stops: Stops<'a>,
     pub(super) program: Program,

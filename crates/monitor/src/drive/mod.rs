@@ -126,7 +126,7 @@ impl Drives {
             }
             Ask::Run { motor, mode, target: to, rate, hold } => {
                 let run = run::Run { target: self.target(motor)?, mode, to, rate, hold };
-                Ok(Answer::Run { from: run.carry_out(&self.control, drive).await? })
+                run.carry_out(&self.control, drive).await
             }
         }
     }

@@ -16,7 +16,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::message::{Answer as ShareAnswer, Ask, Reason};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::watch;
@@ -26,11 +26,14 @@ use super::act::started;
 use super::control::{Control, Motion, Permitted, Running, send};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
-use crate::message::Mode;
+use crate::message::{Answer, Mode, Ran};
 use crate::program::{Program, Refusal};
 
 /// The time between two references.
 const PERIOD: Duration = Duration::from_millis(20);
+/// References that no reply has acknowledged for so long are given up, and the motor is stopped. A motor
+/// that lost its power for longer is not set moving by the next one.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// A motion of a page.
 pub(super) struct Run {
@@ -73,7 +76,7 @@ impl Run {
         self,
         control: &Arc<Control>,
         drive: &impl Motion,
-    ) -> Result<f64, Refusal> {
+    ) -> Result<Answer, Refusal> {
         if !(self.rate.is_finite() && self.rate > 0.0) {
             let message =
                 format!("the rate {} is not a positive number; nothing was sent", self.rate);
@@ -85,25 +88,26 @@ impl Run {
         control.end_run(&self.target).await;
         let permitted = Permitted::new(drive, self.hold, stops).await?;
         let begun = Begun { run: &self, control, permitted };
-        match (self.target.motor, self.target.speaks, self.mode) {
+        let (from, streams) = match (self.target.motor, self.target.speaks, self.mode) {
             (Motor::Rmd(id), _, Mode::Speed) => {
                 let measured = begun.motion_status().await?.speed.dps();
-                begun.stream(Stream::Speed(id), measured).await
+                (begun.stream(Stream::Speed(id), measured).await?, true)
             }
             (Motor::Rmd(id), _, Mode::Torque) => {
                 let measured = begun.motion_status().await?.iq.amps();
-                begun.stream(Stream::Torque(id), measured).await
+                (begun.stream(Stream::Torque(id), measured).await?, true)
             }
-            (Motor::Rmd(id), _, Mode::Position) => begun.position(id).await,
-            (Motor::St(motor), _, Mode::Speed) => begun.st_speed(motor).await,
+            (Motor::Rmd(id), _, Mode::Position) => (begun.position(id).await?, false),
+            (Motor::St(motor), _, Mode::Speed) => (begun.st_speed(motor).await?, false),
             (Motor::St(motor), Speaks::St(Profile::Mcsdk54), Mode::Torque) => {
-                begun.st_torque_ramp(motor).await
+                (begun.st_torque_ramp(motor).await?, false)
             }
             (Motor::St(motor), Speaks::St(Profile::Spec), Mode::Torque) => {
-                begun.st_current(motor).await
+                (begun.st_current(motor).await?, true)
             }
-            (Motor::St(_), ..) => Err(no_position()),
-        }
+            (Motor::St(_), ..) => return Err(no_position()),
+        };
+        Ok(Answer::Run { from, streams })
     }
 
     /// Checks the last command before anything is sent.
@@ -250,7 +254,8 @@ impl<M: Motion> Begun<'_, M> {
             to: self.run.to,
             rate: self.run.rate,
         };
-        let task = tokio::spawn(references.send(from, ended));
+        let report = self.permitted.drive.report();
+        let task = tokio::spawn(references.send(from, ended, report));
         self.control.set_run(self.target(), Running { ends, task });
     }
 
@@ -329,13 +334,19 @@ struct References {
 }
 
 impl References {
-    /// Sends them until the target is reached, one is refused, or `ended` becomes true.
-    async fn send(self, from: f64, mut ended: watch::Receiver<bool>) {
-        let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
+    /// Sends them until the target is reached, one fails, or `ended` becomes true.
+    async fn send(
+        self,
+        from: f64,
+        mut ended: watch::Receiver<bool>,
+        report: impl FnOnce(Ran) + Send,
+    ) {
         let mut ticks = interval_at(Instant::now() + PERIOD, PERIOD);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut value = from;
-        while value != self.to {
+        let mut reference = from;
+        let mut acknowledged = Instant::now();
+        let mut failure = None;
+        while reference != self.to && failure.is_none() {
             tokio::select! {
                 biased;
                 _ = ended.changed() => return,
@@ -343,14 +354,46 @@ impl References {
             }
             // After a pause of the server the reference continues where it was, without a jump.
             let step = self.rate * PERIOD.as_secs_f64();
-            let left = self.to - value;
-            value = if left.abs() <= step { self.to } else { value + step.copysign(left) };
-            let Ok(request) = self.stream.request(value) else { return };
-            if send(&self.control, &exchanges, &request).await.is_err() {
-                return;
+            let left = self.to - reference;
+            let next = if left.abs() <= step { self.to } else { reference + step.copysign(left) };
+            match self.send_one(next).await {
+                Ok(()) => (reference, acknowledged) = (next, Instant::now()),
+                Err(why) if is_ended_by_others(&why) => return,
+                // The same reference again: it is no matter whether the motor has it already.
+                Err(_) if acknowledged.elapsed() < PATIENCE => {}
+                Err(why) => failure = Some(self.stop(&why).await),
             }
         }
+        report(Ran { motor: self.target.name.clone(), reference, failure });
     }
+
+    async fn send_one(&self, reference: f64) -> Result<(), Refusal> {
+        let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
+        let request = self.stream.request(reference)?;
+        send(&self.control, &exchanges, &request).await.map(drop)
+    }
+
+    /// The motor must not turn on at a speed in between. Gives why it was stopped, and how it took that.
+    async fn stop(&self, why: &Refusal) -> String {
+        self.control.stopping(&self.target);
+        let ask = Ask::Stop { motor: Some(self.target.name.clone()) };
+        let failure = match self.program.ask(ask).await {
+            Ok(ShareAnswer::Stop { motors }) => motors.into_iter().find_map(|one| one.failure),
+            Ok(_) => Some("the share gives another answer".to_owned()),
+            Err(refusal) => Some(refusal.message),
+        };
+        let stopped = failure.map_or_else(
+            || "the motor confirmed its stop".to_owned(),
+            |failure| format!("it did not confirm its stop and may keep turning: {failure}"),
+        );
+        format!("{}; {stopped}", why.message)
+    }
+}
+
+/// Whether a stop, another command or the end of the page ended the references. An event says so.
+fn is_ended_by_others(why: &Refusal) -> bool {
+    use Reason::{Displaced, Lapsed, Latched, Overtaken};
+    matches!(why.reason, Displaced | Lapsed | Latched | Overtaken)
 }
 
 fn wanted<Q: Quantity>(value: f64) -> Result<Q, Refusal> {

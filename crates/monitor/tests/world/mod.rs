@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use motorlink::port::{Direction, EventBytes, EventCan, PortName, TapBytes, TapCan};
 use motorlink::{rmd, st};
 use motorlink_monitor::drive::{Drives, Motion};
-use motorlink_monitor::message::{Answer, Ask};
+use motorlink_monitor::message::{Answer, Ask, Ran};
 use motorlink_monitor::program::{Program, Refusal};
 use motorlink_proto::st::{Frame, Parse, Profile};
 use motorlink_telemetry::acquisition::Acquisition;
@@ -53,6 +53,8 @@ pub struct Drive {
     path: PathBuf,
     pub lapsed: AtomicBool,
     pub opened: AtomicBool,
+    /// The ends of references.
+    pub rans: Arc<Mutex<Vec<Ran>>>,
     session: tokio::sync::Mutex<Option<Program>>,
     listening: Mutex<Option<tokio::task::JoinHandle<()>>>,
 }
@@ -75,8 +77,8 @@ impl World {
         Self::with(name, (profile, PATIENT), |link| link, |link| link)
     }
 
-    /// With something around the serial line and around the bus, behind the taps. A reply of the ST drive may
-    /// take `timeout`.
+    /// With something around the serial line and around the bus, behind the taps. A reply may take
+    /// `timeout`.
     pub fn with(
         name: &str,
         (profile, timeout): (Profile, Duration),
@@ -130,7 +132,7 @@ impl World {
             };
             rmd_around.around_bus(Box::new(TapCan::new(around_bus(link), observer)))
         };
-        let options = rmd::Options { timeout: PATIENT, ..Default::default() };
+        let options = rmd::Options { timeout, ..Default::default() };
         let port: PortName = format!("slcan:{rmd_path}").parse().unwrap();
         let client = rmd::EventClient::open_wrapped(&port, wrap, options).unwrap();
         let engine = Acquisition::new(Box::new(RmdLine::new(client)));
@@ -282,6 +284,7 @@ impl Drive {
             path: path.to_owned(),
             lapsed: AtomicBool::new(false),
             opened: AtomicBool::new(false),
+            rans: Arc::default(),
             session: tokio::sync::Mutex::default(),
             listening: Mutex::default(),
         }
@@ -311,5 +314,10 @@ impl Motion for Drive {
         }
         self.opened.store(true, Ordering::SeqCst);
         Ok(session.clone().expect("it was set"))
+    }
+
+    fn report(&self) -> impl FnOnce(Ran) + Send + 'static {
+        let rans = Arc::clone(&self.rans);
+        move |ran| rans.lock().unwrap().push(ran)
     }
 }
