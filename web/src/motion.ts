@@ -35,7 +35,7 @@ export function endOfReferences({ reference, failure }: Ran, unit: string): Sent
   const at = `${number(reference, decimalsOf(unit))} ${unit}`;
   return failure == null
     ? { tone: 'ok', text: `Running. The reference has reached ${at}.` }
-    : { tone: 'bad', text: `The reference got no further than ${at}: ${failure}.` };
+    : { tone: 'bad', text: sentence(`the reference got no further than ${at}: ${failure}`) };
 }
 
 /** Follows a motion, and says what ended it. `unit` is that of its reference. */
