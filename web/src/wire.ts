@@ -336,7 +336,16 @@ wall: number,
 /**
  * What its exchanges came to since it was opened. Earlier shares do not say it.
  */
-counts?: LineCounts | null, };
+counts?: LineCounts | null, 
+/**
+ * The motors that have answered since the line was opened.
+ */
+heard?: Array<number>, 
+/**
+ * The motors that answered or were turned, and have not confirmed their last stop: it failed or is
+ * under way. They may still be turning.
+ */
+unstopped?: Array<number>, };
 
 export type LineCounts = { 
 /**

@@ -49,6 +49,8 @@ fn answer(ask: &Ask) -> Answer {
                 t: 0.0,
                 wall: 0.0,
                 counts: None,
+                heard: Vec::new(),
+                unstopped: Vec::new(),
             };
             Answer::Lines { lines: vec![line], latched_by: None }
         }

@@ -364,6 +364,8 @@ fn first_command(socket: &UnixListener) -> Ask {
                         t: 0.0,
                         wall: 0.0,
                         counts: None,
+                        heard: Vec::new(),
+                        unstopped: Vec::new(),
                     };
                     Answer::Lines { lines: vec![line], latched_by: None }
                 }

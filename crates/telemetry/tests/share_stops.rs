@@ -41,6 +41,12 @@ fn stop_all(program: &mut Asker) -> BTreeMap<(String, u8), &'static str> {
     motors.iter().map(|one| ((one.motor.line.clone(), one.motor.motor), taken(one))).collect()
 }
 
+/// The motors of a line that have answered, and those that have not confirmed their last stop.
+fn heard_and_unstopped(program: &mut Asker, line: &str) -> (Vec<u8>, Vec<u8>) {
+    let line = program.lines().into_iter().find(|one| one.line == line).unwrap();
+    (line.heard, line.unstopped)
+}
+
 fn motors(line: &str, all: &[(u8, &'static str)]) -> BTreeMap<(String, u8), &'static str> {
     all.iter().map(|(motor, how)| ((line.to_owned(), *motor), *how)).collect()
 }
@@ -61,9 +67,13 @@ fn an_id_that_was_only_searched_is_absent_at_every_stop() {
     for _ in 0..2 {
         assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
     }
+    let (heard, unstopped) = heard_and_unstopped(&mut program, "rmd0");
+    assert!(heard.contains(&1) && !heard.contains(&NOBODY), "{heard:?}");
+    assert!(unstopped.is_empty(), "{unstopped:?}");
     // A program that moved it knows better.
     program.ask(command("rmd0", NOBODY, &TURN)).unwrap_err();
     assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "may turn")]));
+    assert_eq!(heard_and_unstopped(&mut program, "rmd0").1, [NOBODY]);
 }
 
 #[test]
@@ -133,11 +143,20 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
     let mut program = Asker::join(&share.path, "reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
+    assert_eq!(heard_and_unstopped(&mut program, "st0"), (vec![1], vec![]));
     cut.store(true, Ordering::SeqCst);
+    // While the stop is under way, and after it has failed.
+    program.send(Ask::Stop { motor: None });
+    assert_eq!(heard_and_unstopped(&mut program, "st0"), (vec![1], vec![1]));
     for _ in 0..2 {
         assert_eq!(stop_all(&mut program), motors("st0", &[(1, "may turn"), (5, "absent")]));
     }
     assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
+    let mut other = Asker::join(&share.path, "comes later");
+    assert_eq!(heard_and_unstopped(&mut other, "st0"), (vec![1], vec![1]));
+    cut.store(false, Ordering::SeqCst);
+    assert_eq!(stop_all(&mut program)[&("st0".to_owned(), 1)], "confirmed");
+    assert!(heard_and_unstopped(&mut other, "st0").1.is_empty());
 }
 
 /// Sends a request to motor 2 as a program that had the port before the share, and awaits the reply.

@@ -143,6 +143,8 @@ fn line() -> Line {
         t: 100.0,
         wall: now() as f64 / 1e9,
         counts: None,
+        heard: Vec::new(),
+        unstopped: Vec::new(),
     }
 }
 

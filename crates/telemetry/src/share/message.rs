@@ -518,6 +518,13 @@ pub struct Line {
     /// What its exchanges came to since it was opened. Earlier shares do not say it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counts: Option<LineCounts>,
+    /// The motors that have answered since the line was opened.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub heard: Vec<u8>,
+    /// The motors that answered or were turned, and have not confirmed their last stop: it failed or is
+    /// under way. They may still be turning.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unstopped: Vec<u8>,
 }
 
 /// What the exchanges of a line came to since it was opened.

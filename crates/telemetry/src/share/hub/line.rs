@@ -64,6 +64,8 @@ pub struct Held {
     pub(super) precautions: BTreeSet<Motor>,
     /// The motors that did not confirm a stop, and who asked for it.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
+    /// The motors whose last stop is not confirmed: it failed, is under way or is repeated.
+    pub(super) unconfirmed: BTreeSet<Motor>,
 }
 
 /// A data segment that a command configures, for the program that sends it.
@@ -112,6 +114,7 @@ impl Held {
             absent: BTreeSet::new(),
             precautions: BTreeSet::new(),
             unstopped: BTreeMap::new(),
+            unconfirmed: BTreeSet::new(),
             runner: Runner::start(name, acquisition)?,
         })
     }
@@ -122,6 +125,7 @@ impl Held {
         self.absent.remove(&motor);
         self.owners.remove(&motor);
         self.unstopped.remove(&motor);
+        self.unconfirmed.remove(&motor);
     }
 
     /// Records a command of a program to a motor.
@@ -214,7 +218,14 @@ impl Held {
         let (line, port) = (self.name.clone(), self.port.to_string());
         let timeout = self.timeout.as_secs_f64();
         let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
-        Line { line, protocol, port, profile, timeout, t, wall, counts }
+        let heard = self.heard.iter().map(|motor| motor.number()).collect();
+        // A stop of all motors is also sent to addresses where no motor has ever answered.
+        let may_be_there = |motor: &&Motor| {
+            (self.heard.contains(motor) || self.may_turn(**motor)) && !self.is_absent(**motor)
+        };
+        let unstopped = self.unconfirmed.iter().filter(may_be_there);
+        let unstopped = unstopped.map(|motor| motor.number()).collect();
+        Line { line, protocol, port, profile, timeout, t, wall, counts, heard, unstopped }
     }
 
     /// The wall clock at a moment of the line's clock.

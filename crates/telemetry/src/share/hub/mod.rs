@@ -378,6 +378,7 @@ impl Hub {
             Ok(_) => held.stopped(motor),
             Err(error) if may_be_executed(error) => {
                 held.unstopped.insert(motor, by);
+                held.unconfirmed.insert(motor);
             }
             Err(_) => held.ended(motor, false, result),
         }
@@ -459,7 +460,10 @@ impl Hub {
             (Motion::Starts, result) => {
                 // The owner stays if the start was refused.
                 if result.as_ref().err().is_none_or(may_be_executed) {
-                    held.unstopped.remove(&motor);
+                    // A stop that is under way is not ended by an earlier start.
+                    if held.unstopped.remove(&motor).is_some() {
+                        held.unconfirmed.remove(&motor);
+                    }
                     held.owners.insert(motor, session);
                 }
                 self.stop_if_orphaned(line, motor);
@@ -467,6 +471,7 @@ impl Hub {
             (Motion::Stops, Err(error)) if may_be_executed(error) => {
                 let name = self.sessions.get(&session).and_then(|session| session.name.clone());
                 held.unstopped.insert(motor, name.unwrap_or_else(|| "share".into()));
+                held.unconfirmed.insert(motor);
             }
             (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
         }
@@ -502,6 +507,7 @@ impl Hub {
         let tell = self.teller(session, None, line);
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
+        held.unconfirmed.insert(motor);
         let asker = Arc::clone(by);
         let ended = move |result| tell(Work::Stop { part, motor, by: asker, result });
         let begun = if part.is_some() || !held.is_unheard(motor) {
