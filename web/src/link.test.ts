@@ -201,6 +201,51 @@ describe('subscriptions', () => {
   });
 });
 
+describe('motors', () => {
+  const answer = (kind: string, more: object) => {
+    const { id } = Socket.last.asked(kind).at(-1)!;
+    Socket.last.give({ kind: 'answer', id, to: kind, ...more });
+    return vi.advanceTimersByTimeAsync(0);
+  };
+  const LINE = { line: 'st0', protocol: 'st', port: 'p', timeout: 1, t: 10, wall: 0 };
+
+  it('that answered before are known while no search finds them', async () => {
+    Socket.last.welcome();
+    await answer('lines', { lines: [{ ...LINE, heard: [2, 1], unstopped: [3] }] });
+    expect(link.motors.value.get('st0')).toEqual([1, 2, 3]);
+    expect(link.searching.value.has('st0')).toBe(true);
+    const { id } = Socket.last.asked('motors').at(-1)!;
+    Socket.last.give({ kind: 'refusal', id, reason: 'silent', message: 'no motor answers' });
+    await vi.advanceTimersByTimeAsync(0);
+    expect(link.motors.value.get('st0')).toEqual([1, 2, 3]);
+    expect(link.searchFailed.value.get('st0')).toBe('no motor answers');
+    // They are searched again later.
+    void link.refreshLines();
+    await answer('lines', { lines: [{ ...LINE, heard: [1, 2] }] });
+    expect(Socket.last.asked('motors')).toHaveLength(2);
+    await answer('motors', { motors: [1] });
+    expect([link.motors.value.get('st0'), link.found.value.get('st0')]).toEqual([[1, 2], [1]]);
+  });
+
+  it('without an answer are those that a search found', async () => {
+    Socket.last.welcome();
+    await answer('lines', { lines: [LINE] });
+    expect(link.motors.value.has('st0')).toBe(false);
+    await answer('motors', { motors: [] });
+    expect(link.motors.value.get('st0')).toEqual([]);
+  });
+
+  it('that confirm a stop, or do not, are asked for once', async () => {
+    Socket.last.welcome();
+    const before = Socket.last.asked('lines').length;
+    for (const motor of [1, 2]) {
+      Socket.last.give({ kind: 'event', wall: 1, event: 'stop-failed', line: 'st0', motor, message: '' });
+    }
+    await vi.advanceTimersByTimeAsync(100);
+    expect(Socket.last.asked('lines')).toHaveLength(before + 1);
+  });
+});
+
 describe('ages', () => {
   it('are unknown before the clocks are known, and grow while nothing is received', async () => {
     Socket.last.welcome();

@@ -44,8 +44,12 @@ export const lastWelcome = signal<Welcome | null>(null);
 export const lines = signal<Line[]>([]);
 /** Who latched the share: motion is refused. */
 export const latchedBy = signal<string | null>(null);
-/** The motors that were found, by line. */
+/** The number of the last entry before the answer that `lines` is from. */
+export const linesAt = signal(0);
+/** The motors of each line: those that the last search found, and those that answered the share before. */
 export const motors = signal<ReadonlyMap<string, readonly number[]>>(new Map());
+/** The motors that the last search of each line found. */
+export const found = signal<ReadonlyMap<string, readonly number[]>>(new Map());
 /** Why the last search of a line found nothing, by line. */
 export const searchFailed = signal<ReadonlyMap<string, string>>(new Map());
 /** An event, or several commands of a program to a motor in a row. */
@@ -89,6 +93,8 @@ const DEAD = 5000;
 /** Clocks of lines drift, and what was refused may be possible later. */
 const LATER = 10_000;
 const RELEASE = 1000;
+/** After an event about a stop the lines are asked for once, so much later: more events follow. */
+const SOON = 50;
 const MOST_EVENTS = 2000;
 /** Commands that are so near to each other, in entries and seconds, are one entry. */
 const NEAR = 40;
@@ -125,6 +131,7 @@ let quiet = 0;
 let measuredDelay = 0;
 let lookedAt = 0;
 let releasedAt = -Infinity;
+let refreshTimer: ReturnType<typeof setTimeout> | null = null;
 
 /** Sends a request. Rejects with `Refused`. */
 export function ask<A extends Ask>(wanted: A): Promise<AnswerTo<A['ask']>> {
@@ -329,7 +336,10 @@ function shareEnded() {
 function heard(text: Text | ShareText) {
   switch (text.kind) {
     case 'welcome':
-      if (lastWelcome.value && lastWelcome.value.run !== text.run) motors.value = new Map();
+      if (lastWelcome.value && lastWelcome.value.run !== text.run) {
+        motors.value = new Map();
+        found.value = new Map();
+      }
       welcome.value = text;
       lastWelcome.value = text;
       state.value = 'open';
@@ -433,6 +443,14 @@ function happened(event: DriveEvent) {
   if (event.event === 'latched') latchedBy.value = event.by ?? 'another program';
   if (event.event === 'released') latchedBy.value = null;
   if (['back', 'opened', 'closed'].includes(event.event)) void refreshLines();
+  if (['latched', 'stopped', 'stop-failed'].includes(event.event)) refreshSoon();
+}
+
+function refreshSoon() {
+  refreshTimer ??= setTimeout(() => {
+    refreshTimer = null;
+    void refreshLines();
+  }, SOON);
 }
 
 function measure({ beat: number, wall, at, since, holds: has }: Beat) {
@@ -447,11 +465,13 @@ export async function refreshLines() {
   try {
     const answer = await ask({ ask: 'lines' });
     for (const { line, t, wall } of answer.lines) clocks.set(line, { t, wall });
+    linesAt.value = lastEntry;
     lines.value = answer.lines;
     forgetMotors(answer.lines);
+    answer.lines.forEach(keepMotors);
     latchedBy.value = answer.latched_by ?? null;
     for (const { line } of answer.lines) {
-      if (!motors.value.get(line)?.length) void refreshMotors(line);
+      if (!found.value.get(line)?.length) void refreshMotors(line);
     }
   } catch {
     // The next connection asks again.
@@ -463,6 +483,16 @@ function forgetMotors(known: readonly Line[]) {
   const isThere = ([line]: [string, unknown]) => known.some((one) => one.line === line);
   const left = [...motors.value].filter(isThere);
   if (left.length < motors.value.size) motors.value = new Map(left);
+  const ofSearch = [...found.value].filter(isThere);
+  if (ofSearch.length < found.value.size) found.value = new Map(ofSearch);
+}
+
+/** A motor that answered before may turn although no search finds it. */
+function keepMotors({ line, heard, unstopped }: Line) {
+  const searched = found.value.get(line);
+  const all = [...new Set([...(searched ?? []), ...(heard ?? []), ...(unstopped ?? [])])].sort((a, b) => a - b);
+  if (all.length === 0 && !searched) return;
+  if (motors.value.get(line)?.join() !== all.join()) motors.value = new Map(motors.value).set(line, all);
 }
 
 /** Lines that are being searched. */
@@ -474,8 +504,11 @@ export async function refreshMotors(line: string) {
   searching.value = new Set(searching.value).add(line);
   let failure: string | null = null;
   try {
-    const found = await ask({ ask: 'motors', line });
-    motors.value = new Map(motors.value).set(line, found.motors);
+    const answer = await ask({ ask: 'motors', line });
+    found.value = new Map(found.value).set(line, answer.motors);
+    const known = lines.value.find((one) => one.line === line);
+    if (known) keepMotors(known);
+    else motors.value = new Map(motors.value).set(line, answer.motors);
   } catch (why) {
     failure = (why as Error).message;
   }
