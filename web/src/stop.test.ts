@@ -128,6 +128,45 @@ describe('stop all', () => {
     });
   });
 
+  it('names the motors that have not confirmed, from 1 s on', async () => {
+    stop.stopAll();
+    latchedBy.value = 'page 1';
+    happened('latched');
+    happened('stopped', 'rmd0', 2);
+    await pass(990);
+    expect(report().message).not.toContain('not yet');
+    await pass(20);
+    expect(report().phase).toBe('sent');
+    expect(report().message).toMatch(/1 of 4 did; not yet: st0\/1, st0\/2, rmd0\/1$/);
+    happened('stopped', 'st0', 1);
+    expect(report().message).toMatch(/2 of 4 did; not yet: st0\/2, rmd0\/1$/);
+  });
+
+  it('names them if none has confirmed and motion was latched before', async () => {
+    latchedBy.value = 'page 1';
+    stop.stopAll();
+    happened('latched');
+    await pass(1010);
+    expect(report().message).toMatch(/0 of 4 did; not yet: st0\/1, st0\/2, rmd0\/1 and 1 more$/);
+  });
+
+  it('follows motors that confirm after the answer', async () => {
+    stop.stopAll();
+    happened('stopped', 'st0', 2);
+    happened('stop-failed', 'st0', 2);
+    asked[0]!.done({ motors: ALL.map((one) => (one.motor === 1 ? one : { ...one, failure: 'no reply' })) });
+    await pass(0);
+    expect(report().message).toContain('st0/2, rmd0/2 did not confirm');
+    happened('stopped', 'rmd0', 2);
+    expect(report()).toEqual({
+      phase: 'unconfirmed',
+      message: 'st0/2 did not confirm: it may still be turning. 3 of 4 motors confirmed.',
+      failures: ['st0/2: no reply'],
+    });
+    happened('stopped', 'st0', 2);
+    expect(report()).toEqual({ phase: 'stopped', message: 'Stopped: 4 of 4 motors confirmed.' });
+  });
+
   it('names the first of many motors, and keeps all of them beside it', async () => {
     stop.stopAll();
     const many = Array.from({ length: 30 }, (_, at) => ({ line: 'rmd1', motor: at + 1, failure: 'no reply' }));
@@ -158,7 +197,8 @@ describe('stop all', () => {
     asked[1]!.done({ motors: [...ALL, { line: 'rmd0', motor: 9, failure: 'no reply', absent: true }] });
     await pass(0);
     expect(report().phase).toBe('stopped');
-    expect(report().message).toContain('4 of 4 motors confirmed. The stop also went to 1 address where no motor was found.');
+    expect(report().message).toBe('Stopped: 4 of 4 motors confirmed.');
+    expect(report().note).toBe('The stop also went to 1 address where no motor was found.');
     // The page knows better: a search of this page found it.
     stop.stopAll();
     asked[2]!.done({ motors: [{ line: 'rmd0', motor: 2, failure: 'no reply', absent: true }] });
@@ -175,7 +215,8 @@ describe('stop all', () => {
       if (fails) posted[0]!.failed(new TypeError('no network'));
       await pass(1000);
       expect(report().phase).toBe('unreachable');
-      expect(report().message).toContain('its own deadline of 300 ms; others turn on');
+      expect(report().message).toContain('its own deadline of 300 ms. If not, they keep turning');
+      expect(report().message).toContain('use the power switch or a guard');
     }
     // An answer after all is better news.
     asked.at(-1)!.done({ motors: ALL });

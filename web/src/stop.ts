@@ -10,6 +10,8 @@ export interface StopReport {
   message: string;
   /** Each motor that did not confirm, and why. */
   failures?: readonly string[];
+  /** Where else the stop went. */
+  note?: string;
 }
 
 /** What is known of the last stop of all motors. */
@@ -26,7 +28,17 @@ const AGAIN = 10_000;
 const MOST_NAMED = 3;
 const WAITING = 'The server has the stop, and waits for the motors to confirm it.';
 
+interface Answered {
+  known: readonly StoppedMotor[];
+  /** Addresses where no motor was found. */
+  others: number;
+}
+
 let last = 0;
+/** The answer to the last stop. */
+let lastAnswer: Answered | null = null;
+/** Whether the motors take long to confirm the last stop. */
+let isSlow = false;
 /** The newest event when all motors were stopped last. */
 let before = 0;
 let pressedAt = -Infinity;
@@ -41,6 +53,8 @@ function send() {
   last += 1;
   const number = last;
   before = entries.value.at(-1)?.number ?? 0;
+  lastAnswer = null;
+  isSlow = false;
   held.value = false;
   sayAlive();
   stopReport.value = { phase: 'sent', message: 'Stop sent. No motor has confirmed it yet.' };
@@ -56,7 +70,9 @@ function send() {
   };
   const answered = (stopped: readonly StoppedMotor[]) => {
     isOver = true;
-    tell(confirmed(stopped));
+    if (number !== last) return;
+    lastAnswer = sorted(stopped);
+    tell(confirmed(lastAnswer));
   };
   const failed = (why: Error) => {
     ways -= 1;
@@ -79,7 +95,11 @@ function send() {
     if (!isLatchedSince()) byHttp();
   }, SECOND_WAY);
   setTimeout(() => {
-    if (isOver || isLatchedSince()) return;
+    if (isOver) return;
+    if (isLatchedSince()) {
+      if (number === last) isSlow = true;
+      return waiting();
+    }
     byHttp();
     tell(unreachable());
   }, UNREACHED);
@@ -97,45 +117,57 @@ function refused(why: Refused): StopReport {
 }
 
 function unreachable(): StopReport {
-  const deadline = lastWelcome.value?.deadline;
+  const { deadline, separate_share: isSeparate } = lastWelcome.value ?? {};
   const own = deadline === undefined ? 'its own deadline' : `its own deadline of ${deadline} ms`;
   return {
     phase: 'unreachable',
     message:
-      `Not reachable. The server stops the motors that this page turned by ${own}; others turn on. ` +
+      `Not reachable. If the server still runs, it stops the motors that this page turned by ${own}. ` +
+      `If not, they ${isSeparate ? 'may keep' : 'keep'} turning, as those of other programs do: ` +
+      'use the power switch or a guard. ' +
       `If the connection is back within ${AGAIN / 1000} s, the stop is sent again.`,
   };
 }
 
 export { nameOf };
 
-function confirmed(stopped: readonly StoppedMotor[]): StopReport {
+/** The first of some names, and how many more there are. */
+export function named(names: readonly string[]): string {
+  const more = names.length - MOST_NAMED;
+  return names.slice(0, MOST_NAMED).join(', ') + (more > 0 ? ` and ${more} more` : '');
+}
+
+function sorted(stopped: readonly StoppedMotor[]): Answered {
   // A search also asks addresses where no motor is. Their stop is sent, too.
   const isMotor = ({ line, motor, absent }: StoppedMotor) =>
     !absent || motors.value.get(line)?.includes(motor);
   const known = stopped.filter(isMotor);
-  const failures = known.filter(({ failure }) => failure);
-  const others = stopped.length - known.length;
-  const silent = others
-    ? ` The stop also went to ${others} ${others === 1 ? 'address' : 'addresses'} where no motor was found.`
-    : '';
+  return { known, others: stopped.length - known.length };
+}
+
+function confirmed({ known, others }: Answered): StopReport {
+  // The server repeats stops that failed.
+  const later = confirmedSince();
+  const failures = known.filter(({ line, motor, failure }) => failure && !later.has(nameOf(line, motor)));
+  const addresses = others === 1 ? 'address' : 'addresses';
+  const note = others ? { note: `The stop also went to ${others} ${addresses} where no motor was found.` } : {};
   if (failures.length) {
-    const names = failures.slice(0, MOST_NAMED).map(({ line, motor }) => nameOf(line, motor));
-    const more = failures.length - names.length;
+    const names = failures.map(({ line, motor }) => nameOf(line, motor));
     const turning = failures.length === 1 ? 'it may' : 'they may';
     return {
       phase: 'unconfirmed',
       message:
-        `${names.join(', ')}${more ? ` and ${more} more` : ''} did not confirm: ${turning} still be turning. ` +
-        `${known.length - failures.length} of ${known.length} motors confirmed.${silent}`,
+        `${named(names)} did not confirm: ${turning} still be turning. ` +
+        `${known.length - failures.length} of ${known.length} motors confirmed.`,
       failures: failures.map(({ line, motor, failure }) => `${nameOf(line, motor)}: ${failure}`),
+      ...note,
     };
   }
   const count = known.length;
   const message = count
-    ? `Stopped: ${count} of ${count} motors confirmed.${silent}`
-    : `The server has it. No motor was read or commanded before.${silent}`;
-  return { phase: 'stopped', message };
+    ? `Stopped: ${count} of ${count} motors confirmed.`
+    : 'The server has it. No motor was read or commanded before.';
+  return { phase: 'stopped', message, ...note };
 }
 
 /** Motion is refused while the share is latched, whatever else may be in its way. */
@@ -201,13 +233,34 @@ export function stopByKeys() {
 /** Whether the server has the last stop. */
 const isLatchedSince = () => entries.value.some(({ number, event }) => number > before && event === 'latched');
 
-/** The motors that confirmed the last stop, while the server waits for others. */
-const confirmedSince = () =>
-  new Set(
-    entries.value.flatMap(({ number, event, line, motor }) =>
-      number > before && event === 'stopped' && line && motor != null ? [nameOf(line, motor)] : [],
-    ),
-  );
+/** The motors that confirmed the last stop. A stop that failed is repeated: the last event of a motor counts. */
+function confirmedSince(): Set<string> {
+  const names = new Set<string>();
+  for (const { number, event, line, motor } of entries.value) {
+    if (number <= before || !line || motor == null) continue;
+    if (event === 'stopped') names.add(nameOf(line, motor));
+    if (event === 'stop-failed') names.delete(nameOf(line, motor));
+  }
+  return names;
+}
+
+/** Says which motors the server waits for. */
+function waiting() {
+  if (stopReport.peek()?.phase !== 'sent') return;
+  const names = confirmedSince();
+  const found = [...motors.peek()].flatMap(([line, all]) => all.map((motor) => nameOf(line, motor)));
+  const missing = found.filter((name) => !names.has(name));
+  const count = found.length - missing.length;
+  if (found.length === 0 || (count === 0 && !isSlow)) return;
+  // The server still asks addresses where no motor was found.
+  stopReport.value =
+    missing.length === 0
+      ? { phase: 'stopped', message: `Stopped: ${count} of ${count} motors confirmed.` }
+      : {
+          phase: 'sent',
+          message: `${WAITING} ${count} of ${found.length} did${isSlow ? `; not yet: ${named(missing)}` : '.'}`,
+        };
+}
 
 let wasLatched = false;
 latchedBy.subscribe((by) => {
@@ -220,16 +273,8 @@ latchedBy.subscribe((by) => {
   wasLatched = by !== null;
 });
 entries.subscribe(() => {
-  if (stopReport.peek()?.phase !== 'sent') return;
-  const names = confirmedSince();
-  if (!names.size) return;
-  const found = [...motors.peek()].flatMap(([line, all]) => all.map((motor) => nameOf(line, motor)));
-  const count = found.filter((name) => names.has(name)).length;
-  // The server still asks addresses where no motor was found.
-  stopReport.value =
-    count === found.length
-      ? { phase: 'stopped', message: `Stopped: ${count} of ${count} motors confirmed.` }
-      : { phase: 'sent', message: `${WAITING} ${count} of ${found.length} did.` };
+  waiting();
+  if (lastAnswer && stopReport.peek()?.phase === 'unconfirmed') stopReport.value = confirmed(lastAnswer);
 });
 
 /** Sends a stop again that ended so. */
