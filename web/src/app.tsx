@@ -2,8 +2,11 @@
 import { useSignal } from '@preact/signals';
 import { Component, type ComponentChildren, type ComponentType } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
+import { watchDescriptions } from './drives';
+import { faultSummary, watchFaults } from './faults';
 import { sentence } from './format';
-import { closedWhy, delay, lapsed, lastWelcome, latchedBy, shareLost, state, welcome } from './link';
+import { latchText } from './latch';
+import { closedWhy, delay, lapsed, lastWelcome, shareLost, state, welcome } from './link';
 import { Said, useSaid } from './parts';
 import { RecordButton } from './record-button';
 import { release, stopAll, stopReport } from './stop';
@@ -73,6 +76,22 @@ function Status() {
   );
 }
 
+/** The faults of all motors, in every view. */
+function FaultsOfAll() {
+  useEffect(watchDescriptions, []);
+  useEffect(watchFaults, []);
+  const text = faultSummary.value;
+  return (
+    <span class="all-faults" role="status" aria-label="Faults of all motors">
+      {text && (
+        <a href="#/motors" class="bad" title={text}>
+          ✕ {text}
+        </a>
+      )}
+    </span>
+  );
+}
+
 /** What is known of the last stop. */
 function Report() {
   const report = stopReport.value;
@@ -83,14 +102,17 @@ function Report() {
       <strong role="status" aria-label="Stop" aria-live="assertive" class={tone}>
         {report && `${SIGNS[tone]} ${report.message}`}
       </strong>
-      {report?.failures && (
+      {(report?.failures || report?.note) && (
         <details>
           <summary>What each said</summary>
-          <ul tabIndex={0} aria-label="Motors that did not confirm">
-            {report.failures.map((failure) => (
-              <li key={failure}>{failure}</li>
-            ))}
-          </ul>
+          {report.failures && (
+            <ul tabIndex={0} aria-label="Motors that did not confirm">
+              {report.failures.map((failure) => (
+                <li key={failure}>{failure}</li>
+              ))}
+            </ul>
+          )}
+          {report.note && <p>{report.note}</p>}
         </details>
       )}
       {isDone && (
@@ -104,12 +126,12 @@ function Report() {
 
 function Latch() {
   const { said, attempt, isBusy } = useSaid();
-  const by = latchedBy.value;
-  if (by === null) return null;
+  const text = latchText.value;
+  if (text === null) return null;
   return (
     <section class="note warn latch" aria-label="Latch">
       <p>
-        <strong>Stopped by {by}.</strong> Motion is refused until the latch is released.
+        <strong>{text}</strong> Motion is refused until the latch is released.
         {welcome.value?.role === 'viewer' && ' A viewer cannot release it.'}
       </p>
       {welcome.value?.role === 'operator' && (
@@ -131,7 +153,7 @@ function Banners() {
           <p>
             <strong>Values are old.</strong> {closedWhy.value && `${sentence(closedWhy.value)} `}The server stops the
             motors that this page turned when it hears nothing for {lastWelcome.value?.deadline ?? 300} ms. Motors of
-            other programs turn on.{' '}
+            other programs keep turning.{' '}
             {lastWelcome.value?.separate_share
               ? 'If the server itself has ended, the share, which is another process, has stopped the motors of this page. '
               : 'If the server itself has ended, only a guard or the power switch stops the motors. '}
@@ -231,6 +253,7 @@ export function App() {
           <StopAll />
           <div class="line">
             <Status />
+            <FaultsOfAll />
             <Report />
           </div>
           <Latch />

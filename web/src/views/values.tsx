@@ -1,19 +1,17 @@
 // The values of a card. Only these are drawn again with each tick.
 import { useEffect, useRef } from 'preact/hooks';
 import { rates } from '../drives';
+import { countOf, faultsText, told } from '../faults';
 import { decimalsOf, decimalsOfStep, number, rate, sentence } from '../format';
 import { state } from '../link';
 import { HISTORY, type Live, liveOf } from '../overview';
-import type { Description, Fault } from '../wire';
+import type { Description } from '../wire';
 
 interface Props {
   line: string;
   motor: number;
   description: Description;
 }
-
-/** Whether a bit of a value is set. Bits above 31 are beyond the operators of numbers. */
-const has = (value: number, bit: number) => Math.floor(value / 2 ** bit) % 2 === 1;
 
 /** The faults with what to do. It has a varying height, so it is below the buttons. */
 export function Faults({ line, motor, description }: Props) {
@@ -51,25 +49,13 @@ function faultsOf(line: string, motor: number, { overview }: Description) {
   return { value: live.values.get(overview.faults)?.value ?? NaN, old: live.old(overview.faults) };
 }
 
-/** What to say about the bits of a value. */
-function told(value: number, faults: readonly Fault[]) {
-  const set = faults.filter(({ bit }) => has(value, bit));
-  const names = new Set(set.filter(({ present }) => present).map(({ name }) => name));
-  return {
-    // A fault whose cause is present is not told a second time as one that occurred.
-    shown: set.filter(({ present, name }) => present || !names.has(name)),
-    unknown: value - set.reduce((sum, { bit }) => sum + 2 ** bit, 0),
-  };
-}
-
 function FaultCount({ line, motor, description }: Props) {
   const { value, old } = faultsOf(line, motor, description);
   if (Number.isNaN(value)) return <span class="muted">faults unknown</span>;
-  const { shown, unknown } = told(value, description.faults);
-  const count = shown.length + (unknown ? 1 : 0);
-  if (old !== null) return <span class="muted">{count || 'no'} faults, {old}</span>;
+  const count = countOf(value, description.faults);
+  if (old !== null) return <span class="muted">{faultsText(count)}, {old}</span>;
   if (count === 0) return <span class="ok">✓ no faults</span>;
-  return <span class="chip bad">✕ {count === 1 ? '1 fault' : `${count} faults`}</span>;
+  return <span class="chip bad">✕ {faultsText(count)}</span>;
 }
 
 /** The last 20 s of the speed. The numbers beside it say the same to a screen reader. */

@@ -1,0 +1,86 @@
+// The faults of all motors, for the header of every view.
+import { effect, signal } from '@preact/signals';
+import { allMotors, descriptions } from './drives';
+import { type Rows, age, subscribe } from './link';
+import { named, nameOf } from './stop';
+import type { Fault, SignalName } from './wire';
+
+/** How often the faults of all motors are read while no other view reads them, in seconds. */
+const PERIOD = 1;
+/** A value that is older, in seconds, is marked in the header. */
+const OLD = 3;
+/** How often the ages of the values are looked at, in ms. */
+const LOOK = 500;
+
+/** Whether a bit of a value is set. Bits above 31 are beyond the operators of numbers. */
+const has = (value: number, bit: number) => Math.floor(value / 2 ** bit) % 2 === 1;
+
+/** What to say about the bits of a value. */
+export function told(value: number, faults: readonly Fault[]) {
+  const set = faults.filter(({ bit }) => has(value, bit));
+  const names = new Set(set.filter(({ present }) => present).map(({ name }) => name));
+  return {
+    // A fault whose cause is present is not told a second time as one that occurred.
+    shown: set.filter(({ present, name }) => present || !names.has(name)),
+    unknown: value - set.reduce((sum, { bit }) => sum + 2 ** bit, 0),
+  };
+}
+
+/** How many faults a value has. Unknown ones are one. */
+export function countOf(value: number, faults: readonly Fault[]): number {
+  const { shown, unknown } = told(value, faults);
+  return shown.length + (unknown ? 1 : 0);
+}
+
+/** A number of faults in words. */
+export const faultsText = (count: number) => `${count || 'no'} ${count === 1 ? 'fault' : 'faults'}`;
+
+/** The last value of the faults of each motor, by name. */
+const last = new Map<string, { value: number; t: number }>();
+
+/** The faults of all motors in words. Empty if there is none. */
+export const faultSummary = signal('');
+
+function summary(): string {
+  let count = 0;
+  const names: string[] = [];
+  for (const { line, motor } of allMotors.peek()) {
+    const name = nameOf(line, motor);
+    const known = last.get(name);
+    const faults = known && countOf(known.value, descriptions.peek().get(line)?.faults ?? []);
+    if (!faults) continue;
+    count += faults;
+    // NaN: the age is unknown.
+    names.push(age(line, known.t) <= OLD ? name : `${name} (old)`);
+  }
+  return count ? `${faultsText(count)}: ${named(names)}` : '';
+}
+
+function take({ line, motor, t0, t, values }: Rows) {
+  const row = t.length - 1;
+  const value = values[0]?.[row];
+  if (value === undefined || Number.isNaN(value)) return;
+  last.set(nameOf(line, motor), { value, t: t0 + t[row]! });
+  faultSummary.value = summary();
+}
+
+/** Reads the faults of all motors while the page is visible. Returns what ends it. */
+export function watchFaults(): () => void {
+  const isHidden = signal(document.hidden);
+  const look = () => void (isHidden.value = document.hidden);
+  document.addEventListener('visibilitychange', look);
+  const stopReading = effect(() => {
+    const signals = allMotors.value.flatMap(({ line, motor }): SignalName[] => {
+      const name = descriptions.value.get(line)?.overview.faults;
+      return name === undefined ? [] : [{ line, motor, name }];
+    });
+    if (isHidden.value || signals.length === 0) return;
+    return subscribe(signals, PERIOD, take, { rows: true });
+  });
+  const timer = setInterval(() => (faultSummary.value = summary()), LOOK);
+  return () => {
+    stopReading();
+    clearInterval(timer);
+    document.removeEventListener('visibilitychange', look);
+  };
+}

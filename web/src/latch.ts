@@ -1,0 +1,50 @@
+// What is said of the latch: who pressed the stop, and which motors have not confirmed it.
+import { computed, signal } from '@preact/signals';
+import { entries, latchedBy, lines, linesAt, motors } from './link';
+import { named, nameOf } from './stop';
+
+/** For so long, in ms, motors that did not confirm are not named: most confirm within it. */
+const FRESH = 1000;
+
+/** The first event of the last latch. */
+let latchedAt = 0;
+let seen = 0;
+let timer: ReturnType<typeof setTimeout> | undefined;
+/** Whether the stop was pressed just now. */
+const isFresh = signal(false);
+
+entries.subscribe((all) => {
+  const latched = all.find(({ number, event }) => number > seen && event === 'latched');
+  seen = all.at(-1)?.number ?? seen;
+  // Each line has an event of the same latch.
+  if (!latched || isFresh.peek()) return;
+  latchedAt = latched.number;
+  isFresh.value = true;
+  clearTimeout(timer);
+  timer = setTimeout(() => (isFresh.value = false), FRESH);
+});
+
+/** Motors that have not confirmed their last stop, by name: they may be turning. */
+export const unstopped = computed<readonly string[]>(() => {
+  const names = new Set(lines.value.flatMap(({ line, unstopped }) => (unstopped ?? []).map((motor) => nameOf(line, motor))));
+  for (const { number, event, line, motor } of entries.value) {
+    if (number <= linesAt.value || !line || motor == null) continue;
+    const isKnown = motors.value.get(line)?.includes(motor);
+    if (event === 'stopped') names.delete(nameOf(line, motor));
+    else if (isKnown && (event === 'stopping' || event === 'stop-failed')) names.add(nameOf(line, motor));
+  }
+  return [...names].sort();
+});
+
+/** Whether an event of this kind came after the latch. */
+const since = (kind: string) => entries.value.some(({ number, event }) => number > latchedAt && event === kind);
+
+/** Who stopped the motors, and what is known of it. `null`: there is no latch. */
+export const latchText = computed<string | null>(() => {
+  const by = latchedBy.value;
+  if (by === null) return null;
+  const open = unstopped.value;
+  if (isFresh.value && (open.length ? !since('stop-failed') : !since('stopped'))) return `Stop pressed by ${by}.`;
+  if (open.length === 0) return `Stopped by ${by}.`;
+  return `Stop of all by ${by}. Not confirmed, may be turning: ${named(open)}.`;
+});
