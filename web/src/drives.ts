@@ -1,6 +1,6 @@
 // What the page knows of lines and motors: descriptions, events about them, and rates.
 import { computed, effect, signal } from '@preact/signals';
-import { ask, entries, lines, motors, welcome } from './link';
+import { ask, entries, found, lines, motors, searchFailed, searching, welcome } from './link';
 import { nameOf } from './stop';
 import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
 
@@ -67,8 +67,29 @@ export const lineEvents = computed(() => newest(entries.value, LINE_KINDS, false
 /** The last time each motor fell silent or answered again. */
 export const motorEvents = computed(() => newest(entries.value, MOTOR_KINDS, true));
 
+/** Whether motors were searched on all lines, and no search is under way. */
+export const isSearched = computed(
+  () =>
+    welcome.value !== null &&
+    lines.value.length > 0 &&
+    searching.value.size === 0 &&
+    lines.value.every(({ line }) => found.value.has(line) || searchFailed.value.has(line)),
+);
+
 /** The rates of all signals that are read. */
 export const rates = signal<readonly SignalRate[]>([]);
+
+/**
+ * Whether a motor does not answer. Without an event about it that is a motor which the last search did
+ * not find, and of which no values come.
+ */
+export function isSilent(line: string, motor: number): boolean {
+  const last = motorEvents.value.get(nameOf(line, motor))?.event;
+  if (last !== undefined) return last === 'silent';
+  if (rates.value.some((one) => one.line === line && one.motor === motor && one.achieved > 0)) return false;
+  const isSearched = found.value.has(line) || searchFailed.value.has(line);
+  return isSearched && !found.value.get(line)?.includes(motor);
+}
 
 /** Asks for the rates again and again. Returns what ends it. */
 export function watchRates(period = 1000): () => void {

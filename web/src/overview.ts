@@ -11,6 +11,8 @@ const FAST = 0.1;
 const SLOW = 0.5;
 /** How often cards are drawn, in ms. */
 const DRAW = 100;
+/** For so long a card may be without a value, in ms. */
+const NEW = 1500;
 /** Points of the history of a card: one each `DRAW`. */
 export const HISTORY = 200;
 
@@ -28,6 +30,8 @@ export class Live {
   /** Counts the drawings of the card. */
   readonly tick = signal(0);
   lost = 0;
+  /** When it was made, in ms. */
+  private readonly since = performance.now();
 
   constructor(readonly line: string) {}
 
@@ -35,6 +39,11 @@ export class Live {
   age(name: string): number {
     const last = this.values.get(name);
     return last ? age(this.line, last.t) : NaN;
+  }
+
+  /** Whether a value of the last second is there, or may come: the card is new. */
+  isHeard(name: string): boolean {
+    return this.age(name) < 1 || performance.now() - this.since < NEW;
   }
 
   /** Why the value of a signal is not live, or null. */

@@ -1,8 +1,8 @@
 // A card a motor: what it does, and the controls that move it.
 import { useEffect } from 'preact/hooks';
-import { allMotors, describeFailed, descriptions, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
-import { lines, refreshMotors, searchFailed, searching, welcome } from '../link';
-import { overviewRefused, watchOverview } from '../overview';
+import { allMotors, describeFailed, descriptions, isSearched, isSilent, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
+import { found, lines, refreshMotors, searchFailed, searching, welcome } from '../link';
+import { liveOf, overviewRefused, watchOverview } from '../overview';
 import { Said } from '../parts';
 import { nameOf } from '../stop';
 import { Control } from './control';
@@ -22,17 +22,33 @@ function Search() {
   );
 }
 
+interface SilentProps {
+  line: string;
+  motor: number;
+  /** The signal that is read most. */
+  speed: string | undefined;
+}
+
+function Silent({ line, motor, speed }: SilentProps) {
+  const live = liveOf(line, motor);
+  // Drawn again with each tick.
+  void live.tick.value;
+  const isTold = motorEvents.value.has(nameOf(line, motor));
+  const isHeard = !isTold && speed !== undefined && live.isHeard(speed);
+  const isMissing = isSilent(line, motor) || (!isTold && !found.value.get(line)?.includes(motor));
+  return isMissing && !isHeard ? <span class="chip bad">✕ silent</span> : null;
+}
+
 function Card({ line, motor }: { line: string; motor: number }) {
   const description = descriptions.value.get(line);
   const name = nameOf(line, motor);
-  const silent = motorEvents.value.get(name);
   return (
     <li>
       <article class="card" aria-label={`Motor ${name}`}>
         <header>
           <h3>{name}</h3>
           {description && <span class="muted">{description.protocol.toUpperCase()}</span>}
-          {silent?.event === 'silent' && <span class="chip bad">✕ silent</span>}
+          <Silent line={line} motor={motor} speed={description?.overview.speed} />
         </header>
         {description ? (
           <>
@@ -45,6 +61,12 @@ function Card({ line, motor }: { line: string; motor: number }) {
       </article>
     </li>
   );
+}
+
+/** Why it is not known yet which motors there are. */
+function searchText(): string {
+  if (welcome.value === null) return 'Connecting to the server …';
+  return searching.value.size || lines.value.length ? 'Searching motors …' : 'Waiting for the lines of the server …';
 }
 
 export default function Motors() {
@@ -74,7 +96,7 @@ export default function Motors() {
       ))}
       {all.length === 0 && (
         <p class="muted">
-          {searching.value.size ? 'Searching motors …' : 'No motor was found. Check power and cables, then search again.'}
+          {isSearched.value ? 'No motor was found. Check power and cables, then search again.' : searchText()}
         </p>
       )}
       <ul class="cards">

@@ -1,6 +1,6 @@
 // The lines that the share holds, and how often signals are read from them.
 import { useEffect } from 'preact/hooks';
-import { lineEvents, motorEvents, rates, watchRates } from '../drives';
+import { isSilent, lineEvents, rates, watchRates } from '../drives';
 import { rate, timeOfDay } from '../format';
 import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
 import { nameOf } from '../stop';
@@ -29,18 +29,27 @@ function incidents(line: string): string {
 function errors({ exchanges, silent, refused, failed, lost }: LineCounts): string {
   const times = lost === 1 ? 'once' : `${lost} times`;
   return (
-    `${silent} without reply, ${refused} refused, ${failed} failed, of ${exchanges} exchanges; ` +
+    `${silent} without reply, ${refused} refused, ${failed} failed, of ${exchanges} exchanges ` +
+    '(searches of empty addresses count); ' +
     `${lost ? `port lost ${times}` : 'port never lost'}`
   );
 }
 
 function LineState({ line }: { line: string }) {
   const last = lineEvents.value.get(line);
+  const found = motors.value.get(line) ?? [];
   const isRead = rates.value.some((one) => one.line === line && one.achieved > 0);
   if (last?.event === 'lost') {
     return (
       <>
         <span class="chip bad">✕ lost</span> since {timeOfDay(last.wall)}: {last.message}
+      </>
+    );
+  }
+  if (found.length > 0 && found.every((motor) => isSilent(line, motor))) {
+    return (
+      <>
+        <span class="chip bad">✕ silent</span> no motor answers
       </>
     );
   }
@@ -95,7 +104,7 @@ function Port({ close, line: { line, protocol, port, profile, timeout, counts } 
           <dd>
             {found.length === 0 && (isBusy ? 'searching' : 'none found')}
             {found.map((motor) => {
-              const silent = motorEvents.value.get(nameOf(line, motor))?.event === 'silent';
+              const silent = isSilent(line, motor);
               return (
                 <span key={motor} class={silent ? 'motor bad' : 'motor'}>
                   {motor}
@@ -123,7 +132,7 @@ function Port({ close, line: { line, protocol, port, profile, timeout, counts } 
 
 function Rates() {
   const all = rates.value;
-  if (all.length === 0) return <p class="muted">No signal is read now. Motors and plots read signals while they are open.</p>;
+  if (all.length === 0) return <p class="muted">No signal is read now. Each page reads the faults of all motors while it is visible, Motors and Plots also other signals.</p>;
   return (
     <div class="scrolled" tabIndex={0} role="region" aria-label="Rates of signals">
       <table>
