@@ -72,7 +72,7 @@ def rests(watcher):
 
 
 def turns_too(watcher):
-    """Turns RMD motor 1 by another program; gives what checks that it turns on."""
+    """Turns RMD motor 1 by another program; gives what checks that it keeps turning."""
     watcher.command("rmd0", 1, SET_SPEED, 0, 0, 0, *struct.pack("<i", 9000))
 
     def turns_still():

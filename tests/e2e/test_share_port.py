@@ -266,7 +266,7 @@ def test_each_program_can_be_killed_and_the_others_go_on(share, start, direct, t
     viewer, tuner = watches(), tunes()
     for turn in range(ROUNDS):
         eventually(lambda: rpm(direct) > 1000, "a motor that turns")
-        # A program that only looks is killed: the motor turns on.
+        # A program that only looks is killed: the motor keeps turning.
         other, _ = records(f"killed-{turn}")
         other.process.kill()
         viewer.process.kill()

@@ -1,4 +1,4 @@
-// How long a motor turns on after what moved it is gone: `make deadman`, docs/BENCHMARKS.md.
+// How long a motor keeps turning after what moved it is gone: `make deadman`, docs/BENCHMARKS.md.
 import { test } from '@playwright/test';
 import { Bench, Program, spin } from './bench';
 import { Chromium } from './chromium';

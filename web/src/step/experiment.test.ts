@@ -153,7 +153,7 @@ describe('a step', () => {
     expect(Math.abs(delay.value - Math.log(2) * 0.05)).toBeLessThan(delay.error);
   });
 
-  it('ends at the start if that is wanted, and the motor turns on', async () => {
+  it('ends at the start if that is wanted, and the motor keeps turning', async () => {
     const one = experiment({ after: 'from' });
     await one.run();
     expect(bench.asked.at(-1)).toBe('run 500');

@@ -64,7 +64,7 @@ function Setup({
   const form = useSignal<Form>({ ...EMPTY, mode: description.modes[0]?.mode ?? '' });
   const progress = useSignal<{ text: string; count: number } | null>(null);
   const running = useRef<Experiment | null>(null);
-  /** Whether the motor turns on at the start of the step, after the run. */
+  /** Whether the motor keeps turning at the start of the step, after the run. */
   const isTurning = useSignal(false);
   const { said, attempt } = useSaid();
   /** What came of the last run. It stays when all motors are stopped: that ends a run. */
@@ -150,7 +150,7 @@ function Setup({
             </label>
             <label class="check">
               <input type="radio" name="after" checked={form.value.after === 'from'} onChange={() => set({ after: 'from' })} />
-              <span>goes back to the start, and turns on</span>
+              <span>goes back to the start, and keeps turning</span>
             </label>
           </fieldset>
         </fieldset>
@@ -288,7 +288,7 @@ function Explanation({ plan }: { plan: Plan }) {
         <li>
           {after === 'stop'
             ? 'The motor stops.'
-            : `The motor goes back to ${from} ${unit}, and turns on until you stop it or leave this view.`}
+            : `The motor goes back to ${from} ${unit}, and keeps turning until you stop it or leave this view.`}
         </li>
       </ol>
       <p class="muted">

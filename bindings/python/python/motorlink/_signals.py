@@ -70,7 +70,7 @@ class _Repeater:
     """Sends a signal to the main thread again until its handler has begun.
 
     Python runs a handler between two steps of the main thread. If the signal comes just before a wait
-    begins, or in another thread, the handler would run after the wait: the motors would turn on.
+    begins, or in another thread, the handler would run after the wait: the motors would keep turning.
     """
 
     def __init__(self) -> None:

@@ -258,7 +258,7 @@ pub struct FullTurn {
 pub struct Wait {
     /// Return when the motor has arrived and is still; stop it after Ctrl-C or if it does not arrive
     ///
-    /// Without --wait the command returns when the motor has confirmed it, and the motor turns on. With
+    /// Without --wait the command returns when the motor has confirmed it, and the motor keeps turning. With
     /// --wait the angle is read until it is within the tolerance and does not change for 0.25 s. After a
     /// timeout, an error of the motor, a lost line or Ctrl-C the motor is stopped (0x81). After kill -9
     /// the motor completes the move.

@@ -35,7 +35,7 @@ Lines: st0, st1, .. are the ports with an ST drive; rmd0, rmd1, .. are those wit
 order of -p. A port that can have both, such as sim:, gives both.
 
 Safety: a stop goes before commands, and commands go before reads. When a program ends or is killed, \
-the motors that it turned last stop. The motors of a program that hangs but does not end turn on. A \
+the motors that it turned last stop. The motors of a program that hangs but does not end keep turning. A \
 latch refuses motion of all programs until it is released. A share cannot stop a motor if the share \
 is killed with SIGKILL, if the cable to the drive is cut, or if the computer stops. If people can be \
 hurt, use an emergency stop in hardware.
@@ -135,7 +135,7 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
         }
         AskFor::Latch => {
             share.ask(Ask::Latch).map_err(failed)?;
-            done("latched", "motion is refused until the latch is released; motors turn on")
+            done("latched", "motion is refused until the latch is released; motors keep turning")
         }
         AskFor::Release => {
             share.ask(Ask::Release).map_err(failed)?;

@@ -286,7 +286,7 @@ impl Act {
 pub struct Wait {
     /// Return when the motor has arrived and is still; stop it after Ctrl-C or if it does not arrive
     ///
-    /// Without --wait the command returns when the drive has acknowledged it, and the motor turns on.
+    /// Without --wait the command returns when the drive has acknowledged it, and the motor keeps turning.
     /// With --wait the motor has to be in RUN or on its way there. Its position is read until it is
     /// within the tolerance and does not change for 0.25 s, after the length of the move. After a
     /// timeout, a fault, a lost line or Ctrl-C the motor is stopped (STOP_MOTOR): it no longer holds a
