@@ -127,6 +127,6 @@ test.describe('stop all', () => {
     await bench.monitor.end('SIGKILL');
     await live.keyboard.press('Escape');
     await expect(live.getByText(/Not reachable/)).toBeVisible();
-    await expect(live.getByText(/guard/)).toBeVisible();
+    await expect(live.getByText(/guard/).first()).toBeVisible();
   });
 });

@@ -1,5 +1,7 @@
 // All commands of the protocol, with their values.
 import { useSignal } from '@preact/signals';
+import { afterAcknowledge } from '../acknowledge';
+import { COMMANDS, descriptions } from '../drives';
 import { sentence } from '../format';
 import { ask, lapsed } from '../link';
 import { Said, useSaid } from '../parts';
@@ -70,6 +72,8 @@ function One({ line, motor, command: { name, doc, fields, moves, wears_rom }, ma
     if (moves) lapsed.value = null;
     const answer = await ask({ ask: 'act', line, motor, command: name, values: numbers, hold: false, to_rom: wears_rom });
     isAllowed.value = false;
+    const protocol = descriptions.peek().get(line)?.protocol;
+    if (protocol && name === COMMANDS[protocol].acknowledge) return afterAcknowledge(line, motor);
     const texts = answer.values.map((value) => `${value.name} ${value.text}`);
     return texts.length ? texts.join(', ') : 'The drive acknowledged it.';
   };
