@@ -112,7 +112,8 @@ async function run({ protocol = 'st', guarded = false, event, from }: Case) {
   try {
     const page = await chromium.tab();
     await page.goto(bench.url);
-    await spin(page, speed, motor);
+    // A page that gets no time for its signs of life turns nothing, or not for long.
+    if (!(await spin(page, speed, motor).then(() => true, () => false))) return null;
     const late = performance.now() + 5_000;
     while ((await bench.speed(protocol, 1)) < speed / 2) {
       if (performance.now() > late) return null;

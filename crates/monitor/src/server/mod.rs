@@ -21,6 +21,7 @@ use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 
 pub use door::random_word;
+pub use state::Settings;
 pub use tls::{Tls, TlsError};
 
 use crate::message::Role;
@@ -50,18 +51,6 @@ pub struct Options {
     pub recordings: PathBuf,
     /// What pages may do, and what they are told.
     pub settings: Settings,
-}
-
-/// What pages may do, and what they are told.
-pub struct Settings {
-    /// Whether the share is another process, which lives on if this one is killed.
-    pub separate_share: bool,
-    /// Whether pages may open lines at addresses in a network.
-    pub opens_addresses: bool,
-    /// How long a page may give no sign of life until its motors stop.
-    pub deadline: Duration,
-    /// The name and version of this program.
-    pub program: String,
 }
 
 /// A web server that runs.

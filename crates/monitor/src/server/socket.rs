@@ -13,9 +13,8 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
-use super::Settings;
 use super::link::{AGAIN, Link};
-use super::state::State;
+use super::state::{Settings, State};
 use crate::alive::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page::{Broken, May, Page, encode};

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
-use super::Settings;
 use super::door::{Door, random_word};
 use super::link::Link;
 use crate::foxglove::Viewers;
@@ -16,6 +16,18 @@ use crate::recordings::Recordings;
 
 /// Pages at the same time.
 const PAGES: usize = 32;
+
+/// What pages may do, and what they are told.
+pub struct Settings {
+    /// Whether the share is another process, which lives on if this one is killed.
+    pub separate_share: bool,
+    /// Whether pages may open lines at addresses in a network.
+    pub opens_addresses: bool,
+    /// How long a page may give no sign of life until its motors stop.
+    pub deadline: Duration,
+    /// The name and version of this program.
+    pub program: String,
+}
 
 /// A server with its pages.
 pub struct State {
