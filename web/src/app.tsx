@@ -151,12 +151,12 @@ function Banners() {
       {isLost && (
         <section class="note bad" aria-label="Connection lost">
           <p>
-            <strong>Values are old.</strong> {closedWhy.value && `${sentence(closedWhy.value)} `}The server stops the
-            motors that this page turned when it hears nothing for {lastWelcome.value?.deadline ?? 300} ms. Motors of
-            other programs keep turning.{' '}
+            <strong>Values are old.</strong> {closedWhy.value && `${sentence(closedWhy.value)} `}If the server
+            still runs, it stops the motors that this page turned when it hears nothing for{' '}
+            {lastWelcome.value?.deadline ?? 300} ms. Motors of other programs keep turning.{' '}
             {lastWelcome.value?.separate_share
               ? 'If the server itself has ended, the share, which is another process, has stopped the motors of this page. '
-              : 'If the server itself has ended, only a guard or the power switch stops the motors. '}
+              : 'If the server itself has ended or is frozen, only a guard or the power switch stops the motors. '}
             Was it started again? Then open the address that it printed.
           </p>
         </section>

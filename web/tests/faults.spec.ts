@@ -25,6 +25,31 @@ test('a fault is shown in words, with what to do, and acknowledged', async ({ be
   await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
 });
 
+for (const [width, height] of [[390, 844], [800, 600], [1280, 800]] as const) {
+  test(`a fault is in the header of every view, ${width} pixels`, async ({ bench, live }) => {
+    await live.setViewportSize({ width, height });
+    const size = async () => (await live.locator('.top header').evaluate((header) => {
+      const boxes = [...header.querySelectorAll('h1, .stop-all, .status, .all-faults')].map((one) => one.getBoundingClientRect());
+      return Math.max(...boxes.map(({ bottom }) => bottom));
+    }));
+    await open(live, 'Events');
+    const before = await size();
+    const faults = live.getByRole('status', { name: 'Faults of all motors' });
+    await expect(faults).toBeEmpty();
+    for (const motor of [1, 2]) {
+      await bench.drives.tell({ command: 'fault', port: `pty:${bench.folder}/st0`, motor, fault: 'OVER_VOLT' });
+    }
+    await expect(faults.getByRole('link', { name: '2 faults: st0/1, st0/2' })).toBeVisible();
+    expect(await size()).toBe(before);
+    const link = (await faults.boundingBox())!;
+    const stop = (await live.getByRole('button', { name: /STOP ALL/ }).boundingBox())!;
+    expect(link.x + link.width).toBeLessThan(stop.x);
+    expect(await live.evaluate(() => document.documentElement.scrollWidth)).toBe(width);
+    await faults.getByRole('link').click();
+    await expect(live.getByRole('heading', { name: 'Motors', level: 2 })).toBeVisible();
+  });
+}
+
 test('a cable that goes and comes back needs no click', async ({ bench, live }) => {
   const motor = card(live, 'st0/1');
   await spin(live, 1000);

@@ -105,6 +105,36 @@ test.describe('stop all', () => {
     });
   }
 
+  test('that was not confirmed is named on every page, also on one that is opened later', async ({ bench, live, browser }) => {
+    test.setTimeout(120_000);
+    const context = await browser.newContext();
+    try {
+      const viewer = await context.newPage();
+      await viewer.goto(bench.viewerUrl);
+      await expect(viewer.getByRole('article')).toHaveCount(6);
+      bench.drives.process.kill('SIGSTOP');
+      await live.keyboard.press('Escape');
+      await expect(live.getByText(/not yet: st0\/1, st0\/2, rmd0\/1 and 3 more/)).toBeVisible();
+      const latch = viewer.getByRole('region', { name: 'Latch' });
+      const named = /Stop of all by page \d+\. Not confirmed, may be turning: rmd0\/1, rmd0\/2, rmd0\/3 and 3 more\./;
+      await expect(latch.getByText(named)).toBeVisible();
+      // No search finds the motors now.
+      await viewer.reload();
+      await expect(latch.getByText(named)).toBeVisible();
+      await expect(viewer.getByRole('article')).toHaveCount(6);
+      await expect(card(viewer, 'st0/1').getByText('✕ silent')).toBeVisible();
+      await expect(live.getByText(/did not confirm: they may still be turning/)).toBeVisible({ timeout: 60_000 });
+      await open(live, 'Ports');
+      await expect(live.getByRole('article', { name: 'Line st0' }).getByText('no motor answers')).toBeVisible();
+      bench.drives.process.kill('SIGCONT');
+      await expect(live.getByText('Stopped: 6 of 6 motors confirmed.')).toBeVisible({ timeout: 30_000 });
+      await expect(latch.getByText(/^Stopped by page \d+\.$/)).toBeVisible();
+    } finally {
+      bench.drives.process.kill('SIGCONT');
+      await context.close();
+    }
+  });
+
   test('is not needed if the monitor of another share is killed, and the page says so', async ({ bench, page }) => {
     await bench.monitor.end();
     const at = `unix:${bench.folder}/share`;
