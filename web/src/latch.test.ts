@@ -71,6 +71,13 @@ describe('the latch', () => {
     expect(text()).toBe('Stop of all by page 1. Not confirmed, may be turning: st1/2.');
   });
 
+  it('is no stop if a program only latched motion', () => {
+    latchedBy.value = 'operator';
+    happened('latched');
+    vi.advanceTimersByTime(1000);
+    expect(text()).toBe('Latched by operator, without a stop.');
+  });
+
   it('is known to a page that was opened later from the lines', () => {
     latchedBy.value = 'page 1';
     lines.value = [{ line: 'st1', unstopped: [1, 2] }];
