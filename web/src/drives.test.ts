@@ -31,6 +31,16 @@ describe('a motor', () => {
     expect(drives.isSilent('st0', 1)).toBe(false);
   });
 
+  it('that did not confirm a stop is silent unless its values come', () => {
+    happened('stop-failed');
+    expect(drives.isSilent('st0', 1)).toBe(true);
+    drives.rates.value = [{ line: 'st0', motor: 1, name: 'FLAGS', asked: 1, predicted: 1, achieved: 1 }];
+    expect(drives.isSilent('st0', 1)).toBe(false);
+    drives.rates.value = [];
+    happened('stopped');
+    expect(drives.isSilent('st0', 1)).toBe(false);
+  });
+
   it('is silent without an event if the search did not find it and no values come', () => {
     link.searchFailed.value = new Map([['st0', 'no motor answers']]);
     expect(drives.isSilent('st0', 1)).toBe(true);

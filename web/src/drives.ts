@@ -60,11 +60,11 @@ function newest(all: readonly DriveEvent[], kinds: ReadonlySet<string>, isOfMoto
 }
 
 const LINE_KINDS = new Set(['lost', 'back']);
-const MOTOR_KINDS = new Set(['silent', 'answers']);
+const MOTOR_KINDS = new Set(['silent', 'answers', 'stop-failed', 'stopped']);
 
 /** The last loss or return of each line since the page was opened. */
 export const lineEvents = computed(() => newest(entries.value, LINE_KINDS, false));
-/** The last time each motor fell silent or answered again. */
+/** The last time each motor fell silent or answered again, or its stop failed or was confirmed. */
 export const motorEvents = computed(() => newest(entries.value, MOTOR_KINDS, true));
 
 /** Whether motors were searched on all lines, and no search is under way. */
@@ -85,8 +85,11 @@ export const rates = signal<readonly SignalRate[]>([]);
  */
 export function isSilent(line: string, motor: number): boolean {
   const last = motorEvents.value.get(nameOf(line, motor))?.event;
-  if (last !== undefined) return last === 'silent';
+  if (last === 'silent') return true;
+  if (last === 'answers' || last === 'stopped') return false;
   if (rates.value.some((one) => one.line === line && one.motor === motor && one.achieved > 0)) return false;
+  // While stops are repeated nothing is read, and nothing else says that it is silent.
+  if (last === 'stop-failed') return true;
   const isSearched = found.value.has(line) || searchFailed.value.has(line);
   return isSearched && !found.value.get(line)?.includes(motor);
 }

@@ -17,6 +17,7 @@ beforeEach(async () => {
   vi.doMock('./link', () => ({ entries, latchedBy, lines, linesAt, motors }));
   vi.doMock('./stop', () => ({
     nameOf: (line: string, motor: number) => `${line}/${motor}`,
+    inOrder: (names: Iterable<string>) => [...names].sort(),
     named: (names: string[]) => names.join(', '),
   }));
   vi.resetModules();

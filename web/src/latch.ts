@@ -1,7 +1,7 @@
 // What is said of the latch: who pressed the stop, and which motors have not confirmed it.
 import { computed, signal } from '@preact/signals';
 import { entries, latchedBy, lines, linesAt, motors } from './link';
-import { named, nameOf } from './stop';
+import { inOrder, named, nameOf } from './stop';
 
 /** For so long, in ms, motors that did not confirm are not named: most confirm within it. */
 const FRESH = 1000;
@@ -33,7 +33,7 @@ export const unstopped = computed<readonly string[]>(() => {
     if (event === 'stopped') names.delete(nameOf(line, motor));
     else if (isKnown && (event === 'stopping' || event === 'stop-failed')) names.add(nameOf(line, motor));
   }
-  return [...names].sort();
+  return inOrder(names);
 });
 
 /** Whether an event of this kind came after the latch. */

@@ -137,6 +137,10 @@ export function named(names: readonly string[]): string {
   return names.slice(0, MOST_NAMED).join(', ') + (more > 0 ? ` and ${more} more` : '');
 }
 
+/** Names in the order of lines and numbers. */
+export const inOrder = (names: Iterable<string>) =>
+  [...names].sort((a, b) => a.localeCompare(b, 'en', { numeric: true }));
+
 function sorted(stopped: readonly StoppedMotor[]): Answered {
   // A search also asks addresses where no motor is. Their stop is sent, too.
   const isMotor = ({ line, motor, absent }: StoppedMotor) =>
@@ -248,7 +252,7 @@ function confirmedSince(): Set<string> {
 function waiting() {
   if (stopReport.peek()?.phase !== 'sent') return;
   const names = confirmedSince();
-  const found = [...motors.peek()].flatMap(([line, all]) => all.map((motor) => nameOf(line, motor)));
+  const found = inOrder([...motors.peek()].flatMap(([line, all]) => all.map((motor) => nameOf(line, motor))));
   const missing = found.filter((name) => !names.has(name));
   const count = found.length - missing.length;
   if (found.length === 0 || (count === 0 && !isSlow)) return;
