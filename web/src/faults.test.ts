@@ -62,9 +62,9 @@ describe('faults', () => {
     expect([0, 1, 2].map(faults.faultsText)).toEqual(['no faults', '1 fault', '2 faults']);
   });
 
-  it('of all motors are read each second, and named', () => {
+  it('of all motors are read twice a second, and named', () => {
     const end = faults.watchFaults();
-    expect(subscribe.mock.calls[0]!.slice(0, 2)).toEqual([[1, 2, 3].map((motor) => ({ line: 'st0', motor, name: 'FLAGS' })), 1]);
+    expect(subscribe.mock.calls[0]!.slice(0, 2)).toEqual([[1, 2, 3].map((motor) => ({ line: 'st0', motor, name: 'FLAGS' })), 0.5]);
     give(1, 0);
     expect(faults.faultSummary.value).toBe('');
     give(1, PRESENT);

@@ -6,7 +6,7 @@ import { named, nameOf } from './stop';
 import type { Fault, SignalName } from './wire';
 
 /** How often the faults of all motors are read while no other view reads them, in seconds. */
-const PERIOD = 1;
+const PERIOD = 0.5;
 /** A value that is older, in seconds, is marked in the header. */
 const OLD = 3;
 /** How often the ages of the values are looked at, in ms. */

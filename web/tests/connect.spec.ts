@@ -63,7 +63,7 @@ test('a line is opened, turned, and closed, which stops its motors', async ({ be
   await page.goto(bench.url);
   await expect(page.getByRole('article')).toHaveCount(2);
   await open(page, 'Ports');
-  await expect(line(page, 'st0')).toContainText(/0 without reply, \d+ refused, 0 failed, of \d+ exchanges; port never lost/);
+  await expect(line(page, 'st0')).toContainText(/0 without reply, \d+ refused, 0 failed, of \d+ exchanges \(searches of empty addresses count\); port never lost/);
   await expect(await enter(page, port, 'rmd')).toContainText('it is the line rmd0');
   await expect(line(page, 'rmd0')).toContainText(port);
   await expect(await enter(page, port, 'rmd')).toContainText('is open already: it is the line rmd0');
