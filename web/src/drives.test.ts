@@ -53,6 +53,16 @@ describe('a motor', () => {
   });
 });
 
+describe('rates', () => {
+  it('of slow signals are kept for 3 s', () => {
+    const rate = (achieved: number, asked = 0.5) => ({ line: 'st0', motor: 1, name: 'FLAGS', asked, predicted: asked, achieved });
+    expect(drives.steady([rate(2)], 0)[0]!.achieved).toBe(2);
+    expect(drives.steady([rate(0)], 2900)[0]!.achieved).toBe(2);
+    expect(drives.steady([rate(0, 0.1)], 2900)[0]!.achieved).toBe(0);
+    expect(drives.steady([rate(0)], 3100)[0]!.achieved).toBe(0);
+  });
+});
+
 describe('a search', () => {
   it('has found nothing only when all lines were searched', () => {
     expect(drives.isSearched.value).toBe(false);

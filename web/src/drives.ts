@@ -94,11 +94,27 @@ export function isSilent(line: string, motor: number): boolean {
   return isSearched && !found.value.get(line)?.includes(motor);
 }
 
+/** For so long, in ms, a slow signal keeps its rate: between two windows of the share it has none. */
+const KEPT = 3000;
+const SLOW = 0.5;
+const kept = new Map<string, { achieved: number; at: number }>();
+
+/** A slow signal has a rate of 0 in some windows of the share although it is read. */
+export function steady(all: readonly SignalRate[], now = performance.now()): SignalRate[] {
+  return all.map((one) => {
+    const name = `${nameOf(one.line, one.motor)} ${one.name}`;
+    if (one.achieved > 0) kept.set(name, { achieved: one.achieved, at: now });
+    const last = kept.get(name);
+    const isKept = one.achieved === 0 && one.asked >= SLOW && last !== undefined && now - last.at < KEPT;
+    return isKept ? { ...one, achieved: last.achieved } : one;
+  });
+}
+
 /** Asks for the rates again and again. Returns what ends it. */
 export function watchRates(period = 1000): () => void {
   const look = () =>
     ask({ ask: 'rates' }).then(
-      (answer) => void (rates.value = answer.rates),
+      (answer) => void (rates.value = steady(answer.rates)),
       () => void (rates.value = []),
     );
   void look();
