@@ -3,11 +3,11 @@ import type { Recorded } from './wire';
 
 vi.mock('./link', () => ({}));
 vi.mock('./parts', () => ({}));
-const { isActive, missing, summary } = await import('./record-button');
+const { gapsText, isActive, missing, summary } = await import('./record-button');
 
 const recording: Recorded = {
   name: '2026-11-23T14-05-09Z.mcap', phase: 'recording', by: 'page 1', began: 0, seconds: 75.3, bytes: 1_234_567,
-  values: 10, lost: 0, unconfirmed: 0, rates: null, motors: [], silent: [], refused: [], left_out: [], message: null,
+  values: 10, lost: 0, unconfirmed: 0, rates: null, slowest: null, gaps: [], motors: [], silent: [], refused: [], left_out: [], message: null,
 };
 
 describe('the recording in the header', () => {
@@ -26,7 +26,18 @@ describe('the recording in the header', () => {
   it('says what is missing', () => {
     expect(missing(recording)).toBe('');
     expect(missing({ ...recording, lost: 3, silent: ['st0/motor1'], left_out: ['rmd0'] })).toBe(
-      '3 lost, no values of st0/motor1, no motor answered on rmd0',
+      '3 lost; no values of st0/1; no motor answered on rmd0',
+    );
+  });
+
+  it('names the motors without values, and for how long', () => {
+    const gaps = [
+      { motor: 'st1/motor1', seconds: 88.2 }, { motor: 'st1/motor2', seconds: 87.9 }, { motor: 'rmd0/motor3', seconds: 1.2 },
+    ];
+    expect(gapsText(gaps)).toBe('st1/1, st1/2: 88 s without values; rmd0/3: 1.2 s without values');
+    // A motor that never gave a value is not named twice.
+    expect(missing({ ...recording, gaps, silent: ['rmd0/motor3'] })).toBe(
+      'st1/1, st1/2: 88 s without values; no values of rmd0/3',
     );
   });
 });

@@ -1,24 +1,48 @@
 // The recording in the header of each view.
+import { duration } from './format';
 import { ask, recorded, welcome } from './link';
 import { Said, useSaid } from './parts';
 import { elapsed, size } from './recordings/part';
-import type { Recorded } from './wire';
+import type { Gap, Recorded } from './wire';
 import './record-button.css';
 
 /** Whether something is recorded. */
 export const isActive = (recording: Recorded | null): boolean =>
   recording !== null && ['starting', 'recording', 'ending'].includes(recording.phase);
 
+/** The name of a motor as the other views write it. */
+const short = (motor: string) => motor.replace('/motor', '/');
+
+/** Motors without values for a time, in words; those with the same time together. Empty without any. */
+export function gapsText(gaps: readonly Gap[]): string {
+  const times = new Map<string, string[]>();
+  for (const { motor, seconds } of gaps) {
+    const time = duration(seconds < 10 ? seconds : Math.round(seconds));
+    times.set(time, [...(times.get(time) ?? []), short(motor)]);
+  }
+  return [...times].map(([time, motors]) => `${motors.join(', ')}: ${time} without values`).join('; ');
+}
+
 /** What is missing in a recording, in words; empty if nothing is. */
-export function missing({ lost, unconfirmed, silent, left_out }: Recorded): string {
+export function missing({ lost, unconfirmed, silent, gaps, left_out }: Recorded): string {
   return [
+    gapsText(gaps.filter(({ motor }) => !silent.includes(motor))),
     lost > 0 && `${lost} lost`,
     unconfirmed > 0 && `${unconfirmed} rows not confirmed`,
-    silent.length > 0 && `no values of ${silent.join(', ')}`,
+    silent.length > 0 && `no values of ${silent.map(short).join(', ')}`,
     left_out.length > 0 && `no motor answered on ${left_out.join(', ')}`,
   ]
     .filter(Boolean)
-    .join(', ');
+    .join('; ');
+}
+
+/** The rate of the slowest motor: the mean since the start, with its name, and that of the last second. */
+export function rateText({ rates, slowest }: Recorded): string {
+  if (!rates) return '–';
+  const [asked, now] = rates.map((rate) => rate.toFixed(1));
+  if (!slowest) return `${now} of ${asked} Hz`;
+  const mean = Math.min(slowest.rate, rates[0]).toFixed(1);
+  return `lowest mean ${mean} of ${asked} Hz (${short(slowest.motor)}); last second ${now} Hz`;
 }
 
 /** The recording as a short text. */

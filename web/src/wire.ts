@@ -262,6 +262,16 @@ line?: string | null, };
 
 export type FromPage = Alive | Request | ShareRequest;
 
+export type Gap = { 
+/**
+ * Line and motor, such as `st0/motor1`.
+ */
+motor: string, 
+/**
+ * All gaps that are longer than 1 s (at low rates: three periods) together, in seconds.
+ */
+seconds: number, };
+
 export type Group = { 
 /**
  * Its number, which is never used again.
@@ -369,6 +379,16 @@ failed: number,
  */
 lost: number, };
 
+export type MeanRate = { 
+/**
+ * Line and motor, such as `st0/motor1`.
+ */
+motor: string, 
+/**
+ * In Hz, since the start of the recording.
+ */
+rate: number, };
+
 export type Mode = "speed" | "torque" | "position";
 
 export type MotorName = { 
@@ -473,9 +493,17 @@ lost: number,
  */
 unconfirmed: number, 
 /**
- * The rate that was asked for, and that of the slowest motor, in Hz.
+ * The rate that was asked for, and that of the slowest motor in the last second, in Hz.
  */
 rates: [number, number] | null, 
+/**
+ * The motor with the lowest mean rate since the start.
+ */
+slowest: MeanRate | null, 
+/**
+ * Motors that had no values for longer than 1 s.
+ */
+gaps: Array<Gap>, 
 /**
  * Its motors.
  */
@@ -584,6 +612,10 @@ seconds: number | null,
  * Its motors.
  */
 motors: Array<string>, 
+/**
+ * Motors that had no values for longer than 1 s, as its end says.
+ */
+gaps: Array<Gap>, 
 /**
  * Whether it is whole.
  */

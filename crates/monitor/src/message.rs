@@ -19,8 +19,8 @@ pub use drives::{
     Value,
 };
 pub use recordings::{
-    Condition, Phase, Recorded, RecordedEvent, RecordedSignal, RecordingContent, RecordingFile,
-    RecordingPart,
+    Condition, Gap, MeanRate, Phase, Recorded, RecordedEvent, RecordedSignal, RecordingContent,
+    RecordingFile, RecordingPart,
 };
 
 /// What a page sends.

@@ -3,11 +3,14 @@
 mod world;
 
 use std::fs;
+use std::os::fd::BorrowedFd;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
 use motorlink_monitor::message::{
     Answer, Ask, Condition, Phase, Recorded, RecordingContent, RecordingFile, RecordingPart,
 };
@@ -38,8 +41,11 @@ impl Desk {
     }
 
     async fn at(name: &str, folder: PathBuf) -> Self {
+        Self::of(World::new(name, Profile::Spec), folder).await
+    }
+
+    async fn of(world: World, folder: PathBuf) -> Self {
         motorlink_telemetry::share::port::register();
-        let world = World::new(name, Profile::Spec);
         let recordings = Arc::new(Recordings::new(folder.clone(), world.path.clone()));
         let (view, _) = connect(&world.path, PAGE).await;
         Desk { world, folder, recordings, view }
@@ -154,6 +160,76 @@ async fn a_recording_has_all_motors_and_is_whole() {
     desk.end().await;
     let names: Vec<String> = desk.list().await.into_iter().map(|it| it.name).collect();
     assert_eq!(names, [other, name]);
+}
+
+/// A line whose replies are dropped while its cable is cut.
+struct Cable {
+    link: Box<dyn EventBytes>,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Link for Cable {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
+impl ByteLink for Cable {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.link.write(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let size = self.link.read(buffer, timeout)?;
+        Ok(if self.is_cut.load(Ordering::SeqCst) { 0 } else { size })
+    }
+}
+
+impl Evented for Cable {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.link.flush()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn motors_without_values_for_a_time_are_named() {
+    let is_cut = Arc::new(AtomicBool::new(false));
+    let cut = Arc::clone(&is_cut);
+    let around =
+        move |link| -> Box<dyn EventBytes> { Box::new(Cable { link, is_cut: Arc::clone(&cut) }) };
+    let world = World::with("gaps", (Profile::Spec, world::PATIENT), around, |link| link);
+    let desk = Desk::of(world, world::path("gaps", "recordings")).await;
+    desk.record().await;
+    let told = desk.told(|told| told.values > 200 && told.slowest.is_some()).await;
+    assert_eq!(told.gaps, []);
+    is_cut.store(true, Ordering::SeqCst);
+    let of_line = ["st0/motor1", "st0/motor2"];
+    let cut = desk.told(|told| told.gaps.iter().any(|gap| gap.seconds > 3.0)).await;
+    assert_eq!(cut.gaps.iter().map(|gap| &*gap.motor).collect::<Vec<_>>(), of_line);
+    assert!(of_line.contains(&&*cut.slowest.unwrap().motor));
+    is_cut.store(false, Ordering::SeqCst);
+    let values = cut.values;
+    // The gap stays named after the line is back.
+    let back = |told: &Recorded| {
+        told.values > values + 1_000 && told.rates.is_some_and(|[_, achieved]| achieved > 50.0)
+    };
+    let back = desk.told(back).await;
+    let ended = desk.end().await;
+    for recorded in [&back.gaps, &ended.gaps] {
+        assert_eq!(recorded.iter().map(|gap| &*gap.motor).collect::<Vec<_>>(), of_line);
+        assert!(recorded.iter().all(|gap| gap.seconds > 3.0), "{recorded:?}");
+    }
+    let slowest = ended.slowest.unwrap();
+    assert!(of_line.contains(&&*slowest.motor) && slowest.rate < 80.0, "{slowest:?}");
+    let [listed] = &desk.list().await[..] else { panic!("one recording") };
+    assert_eq!((&listed.condition, listed.gaps.len()), (&Condition::Whole, 2));
+    for (listed, ended) in listed.gaps.iter().zip(&ended.gaps) {
+        assert!(listed.motor == ended.motor && (listed.seconds - ended.seconds).abs() < 0.001);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -3,7 +3,7 @@ import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import { duration, sentence } from '../format';
 import { type AnswerTo, ask, recorded, welcome } from '../link';
-import { RecordButton, isActive, missing } from '../record-button';
+import { RecordButton, gapsText, isActive, missing, rateText } from '../record-button';
 import { elapsed, fileOf, size } from '../recordings/part';
 import { Replay } from '../recordings/replay';
 import type { Recorded, RecordedSignal, RecordingContent, RecordingFile } from '../wire';
@@ -88,7 +88,7 @@ function List() {
 
 /** The recording that is made, or how the last one ended. */
 function Making({ recording }: { recording: Recorded }) {
-  const { name, phase, by, seconds, bytes, values, rates, motors, message } = recording;
+  const { name, phase, by, seconds, bytes, values, motors, message } = recording;
   const lacks = missing(recording);
   return (
     <dl class="recordings-facts">
@@ -98,7 +98,7 @@ function Making({ recording }: { recording: Recorded }) {
       <div><dt>Time</dt><dd>{elapsed(seconds)}</dd></div>
       <div><dt>Size</dt><dd>{size(bytes)}</dd></div>
       <div><dt>Values</dt><dd>{values}</dd></div>
-      <div><dt>Rate</dt><dd>{rates ? `${rates[1].toFixed(1)} of ${rates[0].toFixed(1)} Hz` : '–'}</dd></div>
+      <div><dt>Rate</dt><dd>{rateText(recording)}</dd></div>
       <div><dt>Missing</dt><dd>{lacks ? <strong class="bad">! {lacks}</strong> : 'nothing'}</dd></div>
       <div><dt>Motors</dt><dd>{motors.join(', ') || '–'}</dd></div>
     </dl>
@@ -109,7 +109,7 @@ const SIGNS = { whole: '✓ whole', cut: '! not whole', unreadable: '✕ cannot 
 const TONES = { whole: 'ok', cut: 'warn', unreadable: 'bad' } as const;
 
 function Item({ file }: { file: RecordingFile }) {
-  const { name, bytes, began, modified, seconds, motors, condition, message } = file;
+  const { name, bytes, began, modified, seconds, motors, gaps, condition, message } = file;
   return (
     <li class="card">
       <h3>
@@ -121,6 +121,7 @@ function Item({ file }: { file: RecordingFile }) {
         {size(bytes)}
       </p>
       {motors.length > 0 && <p class="muted">{motors.join(', ')}</p>}
+      {gaps.length > 0 && <p class="bad">! {gapsText(gaps)}.</p>}
       {message && <p class="muted">{sentence(message)}</p>}
       <p>
         <a href={fileOf(name)} download={name}>Download<span class="hidden"> {name}</span></a>

@@ -28,8 +28,12 @@ pub struct Recorded {
     /// Rows that are missing in it, because nothing confirmed them.
     #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub unconfirmed: u64,
-    /// The rate that was asked for, and that of the slowest motor, in Hz.
+    /// The rate that was asked for, and that of the slowest motor in the last second, in Hz.
     pub rates: Option<[f64; 2]>,
+    /// The motor with the lowest mean rate since the start.
+    pub slowest: Option<MeanRate>,
+    /// Motors that had no values for longer than 1 s.
+    pub gaps: Vec<Gap>,
     /// Its motors.
     pub motors: Vec<String>,
     /// Motors that gave no value yet.
@@ -40,6 +44,26 @@ pub struct Recorded {
     pub left_out: Vec<String>,
     /// Why it failed.
     pub message: Option<String>,
+}
+
+/// The mean rate of the fast signals of a motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct MeanRate {
+    /// Line and motor, such as `st0/motor1`.
+    pub motor: String,
+    /// In Hz, since the start of the recording.
+    pub rate: f64,
+}
+
+/// The time without values of a motor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Gap {
+    /// Line and motor, such as `st0/motor1`.
+    pub motor: String,
+    /// All gaps that are longer than 1 s (at low rates: three periods) together, in seconds.
+    pub seconds: f64,
 }
 
 /// How far a recording is.
@@ -76,6 +100,8 @@ pub struct RecordingFile {
     pub seconds: Option<f64>,
     /// Its motors.
     pub motors: Vec<String>,
+    /// Motors that had no values for longer than 1 s, as its end says.
+    pub gaps: Vec<Gap>,
     /// Whether it is whole.
     pub condition: Condition,
     /// What is wrong with it.

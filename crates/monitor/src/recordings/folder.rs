@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use motorlink_recording::read::{ReadError, Recording, lost};
-use motorlink_recording::schema::Time;
+use motorlink_recording::schema::{self, Time};
 use rustix::fs::OFlags;
 
-use crate::message::{Condition, RecordingFile};
+use crate::message::{Condition, Gap, RecordingFile};
 
 /// How names of recordings end.
 const ENDING: &str = ".mcap";
@@ -76,6 +76,7 @@ struct Contents {
     began: Option<f64>,
     seconds: Option<f64>,
     motors: Vec<String>,
+    gaps: Vec<Gap>,
     condition: Condition,
     message: Option<String>,
 }
@@ -124,7 +125,7 @@ impl Folder {
                 None => Contents::read(&self.path, &name),
             };
             known.insert(name.0.clone(), (version, contents.clone()));
-            let Contents { began, seconds, motors, condition, message } = contents;
+            let Contents { began, seconds, motors, gaps, condition, message } = contents;
             let Version { bytes, modified } = version;
             let name = name.0;
             listed.push(RecordingFile {
@@ -134,6 +135,7 @@ impl Folder {
                 began,
                 seconds,
                 motors,
+                gaps,
                 condition,
                 message,
             });
@@ -168,6 +170,7 @@ impl Contents {
                     began: None,
                     seconds: None,
                     motors: Vec::new(),
+                    gaps: Vec::new(),
                     condition: Condition::Unreadable,
                     message: Some(error.to_string()),
                 };
@@ -175,10 +178,15 @@ impl Contents {
         };
         let times = recording.times();
         let message = lost(recording.losses());
+        let gaps = recording.metadata().iter().filter(|it| it.name == schema::gaps::NAME);
+        let gaps = gaps.flat_map(|it| &it.values).filter_map(|(motor, seconds)| {
+            Some(Gap { motor: motor.clone(), seconds: seconds.parse().ok()? })
+        });
         Contents {
             began: times.map(|[first, _]| first as f64 / 1e9),
             seconds: times.map(|[first, last]| last.saturating_sub(first) as f64 / 1e9),
             motors: recording.drives().map(|drive| drive.name).collect(),
+            gaps: gaps.collect(),
             condition: if message.is_some() { Condition::Cut } else { Condition::Whole },
             message,
         }

@@ -16,7 +16,7 @@ use motorlink_telemetry::share::message::{Line, Reason};
 use tokio::sync::{oneshot, watch};
 
 use super::folder::Name;
-use crate::message::{Phase, Recorded};
+use crate::message::{Gap, MeanRate, Phase, Recorded};
 use crate::program::Refusal;
 
 /// How often pages are told how far it is.
@@ -232,6 +232,8 @@ impl Recorded {
             lost: 0,
             unconfirmed: 0,
             rates: None,
+            slowest: None,
+            gaps: Vec::new(),
             motors: Vec::new(),
             silent: Vec::new(),
             refused: Vec::new(),
@@ -252,6 +254,13 @@ impl Recorded {
         self.lost = progress.counts.lost;
         self.unconfirmed = progress.counts.unconfirmed;
         self.rates = progress.rates.map(|(asked, achieved)| [asked, achieved]);
+        let slowest = progress.slowest.clone();
+        self.slowest = slowest.map(|(motor, rate)| MeanRate { motor, rate });
+        let gap = |(motor, gap): &(String, Duration)| Gap {
+            motor: motor.clone(),
+            seconds: gap.as_secs_f64(),
+        };
+        self.gaps = progress.gaps.iter().map(gap).collect();
         self.silent.clone_from(&progress.silent);
         self.refused.clone_from(&progress.refused);
     }

@@ -1,5 +1,6 @@
 //! The condition of a motor, for diagnostics.
 
+use motorlink_proto::time::Micros;
 use motorlink_telemetry::overview::{self, Overview};
 use motorlink_telemetry::sample::Sample;
 use motorlink_telemetry::signal::{Motor, Signal, Source};
@@ -23,13 +24,37 @@ pub(super) struct Condition {
     pub(super) rates: Option<(f64, f64)>,
     /// What was said last.
     said: Option<(Level, String)>,
+    presence: Presence,
 }
+
+/// When there were values.
+#[derive(Debug)]
+struct Presence {
+    /// A longer time without values is a gap, in ns.
+    longest: u64,
+    /// When the recording of the motor began.
+    began: Option<Time>,
+    /// The time of the newest values; before there are some: when it began.
+    newest: Time,
+    /// The gaps that are over, in ns.
+    gaps: u64,
+    /// Rows of the fast signals.
+    rows: u64,
+}
+
+/// A shorter time without values is no gap, in ns.
+const GAP: u64 = 1_000_000_000;
+/// A gap has so many periods at least.
+const PERIODS: u64 = 3;
 
 /// The least share of the asked rate that is not worth a warning.
 const ENOUGH: f64 = 0.9;
 
 impl Condition {
-    pub(super) fn new(motor: Motor, label: &str, port: &str) -> Self {
+    /// `period` is that of its fastest signals.
+    pub(super) fn new(motor: Motor, label: &str, port: &str, period: Micros) -> Self {
+        let longest = GAP.max(PERIODS * period.0 * 1000);
+        let presence = Presence { longest, began: None, newest: Time(0), gaps: 0, rows: 0 };
         Condition {
             motor,
             label: label.to_owned(),
@@ -40,20 +65,49 @@ impl Condition {
             is_silent: false,
             rates: None,
             said: None,
+            presence,
         }
     }
 
-    /// Values of a row.
+    /// It is recorded from now on, if it was not before.
+    pub(super) fn begin(&mut self, now: Time) {
+        if self.presence.began.is_none() {
+            self.presence.began = Some(now);
+            self.presence.newest = self.presence.newest.max(now);
+        }
+    }
+
+    /// For how long there were no values, in ns: the sum of all times that are longer than 1 s and than
+    /// three periods.
+    pub(super) fn without_values(&self, now: Time) -> u64 {
+        self.presence.gaps + self.presence.open(now)
+    }
+
+    /// The mean rate of the fast signals since the recording began, Hz.
+    pub(super) fn mean_rate(&self, now: Time) -> Option<f64> {
+        let Presence { began, newest, rows, .. } = self.presence;
+        let until = if self.presence.open(now) > 0 { now } else { newest };
+        let span = until.0.saturating_sub(began?.0);
+        (span > 0).then(|| rows as f64 * 1e9 / span as f64)
+    }
+
+    /// Values of a row. `is_fast`: of the signals that are read most often.
     pub(super) fn take(
         &mut self,
         at: Time,
+        is_fast: bool,
         values: impl Iterator<Item = (Signal, Option<Sample>)>,
     ) {
+        let mut has_value = false;
         for (Signal { source, .. }, sample) in values {
+            has_value |= sample.is_some();
             self.last.retain(|(it, _)| *it != source);
             self.last.extend(sample.map(|sample| (source, sample)));
         }
         self.at = Some(at);
+        if has_value {
+            self.presence.take(at, is_fast);
+        }
     }
 
     /// Whether there was a row.
@@ -116,5 +170,69 @@ impl Condition {
             hardware_id: self.port.clone(),
             values: known.collect(),
         }
+    }
+}
+
+impl Presence {
+    fn take(&mut self, at: Time, is_fast: bool) {
+        self.began.get_or_insert(at);
+        if self.newest.0 > 0 {
+            self.gaps += self.open(at);
+        }
+        self.newest = self.newest.max(at);
+        self.rows += u64::from(is_fast);
+    }
+
+    /// The time since the newest values, if it is a gap.
+    fn open(&self, now: Time) -> u64 {
+        let since = now.0.saturating_sub(self.newest.0);
+        if self.began.is_some() && since > self.longest { since } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motorlink_proto::st::MotorNumber;
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn times_without_values_are_summed() {
+        let motor = Motor::St(MotorNumber::FIRST);
+        let signal = Signal::named(motor, "SPEED_MEAS").unwrap();
+        let mut condition = Condition::new(motor, "st1", "port", Micros(10_000));
+        let start = 1_000_000 * MS;
+        let time = |ms: u64| Time(start + ms * MS);
+        condition.begin(time(0));
+        let mut row = |condition: &mut Condition, ms, value: Option<f64>| {
+            condition.take(time(ms), true, [(signal, value.map(Sample::told))].into_iter());
+        };
+        for ms in (0..10_000).step_by(10) {
+            row(&mut condition, ms, Some(1.0));
+        }
+        assert_eq!(condition.without_values(time(10_900)), 0);
+        assert_eq!(condition.mean_rate(time(10_900)).map(f64::round), Some(100.0));
+        // A row without a value is no value.
+        row(&mut condition, 20_000, None);
+        assert_eq!(condition.without_values(time(97_990)), 88_000 * MS);
+        for ms in (98_000..108_000).step_by(10) {
+            row(&mut condition, ms, Some(1.0));
+        }
+        assert_eq!(condition.without_values(time(108_000)), 88_010 * MS);
+        let mean = condition.mean_rate(time(108_000)).unwrap();
+        assert!((18.0..19.0).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn slow_signals_and_a_motor_that_gives_nothing() {
+        let motor = Motor::St(MotorNumber::FIRST);
+        let mut condition = Condition::new(motor, "st1", "port", Micros(10_000_000));
+        assert_eq!((condition.without_values(Time(5)), condition.mean_rate(Time(5))), (0, None));
+        condition.begin(Time(7));
+        assert_eq!(condition.without_values(Time(7 + 29_000 * MS)), 0);
+        assert_eq!(condition.without_values(Time(7 + 31_000 * MS)), 31_000 * MS);
+        assert_eq!(condition.mean_rate(Time(7 + 31_000 * MS)), Some(0.0));
     }
 }

@@ -102,8 +102,15 @@ pub(super) struct Values {
 
 impl Content {
     pub(super) fn new(line: Line, groups: Vec<Group>, topics: &mut Topics) -> Self {
-        let feeds = groups.into_iter().map(|group| Feed::new(&line, group, topics)).collect();
-        let condition = |motor: &Motor| (*motor, Condition::new(*motor, &line.label, &line.port));
+        let feeds: Vec<Feed> =
+            groups.into_iter().map(|group| Feed::new(&line, group, topics)).collect();
+        let period = |motor: &Motor| {
+            let feeds = feeds.iter().filter(|feed: &&Feed| feed.motors.contains_key(motor));
+            feeds.map(|feed| feed.period).min().unwrap_or(Micros(0))
+        };
+        let condition = |motor: &Motor| {
+            (*motor, Condition::new(*motor, &line.label, &line.port, period(motor)))
+        };
         let conditions = line.motors.iter().map(condition).collect();
         Content {
             line,
@@ -141,6 +148,23 @@ impl Content {
         self.conditions.iter().filter_map(without_row)
     }
 
+    /// The motors without values for longer than 1 s, as `st0/motor1`, and for how long in all, in ns.
+    pub(super) fn gaps(&self, now: Time) -> impl Iterator<Item = (String, u64)> {
+        let gap = move |(motor, condition): (&Motor, &Condition)| {
+            let without = condition.without_values(now);
+            (without > 0).then(|| (name::path(&self.line.label, *motor), without))
+        };
+        self.conditions.iter().filter_map(gap)
+    }
+
+    /// The mean rate of the fast signals of each motor since the start, Hz.
+    pub(super) fn mean_rates(&self, now: Time) -> impl Iterator<Item = (String, f64)> {
+        let mean = move |(motor, condition): (&Motor, &Condition)| {
+            Some((name::path(&self.line.label, *motor), condition.mean_rate(now)?))
+        };
+        self.conditions.iter().filter_map(mean)
+    }
+
     /// How often signals had values in the last second.
     pub(super) fn take_rates(&mut self, rates: &[(Signal, f64)]) {
         let Some(feed) = self.feeds.first() else { return };
@@ -172,7 +196,8 @@ impl Content {
         self.counts.values += of_motor.write(values, put);
         if let Some(condition) = self.conditions.get_mut(&motor) {
             let signals = of_motor.signals.iter().copied();
-            condition.take(values.stamp, signals.zip(values.samples.iter().copied()));
+            let values_of = signals.zip(values.samples.iter().copied());
+            condition.take(values.stamp, feed == 0, values_of);
         }
     }
 
@@ -219,6 +244,7 @@ impl Content {
 
     /// Diagnostics that are due.
     pub(super) fn diagnose(&mut self, now: Time, put: &mut dyn FnMut(Entry)) {
+        self.conditions.values_mut().for_each(|condition| condition.begin(now));
         let is_due = now.0.saturating_sub(self.said_at.0) >= DIAGNOSTICS;
         if is_due {
             self.tell_unconfirmed(now, put);

@@ -74,6 +74,10 @@ pub struct Progress {
     pub refused: Vec<String>,
     /// Motors of which no value came, as `st0/motor1`.
     pub silent: Vec<String>,
+    /// Motors without values for longer than 1 s (at low rates: three periods), and for how long in all.
+    pub gaps: Vec<(String, Duration)>,
+    /// The motor whose fast signals have the lowest mean rate since the start, and this rate in Hz.
+    pub slowest: Option<(String, f64)>,
     /// Nothing more is recorded: the file cannot be written, or has the size that it may have.
     pub is_over: bool,
 }
@@ -224,6 +228,7 @@ fn run(
         tell(&recorded, &writer, &losses, began, shared);
     }
     await_confirmation(&mut recorded, &writer, &mut losses);
+    let gaps = take_means(&recorded, &mut shared.progress());
     let mut counts = Counts::default();
     for it in recorded {
         let ended = it.end(&mut |entry| {
@@ -233,7 +238,21 @@ fn run(
     }
     counts.lost += writer.queue().lost();
     shared.progress().counts = counts;
+    if !gaps.is_empty() {
+        writer.queue().push(Entry::Metadata(schema::gaps::NAME.to_owned(), gaps));
+    }
     writer.end()
+}
+
+/// What is missing of each motor up to now; also for the file.
+fn take_means(recorded: &[Recorded], progress: &mut Progress) -> Pairs {
+    let now = wall_now();
+    let gaps = recorded.iter().flat_map(|it| it.content().gaps(now));
+    progress.gaps = gaps.map(|(motor, ns)| (motor, Duration::from_nanos(ns))).collect();
+    let means = recorded.iter().flat_map(|it| it.content().mean_rates(now));
+    progress.slowest = means.min_by(|(_, one), (_, other)| one.total_cmp(other));
+    let text = |(motor, gap): &(String, Duration)| (motor.clone(), schema::gaps::text(*gap));
+    progress.gaps.iter().map(text).collect()
 }
 
 fn turn(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
@@ -259,6 +278,7 @@ fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant,
     progress.rates = rates.reduce(|(asked, one), (_, other)| (asked, one.min(other)));
     progress.refused = recorded.iter().flat_map(|it| it.content().refused()).collect();
     progress.silent = recorded.iter().flat_map(|it| it.content().silent()).collect();
+    take_means(recorded, &mut progress);
 }
 
 /// Messages that did not fit into the queue of the writer.

@@ -47,6 +47,20 @@ pub mod recording {
     pub const PART: &str = "part";
 }
 
+/// The metadata record with the motors that had no values for a time. It is written at the end of a
+/// recording, if there are some. The keys are motors such as `st0/motor1`.
+pub mod gaps {
+    use std::time::Duration;
+
+    /// The name of the metadata record.
+    pub const NAME: &str = "gaps";
+
+    /// How long a motor had no values, in seconds.
+    pub fn text(gap: Duration) -> String {
+        format!("{:.3}", gap.as_secs_f64())
+    }
+}
+
 /// Keys of the metadata of a motor, which is named [`drive::NAME`]. Channels of
 /// frames have some of them, too.
 pub mod drive {
