@@ -287,6 +287,16 @@ describe('search', () => {
     expect(found('nothing')).toEqual([]);
   });
 
+  it('finds one motor by its line and its number', () => {
+    const two = new Map([['st0', [1, 2, 11]]]);
+    const digits = new Map([['st0', [{ name: 'TORQUE_MEAS', unit: 's16A', doc: '' }]]]);
+    const motorsOf = (text: string) => candidates(two, digits, text).map(({ motor }) => motor);
+    expect(motorsOf('st0/1 torque')).toEqual([1]);
+    expect(motorsOf('ST0/2')).toEqual([2]);
+    expect(motorsOf('st0/')).toEqual([1, 2, 11]);
+    expect(motorsOf('t0/1')).toEqual([]);
+  });
+
   it('has names that begin with a word first', () => {
     expect(found('st0 1 speed')).toEqual(['st0 1 SPEED_MEAS', 'st0 1 RAMP_FINAL_SPEED']);
   });
