@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import type { WireFrame, WireLoad } from '../wire';
-import { NO_FILTER, addressOf, asCsv, asText, filtered, joined, nearest, sum, told, troubleOf, wanted, windowOf } from './list';
+import { NO_FILTER, addressOf, asCsv, asText, countsOf, filtered, joined, nearest, sum, told, troubleOf, wanted, windowOf } from './list';
 
 const frame = (number: number, more: Partial<WireFrame> = {}): WireFrame => ({
   number, t: number / 10, direction: 'to-drive', result: 'ok', bytes: '22 01 1e 41',
@@ -68,10 +68,18 @@ test('loads are added', () => {
     load({ from: 2, to: 5, bits: 3000, busy: 0, retries: 2, damaged: 1 }),
   ]);
   expect(all).toEqual(load({ from: 1, to: 5, bits: 4000, busy: 0.25, nacks: 1, retries: 2, damaged: 1 }));
-  expect(told(all)).toBe(
-    'In 4.0 s: 25 % of the time waiting for replies, 1.0 kbit/s. 1 refused (NACK), 2 retries, 0 without a reply, 1 damaged.',
-  );
+  expect(told(all)).toBe('In 4.0 s: 25 % of the time waiting for replies, 1.0 kbit/s.');
+  expect(told(all, true)).toMatch(/^In the last 4.0 s: /);
   expect(told({ ...all, busy: 0.004 })).toContain('less than 1 % of the time');
+});
+
+test('errors are counted in the frames that are listed', () => {
+  const frames = [
+    frame(1, { unanswered: true }), frame(2, { retry: true, unanswered: true }), frame(3, { result: 'nack' }), frame(4),
+    frame(5, { result: 'damaged' }),
+  ];
+  expect(countsOf(frames)).toBe('5 frames are listed: 1 refused (NACK), 1 retry, 2 without a reply, 1 damaged.');
+  expect(countsOf([frame(4)])).toBe('1 frame is listed: 0 refused (NACK), 0 retries, 0 without a reply, 0 damaged.');
 });
 
 test('frames are exported as text and as values', () => {

@@ -106,20 +106,27 @@ export function sum(loads: readonly WireLoad[]): WireLoad {
 
 const counted = (count: number, one: string, many: string) => `${count} ${count === 1 ? one : many}`;
 
-/** A load as a sentence. */
-export function told(load: WireLoad): string {
-  const { from, to, bits, busy, nacks, damaged, retries, unanswered } = load;
+/** What is wrong with the frames that are listed, as a sentence. */
+export function countsOf(frames: readonly WireFrame[]): string {
+  const of = (is: (frame: WireFrame) => boolean | undefined) => frames.filter(is).length;
+  const nacks = of(({ result }) => result === 'nack');
+  const damaged = of(({ result }) => result === 'damaged');
+  const retries = of(({ retry }) => retry);
+  const unanswered = of((frame) => frame.unanswered);
+  const troubles = [
+    `${nacks} refused (NACK)`, counted(retries, 'retry', 'retries'), `${unanswered} without a reply`, `${damaged} damaged`,
+  ];
+  return `${counted(frames.length, 'frame is', 'frames are')} listed: ${troubles.join(', ')}.`;
+}
+
+/** The use of the line as a sentence. `isLive`: of the time up to now. */
+export function told(load: WireLoad, isLive = false): string {
+  const { from, to, bits, busy } = load;
   if (from == null || to == null) return 'No frames.';
   const span = to - from;
   const rate = span > 0 ? `, ${(bits / span / 1000).toFixed(1)} kbit/s` : '';
-  const troubles = [
-    `${nacks} refused (NACK)`,
-    counted(retries, 'retry', 'retries'),
-    `${unanswered} without a reply`,
-    `${damaged} damaged`,
-  ];
   const share = busy > 0 && busy < 0.005 ? 'less than 1 %' : `${Math.round(busy * 100)} %`;
-  return `In ${span.toFixed(1)} s: ${share} of the time waiting for replies${rate}. ${troubles.join(', ')}.`;
+  return `${isLive ? 'In the last' : 'In'} ${span.toFixed(1)} s: ${share} of the time waiting for replies${rate}.`;
 }
 
 export const timeOf = (t: number): string => t.toFixed(6);

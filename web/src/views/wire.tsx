@@ -3,10 +3,11 @@ import { useComputed, useSignal, useSignalEffect } from '@preact/signals';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { frames, follow, gaps, isLoading, load, paused, refused } from '../frames/follow';
 import {
-  AROUND, type Filter, NO_FILTER, addressOf, asCsv, asText, bytesOf, filtered, nearest, timeOf, told, troubleOf, wanted,
+  AROUND, type Filter, NO_FILTER, addressOf, asCsv, asText, bytesOf, countsOf, filtered, nearest, timeOf, told, troubleOf, wanted,
   windowOf,
 } from '../frames/list';
-import { lines, welcome } from '../link';
+import { timeOfDay } from '../format';
+import { lines, wallAt, welcome } from '../link';
 import { download } from '../registers/download';
 import type { WireFrame } from '../wire';
 import { Words } from '../words';
@@ -116,7 +117,7 @@ export default function Wire() {
       </div>
       <p class="load">
         {t === null ? (paused.value ? 'Paused. ' : 'Live. ') : `From ${AROUND} s before ${timeOf(t)} s to ${AROUND} s after. `}
-        {isLoading.value ? 'Loading …' : told(load.value)}
+        {isLoading.value ? 'Loading …' : told(load.value, t === null)} {count > 0 && countsOf(shown.value)}
       </p>
       {gaps.value > 0 && <p class="warn">! Some frames between these are missing: the share has forgotten them.</p>}
       {refused.value !== null && (
@@ -124,13 +125,14 @@ export default function Wire() {
           ! {refused.value}
         </p>
       )}
-      <Frames shown={shown.value} mark={mark.value} isLive={t === null} chosen={chosen.value} onChosen={(number) => (chosen.value = number)} />
+      <Frames line={line} shown={shown.value} mark={mark.value} isLive={t === null} chosen={chosen.value} onChosen={(number) => (chosen.value = number)} />
       <Words of={WIRE_WORDS} />
     </>
   );
 }
 
 interface Props {
+  line: string | null;
   shown: readonly WireFrame[];
   /** The place of the frame that is nearest to the instant. */
   mark: number;
@@ -139,7 +141,7 @@ interface Props {
   onChosen: (number: number) => void;
 }
 
-function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
+function Frames({ line, shown, mark, isLive, chosen, onChosen }: Props) {
   const box = useRef<HTMLDivElement>(null);
   const top = useSignal(0);
   const height = useSignal(400);
@@ -215,7 +217,7 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
           <thead>
             <tr aria-rowindex={1}>
               <th scope="col" class="number">
-                Time, s
+                <span class="wide">Time of day, </span>line, s
               </th>
               <th scope="col">
                 <span class="wide">Direction</span>
@@ -232,6 +234,7 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
               <Row
                 key={it.number}
                 frame={it}
+                wall={dayOf(line, it)}
                 index={first + place + 2}
                 isChosen={it.number === frame?.number}
                 isMarked={it.number === marked}
@@ -245,10 +248,13 @@ function Frames({ shown, mark, isLive, chosen, onChosen }: Props) {
           <p class="muted">{frames.value.length > 0 ? 'No frame fits the search.' : !isLoading.value && 'No frames.'}</p>
         )}
       </div>
-      <Detail frame={frame} isMarked={frame !== undefined && frame.number === marked} />
+      <Detail frame={frame} wall={frame ? dayOf(line, frame) : ''} isMarked={frame !== undefined && frame.number === marked} />
     </>
   );
 }
+
+/** The time of the day of a frame. Plots and events have the same clock. */
+const dayOf = (line: string | null, { t }: WireFrame) => timeOfDay(line === null ? NaN : wallAt(line, t));
 
 /** Takes the place of rows that are not in the document. */
 function Space({ rows, height }: { rows: number; height: number }) {
@@ -261,20 +267,21 @@ function Space({ rows, height }: { rows: number; height: number }) {
 
 interface RowProps {
   frame: WireFrame;
+  wall: string;
   index: number;
   isChosen: boolean;
   isMarked: boolean;
   onChosen: () => void;
 }
 
-function Row({ frame, index, isChosen, isMarked, onChosen }: RowProps) {
+function Row({ frame, wall, index, isChosen, isMarked, onChosen }: RowProps) {
   const trouble = troubleOf(frame);
   const kind = isMarked ? 'marked' : isChosen ? 'chosen' : undefined;
   return (
     <tr aria-rowindex={index} aria-current={isChosen ? 'true' : undefined} class={kind} onClick={onChosen}>
       <td class="mono number">
         {isMarked && '▶ '}
-        {timeOf(frame.t)}
+        <span class="day">{wall}</span> {timeOf(frame.t)}
       </td>
       <td>
         {frame.direction === 'to-drive' ? '→' : '←'} <span class="wide">drive</span>
@@ -290,14 +297,14 @@ function Row({ frame, index, isChosen, isMarked, onChosen }: RowProps) {
 }
 
 /** The whole of a frame: rows are cut. */
-function Detail({ frame, isMarked }: { frame: WireFrame | undefined; isMarked: boolean }) {
+function Detail({ frame, wall, isMarked }: { frame: WireFrame | undefined; wall: string; isMarked: boolean }) {
   if (!frame) return <p class="muted frame">Choose a frame to see all of it.</p>;
   const trouble = troubleOf(frame);
   return (
     <section class="frame card" aria-label="Chosen frame">
       <p>
         <strong>
-          {timeOf(frame.t)} s, {frame.direction === 'to-drive' ? 'to the drive' : 'from the drive'}
+          {wall}, {timeOf(frame.t)} s of the line, {frame.direction === 'to-drive' ? 'to the drive' : 'from the drive'}
           {isMarked && ', nearest to the instant'}
         </strong>
         {trouble && <span class="bad"> ! {trouble}</span>}
