@@ -238,6 +238,9 @@ async fn an_st_motor_ramps_and_starts() {
     for profile in Profile::ALL {
         let world = World::new(&format!("run-st-{}", profile.name()), profile);
         let page = world.page().await;
+        let (reason, message) = page.refused(run(st(1), Mode::Speed, 0.0, 3000.0)).await;
+        assert!(reason == Reason::Usage && message.contains("it is at rest"), "{message}");
+        assert_eq!(world.st_writes(), []);
         assert_eq!(from(&page, run(st(1), Mode::Speed, 1500.0, 3000.0)).await, 0.0);
         let sent = world.st_writes();
         let start = Request::ExecuteCommand(motorlink_proto::st::Command::StartMotor);

@@ -1,13 +1,14 @@
 // The controls of a motor: start, stop, faults, a reference with its ramp and limit, hold-to-run.
-import { useSignal } from '@preact/signals';
+import { useSignal, useSignalEffect } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
+import { afterAcknowledge } from '../acknowledge';
 import { COMMANDS, limitName, limits, setLimit } from '../drives';
 import { decimalsOf, number } from '../format';
 import { holdToRun } from '../hold';
 import { ask, held, lapsed, welcome } from '../link';
 import { useMotion } from '../motion';
 import { liveOf } from '../overview';
-import { Said, useSaid } from '../parts';
+import { Said, type Sentence, useSaid } from '../parts';
 import { checkLatch, nameOf, stopMotor } from '../stop';
 import type { Controlled, Description, Mode } from '../wire';
 import { Commands } from './commands';
@@ -34,6 +35,22 @@ function numberOf(text: string, field: string): number {
   return value;
 }
 
+/** What a person entered for a motor. It stays while another view is shown. */
+interface Kept {
+  mode?: Mode;
+  isHold?: boolean;
+  fields: Map<Mode, { target: string | null; rate: string }>;
+}
+
+const allKept = new Map<string, Kept>();
+
+function keptOf(line: string, motor: number): Kept {
+  const name = nameOf(line, motor);
+  const kept = allKept.get(name) ?? { fields: new Map() };
+  allKept.set(name, kept);
+  return kept;
+}
+
 interface Props {
   line: string;
   motor: number;
@@ -45,19 +62,24 @@ export function Control({ line, motor, description }: Props) {
   const role = welcome.value?.role;
   const isViewer = role === 'viewer';
   const mayMove = role === 'operator';
-  const chosen = useSignal<Mode>(description.modes[0]?.mode ?? 'speed');
-  const isHold = useSignal(false);
+  const kept = keptOf(line, motor);
+  const chosen = useSignal<Mode>(kept.mode ?? description.modes[0]?.mode ?? 'speed');
+  const isHold = useSignal(kept.isHold ?? false);
+  useSignalEffect(() => {
+    kept.mode = chosen.value;
+    kept.isHold = isHold.value;
+  });
   const mode = description.modes.find((one) => one.mode === chosen.value);
   const { start, title, hint, acknowledge } = COMMANDS[description.protocol];
   const has = (name: string) => description.commands.some((command) => command.name === name);
   const why = isViewer ? 'viewer' : undefined;
 
-  const act = (command: string, text: string) =>
+  const act = (command: string, done: () => string | Promise<Sentence>) =>
     attempt(async () => {
       lapsed.value = null;
       if (command === start) checkLatch();
       await ask({ ask: 'act', line, motor, command, values: {}, hold: false });
-      return text;
+      return done();
     });
 
   return (
@@ -68,7 +90,7 @@ export function Control({ line, motor, description }: Props) {
           disabled={!mayMove || isHold.value || !has(start)}
           aria-describedby={why}
           title={hint}
-          onClick={() => act(start, `${title}: the drive acknowledged it.`)}
+          onClick={() => act(start, () => `${title}: the drive acknowledged it.`)}
         >
           {title}
         </button>
@@ -80,7 +102,7 @@ export function Control({ line, motor, description }: Props) {
             type="button"
             disabled={!mayMove}
             aria-describedby={why}
-            onClick={() => act(acknowledge, 'Faults acknowledged.')}
+            onClick={() => act(acknowledge, () => afterAcknowledge(line, motor))}
           >
             Acknowledge faults
           </button>
@@ -157,8 +179,10 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
   const { said, attempt, say, isBusy } = useSaid();
   const motion = useMotion(line, motor, description, unit, say);
   const decimals = decimalsOf(unit);
-  const target = useSignal<string | null>(null);
-  const rate = useSignal(String(usual(unit).rate));
+  const kept = keptOf(line, motor).fields;
+  /** What was typed. `null`: the first motion is none. */
+  const target = useSignal<string | null>(kept.get(mode)?.target ?? null);
+  const rate = useSignal(kept.get(mode)?.rate ?? String(usual(unit).rate));
   const limit = limits.value?.get(limitName(line, motor, mode));
   const newLimit = useSignal('');
   const isHeld = useSignal(false);
@@ -218,6 +242,7 @@ function Reference({ line, motor, mode: controlled, description, isHold, mayMove
   const step = 10 ** -decimals;
   const typed = (signal: { value: string | null }) => (event: { currentTarget: HTMLInputElement }) => {
     signal.value = event.currentTarget.value;
+    kept.set(mode, { target: target.value, rate: rate.value });
   };
   const none = limits.value ? 'none set' : 'unknown';
   const limitText = limit === undefined ? none : `±${number(limit, decimals)} ${unit}`;

@@ -269,7 +269,13 @@ impl<M: Motion> Begun<'_, M> {
 
     /// A ramp of the drive. START_MOTOR also makes the page responsible for a motor that turns already.
     async fn st_speed(&self, motor: MotorNumber) -> Result<f64, Refusal> {
-        let read = self.state(&[RegisterId::SPEED_MEAS]).await?;
+        let (status, read) = self.state(&[RegisterId::SPEED_MEAS]).await?;
+        if status == Status::Idle && self.run.to == 0.0 {
+            let place = self.reads().place();
+            return Err(usage(format!(
+                "{place}: it is at rest, and the target is 0; nothing was sent"
+            )));
+        }
         let from = f64::from(read[0]);
         let ramp = Ramp { speed_rpm: speed(self.run.to)?, duration_ms: self.run.duration(from)? };
         self.command(&Request::st(motor.number(), StRequest::SetRamp(ramp))).await?;
@@ -279,7 +285,7 @@ impl<M: Motion> Begun<'_, M> {
 
     /// A ramp of the drive.
     async fn st_torque_ramp(&self, motor: MotorNumber) -> Result<f64, Refusal> {
-        let read = self.state(&[RegisterId::TORQUE_MEAS]).await?;
+        let (_, read) = self.state(&[RegisterId::TORQUE_MEAS]).await?;
         let from = f64::from(read[0]);
         let torque_s16a = current(self.run.to)?.into();
         let ramp = TorqueRamp { torque_s16a, duration_ms: self.run.duration(from)? };
@@ -290,7 +296,7 @@ impl<M: Motion> Begun<'_, M> {
 
     /// The document has no torque ramp: references are sent one by one.
     async fn st_current(&self, motor: MotorNumber) -> Result<f64, Refusal> {
-        let read = self.state(&[RegisterId::TORQUE_MEAS, RegisterId::FLUX_REF]).await?;
+        let (_, read) = self.state(&[RegisterId::TORQUE_MEAS, RegisterId::FLUX_REF]).await?;
         let from = self.first(f64::from(read[0]));
         let stream = Stream::Current(motor, read[1] as i16);
         self.command(&stream.request(from)?).await?;
@@ -299,8 +305,8 @@ impl<M: Motion> Begun<'_, M> {
         Ok(from)
     }
 
-    /// Registers of a motor that can be started.
-    async fn state(&self, registers: &[RegisterId]) -> Result<Vec<i32>, Refusal> {
+    /// The state and registers of a motor that can be started.
+    async fn state(&self, registers: &[RegisterId]) -> Result<(Status, Vec<i32>), Refusal> {
         let always = [RegisterId::STATUS, RegisterId::FLAGS];
         let mut read = self.registers(&[&always, registers].concat()).await?;
         let rest = read.split_off(always.len());
@@ -310,7 +316,7 @@ impl<M: Motion> Begun<'_, M> {
             Status::AnyStop | Status::Stop | Status::StopIdle | Status::WaitStopMotor => {
                 NotStarted::Stopping { status }
             }
-            _ => return Ok(rest),
+            _ => return Ok((status, rest)),
         };
         let message = format!("{}: the motor does not start: {why}", self.reads().place());
         Err(refusal(Reason::Refused, message))
