@@ -124,7 +124,7 @@ export class Bench {
 
   /** Turns the first ST motor from another program at the share, which stays until the end of the test. */
   async start() {
-    const command = (id: number, ...bytes: number[]) => ({ id, ask: 'command', line: 'st0', motor: 1, bytes, time_to_live: 1 });
+    const command = (id: number, ...bytes: number[]) => ({ id, ask: 'command', line: 'st0', motor: 1, bytes, time_to_live: 10 });
     this.join(
       command(2, 7, 232, 3, 0, 0, 244, 1), // SET_RAMP: to 1000 rpm in 500 ms
       command(3, 3, 1), // EXECUTE_CMD START_MOTOR
