@@ -369,6 +369,20 @@ describe('the connection', () => {
     ]);
   });
 
+  it('takes only the same command as one more of a row', () => {
+    Socket.last.welcome();
+    const give = (wall: number, text: string) =>
+      Socket.last.give({ kind: 'event', wall, event: 'commanded', line: 'st0', motor: 1, by: 'p', message: `st0, motor 1: p sends ${text}` });
+    give(0, 'SET_RAMP 1500 rpm, 1000 ms');
+    give(0.01, 'EXECUTE_CMD START_MOTOR');
+    give(0.02, 'SET_RAMP -1200.5 rpm, 900 ms');
+    give(0.03, 'SET_REG SPEED_KP = 300');
+    give(0.04, 'SET_REG SPEED_KI = 300');
+    expect(link.entries.value.map(({ message, times }) => [message.split('sends ')[1], times])).toEqual([
+      ['SET_RAMP -1200.5 rpm, 900 ms', 2], ['EXECUTE_CMD START_MOTOR', 1], ['SET_REG SPEED_KP = 300', 1], ['SET_REG SPEED_KI = 300', 1],
+    ]);
+  });
+
   it('knows the latch from events, and the motors of a new server from a new search', async () => {
     Socket.last.welcome();
     Socket.last.give({ kind: 'event', wall: 1, event: 'latched', by: 'page 2', message: 'page 2 latched' });

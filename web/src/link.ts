@@ -418,11 +418,12 @@ function begunAgain() {
   wants.forEach(begin);
 }
 
-/** Whether an event is one more command of a row: a ramp is many of them. */
-function continues(entry: Entry, { event, line, motor, by, wall }: DriveEvent): boolean {
+/** Whether an event is the same command again, with other numbers: a ramp is many of them. */
+function continues(entry: Entry, { event, line, motor, by, wall, message }: DriveEvent): boolean {
+  const withoutNumbers = (text: string) => text.replace(/(?<![\w.])[-−+]?\d[\d.]*/g, '');
   return (
     event === 'commanded' && entry.event === event && entry.line === line && entry.motor === motor &&
-    entry.by === by && wall - entry.until < PAUSE
+    entry.by === by && wall - entry.until < PAUSE && withoutNumbers(entry.message) === withoutNumbers(message)
   );
 }
 
