@@ -1,7 +1,7 @@
 // The values of registers that were read, by motor. They stay when the view is left.
 import { type Signal, batch, signal } from '@preact/signals';
 import { Refused, ask } from '../link';
-import type { Difference, MotorName, Value } from '../wire';
+import type { Difference, Event as DriveEvent, MotorName, Value } from '../wire';
 import { byName } from './model';
 
 export interface Cell {
@@ -71,6 +71,12 @@ export function keep(sheet: Sheet, values: readonly Value[]) {
     next.set(value.name, { first, now: value, at });
   }
   cells.value = next;
+}
+
+/** Whether an event says that this motor was stopped: what was read before is not true any more. */
+export function isStopOf({ event, line, motor }: DriveEvent, of: MotorName): boolean {
+  const isStop = event === 'stopped' || event === 'stop-failed';
+  return isStop && (line ?? of.line) === of.line && (motor ?? of.motor) === of.motor;
 }
 
 /** Reads registers in batches until all are read or `isWanted` says no. */

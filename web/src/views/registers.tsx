@@ -1,12 +1,12 @@
 // The registers of a motor: read, changed in place, and compared with a file.
-import { useSignal } from '@preact/signals';
+import { effect, useSignal } from '@preact/signals';
 import { useEffect, useMemo, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
-import { state, welcome } from '../link';
+import { events, state, welcome } from '../link';
 import { Said, useSaid } from '../parts';
 import { found, groups } from '../registers/model';
 import { MotorPicker } from '../registers/picker';
-import { type Sheet, chosen, read, reasonOf, sheetOf } from '../registers/values';
+import { type Sheet, chosen, isStopOf, read, reasonOf, sheetOf } from '../registers/values';
 import { nameOf } from '../stop';
 import type { Description, Register } from '../wire';
 import { RegisterRow } from './registers-row';
@@ -19,6 +19,8 @@ const REGISTER_WORDS = ['s16A', 's16V', 's16degree', 'dpp', 'ROM'] as const;
 
 /** How often the registers in view are read if that is switched on, in ms. */
 const AGAIN = 2000;
+/** When registers are read after a stop, in ms: a motor slows down for some time. */
+const AFTER_STOP = [200, 2000];
 /** Rows that come into view while one scrolls are read together after this time, in ms. */
 const REST = 150;
 
@@ -78,6 +80,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
       })
     : matching;
   const { body, inView } = useRowsInView(sheet, description.registers, shown);
+  useReadAfterStop(sheet, inView);
 
   useEffect(() => {
     const timer = setInterval(() => (now.value = performance.now()), 1000);
@@ -103,6 +106,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
   }, [isLive.value]);
 
   const readable = shown.filter((register) => register.readable).map(({ name }) => name);
+  const unreadable = shown.filter((register) => !register.readable).map(({ name }) => name);
   const readShown = async () => {
     await read(sheet, readable).catch(failed);
     return `${readable.length} registers were read.`;
@@ -141,6 +145,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
       </div>
       <p class="muted count" aria-live="polite">
         {shown.length} of {description.registers.length} registers
+        {unreadable.length > 0 && `; cannot be read, only written: ${unreadable.join(', ')}`}
         {drafts.size > 0 && `, ${drafts.size} with a value that is not written`}
       </p>
       {!isLive.value && <p class="muted count">Values are read once, and get older. "Read" reads them again.</p>}
@@ -196,6 +201,31 @@ function failed(why: unknown): never {
 /** In whole seconds, so that rows are only drawn again when their text changes. */
 function ageOf(at: number | undefined, now: number): number {
   return at === undefined ? NaN : Math.max(0, Math.floor((now - at) / 1000));
+}
+
+/** Reads the registers in view after a stop of the motor, and again when it is at rest. */
+function useReadAfterStop(sheet: Sheet, inView: () => string[]) {
+  const latest = useRef(inView);
+  latest.current = inView;
+  useEffect(() => {
+    const timers = new Set<ReturnType<typeof setTimeout>>();
+    let known = events.peek().at(-1);
+    const end = effect(() => {
+      const all = events.value;
+      const young = all.slice(known ? all.lastIndexOf(known) + 1 : 0);
+      known = all.at(-1);
+      if (!young.some((one) => isStopOf(one, sheet.motor))) return;
+      timers.forEach(clearTimeout);
+      timers.clear();
+      for (const ms of AFTER_STOP) {
+        timers.add(setTimeout(() => void read(sheet, latest.current()).catch(() => {}), ms));
+      }
+    });
+    return () => {
+      end();
+      timers.forEach(clearTimeout);
+    };
+  }, [sheet]);
 }
 
 /** Reads registers once when they come into view. */
