@@ -18,6 +18,8 @@ export interface Series {
   t: ArrayLike<number>;
   /** As many as `t`. NaN is no value: the curve has a gap there. */
   values: ArrayLike<number>;
+  /** The number of its look, if it has to stay when other curves come. Otherwise it is its place. */
+  look?: number;
   /** Each value holds until the next one, as a reference does. */
   stepped?: boolean;
 }
@@ -71,13 +73,13 @@ export function Plot({ label, series, marks, height = 280, onPick, pickLabel }: 
   );
 }
 
-function traceOf({ name, unit, t, values, stepped = false }: Series, index: number): Trace {
+function traceOf({ name, unit, t, values, look, stepped = false }: Series, index: number): Trace {
   const samples = new Samples();
   for (let at = 0; at < t.length; at += 1) {
     const value = values[at] ?? NaN;
     samples.push(t[at]!, isFinite(value) ? value : NaN);
   }
-  return { key: name, name, unit, line: '', samples, style: styleOf(index), stepped, shown: true, old: false };
+  return { key: name, name, unit, line: '', samples, style: styleOf(look ?? index), stepped, shown: true, old: false };
 }
 
 /** From the first to the last sample. */

@@ -1,6 +1,7 @@
 // The runs that are kept: drawn over each other, and compared in a table.
 import { computed, signal } from '@preact/signals';
 import { type Series, Plot } from '../plot/static';
+import { numbered } from '../plot/style';
 import { download } from '../registers/download';
 import { DEFINITIONS, type Figure, type FigureName, WAY } from '../step/analysis';
 import { type Run, csv, figureText, fileName, json, remove, runs, title, unitOf } from '../step/run';
@@ -10,6 +11,17 @@ const hidden = signal<ReadonlySet<number>>(new Set());
 
 const drawnRuns = computed(() => runs.value.filter(({ number }) => !hidden.value.has(number)));
 const series = computed(() => drawnRuns.value.flatMap(seriesOf));
+
+let known: ReadonlyMap<string, number> = new Map();
+/** The looks of the curves: a run keeps its colours when others come or go. */
+const looks = computed(() => {
+  const oldestFirst = [...runs.value].sort((one, other) => one.number - other.number);
+  known = numbered(oldestFirst.flatMap(({ number }) => [measuredKey(number), referenceKey(number)]), known);
+  return known;
+});
+const measuredKey = (run: number) => `${run} measured`;
+const referenceKey = (run: number) => `${run} reference`;
+const lookOf = (key: string) => looks.value.get(key) ?? 0;
 
 const FIGURES = Object.keys(DEFINITIONS) as FigureName[];
 
@@ -70,14 +82,15 @@ function show(number: number, is: boolean) {
 const drawn = new WeakMap<Run, Series[]>();
 
 function seriesOf(run: Run): Series[] {
-  const known = drawn.get(run);
-  if (known) return known;
+  const earlier = drawn.get(run);
+  if (earlier) return earlier;
   const of = (values: (number | null)[]) => values.map((value) => value ?? NaN);
   const { unit, t, from, to } = run;
+  const look = lookOf(referenceKey(run.number));
   const reference: Series = run.reference
-    ? { name: `${run.number} reference`, unit, t, values: of(run.reference), stepped: true }
-    : { name: `${run.number} reference sent`, unit, t: [t[0] ?? -1, 0, t.at(-1) ?? 1], values: [from, to, to], stepped: true };
-  const series = [{ name: `${run.number} ${run.measured}`, unit, t, values: of(run.y) }, reference];
+    ? { look, name: `${run.number} reference`, unit, t, values: of(run.reference), stepped: true }
+    : { look, name: `${run.number} reference sent`, unit, t: [t[0] ?? -1, 0, t.at(-1) ?? 1], values: [from, to, to], stepped: true };
+  const series = [{ look: lookOf(measuredKey(run.number)), name: `${run.number} ${run.measured}`, unit, t, values: of(run.y) }, reference];
   drawn.set(run, series);
   return series;
 }

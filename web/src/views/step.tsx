@@ -1,5 +1,5 @@
 // Step response: apply a step to a motor, record, and say what the response is like.
-import { useSignal } from '@preact/signals';
+import { type Signal, signal, useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
 import { number, tooOld } from '../format';
@@ -52,6 +52,15 @@ interface Form {
 }
 
 const EMPTY: Form = { mode: '', from: '', to: '', approach: '', duration: '2', after: 'stop' };
+/** What was entered, by motor: it stays when the view is left. */
+const forms = new Map<string, Signal<Form>>();
+
+function formOf(name: string, mode: string): Signal<Form> {
+  const form = forms.get(name) ?? signal({ ...EMPTY, mode });
+  forms.set(name, form);
+  return form;
+}
+
 const DURATION = { range: [0.2, 20, 0] as const, unit: 's' };
 
 function Setup({
@@ -61,7 +70,7 @@ function Setup({
   description: Description;
   onBusy: (is: boolean) => void;
 }) {
-  const form = useSignal<Form>({ ...EMPTY, mode: description.modes[0]?.mode ?? '' });
+  const form = formOf(nameOf(motor.line, motor.motor), description.modes[0]?.mode ?? '');
   const progress = useSignal<{ text: string; count: number } | null>(null);
   const running = useRef<Experiment | null>(null);
   /** Whether the motor keeps turning at the start of the step, after the run. */
@@ -101,7 +110,7 @@ function Setup({
     const unwatch = watch(motor, (why) => experiment.abort(why));
     try {
       const run = add(await experiment.run());
-      result.value = { tone: 'ok', text: summary(run) };
+      result.value = { tone: 'ok', text: `${summary(run)} ${ending(plan)}` };
     } catch (why) {
       result.value = { tone: 'bad', text: (why as Error).message };
     } finally {
@@ -154,7 +163,7 @@ function Setup({
             </label>
           </fieldset>
         </fieldset>
-        <Now motor={motor} controlled={controlled} />
+        <Now motor={motor} controlled={controlled} isBusy={isBusy} />
         <div class="plan" aria-live="polite">
           {'plan' in parsed ? <Explanation plan={parsed.plan} /> : <p class="muted">{parsed.why}</p>}
         </div>
@@ -299,7 +308,7 @@ function Explanation({ plan }: { plan: Plan }) {
 }
 
 /** The measured value now, to choose the start by. */
-function Now({ motor, controlled }: { motor: MotorName; controlled: Controlled }) {
+function Now({ motor, controlled, isBusy }: { motor: MotorName; controlled: Controlled; isBusy: boolean }) {
   const last = useSignal<{ value: number; t: number } | null>(null);
   const tick = useSignal(0);
   useEffect(() => {
@@ -310,26 +319,31 @@ function Now({ motor, controlled }: { motor: MotorName; controlled: Controlled }
         const row = t.length - 1;
         if (row >= 0) last.value = { value: values[0]![row]!, t: t0 + t[row]! };
       },
-      { rows: true },
+      // A step reads faster than the line carries: confirmed rows then come seconds late.
+      { rows: !isBusy },
     );
     const timer = setInterval(() => (tick.value += 1), 500);
     return () => {
       end();
       clearInterval(timer);
     };
-  }, [motor.line, motor.motor, controlled.measured]);
+  }, [motor.line, motor.motor, controlled.measured, isBusy]);
   void tick.value;
   const old = last.value && tooOld(age(motor.line, last.value.t));
   return (
     <p class="now">
       {controlled.measured}{' '}
       <output class={old ? 'muted' : undefined} aria-live="off">
-        {last.value ? number(last.value.value, controlled.unit === 'A' ? 2 : 0) : '–'}
+        {last.value && !old ? number(last.value.value, controlled.unit === 'A' ? 2 : 0) : '–'}
       </output>{' '}
-      {controlled.unit} {old && <span class="muted">{old}</span>}
+      {controlled.unit} {old && <span class="muted">(last value: {old})</span>}
     </p>
   );
 }
+
+/** What the motor does after the record. */
+const ending = ({ after, from, controlled: { unit } }: Plan): string =>
+  after === 'stop' ? 'The motor has stopped.' : `The motor goes back to ${from} ${unit}, and turns on.`;
 
 function summary(run: Run): string {
   const names: FigureName[] = ['rise', 'overshoot', 'settling2'];
