@@ -101,7 +101,7 @@ test('settings are not restored while the motor runs, and the page says what to 
   const buffer = readFileSync(await (await saved).path());
   await write(live, 'SPEED_KP', '123');
   await live.getByLabel('Compare with a file').setInputFiles({ name: 'st0.toml', mimeType: 'text/plain', buffer });
-  await expect(live.getByRole('cell', { name: 'at rest', exact: true })).toBeVisible();
+  await expect(live.getByRole('cell', { name: 'yes, at rest', exact: true })).toBeVisible();
   await open(live, 'Motors');
   await spin(live, 500);
   await open(live, 'Registers');

@@ -46,6 +46,10 @@ export default function Events() {
           </select>
         </label>
       </div>
+      <p class="muted">
+        <q>page 1</q> is a page in a browser. A page opens a second connection, <q>(control)</q>, when it commands
+        motors. <q>joined</q>: a program or page was connected. <q>left</q>: it was disconnected.
+      </p>
       {chosen.length === 0 && <p class="muted">Nothing happened since this page was opened.</p>}
       {chosen.length > 0 && (
         <table class="events">

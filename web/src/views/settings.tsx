@@ -1,5 +1,6 @@
 // Files of settings: download, compare, restore.
 import { useSignal } from '@preact/signals';
+import { sentence } from '../format';
 import { Refused, ask } from '../link';
 import { Said, useSaid } from '../parts';
 import { Confirm, RomWear } from '../registers/confirm';
@@ -95,10 +96,10 @@ export function Settings({
       <Said said={said} />
       {warnings.value.length > 0 && (
         <section class="note">
-          <h4>The file does not have:</h4>
+          <h4>Not complete</h4>
           <ul>
             {warnings.value.map((warning) => (
-              <li key={warning}>{warning}</li>
+              <li key={warning}>{inWords(warning)}</li>
             ))}
           </ul>
         </section>
@@ -155,6 +156,12 @@ export function Settings({
       )}
     </details>
   );
+}
+
+/** A setting that is not in a file that was saved, and why. */
+function inWords(warning: string): string {
+  const [, name] = /^the motor refuses to read (.+)$/.exec(warning) ?? [];
+  return name ? `Not in the file, because the motor does not let it be read: ${name}.` : sentence(warning);
 }
 
 function noFile({ protocol }: Description): string {
@@ -218,7 +225,7 @@ function Differences({
               {file} {unit}
             </td>
             <td>
-              {isWritten ? (wearsRom ? 'written to the ROM' : '') : (fixed ?? (wearsRom ? 'at rest, wears the ROM' : 'at rest'))}
+              {isWritten ? (wearsRom ? 'written to the ROM' : '') : (fixed ?? (wearsRom ? 'yes, at rest; it wears the ROM' : 'yes, at rest'))}
             </td>
           </tr>
         ))}

@@ -206,7 +206,7 @@ mod tests {
         let start = 1_000_000 * MS;
         let time = |ms: u64| Time(start + ms * MS);
         condition.begin(time(0));
-        let mut row = |condition: &mut Condition, ms, value: Option<f64>| {
+        let row = |condition: &mut Condition, ms, value: Option<f64>| {
             condition.take(time(ms), true, [(signal, value.map(Sample::told))].into_iter());
         };
         for ms in (0..10_000).step_by(10) {
