@@ -7,6 +7,7 @@
 import uPlot from 'uplot';
 import { Columns, drawColumns, drawSamples, type Frame } from './columns';
 import { type Clock, onAxis } from './format';
+import { labelsOf } from './labels';
 import type { Extremes, Samples } from './samples';
 import type { Style } from './style';
 
@@ -286,6 +287,7 @@ export class Chart {
     ctx.font = `${12 * ratio}px system-ui, sans-serif`;
     ctx.lineWidth = ratio;
     ctx.setLineDash([4 * ratio, 4 * ratio]);
+    const placed: { x: number; label: string }[] = [];
     for (const { label, t, value, unit = '' } of this.options.marks) {
       ctx.beginPath();
       if (t !== undefined) {
@@ -293,9 +295,7 @@ export class Chart {
         if (x < bbox.left || x > bbox.left + bbox.width) continue;
         ctx.moveTo(x, bbox.top);
         ctx.lineTo(x, bbox.top + bbox.height);
-        const right = x > bbox.left + bbox.width / 2;
-        ctx.textAlign = right ? 'right' : 'left';
-        ctx.fillText(label, x + (right ? -4 : 4) * ratio, bbox.top + 12 * ratio);
+        placed.push({ x, label });
       } else if (value !== undefined && plot.scales[`y${unit}`]) {
         const y = plot.valToPos(value, `y${unit}`, true);
         ctx.moveTo(bbox.left, y);
@@ -308,6 +308,11 @@ export class Chart {
         ctx.fillText(label, bbox.left + bbox.width - 4 * ratio, y + (crowded ? 14 : -4) * ratio);
       }
       ctx.stroke();
+    }
+    const width = (text: string) => ctx.measureText(text).width;
+    for (const { x, text, isLeft } of labelsOf(placed, width, bbox.left + bbox.width, 4 * ratio)) {
+      ctx.textAlign = isLeft ? 'right' : 'left';
+      ctx.fillText(text, x + (isLeft ? -4 : 4) * ratio, bbox.top + 12 * ratio);
     }
     ctx.restore();
   }

@@ -46,6 +46,7 @@ export function Figure(props: FigureProps) {
   const legend = useRef<HTMLTableElement>(null);
   const reading = useRef<HTMLParagraphElement>(null);
   const picker = useRef<HTMLButtonElement>(null);
+  const finder = useRef<HTMLButtonElement>(null);
   const announcer = useRef<HTMLParagraphElement>(null);
   const [hidden, setHidden] = useState<readonly string[]>([]);
   const [, redraw] = useState(0);
@@ -158,6 +159,11 @@ export function Figure(props: FigureProps) {
     }
     if (picker.current) picker.current.disabled = a === null;
     legend.current?.classList.toggle('plot-two', b !== null);
+    for (const [is, x] of [['a', a], ['b', b]] as const) {
+      const head = legend.current?.querySelector<HTMLElement>(`[data-head=${is}]`);
+      if (head) put(head, `${is.toUpperCase()}${window.isOutside(x) ? ' outside' : ''}`);
+    }
+    if (finder.current) finder.current.hidden = !window.isOutside(a) && !window.isOutside(b);
     if (reading.current) put(reading.current, cursorText(hover.current));
   };
 
@@ -165,9 +171,10 @@ export function Figure(props: FigureProps) {
     const { full } = latest.current.clock;
     const { a, b } = window;
     const parts = [];
-    if (a !== null) parts.push(`A ${full(a)}`);
+    const at = (name: string, x: number) => `${name} ${full(x)}${window.isOutside(x) ? ' (outside)' : ''}`;
+    if (a !== null) parts.push(at('A', a));
     else if (over !== null) parts.push(`Pointer ${full(over)}`);
-    if (b !== null) parts.push(`B ${full(b)}`);
+    if (b !== null) parts.push(at('B', b));
     const both = between(a, b);
     if (both) parts.push(`B − A ${duration(both.dt)}`, `1/(B − A) ${withUnit(both.frequency, 'Hz')}`);
     return parts.map((part) => part.replaceAll(' ', '\u00a0')).join('  ');
@@ -237,6 +244,9 @@ export function Figure(props: FigureProps) {
               </button>
             )}
             <button type="button" onClick={() => moveCursors(window.b, window.a)}>Swap A and B</button>
+            <button ref={finder} type="button" hidden onClick={() => (window.showCursors(), scheduler.request())}>
+              Show cursors
+            </button>
             <button type="button" onClick={() => moveCursors(null, null)}>Remove cursors</button>
             {children}
           </div>
@@ -249,7 +259,7 @@ export function Figure(props: FigureProps) {
             <thead role="rowgroup">
               <tr role="row">
                 <th scope="col" role="columnheader">Curve</th>
-                {cells.map(([, name]) => <th scope="col" role="columnheader">{name}</th>)}
+                {cells.map(([is, name]) => <th key={is} scope="col" role="columnheader" data-head={is}>{name}</th>)}
               </tr>
             </thead>
             <tbody role="rowgroup">

@@ -25,6 +25,23 @@ describe('the window', () => {
     return window;
   };
 
+  it('says which cursors are outside, and shows them', () => {
+    const window = live();
+    [window.a, window.b] = [95, null];
+    expect([window.isOutside(window.a), window.isOutside(window.b)]).toEqual([false, false]);
+    window.follow(110);
+    expect(window.isOutside(window.a)).toBe(true);
+    window.showCursors();
+    expect([window.live, window.min, window.max]).toEqual([false, 90, 100]);
+    window.b = 130;
+    window.showCursors();
+    expect([window.isOutside(window.a), window.isOutside(window.b)]).toEqual([false, false]);
+    [window.a, window.b] = [null, null];
+    window.show(0, 1);
+    window.showCursors();
+    expect([window.min, window.max]).toEqual([0, 1]);
+  });
+
   it('follows the newest values, and never trembles', () => {
     const window = live();
     expect([window.min, window.max]).toEqual([90, 100]);

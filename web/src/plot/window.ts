@@ -65,6 +65,21 @@ export class Window {
     this.version += 1;
   }
 
+  /** Whether a cursor is set, and not in the visible part. */
+  isOutside(cursor: number | null): boolean {
+    return cursor !== null && (cursor < this.min || cursor > this.max);
+  }
+
+  /** Shows the part with the cursors, with the same span if it is long enough. */
+  showCursors() {
+    const set = [this.a, this.b].filter((cursor) => cursor !== null);
+    if (set.length === 0) return;
+    const [first, last] = [Math.min(...set), Math.max(...set)];
+    const half = Math.max(this.span, 1.1 * (last - first)) / 2;
+    const middle = (first + last) / 2;
+    this.show(middle - half, middle + half);
+  }
+
   pause() {
     this.live = false;
     this.version += 1;

@@ -15,8 +15,8 @@ import { type Part, type Points, ask, finer, splice } from './part';
 const POINTS = 6000;
 const LEAST_SPAN = 1e-4;
 const QUIET = 150;
-/** Names of more events would cover the curves. */
-const MOST_MARKS = 24;
+/** Lines of more events would cover the curves. */
+const MOST_MARKS = 500;
 
 export function Replay({ content, chosen }: { content: RecordingContent; chosen: readonly number[] }) {
   const { name, signals, seconds } = content;
