@@ -231,7 +231,7 @@ pub enum Text {
     },
     /// The recording that is made, or the last one. It comes at the start, if there was one, and
     /// whenever something changes.
-    Recorded(Recorded),
+    Recorded(Box<Recorded>),
 }
 
 /// The end of references that the server sent.
@@ -369,7 +369,7 @@ pub enum Answer {
     /// To end-recording: the file is whole, or the recording failed.
     EndRecording {
         /// The recording.
-        recording: Recorded,
+        recording: Box<Recorded>,
     },
     /// To recordings.
     Recordings {

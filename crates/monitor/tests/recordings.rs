@@ -65,7 +65,7 @@ impl Desk {
 
     async fn end(&self) -> Recorded {
         match self.ask(Ask::EndRecording).await {
-            Ok(Answer::EndRecording { recording }) => recording,
+            Ok(Answer::EndRecording { recording }) => *recording,
             other => panic!("{other:?}"),
         }
     }

@@ -172,7 +172,7 @@ impl RecordingInProgress {
                 State::Ending(progress, _) | State::Ended(progress, _) => (progress.clone(), ended),
             }
         });
-        let Progress { elapsed, written, counts, rates, refused, silent, is_over } = progress;
+        let Progress { elapsed, written, counts, rates, refused, silent, is_over, .. } = progress;
         Status {
             seconds: elapsed.as_secs_f64(),
             files: written.files,

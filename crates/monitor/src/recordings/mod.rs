@@ -86,7 +86,9 @@ impl Recordings {
                 };
                 Ok(Answer::Record { name: self.record(by, period, lines).await? })
             }
-            Ask::EndRecording => Ok(Answer::EndRecording { recording: self.end().await? }),
+            Ask::EndRecording => {
+                Ok(Answer::EndRecording { recording: Box::new(self.end().await?) })
+            }
             Ask::Recordings => self.list().await,
             Ask::Recording { name } => {
                 let file = self.open(&name)?;

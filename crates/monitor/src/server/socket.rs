@@ -131,7 +131,9 @@ async fn write(
 ) {
     let mut beats = interval(BEAT);
     beats.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    first.extend(recorded.borrow_and_update().clone().map(|it| encode(&Text::Recorded(it))));
+    first.extend(
+        recorded.borrow_and_update().clone().map(|it| encode(&Text::Recorded(Box::new(it)))),
+    );
     let mut first = first.into_iter();
     loop {
         let message = match first.next() {
@@ -142,7 +144,7 @@ async fn write(
                 Some(text) = outgoing.recv() => Message::Text(text.into()),
                 Ok(()) = recorded.changed() => {
                     let Some(changed) = recorded.borrow_and_update().clone() else { continue };
-                    Message::Text(encode(&Text::Recorded(changed)).into())
+                    Message::Text(encode(&Text::Recorded(Box::new(changed))).into())
                 }
                 message = view.next(page) => message,
             },
