@@ -161,7 +161,9 @@ export function Figure(props: FigureProps) {
     legend.current?.classList.toggle('plot-two', b !== null);
     for (const [is, x] of [['a', a], ['b', b]] as const) {
       const head = legend.current?.querySelector<HTMLElement>(`[data-head=${is}]`);
-      if (head) put(head, `${is.toUpperCase()}${window.isOutside(x) ? ' outside' : ''}`);
+      if (!head) continue;
+      put(head, `${is.toUpperCase()}${window.isOutside(x) ? ' outside' : ''}`);
+      head.classList.toggle('plot-outside', window.isOutside(x));
     }
     if (finder.current) finder.current.hidden = !window.isOutside(a) && !window.isOutside(b);
     if (reading.current) put(reading.current, cursorText(hover.current));

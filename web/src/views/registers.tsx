@@ -148,7 +148,7 @@ function Table({ sheet, description, isOperator }: { sheet: Sheet; description: 
         {unreadable.length > 0 && `; cannot be read, only written: ${unreadable.join(', ')}`}
         {drafts.size > 0 && `, ${drafts.size} with a value that is not written`}
       </p>
-      {!isLive.value && <p class="muted count">Values are read once, and get older. "Read" reads them again.</p>}
+      {!isLive.value && <p class="muted count">Values are read once, and again after a stop. "Read" reads them again.</p>}
       <Said said={said} />
       <table class="sheet" ref={body}>
         <caption class="hidden">Registers of motor {nameOf(sheet.motor.line, sheet.motor.motor)}</caption>

@@ -217,7 +217,7 @@ function Frames({ line, shown, mark, isLive, chosen, onChosen }: Props) {
           <thead>
             <tr aria-rowindex={1}>
               <th scope="col" class="number">
-                <span class="wide">Time of day, </span>line, s
+                Time; line, s
               </th>
               <th scope="col">
                 <span class="wide">Direction</span>
