@@ -280,8 +280,8 @@ function Row({ frame, wall, index, isChosen, isMarked, onChosen }: RowProps) {
   return (
     <tr aria-rowindex={index} aria-current={isChosen ? 'true' : undefined} class={kind} onClick={onChosen}>
       <td class="mono number">
-        {isMarked && '▶ '}
-        <span class="day">{wall}</span> {timeOf(frame.t)}
+        <span class="day">{wall}</span> {isMarked && '▶ '}
+        {timeOf(frame.t)}
       </td>
       <td>
         {frame.direction === 'to-drive' ? '→' : '←'} <span class="wide">drive</span>
