@@ -49,3 +49,22 @@ test('a recording is made, seen by all pages, drawn with more points after a zoo
   expect(download.suggestedFilename()).toMatch(/^\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ\.mcap$/);
   await context.close();
 });
+
+test('motors without values for a time are named in the header and in the list', async ({ bench, live }) => {
+  test.setTimeout(120_000);
+  const header = inHeader(live);
+  await header.getByRole('button', { name: '● Record' }).click();
+  await expect(header).toContainText(/REC \d\d:0[2-9]/, { timeout: 60_000 });
+  await expect(header).not.toContainText('without values');
+  await bench.drives.end('SIGKILL');
+  await expect(header).toContainText(/! .*st0\/1, st0\/2.*: [3-9][.\d]* s without values/, { timeout: 60_000 });
+  await bench.plug();
+  await open(live, 'Recordings');
+  const facts = live.getByRole('region', { name: 'The recording that is made' });
+  // The gap stays named after the lines are back.
+  await expect(facts).toContainText(/last second (9\d|100)\.\d Hz/, { timeout: 60_000 });
+  await expect(facts).toContainText(/lowest mean \d\d\.\d of 100\.0 Hz \((st0|rmd0)\/\d\)/);
+  await expect(header).toContainText('s without values');
+  await header.getByRole('button', { name: 'End recording' }).click();
+  await expect(live.getByRole('listitem').filter({ hasText: '.mcap' })).toContainText(/st0\/1, st0\/2.*s without values/);
+});

@@ -135,3 +135,15 @@ test('a viewer reads, and changes nothing', async ({ bench, page }) => {
   await expect(row(page, 'BUS_VOLTAGE').getByText('V', { exact: true })).toBeVisible();
   await expect(page.getByRole('button', { name: /^Change/ })).toHaveCount(0);
 });
+
+test('registers in view are read again after a stop', async ({ live }) => {
+  await spin(live, 1500);
+  await registers(live, 'st0/1');
+  await live.getByRole('button', { name: /^Read \d+$/ }).click();
+  const status = row(live, 'STATUS').getByRole('status').first();
+  // The motor may still be in its start procedure.
+  await expect(status).toHaveText(/RUN|START/);
+  await live.keyboard.press('Escape');
+  await expect(status).toHaveText('IDLE');
+  await expect(row(live, 'SPEED_REF').getByRole('status').first()).toHaveText('0');
+});

@@ -20,8 +20,12 @@ test('a step of an ST drive: what it is like, the gains, the files', async ({ li
   await setUp(live, 'st0/1', 1000, 1500);
   await expect(live.getByText('st0/1 goes from its measured speed to 1000 rpm at 750 rpm/s.')).toBeVisible();
   await apply(live);
-  await expect(live.getByText(/^✓ Run 1 is recorded/)).toBeVisible({ timeout: 60_000 });
+  await expect(live.getByText(/^✓ Run 1 is recorded.*The motor has stopped\.$/)).toBeVisible({ timeout: 60_000 });
   await expect.poll(() => bench.speed('st', 1), { timeout: 30_000 }).toBeLessThan(50);
+  // What was entered stays while another view is open.
+  await open(live, 'Registers');
+  await open(live, 'Step response');
+  await expect(live.getByLabel(/^From/)).toHaveValue('1000');
 
   const table = live.getByRole('region', { name: 'Comparison of the runs' });
   const overshoot = table.getByRole('row', { name: /^Overshoot/ }).getByRole('cell');

@@ -20,7 +20,7 @@ const REGISTER_WORDS = ['s16A', 's16V', 's16degree', 'dpp', 'ROM'] as const;
 /** How often the registers in view are read if that is switched on, in ms. */
 const AGAIN = 2000;
 /** When registers are read after a stop, in ms: a motor slows down for some time. */
-const AFTER_STOP = [200, 2000];
+const AFTER_STOP = [200, 2000, 5000, 10_000];
 /** Rows that come into view while one scrolls are read together after this time, in ms. */
 const REST = 150;
 
@@ -203,7 +203,7 @@ function ageOf(at: number | undefined, now: number): number {
   return at === undefined ? NaN : Math.max(0, Math.floor((now - at) / 1000));
 }
 
-/** Reads the registers in view after a stop of the motor, and again when it is at rest. */
+/** Reads the registers in view after a stop of the motor, and again while it slows down. */
 function useReadAfterStop(sheet: Sheet, inView: () => string[]) {
   const latest = useRef(inView);
   latest.current = inView;
