@@ -54,8 +54,8 @@ export function timeOfDay(wall: number): string {
   return Number.isFinite(wall) ? TIME.format(wall * 1000) : '–';
 }
 
-/** The name of a motor. */
-export const nameOf = (line: string, motor: number) => `${line}/${motor}`;
+/** The name of a motor. Number 0 stands for any motor of a line on which nothing has answered. */
+export const nameOf = (line: string, motor: number) => (motor === 0 ? line : `${line}/${motor}`);
 
 /** A text of a table as a sentence. */
 export function sentence(text: string): string {

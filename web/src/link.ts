@@ -491,7 +491,10 @@ function forgetMotors(known: readonly Line[]) {
 /** A motor that answered before may turn although no search finds it. */
 function keepMotors({ line, heard, unstopped }: Line) {
   const searched = found.value.get(line);
-  const all = [...new Set([...(searched ?? []), ...(heard ?? []), ...(unstopped ?? [])])].sort((a, b) => a - b);
+  const numbers = new Set([...(searched ?? []), ...(heard ?? []), ...(unstopped ?? [])]);
+  // Any motor of the line is none that a card is for.
+  numbers.delete(0);
+  const all = [...numbers].sort((a, b) => a - b);
   if (all.length === 0 && !searched) return;
   if (motors.value.get(line)?.join() !== all.join()) motors.value = new Map(motors.value).set(line, all);
 }

@@ -152,24 +152,31 @@ function sorted(stopped: readonly StoppedMotor[]): Answered {
 function confirmed({ known, others }: Answered): StopReport {
   // The server repeats stops that failed.
   const later = confirmedSince();
-  const failures = known.filter(({ line, motor, failure }) => failure && !later.has(nameOf(line, motor)));
+  const isOpen = ({ line, motor, failure }: StoppedMotor) =>
+    failure && !(motor === 0 ? [...later].some((name) => name.startsWith(`${line}/`)) : later.has(nameOf(line, motor)));
+  const open = known.filter(isOpen);
+  const failures = open.filter(({ motor }) => motor !== 0);
+  const silent = open.filter(({ motor }) => motor === 0).map(({ line }) => line);
+  const all = known.filter(({ motor }) => motor !== 0).length;
   const addresses = others === 1 ? 'address' : 'addresses';
   const note = others ? { note: `The stop also went to ${others} ${addresses} where no motor was found.` } : {};
-  if (failures.length) {
+  if (open.length) {
     const names = failures.map(({ line, motor }) => nameOf(line, motor));
     const turning = failures.length === 1 ? 'it may' : 'they may';
+    const sentences = [
+      ...(names.length ? [`${named(names)} did not confirm: ${turning} still be turning.`] : []),
+      ...(silent.length ? [`Nothing has ever answered on ${named(silent)}: motors there may be turning.`] : []),
+      `${all - failures.length} of ${all} motors confirmed.`,
+    ];
     return {
       phase: 'unconfirmed',
-      message:
-        `${named(names)} did not confirm: ${turning} still be turning. ` +
-        `${known.length - failures.length} of ${known.length} motors confirmed.`,
-      failures: failures.map(({ line, motor, failure }) => `${nameOf(line, motor)}: ${failure}`),
+      message: sentences.join(' '),
+      failures: open.map(({ line, motor, failure }) => `${nameOf(line, motor)}: ${failure}`),
       ...note,
     };
   }
-  const count = known.length;
-  const message = count
-    ? `Stopped: ${count} of ${count} motors confirmed.`
+  const message = all
+    ? `Stopped: ${all} of ${all} motors confirmed.`
     : 'The server has it. No motor was read or commanded before.';
   return { phase: 'stopped', message, ...note };
 }

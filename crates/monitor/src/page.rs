@@ -185,7 +185,11 @@ impl Page {
             | Ask::Ports
             | Ask::Frames { .. } => {}
             Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
-            Ask::Latch | Ask::Release | Ask::Close { .. } => self.check_operator()?,
+            Ask::Latch => {
+                self.check_operator()?;
+                self.link.latching();
+            }
+            Ask::Release | Ask::Close { .. } => self.check_operator()?,
             Ask::Scan { port, .. } | Ask::Open { port, .. } => {
                 self.check_operator()?;
                 self.check_port(port)?;
@@ -207,6 +211,7 @@ impl Page {
             }
             Ask::StopAll => {
                 self.control().man.stop(None);
+                self.link.latching();
                 let view = self.view();
                 tasks.spawn(async move {
                     let stopped = match view {

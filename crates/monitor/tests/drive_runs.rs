@@ -74,14 +74,12 @@ async fn a_speed_goes_from_the_measured_value_to_the_target() {
     let page = world.page().await;
     assert_eq!(from(&page, run(rmd(1), Mode::Speed, 360.0, 1800.0)).await, 0.0);
     world.reaches("rmd1.speed_dps", |dps| dps > 340.0).await;
-    let up = until(|| {
-        let up = speeds(&world.rmd_motion(1));
-        (up.last() == Some(&360.0)).then_some(up)
-    })
-    .await;
+    until(|| (speeds(&world.rmd_motion(1)).last() == Some(&360.0)).then_some(())).await;
+    quiet(&world, 1).await;
+    let up = speeds(&world.rmd_motion(1));
     assert_eq!(up[0], 0.0);
     assert!(up.is_sorted() && up.windows(2).all(|two| two[1] - two[0] <= 36.01), "{up:?}");
-    assert_eq!(quiet(&world, 1).await, up.len(), "the target is the last reference");
+    assert!(up.ends_with(&[360.0; 3]), "its reply may be a late one: {up:?}");
 
     let measured = from(&page, run(rmd(1), Mode::Speed, -100.0, 4000.0)).await;
     assert!((measured - 360.0).abs() < 20.0, "{measured}");

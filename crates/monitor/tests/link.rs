@@ -110,3 +110,27 @@ async fn a_stop_that_is_too_old_is_not_sent() {
     assert_eq!(latched_by(&page).await, None);
     assert!(matches!(page.ask(turn()).await, Ok(Answer::Command { .. })));
 }
+
+#[tokio::test]
+async fn a_latch_holds_for_a_share_that_is_started_again() {
+    let world = World::new("link-latch", Profile::Spec);
+    let link = Arc::new(Link::new(world.path.clone()));
+    let kept = Arc::clone(&link);
+    tokio::spawn(async move { kept.keep().await });
+    joins(&link, true).await;
+    link.stop_all().await.unwrap();
+    drop(world);
+    joins(&link, false).await;
+    let world = World::new("link-latch", Profile::Spec);
+    let page = connected(&link).await;
+    assert!(latched_by(&page).await.is_some());
+    assert_eq!(page.ask(turn()).await.unwrap_err().reason, Reason::Latched);
+    // A release holds, too.
+    joins(&link, true).await;
+    page.ask(Ask::Release).await.unwrap();
+    page.ask(turn()).await.unwrap();
+    drop(world);
+    joins(&link, false).await;
+    let _world = World::new("link-latch", Profile::Spec);
+    assert_eq!(latched_by(&connected(&link).await).await, None);
+}

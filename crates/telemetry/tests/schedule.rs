@@ -412,7 +412,7 @@ fn stops_go_ahead_of_precautions_on_every_lane() {
 }
 
 #[test]
-fn precautions_on_a_silent_line_delay_a_stop_by_one_exchange_and_end_soon() {
+fn precautions_on_a_silent_line_give_way_to_a_stop_and_end_soon() {
     for pressed in (SECOND..12 * SECOND).step_by(300_000) {
         let sent = RefCell::default();
         let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
@@ -425,10 +425,14 @@ fn precautions_on_a_silent_line_delay_a_stop_by_one_exchange_and_end_soon() {
         line.run(20 * SECOND);
         drop(line);
         let sent = sent.into_inner();
-        let (at, _) = sent.iter().find(|(_, name)| *name == "again").unwrap();
-        assert!(at.0 - pressed <= SECOND, "{pressed}: {sent:?}");
-        // Each precaution is sent once here. The others are sent four times.
-        assert_eq!(sent.len(), 4 + 6 + 4, "{pressed}: {sent:?}");
+        let at = sent.iter().position(|(_, name)| *name == "again").unwrap();
+        let (before, under_way) = sent[at - 1];
+        let gave_way = under_way == "other" && before.0 + SECOND > pressed;
+        // Any other exchange goes on until its timeout.
+        let longest = if gave_way { 100_000 } else { SECOND };
+        assert!(sent[at].0.0 - pressed <= longest, "{pressed}: {sent:?}");
+        // Each precaution is sent once here, or again if it gave way. The others are sent four times.
+        assert_eq!(sent.len(), 4 + 6 + 4 + usize::from(gave_way), "{pressed}: {sent:?}");
     }
 }
 
@@ -602,8 +606,10 @@ proptest! {
             }
             loop {
                 match schedule.next(now) {
-                    Next::Begin(lane, Job::Stop { displaced: Some(_), .. }) => {
-                        prop_assert!(preempts && under_way.contains(&lane));
+                    Next::Begin(lane, Job::Stop { displaced: Some(displaced), .. }) => {
+                        // A silent precaution gives way on each line.
+                        prop_assert!(preempts || displaced == Displaced::Stop);
+                        prop_assert!(under_way.contains(&lane));
                     }
                     Next::Begin(lane, job) => {
                         prop_assert!(!under_way.contains(&lane));

@@ -197,6 +197,30 @@ fn a_port_that_is_scanned_is_busy() {
 }
 
 #[test]
+fn scans_that_hang_keep_no_line_from_being_closed() {
+    let share = Share::new("scan-hangs");
+    let mut program = Asker::join(&share.path, "scans");
+    // They accept connections and never answer.
+    let listen = || std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let silent: Vec<_> = (0..5).map(|_| listen()).collect();
+    let port = |at: usize| format!("tcp:{}", silent[at].local_addr().unwrap());
+    let ask = |at| Ask::Scan {
+        port: port(at),
+        protocol: Protocol::St,
+        rate: None,
+        timeout: Some(LONGEST_SCAN),
+    };
+    for at in 0..4 {
+        program.send(ask(at));
+    }
+    assert_eq!(refused(program.ask(ask(4))).0, Reason::Busy);
+    assert!(matches!(program.ask(close("rmd0")), Ok(Answer::Close { .. })));
+    let too_long =
+        Ask::Scan { port: port(4), protocol: Protocol::St, rate: None, timeout: Some(6.0) };
+    assert_eq!(refused(program.ask(too_long)).0, Reason::Usage);
+}
+
+#[test]
 fn only_devices_are_opened() {
     motorlink_testbench::register();
     motorlink_telemetry::share::port::register();

@@ -29,6 +29,18 @@ const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 /// Turns it with 10 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
 
+/// Stops all motors: whether each of some confirmed, may turn or is absent. The share also stops the motors
+/// that no program has used.
+fn stop_all_of(
+    program: &mut Asker,
+    line: &str,
+    numbers: &[u8],
+) -> BTreeMap<(String, u8), &'static str> {
+    let mut all = stop_all(program);
+    all.retain(|(of, motor), _| of == line && numbers.contains(motor));
+    all
+}
+
 /// Stops all motors: whether each confirmed, may turn or is absent.
 fn stop_all(program: &mut Asker) -> BTreeMap<(String, u8), &'static str> {
     let Ok(Answer::Stop { motors }) = program.ask(Ask::Stop { motor: None }) else { panic!() };
@@ -65,23 +77,26 @@ fn an_id_that_was_only_searched_is_absent_at_every_stop() {
     };
     assert!(stopped[0].failure.is_some(), "{stopped:?}");
     for _ in 0..2 {
-        assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
+        let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY]);
+        assert_eq!(stopped, motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
     }
     let (heard, unstopped) = heard_and_unstopped(&mut program, "rmd0");
     assert!(heard.contains(&1) && !heard.contains(&NOBODY), "{heard:?}");
     assert!(unstopped.is_empty(), "{unstopped:?}");
     // A program that moved it knows better.
     program.ask(command("rmd0", NOBODY, &TURN)).unwrap_err();
-    assert_eq!(stop_all(&mut program), motors("rmd0", &[(1, "confirmed"), (NOBODY, "may turn")]));
+    let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY]);
+    assert_eq!(stopped, motors("rmd0", &[(1, "confirmed"), (NOBODY, "may turn")]));
     assert_eq!(heard_and_unstopped(&mut program, "rmd0").1, [NOBODY]);
 }
 
 #[test]
-fn ids_that_never_answered_are_absent_where_no_motor_confirms() {
+fn ids_that_never_answered_are_absent_where_others_confirm() {
     let share = Share::with("stops-nobody", SHORT, |link| link);
     let mut program = Asker::join(&share.path, "searches");
     program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
-    assert_eq!(stop_all(&mut program), motors("rmd0", &[(NOBODY, "absent")]));
+    let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY, 30]);
+    assert_eq!(stopped, motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
 }
 
 #[test]
@@ -91,7 +106,8 @@ fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
     for _ in 0..2 {
-        assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed"), (5, "absent")]));
+        let stopped = stop_all_of(&mut program, "st0", &[1, 5]);
+        assert_eq!(stopped, motors("st0", &[(1, "confirmed"), (5, "absent")]));
     }
     for _ in 0..2 {
         program.event(Happening::Stopped);
@@ -149,7 +165,8 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
     program.send(Ask::Stop { motor: None });
     assert_eq!(heard_and_unstopped(&mut program, "st0"), (vec![1], vec![1]));
     for _ in 0..2 {
-        assert_eq!(stop_all(&mut program), motors("st0", &[(1, "may turn"), (5, "absent")]));
+        let stopped = stop_all_of(&mut program, "st0", &[1, 5]);
+        assert_eq!(stopped, motors("st0", &[(1, "may turn"), (5, "absent")]));
     }
     assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
     let mut other = Asker::join(&share.path, "comes later");
@@ -192,7 +209,7 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     let mut program = Asker::join(&share.path, "reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
-    assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed")]));
+    assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
 
@@ -206,7 +223,7 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
         frames.iter().filter(is_stop).count()
     };
     while stops(&mut program, 7) == 0 {}
-    assert_eq!(stop_all(&mut program), motors("st0", &[(1, "confirmed")]));
+    assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
     assert_eq!([1, 2, 3, 7].map(|motor| stops(&mut program, motor)), [2, 2, 1, 1]);
     // The drive has motors 1 and 2, the bus has 1 to 4.
@@ -215,4 +232,56 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
     };
     let told: Vec<_> = program.events.iter().filter(is_of_no_motor).collect();
     assert!(told.is_empty(), "{told:?}");
+}
+
+#[test]
+fn where_nothing_has_answered_a_stop_is_not_confirmed_and_is_repeated() {
+    let is_cut = Arc::new(AtomicBool::new(false));
+    let cut = Arc::clone(&is_cut);
+    let share = Share::with("stops-unanswered", SHORT, move |mut link| {
+        let ramp = Ramp { speed_rpm: 1000, duration_ms: 100 };
+        before_the_share(&mut *link, Request::SetRamp(ramp));
+        before_the_share(&mut *link, Request::ExecuteCommand(Command::StartMotor));
+        is_cut.store(true, Ordering::SeqCst);
+        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+    });
+    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    let mut program = Asker::join(&share.path, "comes after a restart");
+    let mut stopped = stop_all(&mut program);
+    assert_eq!(stopped.remove(&("st0".to_owned(), ANY_MOTOR)), Some("may turn"));
+    assert_eq!(stopped, motors("rmd0", &[1, 2, 3, 4].map(|motor| (motor, "confirmed"))));
+    let (heard, unstopped) = heard_and_unstopped(&mut program, "st0");
+    assert_eq!((heard, unstopped), (vec![], vec![ANY_MOTOR]));
+    // A program that searches finds nothing, and knows the numbers then.
+    program.ask(command("st0", 2, &READ_STATUS)).unwrap_err();
+    assert_eq!(
+        stop_all_of(&mut program, "st0", &[ANY_MOTOR, 2]),
+        motors("st0", &[(0, "may turn")])
+    );
+    cut.store(false, Ordering::SeqCst);
+    share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
+    assert_eq!(
+        stop_all_of(&mut program, "st0", &[ANY_MOTOR, 2]),
+        motors("st0", &[(2, "confirmed")])
+    );
+    assert!(heard_and_unstopped(&mut program, "st0").1.is_empty());
+}
+
+#[test]
+fn a_release_ends_the_repeats_where_nothing_has_answered() {
+    let is_cut = Arc::new(AtomicBool::new(true));
+    let cut = Arc::clone(&is_cut);
+    let share = Share::with("stops-released", SHORT, move |link| {
+        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+    });
+    let mut program = Asker::join(&share.path, "releases");
+    assert_eq!(stop_all_of(&mut program, "st0", &[ANY_MOTOR]), motors("st0", &[(0, "may turn")]));
+    program.ask(Ask::Release).unwrap();
+    assert!(heard_and_unstopped(&mut program, "st0").1.is_empty());
+    cut.store(false, Ordering::SeqCst);
+    // Stops of the last round may still be sent: they end after 2 s and a timeout for each number.
+    let end = std::time::Instant::now() + LIMIT;
+    while program.ask(command("st0", 1, &[3, 1])).is_err() {
+        assert!(std::time::Instant::now() < end, "the motor does not start");
+    }
 }

@@ -30,8 +30,12 @@ export const isDrive = ({ finding }: Scanned) => finding === 'drive' || finding 
 export const rateText = (rate: number, protocol: Protocol) =>
   protocol === 'st' ? `${rate} baud` : `${rate / 1000} kbit/s`;
 
+/** The longest time for a reply in a scan, in seconds. */
+const LONGEST = 5;
+
 /** Scans until something answers. What it came to, in words. */
-export async function scan(wanted: Wanted, { found, mayDisturb, isEnded }: Steps): Promise<Sentence> {
+export async function scan(form: Wanted, { found, mayDisturb, isEnded }: Steps): Promise<Sentence> {
+  const wanted = { ...form, timeout: form.timeout && Math.min(form.timeout, LONGEST) };
   const first = await askPorts({ ask: 'scan', ...wanted, rate: null });
   const others = first.rates.filter((rate) => rate !== first.rate);
   found(first, others.length);

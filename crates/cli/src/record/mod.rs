@@ -235,9 +235,14 @@ fn words(progress: &Progress) -> String {
         true => String::new(),
         false => format!(", {what}: {}", names.join(", ")),
     };
-    let refused = named("refused", refused) + &named("SILENT", silent);
+    let gaps = progress.gaps.iter().filter(|(motor, _)| !silent.contains(motor));
+    let gaps = gaps.map(|(motor, span)| format!("{motor} {:.1} s", span.as_secs_f64()));
+    let gaps: Vec<String> = gaps.collect();
+    let refused =
+        named("refused", refused) + &named("SILENT", silent) + &named("WITHOUT VALUES", &gaps);
     let lost = match (counts.lost, counts.unconfirmed) {
-        (0, 0) => "nothing lost".to_owned(),
+        (0, 0) if gaps.is_empty() => "nothing lost".to_owned(),
+        (0, 0) => "no message lost".to_owned(),
         (lost, 0) => format!("{lost} LOST"),
         (lost, unconfirmed) => format!("{lost} LOST, {unconfirmed} rows not confirmed"),
     };
@@ -263,6 +268,7 @@ fn size(bytes: u64) -> String {
 fn object(event: &str, progress: &Progress) -> Value {
     let Progress { elapsed, written, counts, rates, refused, silent, .. } = progress;
     let files = written.files.iter().map(|path| path.display().to_string());
+    let gap = |(motor, span): &(String, Duration)| json!({"motor": motor, "seconds": (span.as_secs_f64() * 1e3).round() / 1e3});
     json!({
         "event": event,
         "seconds": (elapsed.as_secs_f64() * 1e3).round() / 1e3,
@@ -276,5 +282,6 @@ fn object(event: &str, progress: &Progress) -> Value {
         "achieved_hz": rates.map(|(_, achieved)| achieved),
         "refused": refused,
         "silent": silent,
+        "gaps": progress.gaps.iter().map(gap).collect::<Vec<_>>(),
     })
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink_telemetry::line::Stopped;
-use motorlink_telemetry::share::message::{self, Answer, Ask, Event, StoppedMotor};
+use motorlink_telemetry::share::message::{self, ANY_MOTOR, Answer, Ask, Event, StoppedMotor};
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
@@ -244,8 +244,15 @@ fn tell_stop(
         Ok(()) => ("stopped", "it confirmed the stop".to_owned()),
         Err(error) => ("stop-failed", format!("it may still be turning: {error}")),
     };
-    let message = format!("{line}, motor {motor}: {words}");
+    let of_line = motor == ANY_MOTOR;
+    let message = match of_line {
+        true => format!("{line}: motors {}", words.trim_start_matches("it ")),
+        false => format!("{line}, motor {motor}: {words}"),
+    };
     match json {
+        true if of_line => {
+            output::print_line(&json!({"event": event, "line": line, "message": message}))
+        }
         true => output::print_line(
             &json!({"event": event, "line": line, "motor": motor, "message": message}),
         ),

@@ -31,6 +31,8 @@ use crate::program::{Program, Refusal};
 
 /// The time between two references.
 const PERIOD: Duration = Duration::from_millis(20);
+/// The target is sent so often: its reply may be a late one to the reference before it.
+const LAST: u32 = 3;
 /// References that no reply has acknowledged for so long are given up, and the motor is stopped. A motor
 /// that lost its power for longer is not set moving by the next one.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -238,22 +240,33 @@ impl<M: Motion> Begun<'_, M> {
     /// Sends references at the rate until the target is reached.
     async fn stream(&self, stream: Stream, measured: f64) -> Result<f64, Refusal> {
         let from = self.first(measured);
-        self.command(&stream.request(from)?).await?;
-        self.go_on(stream, from);
+        let references = self.references(stream);
+        if let Err(why) = self.command(&stream.request(from)?).await {
+            // The motor may have the reference, whose reply was lost.
+            let is_unknown =
+                matches!(why.reason, Reason::Silent | Reason::Unconfirmed | Reason::Line);
+            let message = if is_unknown { references.stop(&why).await } else { why.message };
+            return Err(Refusal { message, ..why });
+        }
+        self.go_on(references, from);
         Ok(from)
     }
 
-    /// Sends the next references in a task of their own.
-    fn go_on(&self, stream: Stream, from: f64) {
-        let (ends, ended) = watch::channel(false);
-        let references = References {
+    /// The references of the run.
+    fn references(&self, stream: Stream) -> References {
+        References {
             control: Arc::clone(self.control),
             program: self.permitted.program.clone(),
             target: self.target().clone(),
             stream,
             to: self.run.to,
             rate: self.run.rate,
-        };
+        }
+    }
+
+    /// Sends the next references in a task of their own.
+    fn go_on(&self, references: References, from: f64) {
+        let (ends, ended) = watch::channel(false);
         let report = self.permitted.drive.report();
         let task = tokio::spawn(references.send(from, ended, report));
         self.control.set_run(self.target(), Running { ends, task });
@@ -301,7 +314,7 @@ impl<M: Motion> Begun<'_, M> {
         let stream = Stream::Current(motor, read[1] as i16);
         self.command(&stream.request(from)?).await?;
         self.start(motor).await?;
-        self.go_on(stream, from);
+        self.go_on(self.references(stream), from);
         Ok(from)
     }
 
@@ -351,8 +364,8 @@ impl References {
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut reference = from;
         let mut acknowledged = Instant::now();
-        let mut failure = None;
-        while reference != self.to && failure.is_none() {
+        let (mut repeats, mut failure) = (0, None);
+        while (reference != self.to || repeats < LAST) && failure.is_none() {
             tokio::select! {
                 biased;
                 _ = ended.changed() => return,
@@ -362,8 +375,11 @@ impl References {
             let step = self.rate * PERIOD.as_secs_f64();
             let left = self.to - reference;
             let next = if left.abs() <= step { self.to } else { reference + step.copysign(left) };
-            match self.send_one(next).await {
-                Ok(()) => (reference, acknowledged) = (next, Instant::now()),
+            match self.send_one(next, repeats + 1 == LAST).await {
+                Ok(()) => {
+                    (reference, acknowledged) = (next, Instant::now());
+                    repeats += u32::from(next == self.to);
+                }
                 Err(why) if is_ended_by_others(&why) => return,
                 // The same reference again: it is no matter whether the motor has it already.
                 Err(_) if acknowledged.elapsed() < PATIENCE => {}
@@ -373,10 +389,16 @@ impl References {
         report(Ran { motor: self.target.name.clone(), reference, failure });
     }
 
-    async fn send_one(&self, reference: f64) -> Result<(), Refusal> {
+    /// Sends one. The replies so far are confirmed with the last one.
+    async fn send_one(&self, reference: f64, is_last: bool) -> Result<(), Refusal> {
         let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
         let request = self.stream.request(reference)?;
-        send(&self.control, &exchanges, &request).await.map(drop)
+        if !is_last {
+            return send(&self.control, &exchanges, &request).await.map(drop);
+        }
+        let _lane = exchanges.lane().await;
+        send(&self.control, &exchanges, &request).await?;
+        exchanges.confirm().await
     }
 
     /// The motor must not turn on at a speed in between. Gives why it was stopped, and how it took that.

@@ -2,12 +2,13 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::frame::Kind;
 use motorlink_telemetry::share::message::{
-    Answer, Ask, Event, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
+    Answer, Ask, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
 };
 use tokio::sync::{Mutex as AsyncMutex, watch};
 use tokio::time::{Instant, sleep, timeout};
@@ -32,12 +33,23 @@ pub struct Link {
     path: PathBuf,
     /// The stops of all pages.
     stops: Arc<Mutex<Stops>>,
-    /// When a stop of all motors was asked for that the share did not get.
-    pending: Mutex<Option<Instant>>,
+    /// What the next share gets first.
+    pending: Mutex<Pending>,
+    /// Whether motion is refused until somebody releases it, as far as this program knows.
+    is_latched: AtomicBool,
     /// One connection at a time sends it. The others wait: none can move a motor before it.
     sending: AsyncMutex<()>,
     /// `None` until the first attempt to connect has ended.
     joined: watch::Sender<Option<Result<Joined, String>>>,
+}
+
+/// What a share gets before anything else.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+struct Pending {
+    /// When a stop of all motors was asked for that no share got.
+    stop: Option<Instant>,
+    /// The share before this one was latched when it ended.
+    latch: bool,
 }
 
 /// What there is while the share is there.
@@ -54,6 +66,7 @@ impl Link {
             path,
             stops: Arc::default(),
             pending: Mutex::default(),
+            is_latched: AtomicBool::new(false),
             sending: AsyncMutex::default(),
             joined: watch::Sender::new(None),
         }
@@ -69,13 +82,18 @@ impl Link {
         &self.path
     }
 
-    /// Connects a program of this name, after a stop that the share did not get. Gives the name that
-    /// events have, too.
+    /// A page latches the share: a share that is started later is latched, too.
+    pub fn latching(&self) {
+        self.is_latched.store(true, Ordering::SeqCst);
+    }
+
+    /// Connects a program of this name, after a stop or a latch that the share did not get. Gives the name
+    /// that events have, too.
     ///
     /// # Errors
     /// No share is there, or it refuses.
     pub async fn connect(&self, name: &str) -> io::Result<(Program, Listener, String)> {
-        self.send_pending_stop().await?;
+        self.send_pending().await?;
         self.open(name).await
     }
 
@@ -84,22 +102,29 @@ impl Link {
         connected.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
     }
 
-    /// Latches the share and stops all motors if that was asked for while the share was lost.
-    async fn send_pending_stop(&self) -> io::Result<()> {
+    /// Latches the share if the one before it was latched. Stops all motors, too, if that was asked for
+    /// while the share was lost.
+    async fn send_pending(&self) -> io::Result<()> {
         let _sending = self.sending.lock().await;
-        let asked = *self.pending();
-        let Some(asked) = asked.filter(|asked| asked.elapsed() < PENDING) else { return Ok(()) };
-        let (program, mut listener, _) = self.open(NAME).await?;
-        for (id, ask) in [(1, Ask::Latch), (2, Ask::Stop { motor: None })] {
-            program.pass(&Request { id, ask }).await?;
+        let wanted = *self.pending();
+        let stop = wanted.stop.filter(|asked| asked.elapsed() < PENDING);
+        if stop.is_none() && !wanted.latch {
+            return Ok(());
         }
-        // The share takes the requests of a program in their order: it has the stop when it answers.
+        let (program, mut listener, _) = self.open(NAME).await?;
+        program.pass(&Request { id: 1, ask: Ask::Latch }).await?;
+        if stop.is_some() {
+            program.pass(&Request { id: 2, ask: Ask::Stop { motor: None } }).await?;
+        }
+        // The share takes the requests of a program in their order: it has them when it answers.
         lines(&program, &mut listener).await?;
-        self.pending().take_if(|latest| *latest == asked);
+        let mut pending = self.pending();
+        pending.stop.take_if(|latest| wanted.stop == Some(*latest));
+        pending.latch = false;
         Ok(())
     }
 
-    fn pending(&self) -> MutexGuard<'_, Option<Instant>> {
+    fn pending(&self) -> MutexGuard<'_, Pending> {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -121,13 +146,14 @@ impl Link {
                         let joined = Joined { program: program.clone(), drives: drives.clone() };
                         self.joined.send_replace(Some(Ok(joined)));
                         // A stop may have been asked for just before. If this fails, the share is lost again.
-                        let _ = self.send_pending_stop().await;
-                        match next_lines(&program, &mut listener).await {
+                        let _ = self.send_pending().await;
+                        match self.next_lines(&program, &mut listener).await {
                             Ok(next) => (lines, drives) = (next.clone(), drives.with_lines(next)),
                             Err(error) => break error,
                         }
                     };
                     known = Some((lines, drives));
+                    self.pending().latch |= self.is_latched.load(Ordering::SeqCst);
                     lost
                 }
                 Err(error) => error,
@@ -139,8 +165,33 @@ impl Link {
 
     async fn join(&self) -> io::Result<(Program, Vec<Line>, Listener)> {
         let (program, mut listener, _) = self.connect(NAME).await?;
-        let lines = lines(&program, &mut listener).await?;
+        let (lines, is_latched) = lines(&program, &mut listener).await?;
+        self.is_latched.store(is_latched, Ordering::SeqCst);
         Ok((program, lines, listener))
+    }
+
+    /// Waits until lines are opened or closed, and gives all lines. Remembers the latch meanwhile.
+    async fn next_lines(
+        &self,
+        program: &Program,
+        listener: &mut Listener,
+    ) -> io::Result<Vec<Line>> {
+        loop {
+            let frame = listener.next().await?;
+            if frame.kind != Kind::Text {
+                continue;
+            }
+            let Ok(Text::Event(event)) = decode(&frame.payload) else { continue };
+            match event.event {
+                Happening::Latched => self.is_latched.store(true, Ordering::SeqCst),
+                Happening::Released => self.is_latched.store(false, Ordering::SeqCst),
+                // An event that comes before the answer happened before it.
+                Happening::Opened | Happening::Closed => {
+                    return Ok(lines(program, listener).await?.0);
+                }
+                _ => {}
+            }
+        }
     }
 
     /// The drives of the share.
@@ -188,14 +239,15 @@ impl Link {
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
         self.stops.lock().unwrap_or_else(PoisonError::into_inner).count(None);
+        self.latching();
         let asked = Instant::now();
         // Before the look at the connection: one that is made at this moment sends it.
-        *self.pending() = Some(asked);
+        self.pending().stop = Some(asked);
         let program = self.get().await.map_err(until_back)?.program;
-        self.pending().take_if(|latest| *latest == asked);
+        self.pending().stop.take_if(|latest| *latest == asked);
         match stop_all(&program).await {
             Err(refusal) if refusal.reason == Reason::Line => {
-                *self.pending() = Some(asked);
+                self.pending().stop = Some(asked);
                 Err(until_back(lost("the connection has ended")))
             }
             stopped => stopped,
@@ -212,8 +264,8 @@ impl Link {
     }
 }
 
-/// Asks for the lines.
-async fn lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Line>> {
+/// Asks for the lines, and whether motion is refused.
+async fn lines(program: &Program, listener: &mut Listener) -> io::Result<(Vec<Line>, bool)> {
     let lines = tokio::select! {
         answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
         // Events come before the answer.
@@ -222,25 +274,9 @@ async fn lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Lin
         }
     };
     match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
-        Ok(Answer::Lines { lines, .. }) => Ok(lines),
+        Ok(Answer::Lines { lines, latched_by }) => Ok((lines, latched_by.is_some())),
         Ok(_) => Err(io::Error::other("it gives another answer")),
         Err(refusal) => Err(io::Error::other(refusal.message)),
-    }
-}
-
-/// Waits until lines are opened or closed, and gives all lines.
-async fn next_lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Line>> {
-    loop {
-        let frame = listener.next().await?;
-        let is_of_lines =
-            |event: &Event| matches!(event.event, Happening::Opened | Happening::Closed);
-        if frame.kind == Kind::Text
-            && let Ok(Text::Event(event)) = decode(&frame.payload)
-            && is_of_lines(&event)
-        {
-            // An event that comes before the answer happened before it.
-            return lines(program, listener).await;
-        }
     }
 }
 

@@ -10,6 +10,8 @@ use super::exchange::{CommandId, Kind, Outcome, PollId, UnderWay, Verdict};
 /// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
 /// silence: on a line that loses bytes they are common.
 const PATIENCE: Micros = Micros::from_millis(2_000);
+/// A precaution that got no reply for so long gives way to another stop.
+const GIVES_WAY: Micros = Micros::from_millis(100);
 /// The pause before its next poll.
 const PAUSE: Micros = Micros::from_millis(500);
 
@@ -143,11 +145,20 @@ impl<C: Clone> LaneState<C> {
     }
 
     /// Whether a stop may begin: nothing is under way, or what gives way to it.
-    pub(super) fn may_stop(&self, preempts: bool) -> bool {
+    pub(super) fn may_stop(&self, now: Instant, preempts: bool) -> bool {
         self.under_way.is_none_or(|exchange| match exchange.kind {
+            Kind::Stop(_) if self.gives_way_at().is_some_and(|at| at <= now) => true,
             Kind::Stop(_) => !preempts && exchange.is_unsent && self.unsent_stop().is_some(),
             _ => preempts || exchange.is_unsent,
         })
+    }
+
+    /// When the precaution that is under way gives way to a stop that waits behind it.
+    pub(super) fn gives_way_at(&self) -> Option<Instant> {
+        let exchange = self.under_way.filter(|exchange| matches!(exchange.kind, Kind::Stop(_)))?;
+        let is_precaution = self.stops.front().is_some_and(|stop| stop.is_precaution);
+        let waits = self.unsent_stop().is_some_and(|at| !self.stops[at].is_precaution);
+        (is_precaution && waits).then_some(exchange.since + GIVES_WAY)
     }
 
     /// Whether a command or a poll may begin: nothing is under way, and no stop is due.

@@ -21,7 +21,8 @@
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
 //! ahead of it, and none that was not sent yet. In a lane that is brought in sync each stop is sent
 //! ahead, one after the other. A stop as a precaution is for a motor that may not exist. It never goes
-//! ahead of other stops, and those of its lane end before it begins.
+//! ahead of other stops, and those of its lane end before it begins. If it gets no reply at once, it
+//! gives way to a stop that comes later.
 //!
 //! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
 //! little of the line.
@@ -278,12 +279,12 @@ impl<C: Clone> Schedule<C> {
     pub fn has_stop(&self, now: Instant) -> bool {
         let preempts = self.rules.stop_preempts;
         self.is_open
-            && self.lanes.values().any(|lane| lane.may_stop(preempts) && lane.is_stop_due(now))
+            && self.lanes.values().any(|lane| lane.may_stop(now, preempts) && lane.is_stop_due(now))
     }
 
     fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
         let preempts = self.rules.stop_preempts;
-        let ready = self.lanes.iter().filter(|(_, state)| state.may_stop(preempts));
+        let ready = self.lanes.iter().filter(|(_, state)| state.may_stop(now, preempts));
         let due = ready.filter_map(|(lane, state)| Some((state.is_precaution_due(now)?, *lane)));
         let (_, lane) = due.min()?;
         let state = self.lanes.get_mut(&lane)?;
@@ -386,6 +387,7 @@ impl<C: Clone> Schedule<C> {
         self.first_deadline()
             .into_iter()
             .chain(retries)
+            .chain(self.lanes.values().filter_map(LaneState::gives_way_at))
             .chain(of_groups)
             .filter(|instant| *instant > now)
             .min()

@@ -14,7 +14,9 @@ pub use events::{Event, Happening, Reason};
 pub use frames::{WireFrame, WireLoad, WireResult, WireWay};
 pub use json::{MessageError, decode, encode};
 pub use lines::{Finding, FoundPort, Line, LineCounts, Protocol};
-pub use motors::{Column, DropRule, Group, MotorName, SignalName, SignalRate, StoppedMotor};
+pub use motors::{
+    ANY_MOTOR, Column, DropRule, Group, MotorName, SignalName, SignalRate, StoppedMotor,
+};
 
 /// The most lines of a share that programs open. Those of its start do not count.
 pub const MOST_OPENED: usize = 16;
@@ -22,6 +24,8 @@ pub const MOST_OPENED: usize = 16;
 pub const LONGEST_PORT: usize = 512;
 /// The longest time for a reply, in seconds.
 pub const LONGEST_TIMEOUT: f64 = 60.0;
+/// The longest time for a reply in a scan, in seconds.
+pub const LONGEST_SCAN: f64 = 5.0;
 /// The longest name of a program, in bytes.
 pub const LONGEST_NAME: usize = 64;
 /// The longest reason of a program that leaves, in bytes.

@@ -42,8 +42,8 @@ impl Share {
         Self::with(name, PATIENT, |link| link)
     }
 
-    /// As [`new`](Self::new), with something around the serial line. RMD motors have this time for a
-    /// reply.
+    /// As [`new`](Self::new), with something around the serial line. Drives have this time for a reply, an
+    /// ST drive at most 1 s.
     pub fn with(
         name: &str,
         timeout: Duration,
@@ -55,7 +55,9 @@ impl Share {
             let tap = tap.clone();
             move |link| tap.around_line(around(link))
         };
-        let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, Options::default());
+        let options =
+            Options { timeout: timeout.min(Duration::from_secs(1)), ..Options::default() };
+        let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, options);
         let line = StLine::new(client.unwrap());
         let engine = Acquisition::new(Box::new(line));
         let (port, speaks) = (st.parse().unwrap(), Speaks::St(Profile::Spec));

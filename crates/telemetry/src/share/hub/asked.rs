@@ -19,8 +19,8 @@ use crate::line::{Request, may_move};
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
 use crate::share::message::{
-    self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_TIME,
-    LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
+    self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_SCAN,
+    LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
 };
 use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
@@ -172,7 +172,8 @@ impl Hub {
             Ask::Release if waited > RELEASE => Err(refused(&CommandError::Expired)),
             Ask::Release => {
                 self.latch = None;
-                for held in self.lines.values() {
+                for held in self.lines.values_mut() {
+                    held.unanswered_stop = None;
                     let by = Arc::clone(name);
                     held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;
                 }
@@ -181,6 +182,9 @@ impl Hub {
             Ask::Rates => self.rates(session, id),
             Ask::Ports => self.list_ports(session, name, id),
             Ask::Scan { port, protocol, rate, timeout } => {
+                if timeout.is_some_and(|timeout| timeout > LONGEST_SCAN) {
+                    return Err(usage(format!("`timeout` of a scan is at most {LONGEST_SCAN} s")));
+                }
                 let order = self.order(&port, protocol, None, timeout)?;
                 self.scan_port(session, name, id, order, rate)
             }
@@ -345,27 +349,27 @@ impl Hub {
         id: u32,
         motor: Option<&MotorName>,
     ) -> Result<Option<Answer>, Refused> {
-        let is_all = motor.is_none();
-        let (mut motors, mut others): (Vec<(usize, Motor)>, _) = match motor {
+        let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
+                for held in self.lines.values_mut().filter(|held| !held.has_answered()) {
+                    held.unanswered_stop = Some(Arc::clone(name));
+                }
                 let lines = self.lines.iter();
                 let all =
                     lines.flat_map(|(line, held)| held.stoppable().map(move |it| (*line, it)));
-                all.partition(|(line, motor)| self.lines[line].known.contains(motor))
+                all.partition(|(line, motor)| self.lines[line].is_awaited(*motor))
             }
         };
-        if motors.is_empty() {
-            std::mem::swap(&mut motors, &mut others);
-        }
-        if motors.is_empty() {
+        if awaited.is_empty() {
             return Ok(Some(Answer::Stop { motors: Vec::new() }));
         }
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
-        let part = asker.gather(id, motors.len());
-        for (line, motor) in motors {
+        let part = asker.gather(id, awaited.len());
+        let of_all = motor.is_none();
+        for (line, motor) in awaited {
             let held = &self.lines[&line];
-            if is_all && held.known.contains(&motor) && !held.may_turn(motor) {
+            if of_all && held.has_answered() && !held.may_turn(motor) {
                 let tell = self.teller(session, None, line);
                 let task = move |engine: &mut Acquisition| {
                     if !engine.has_answered(&line::stop(motor)) {
@@ -375,10 +379,10 @@ impl Hub {
                 // If the engine has ended, the stop fails, too.
                 let _ = held.remote().post(task);
             }
-            self.stop(line, motor, session, Some(part), name);
+            self.stop_of(of_all, line, motor, session, Some(part), name);
         }
         for (line, motor) in others {
-            self.stop(line, motor, session, None, name);
+            self.stop_of(of_all, line, motor, session, None, name);
         }
         Ok(None)
     }

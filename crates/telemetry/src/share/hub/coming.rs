@@ -136,7 +136,7 @@ impl Hub {
         id: u32,
         Order { wish, protocol }: Order,
     ) -> Result<Option<Answer>, Refused> {
-        if self.lines.len() + self.jobs.opening() >= self.first_lines + MOST_OPENED {
+        if self.lines.len() + self.jobs.count(Does::Opens) >= self.first_lines + MOST_OPENED {
             let message = format!("programs open up to {MOST_OPENED} lines; close one first");
             return Err((Reason::Busy, message));
         }
@@ -152,7 +152,6 @@ impl Hub {
         id: u32,
         line: usize,
     ) -> Result<Option<Answer>, Refused> {
-        self.check_jobs()?;
         // Events of the line come before its end.
         let _ = self.collect_events();
         let Some(held) = self.lines.remove(&line) else { return Ok(None) };
@@ -165,16 +164,6 @@ impl Hub {
         })
     }
 
-    fn check_jobs(&self) -> Result<(), Refused> {
-        match self.jobs.are_many() {
-            false => Ok(()),
-            true => Err((
-                Reason::Busy,
-                "the share scans, opens or closes too many ports now".to_owned(),
-            )),
-        }
-    }
-
     fn begin(
         &mut self,
         session: SessionId,
@@ -183,7 +172,10 @@ impl Hub {
         place: Option<(String, Does)>,
         work: impl FnOnce() -> End + Send + 'static,
     ) -> Result<Option<Answer>, Refused> {
-        self.check_jobs()?;
+        if !self.jobs.has_room(place.as_ref().map(|(_, does)| *does)) {
+            let message = "the share scans or opens too many ports at this moment".to_owned();
+            return Err((Reason::Busy, message));
+        }
         let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
         let ended = move |job| {
             // The hub may have gone.

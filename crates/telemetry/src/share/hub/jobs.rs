@@ -15,8 +15,10 @@ use crate::share::message::{FoundPort, Protocol};
 use crate::share::opening::{OpenError, Opened};
 use crate::share::scan::Found;
 
-/// Jobs at the same time.
+/// Jobs at the same time, besides ports that are closed: that stops motors, and is always possible.
 const MOST_JOBS: usize = 8;
+/// Scans at the same time.
+const MOST_SCANS: usize = 4;
 
 /// A job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -90,9 +92,15 @@ impl Jobs {
             .collect()
     }
 
-    /// Whether there are as many as there can be.
-    pub(super) fn are_many(&self) -> bool {
-        self.under_way.len() >= MOST_JOBS
+    /// Whether there is room for one that does this; `None`: it lists ports.
+    pub(super) fn has_room(&self, does: Option<Does>) -> bool {
+        let closing = self.count(Does::Closes);
+        let has_room = self.under_way.len() - closing < MOST_JOBS;
+        match does {
+            Some(Does::Closes) => true,
+            Some(Does::Scans) => has_room && self.count(Does::Scans) < MOST_SCANS,
+            Some(Does::Opens) | None => has_room,
+        }
     }
 
     /// Begins a job. `ended` is called in its thread, after which it is [taken](Self::take).
@@ -125,9 +133,9 @@ impl Jobs {
         self.under_way.values().find(is_there)
     }
 
-    /// How many open a port.
-    pub(super) fn opening(&self) -> usize {
-        self.under_way.values().filter(|job| job.does(Does::Opens)).count()
+    /// How many do this.
+    pub(super) fn count(&self, what: Does) -> usize {
+        self.under_way.values().filter(|job| job.does(what)).count()
     }
 }
 

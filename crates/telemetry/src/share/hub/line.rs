@@ -19,7 +19,7 @@ use crate::event::{CommandError, What};
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
-use crate::share::message::{Answer, Event, Happening, Line};
+use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
 use crate::share::opening::Opened;
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
@@ -60,8 +60,11 @@ pub struct Held {
     moved: BTreeSet<Motor>,
     /// Numbers for which the drive says that it has no such motor.
     absent: BTreeSet<Motor>,
-    /// The motors whose stop as a precaution is under way.
-    pub(super) precautions: BTreeSet<Motor>,
+    /// How many stops as a precaution are under way.
+    pub(super) precautions: usize,
+    /// Who stopped all motors while nothing on the line had ever answered: that is repeated until something
+    /// answers.
+    pub(super) unanswered_stop: Option<Arc<str>>,
     /// The motors that did not confirm a stop, and who asked for it.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
     /// The motors whose last stop is not confirmed: it failed, is under way or is repeated.
@@ -112,7 +115,8 @@ impl Held {
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
             absent: BTreeSet::new(),
-            precautions: BTreeSet::new(),
+            precautions: 0,
+            unanswered_stop: None,
             unstopped: BTreeMap::new(),
             unconfirmed: BTreeSet::new(),
             runner: Runner::start(name, acquisition)?,
@@ -148,6 +152,7 @@ impl Held {
             return Ok(());
         }
         if moves {
+            self.unanswered_stop = None;
             self.sequences.retain(|one| one.0 != own.0);
         }
         self.sequences.insert(own);
@@ -196,10 +201,24 @@ impl Held {
         all.filter(|motor| self.known.contains(motor) || !self.absent.contains(motor))
     }
 
-    /// Whether no program has read, commanded or turned it, and it has never answered.
+    /// Whether anything on the line has answered since it was opened. Until then silence shows nothing: a
+    /// share before this one may have turned motors that do not hear the stop now.
+    pub(super) fn has_answered(&self) -> bool {
+        !self.heard.is_empty() || !self.absent.is_empty()
+    }
+
+    /// Whether the answer to a stop of all waits for this motor: programs know it, or it has answered.
+    /// Where nothing has answered, for all that the line can have.
+    pub(super) fn is_awaited(&self, motor: Motor) -> bool {
+        self.known.contains(&motor) || self.heard.contains(&motor) || !self.has_answered()
+    }
+
+    /// Whether nothing shows that the motor exists: no program has turned it and it has never answered.
+    /// Where something else has answered, no program has read it, either.
     pub(super) fn is_unheard(&self, motor: Motor) -> bool {
-        let is_known = self.known.contains(&motor) || self.owners.contains_key(&motor);
-        !is_known && !self.heard.contains(&motor)
+        let is_turned = self.owners.contains_key(&motor) || self.may_turn(motor);
+        let is_known = self.known.contains(&motor) && self.has_answered();
+        !is_turned && !is_known && !self.heard.contains(&motor)
     }
 
     /// What its port occupies.
@@ -223,8 +242,9 @@ impl Held {
         let may_be_there = |motor: &&Motor| {
             (self.heard.contains(motor) || self.may_turn(**motor)) && !self.is_absent(**motor)
         };
-        let unstopped = self.unconfirmed.iter().filter(may_be_there);
-        let unstopped = unstopped.map(|motor| motor.number()).collect();
+        let unstopped = self.unconfirmed.iter().filter(may_be_there).map(|motor| motor.number());
+        let any = self.unanswered_stop.as_ref().filter(|_| !self.has_answered());
+        let unstopped = any.map(|_| ANY_MOTOR).into_iter().chain(unstopped).collect();
         Line { line, protocol, port, profile, timeout, t, wall, counts, heard, unstopped }
     }
 

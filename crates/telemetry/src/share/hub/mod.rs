@@ -94,6 +94,7 @@ enum Work {
         part: Option<Part>,
         motor: Motor,
         by: Arc<str>,
+        is_precaution: bool,
         result: CommandResult,
     },
     /// A motor that should stop has never answered.
@@ -243,6 +244,26 @@ impl Hub {
             self.again.remove(&(line, motor));
             self.stop_again(line, motor);
         }
+        self.repeat_unanswered_stops();
+    }
+
+    /// Repeats stops of all motors on lines where nothing has ever answered, and once more when something
+    /// does: the motors that turn may not be those that answer first.
+    fn repeat_unanswered_stops(&mut self) {
+        for line in self.numbers() {
+            let Some(held) = self.lines.get_mut(&line) else { continue };
+            if held.precautions > 0 {
+                continue;
+            }
+            let Some(by) = held.unanswered_stop.clone() else { continue };
+            if held.has_answered() {
+                held.unanswered_stop = None;
+            }
+            let motors: Vec<Motor> = held.stoppable().collect();
+            for motor in motors {
+                self.stop_of(true, line, motor, SessionId::default(), None, &by);
+            }
+        }
     }
 
     fn collect_events(&mut self) -> Result<(), LineEnded> {
@@ -335,18 +356,32 @@ impl Hub {
                     }
                 }
             }
-            Work::Stop { part, motor, by, result } => {
+            Work::Stop { part, motor, by, is_precaution, result } => {
                 self.stop_ended(line, motor, by, &result);
                 let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
-                let is_absent = self.lines.get(&line).is_some_and(|held| {
-                    held.is_absent(motor) || is_silent && held.is_unheard(motor)
-                });
+                // A line that was closed meanwhile is one that fails.
+                let (mut is_absent, mut has_answered, mut is_known) = (false, true, true);
+                if let Some(held) = self.lines.get_mut(&line) {
+                    held.precautions -= usize::from(is_precaution);
+                    is_absent = held.is_absent(motor) || is_silent && held.is_unheard(motor);
+                    has_answered = held.has_answered();
+                    is_known = held.known.contains(&motor);
+                }
                 let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
                     return;
                 };
                 let motor = MotorName { line: name.to_string(), motor: motor.number() };
-                let failure = result.err().map(|error| error.to_string());
-                session.stopped(part, motor, failure, is_absent);
+                match result {
+                    Err(_) if is_precaution && !has_answered => {
+                        session.unanswered(part, motor.line)
+                    }
+                    Err(_) if is_precaution && !is_known => session.left_out(part, &motor.line),
+                    result => {
+                        let failure = result.err().map(|error| error.to_string());
+                        // A motor that exists is not stopped as a precaution.
+                        session.stopped(part, motor, failure, is_absent || is_precaution);
+                    }
+                }
             }
             Work::Unheard(part, motor) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
@@ -372,7 +407,6 @@ impl Hub {
     /// A stop is over. If the motor did not confirm it, it is repeated.
     fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        held.precautions.remove(&motor);
         let is_owned = held.owners.contains_key(&motor);
         match result {
             Ok(_) => held.stopped(motor),
@@ -504,24 +538,37 @@ impl Hub {
         part: Option<Part>,
         by: &Arc<str>,
     ) {
+        self.stop_of(false, line, motor, session, part, by);
+    }
+
+    /// Stops a motor. `of_all`: it is one of all that the lines can have.
+    fn stop_of(
+        &mut self,
+        of_all: bool,
+        line: usize,
+        motor: Motor,
+        session: SessionId,
+        part: Option<Part>,
+        by: &Arc<str>,
+    ) {
         let tell = self.teller(session, None, line);
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
         held.unconfirmed.insert(motor);
+        let is_precaution = of_all && held.is_unheard(motor);
+        held.precautions += usize::from(is_precaution);
         let asker = Arc::clone(by);
-        let ended = move |result| tell(Work::Stop { part, motor, by: asker, result });
-        let begun = if part.is_some() || !held.is_unheard(motor) {
-            held.remote().stop_then(by, line::stop(motor), ended)
-        } else if held.precautions.insert(motor) {
-            held.remote().stop_as_precaution_then(by, line::stop(motor), ended)
-        } else {
-            // The one that is under way is repeated.
-            return;
+        let ended = move |result| {
+            tell(Work::Stop { part, motor, by: asker, is_precaution, result });
+        };
+        let begun = match is_precaution {
+            false => held.remote().stop_then(by, line::stop(motor), ended),
+            true => held.remote().stop_as_precaution_then(by, line::stop(motor), ended),
         };
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
             let name = held.name.as_str().into();
-            let what = Work::Stop { part, motor, by, result };
+            let what = Work::Stop { part, motor, by, is_precaution, result };
             self.finish(Done { session, id: None, line, name, what });
         }
     }

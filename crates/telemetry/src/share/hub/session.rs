@@ -9,7 +9,7 @@ use super::feed::Feed;
 use super::line::Lines;
 use crate::share::frame::Frame;
 use crate::share::message::{
-    self, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
+    self, ANY_MOTOR, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
 };
 use crate::signal::Motor;
 
@@ -68,9 +68,14 @@ struct Gathering {
     stopped: Vec<StoppedMotor>,
     /// Motors whose part is missing, and that have never answered.
     unheard: BTreeSet<MotorName>,
+    /// Lines on which nothing has ever answered.
+    unanswered: BTreeSet<String>,
     rates: Option<Vec<SignalRate>>,
 }
 
+/// What is said of a line on which nothing has ever answered.
+const UNANSWERED: &str = "nothing on this line has answered since it was opened; motors that were turned \
+    before may keep turning; the stop is repeated until something answers";
 /// What is said of a motor that is not waited for.
 const UNHEARD: &str = "it has never answered; it is unknown whether it received the stop";
 
@@ -213,10 +218,31 @@ impl Session {
         is_absent: bool,
     ) {
         if let Some(gathering) = self.gathering.get_mut(&part) {
+            if failure.is_none() {
+                gathering.unanswered.remove(&motor.line);
+            }
             let is_unheard = gathering.unheard.remove(&motor);
             let absent = failure.is_some() && (is_absent || is_unheard);
             let failure = failure.map(|why| if is_unheard { UNHEARD.to_owned() } else { why });
             gathering.stopped.push(StoppedMotor { motor, failure, absent });
+            gathering.missing -= 1;
+            self.gathered(part);
+        }
+    }
+
+    /// An address did not answer, on a line on which nothing ever has.
+    pub(super) fn unanswered(&mut self, part: Part, line: String) {
+        if let Some(gathering) = self.gathering.get_mut(&part) {
+            gathering.unanswered.insert(line);
+            gathering.missing -= 1;
+            self.gathered(part);
+        }
+    }
+
+    /// No motor is at an address of a line that answers.
+    pub(super) fn left_out(&mut self, part: Part, line: &str) {
+        if let Some(gathering) = self.gathering.get_mut(&part) {
+            gathering.unanswered.remove(line);
             gathering.missing -= 1;
             self.gathered(part);
         }
@@ -247,7 +273,8 @@ impl Session {
         if !self.gathering.get(&part).is_some_and(is_over) {
             return;
         }
-        let Some(Gathering { id, mut stopped, unheard, rates, .. }) = self.gathering.remove(&part)
+        let Some(Gathering { id, mut stopped, unheard, unanswered, rates, .. }) =
+            self.gathering.remove(&part)
         else {
             return;
         };
@@ -255,6 +282,10 @@ impl Session {
         stopped.extend(unheard.into_iter().map(|motor| {
             let failure = Some(UNHEARD.to_owned());
             StoppedMotor { motor, failure, absent: true }
+        }));
+        stopped.extend(unanswered.into_iter().map(|line| {
+            let motor = MotorName { line, motor: ANY_MOTOR };
+            StoppedMotor { motor, failure: Some(UNANSWERED.to_owned()), absent: false }
         }));
         stopped.sort_by(|one, other| one.motor.cmp(&other.motor));
         self.answer(

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::json::is_false;
 
+/// In the answer to a stop: any motor of a line on which nothing has answered since it was opened.
+pub const ANY_MOTOR: u8 = 0;
+
 /// A motor of a share.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
