@@ -381,7 +381,7 @@ impl References {
                     repeats += u32::from(next == self.to);
                 }
                 Err(why) if is_ended_by_others(&why) => return,
-                // The same reference again: it is no matter whether the motor has it already.
+                // The same reference is sent again: the motor may have it already.
                 Err(_) if acknowledged.elapsed() < PATIENCE => {}
                 Err(why) => failure = Some(self.stop(&why).await),
             }
@@ -401,7 +401,7 @@ impl References {
         exchanges.confirm().await
     }
 
-    /// The motor must not turn on at a speed in between. Gives why it was stopped, and how it took that.
+    /// The motor must not keep turning at a speed in between. Gives why it was stopped, and how it took that.
     async fn stop(&self, why: &Refusal) -> String {
         self.control.stopping(&self.target);
         let ask = Ask::Stop { motor: Some(self.target.name.clone()) };

@@ -233,7 +233,7 @@ impl Link {
     }
 
     /// Latches the share, then stops all motors. If the share is lost, that is done when it is back within
-    /// [`PENDING`].
+    /// 10 s.
     ///
     /// # Errors
     /// It is lost.
