@@ -1,7 +1,7 @@
 // What the page knows of lines and motors: descriptions, events about them, and rates.
 import { computed, effect, signal } from '@preact/signals';
+import { nameOf } from './format';
 import { ask, entries, found, lines, motors, searchFailed, searching, welcome } from './link';
-import { nameOf } from './stop';
 import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
 
 export interface MotorId {

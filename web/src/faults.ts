@@ -1,8 +1,9 @@
 // The faults of all motors, for the header of every view.
 import { effect, signal } from '@preact/signals';
 import { allMotors, descriptions } from './drives';
+import { nameOf } from './format';
 import { type Rows, age, subscribe } from './link';
-import { named, nameOf } from './stop';
+import { named } from './stop';
 import type { Fault, SignalName } from './wire';
 
 /** How often the faults of all motors are read while no other view reads them, in seconds. */

@@ -1,7 +1,8 @@
 // What is said of the latch: who pressed the stop, and which motors have not confirmed it.
 import { computed, signal } from '@preact/signals';
+import { nameOf } from './format';
 import { entries, latchedBy, lines, linesAt, motors } from './link';
-import { inOrder, named, nameOf } from './stop';
+import { inOrder, named } from './stop';
 
 /** For so long, in ms, motors that did not confirm are not named: most confirm within it. */
 const FRESH = 1000;

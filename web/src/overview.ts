@@ -1,9 +1,8 @@
 // The values on the cards: the last of each signal, and a short history of the speed.
 import { type Signal, effect, signal } from '@preact/signals';
 import { allMotors, descriptions } from './drives';
-import { tooOld } from './format';
+import { nameOf, tooOld } from './format';
 import { type Refused, type Rows, age, state, subscribe } from './link';
-import { nameOf } from './stop';
 import type { Overview, SignalName } from './wire';
 
 /** How often the values of the cards are read, in seconds. */

@@ -129,8 +129,6 @@ function unreachable(): StopReport {
   };
 }
 
-export { nameOf };
-
 /** The first of some names, and how many more there are. */
 export function named(names: readonly string[]): string {
   const more = names.length - MOST_NAMED;

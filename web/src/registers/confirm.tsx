@@ -1,6 +1,7 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useId, useRef } from 'preact/hooks';
-import { nameOf, stopAll } from '../stop';
+import { nameOf } from '../format';
+import { stopAll } from '../stop';
 import type { MotorName } from '../wire';
 
 /**

@@ -1,8 +1,8 @@
 import { effect } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
 import { allMotors, describeLines, descriptions } from '../drives';
+import { nameOf } from '../format';
 import { lines, welcome } from '../link';
-import { nameOf } from '../stop';
 import './picker.css';
 import { chosen } from './values';
 

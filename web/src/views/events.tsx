@@ -2,9 +2,8 @@
 import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import { allMotors } from '../drives';
-import { timeOfDay } from '../format';
+import { nameOf, timeOfDay } from '../format';
 import { entries } from '../link';
-import { nameOf } from '../stop';
 import type { Happening } from '../wire';
 import './events.css';
 

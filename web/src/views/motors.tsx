@@ -1,10 +1,10 @@
 // A card a motor: what it does, and the controls that move it.
 import { useEffect } from 'preact/hooks';
 import { allMotors, describeFailed, descriptions, isSearched, isSilent, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
+import { nameOf } from '../format';
 import { found, lines, refreshMotors, searchFailed, searching, welcome } from '../link';
 import { liveOf, overviewRefused, watchOverview } from '../overview';
 import { Said } from '../parts';
-import { nameOf } from '../stop';
 import { Control } from './control';
 import './motors.css';
 import { Values } from './values';

@@ -1,9 +1,8 @@
 // The lines that the share holds, and how often signals are read from them.
 import { useEffect } from 'preact/hooks';
 import { isSilent, lineEvents, rates, watchRates } from '../drives';
-import { rate, timeOfDay } from '../format';
+import { nameOf, rate, timeOfDay } from '../format';
 import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
-import { nameOf } from '../stop';
 import type { Line, LineCounts } from '../wire';
 import { Said, useSaid } from '../parts';
 import { CloseLine, Connect } from '../connect/connect';

@@ -2,12 +2,12 @@
 import { effect, useSignal } from '@preact/signals';
 import { useEffect, useMemo, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
+import { nameOf } from '../format';
 import { events, state, welcome } from '../link';
 import { Said, useSaid } from '../parts';
 import { found, groups } from '../registers/model';
 import { MotorPicker } from '../registers/picker';
 import { type Sheet, chosen, isStopOf, read, reasonOf, sheetOf } from '../registers/values';
-import { nameOf } from '../stop';
 import type { Description, Register } from '../wire';
 import { RegisterRow } from './registers-row';
 import { RomCommands } from './registers-rom';

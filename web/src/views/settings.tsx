@@ -1,12 +1,11 @@
 // Files of settings: download, compare, restore.
 import { useSignal } from '@preact/signals';
-import { sentence } from '../format';
+import { nameOf, sentence } from '../format';
 import { Refused, ask } from '../link';
 import { Said, useSaid } from '../parts';
 import { Confirm, RomWear } from '../registers/confirm';
 import { type Sheet, compare, read, reasonOf } from '../registers/values';
 import { download } from '../registers/download';
-import { nameOf } from '../stop';
 import type { Description, Difference } from '../wire';
 
 /** The server takes texts of 64 KiB. A file of settings has about 4. */

@@ -2,7 +2,7 @@
 import { type Signal, signal, useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
-import { number, tooOld } from '../format';
+import { nameOf, number, tooOld } from '../format';
 import { age, latchedBy, state, subscribe, welcome } from '../link';
 import { Said, type Sentence, useSaid } from '../parts';
 import { numberOf } from '../registers/model';
@@ -12,7 +12,7 @@ import { DEFINITIONS, type FigureName } from '../step/analysis';
 import { Experiment, type Plan, referenceOf } from '../step/experiment';
 import { rig, watch } from '../step/rig';
 import { add, figureText, type Run, unitOf } from '../step/run';
-import { nameOf, stopMotor } from '../stop';
+import { stopMotor } from '../stop';
 import type { Controlled, Description, MotorName } from '../wire';
 import { Runs } from './step-runs';
 import './step.css';
