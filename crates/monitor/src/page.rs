@@ -324,7 +324,7 @@ impl Page {
         }
     }
 
-    /// Whether this page may open this port. The share refuses what is no port.
+    /// Whether this page may open this port. The share refuses names that are not ports.
     fn check_port(&self, port: &str) -> Result<(), Refusal> {
         let is_address = port.parse::<PortName>().is_ok_and(|port| port.is_address());
         match is_address && !self.may.opens_addresses {

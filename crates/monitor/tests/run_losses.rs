@@ -1,4 +1,4 @@
-//! Runs whose references get no reply: they continue, or the motor stops and the page is told.
+//! Runs whose references get no reply: they continue, or the motor stops and the page gets the reason.
 
 mod world;
 

@@ -428,7 +428,7 @@ fn precautions_on_a_silent_line_give_way_to_a_stop_and_end_soon() {
         let at = sent.iter().position(|(_, name)| *name == "again").unwrap();
         let (before, under_way) = sent[at - 1];
         let gave_way = under_way == "other" && before.0 + SECOND > pressed;
-        // Any other exchange goes on until its timeout.
+        // Any other exchange continues until its timeout.
         let longest = if gave_way { 100_000 } else { SECOND };
         assert!(sent[at].0.0 - pressed <= longest, "{pressed}: {sent:?}");
         // Each precaution is sent once here, or again if it gave way. The others are sent four times.

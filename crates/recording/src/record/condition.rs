@@ -42,7 +42,7 @@ struct Presence {
     rows: u64,
 }
 
-/// A shorter time without values is no gap, in ns.
+/// The shortest time without values that counts as a gap, in ns.
 const GAP: u64 = 1_000_000_000;
 /// A gap has so many periods at least.
 const PERIODS: u64 = 3;
@@ -214,7 +214,7 @@ mod tests {
         }
         assert_eq!(condition.without_values(time(10_900)), 0);
         assert_eq!(condition.mean_rate(time(10_900)).map(f64::round), Some(100.0));
-        // A row without a value is no value.
+        // A row without a value does not end a gap.
         row(&mut condition, 20_000, None);
         assert_eq!(condition.without_values(time(97_990)), 88_000 * MS);
         for ms in (98_000..108_000).step_by(10) {
