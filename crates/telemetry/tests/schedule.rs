@@ -205,6 +205,25 @@ fn a_slow_line_slows_all_polls_by_the_factor_that_it_predicts() {
 }
 
 #[test]
+fn a_line_that_answers_late_at_first_is_predicted_with_its_first_answer() {
+    let mut line = Line::new(SERIAL, |now, _, _: &Job<_>| match now.0 < 3 * SECOND / 2 {
+        true => (Micros(50_000), Outcome::Failed),
+        false => (Micros(40_000), Outcome::Answered),
+    });
+    line.polls(&[(1, 0, 100)]);
+    let is_known = |line: &Line<_>| line.schedule.load().is_known([PollId(1)].iter());
+    let mut waited = 0;
+    while !is_known(&line) {
+        line.run(MILLISECOND);
+        waited += 1;
+        assert!(waited < 5_000, "the line answers");
+    }
+    let predicted = line.schedule.predicted_period(Micros(10_000));
+    assert!(predicted.0.abs_diff(42_105) < 1_000, "{predicted:?}");
+    assert!(line.times(1).last().unwrap().0.0 < 2 * SECOND, "before the window of a second ends");
+}
+
+#[test]
 fn a_line_that_carries_everything_is_not_slowed() {
     let mut line = Line::new(SERIAL, taking(900));
     line.polls(&[(1, 0, 1_000)]);

@@ -131,8 +131,12 @@ impl Load {
         self.costs.get(&poll).map_or(0.0, |cost| cost.pace.rate())
     }
 
-    /// Whether each of the polls was answered once, so that the factor is known.
-    pub fn is_known<'a>(&self, mut polls: impl Iterator<Item = &'a PollId>) -> bool {
+    /// Whether each of the polls was answered once, and the factor follows from that.
+    pub fn is_known<'a>(&self, polls: impl Iterator<Item = &'a PollId>) -> bool {
+        self.is_decided && self.have_measured(polls)
+    }
+
+    fn have_measured<'a>(&self, mut polls: impl Iterator<Item = &'a PollId>) -> bool {
         polls.all(|poll| self.has_measured(*poll))
     }
 
@@ -170,6 +174,8 @@ impl Load {
         match exchange.kind {
             Kind::Poll(poll) => {
                 let cost = self.costs.entry(poll).or_default();
+                // What its first answer changes is not left to the end of the window.
+                self.is_decided &= cost.mean > 0.0;
                 cost.took(span);
                 if outcome == Outcome::Answered {
                     cost.pace.came(now);
@@ -197,7 +203,9 @@ impl Load {
         let span = now.since(since);
         if span >= WINDOW {
             self.close_window(now, span);
-        } else if self.is_decided || !self.is_known(groups.clone().flat_map(|(_, polls)| polls)) {
+        } else if self.is_decided
+            || !self.have_measured(groups.clone().flat_map(|(_, polls)| polls))
+        {
             return;
         }
         self.is_decided = true;
