@@ -47,6 +47,27 @@ fn every_form_has_one_spelling_without_defaults() {
 }
 
 #[test]
+fn names_of_one_device_have_one_place() {
+    for (one, other) in [
+        ("tcp:localhost:4000", "tcp:127.0.0.1:4000"),
+        ("tcp:LocalHost:4000", "tcp:[::1]:4000"),
+        ("tcp:Drive.local:4000", "tcp:drive.local:4000"),
+        ("tcp:[2001:DB8:0::1]:4000", "slcan:tcp:[2001:db8::1]:4000"),
+        ("slcan:tcp:h:1?bitrate=250000", "tcp:h:1"),
+        ("ttyUSB1?baud=9600", "/dev/ttyUSB1"),
+    ] {
+        assert_eq!(port(one).place(), port(other).place());
+    }
+    for (one, other) in [
+        ("tcp:127.0.0.1:4000", "tcp:127.0.0.1:4001"),
+        ("tcp:127.0.0.1:4000", "tcp:127.0.0.2:4000"),
+        ("tcp:h:1", "unix:h:1"),
+    ] {
+        assert_ne!(port(one).place(), port(other).place());
+    }
+}
+
+#[test]
 fn a_wrong_name_is_refused_with_a_valid_form() {
     for (name, says) in [
         ("can0", "did you mean `socketcan:can0`?"),

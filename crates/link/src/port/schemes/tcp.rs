@@ -1,6 +1,6 @@
 //! Serial lines behind a TCP server.
 
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, TcpStream, ToSocketAddrs};
 use std::time::Duration;
 use std::{fmt, io};
 
@@ -112,6 +112,19 @@ impl Port for TcpBytes {
 
     fn is_address(&self) -> bool {
         true
+    }
+
+    /// Other names of a host than those of this computer are not looked up: that may take seconds.
+    fn place(&self) -> String {
+        let TcpAddress { host, port } = &self.address;
+        let host = match unbracketed(host).parse::<IpAddr>() {
+            Ok(IpAddr::V4(Ipv4Addr::LOCALHOST) | IpAddr::V6(Ipv6Addr::LOCALHOST)) => {
+                "localhost".to_owned()
+            }
+            Ok(address) => address.to_string(),
+            Err(_) => host.to_ascii_lowercase(),
+        };
+        format!("tcp:{host}:{port}")
     }
 }
 
