@@ -77,11 +77,13 @@ impl Door {
         let Some(host) = single(headers, HOST) else { return false };
         let Ok(authority) = host.parse::<Authority>() else { return false };
         let name = authority.host();
+        let has_port = host.len() > name.len();
+        if host.contains('@') || has_port && authority.port_u16().is_none() {
+            return false;
+        }
         let is_address = address(name).is_some();
         let is_known = |own: &str| own.eq_ignore_ascii_case(name);
-        let is_own =
-            is_address || is_known("localhost") || self.names.iter().any(|own| is_known(own));
-        is_own && !host.contains('@')
+        is_address || is_known("localhost") || self.names.iter().any(|own| is_known(own))
     }
 
     /// The scheme of addresses.
@@ -161,8 +163,9 @@ mod tests {
         }
         let others =
             ["evil.example:8707", "127.0.0.1.evil.example", "a@127.0.0.1", "", "2130706433x"];
-        for host in others.into_iter().chain(["localhost.evil.example:8707", "[::1", "127.1:8707"])
-        {
+        let more = ["localhost.evil.example:8707", "[::1", "127.1:8707"];
+        let ports = ["127.0.0.1:8707.evil.example", "localhost:evil", "[::1]:99999", "localhost:"];
+        for host in others.into_iter().chain(more).chain(ports) {
             assert!(!door().is_own_host(&headers(&[(HOST, host)])), "{host}");
         }
         assert!(!door().is_own_host(&headers(&[])));
