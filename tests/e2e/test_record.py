@@ -440,7 +440,7 @@ def test_a_share_is_recorded_with_what_other_programs_do(run, share, record, tmp
     assert "frames     those of rmd0 are not recorded: a share holds the port" in info
 
 
-def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, record, tmp_path):
+def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, record, run, tmp_path):
     running, path = share(), tmp_path / "run.mcap"
     recording = record(path, "-p", f"share:{running.path}/rmd0", "--id", "1", until=1)
 
@@ -462,6 +462,10 @@ def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, reco
     continues(ended)
     told = recorded(recording)
     assert told["lost"] == 0
+    (gap,) = told["gaps"]
+    assert gap["motor"] == "rmd0/motor1" and gap["seconds"] > 3
+    assert run("info", path, "--json").ended(0).json["gaps"] == told["gaps"]
+    assert f"\nno values  rmd0/motor1 for {gap['seconds']:.3f} s\n" in run("info", path).ended(0).out
     file = File(path)
     events = [log for log in file.of("/events") if log.function in ("lost", "back")]
     assert [log.function for log in events] == ["lost", "back"] * 2

@@ -9,6 +9,7 @@ import subprocess
 import sysconfig
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -96,6 +97,15 @@ class Served:
         (bench,) = self.do("state", port=port)["state"]
         motors: list[dict[str, object]] = bench["motors"]
         return next(motor for motor in motors if motor["motor"] == number)
+
+    @contextmanager
+    def silent(self) -> Iterator[None]:
+        """Drives that do not answer."""
+        self._process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._process.send_signal(signal.SIGCONT)
 
     def end(self) -> None:
         """Ends the simulator."""

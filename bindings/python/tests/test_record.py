@@ -309,6 +309,19 @@ def test_a_silent_line_is_a_timeout(tmp_path: Path) -> None:
         os.close(theirs)
 
 
+def test_a_motor_without_values_for_a_time_is_named(served: Served, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with motorlink.record(served.can, path, timeout=PATIENT, ids=[2]) as recorder:
+        recorded(recorder)
+        assert recorder.status().gaps == {}
+        # A reply within the timeout would have a time in the middle.
+        with served.silent():
+            eventually(lambda: recorder.status().gaps.get("can0/motor2", 0) > 2 * PATIENT, "a gap", within=60)
+        recorded(recorder)
+    (facts,) = (facts for name, facts in motorlink.read(path).metadata if name == "gaps")
+    assert float(facts["can0/motor2"]) > PATIENT and len(facts) == 1
+
+
 def test_a_file_is_overwritten_with_force_only(served: Served, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_text("mine")

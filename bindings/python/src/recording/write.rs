@@ -1,5 +1,6 @@
 //! Recordings in progress. No thread of them waits for Python.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -79,6 +80,7 @@ struct Status {
     achieved_hz: Option<f64>,
     refused: Vec<String>,
     silent: Vec<String>,
+    gaps: BTreeMap<String, f64>,
     is_over: bool,
 }
 
@@ -172,7 +174,8 @@ impl RecordingInProgress {
                 State::Ending(progress, _) | State::Ended(progress, _) => (progress.clone(), ended),
             }
         });
-        let Progress { elapsed, written, counts, rates, refused, silent, is_over, .. } = progress;
+        let Progress { elapsed, written, counts, rates, refused, silent, gaps, is_over, .. } =
+            progress;
         Status {
             seconds: elapsed.as_secs_f64(),
             files: written.files,
@@ -186,6 +189,7 @@ impl RecordingInProgress {
             achieved_hz: rates.map(|(_, achieved)| achieved),
             refused,
             silent,
+            gaps: gaps.into_iter().map(|(motor, gap)| (motor, gap.as_secs_f64())).collect(),
             is_over: is_over || ended,
         }
     }

@@ -223,6 +223,11 @@ impl Contents {
         for (n, line) in flow(&attached, "  ", SIGNALS).into_iter().enumerate() {
             row(if n == 0 { "attached" } else { "" }, line);
         }
+        let gaps: Vec<String> =
+            gaps(recording).map(|(motor, seconds)| format!("{motor} for {seconds} s")).collect();
+        for (n, line) in flow(&gaps, ", ", SIGNALS).into_iter().enumerate() {
+            row(if n == 0 { "no values" } else { "" }, line);
+        }
         let lost = lost(recording.losses()).into_iter();
         let lost = lost.chain(self.lost(Loss::Messages).map(|(count, names)| {
             format!("{count} messages in {names}: the recorder or its disk was too slow")
@@ -277,6 +282,10 @@ impl Contents {
             self.kinds.iter().map(|(kind, count)| (kind.clone(), (*count).into())).collect();
         add("events", kinds.into());
         add("attachments", recording.attachments().collect());
+        let gaps = gaps(recording).map(
+            |(motor, seconds)| json!({ "motor": motor, "seconds": seconds.parse::<f64>().ok() }),
+        );
+        add("gaps", gaps.collect());
         let count = |loss| self.lost(loss).map_or(0, |(count, _)| count).into();
         add("lost_messages", count(Loss::Messages));
         add("unconfirmed_rows", count(Loss::Rows));
@@ -289,6 +298,12 @@ impl Contents {
 
 fn drives(recording: &Recording<File>) -> impl Iterator<Item = &Metadata> {
     recording.metadata().iter().filter(|metadata| metadata.name == drive::NAME)
+}
+
+/// The motors that had no values for a time, and the time in seconds.
+fn gaps(recording: &Recording<File>) -> impl Iterator<Item = (&str, &str)> {
+    let found = recording.metadata().iter().filter(|it| it.name == schema::gaps::NAME);
+    found.flat_map(|gaps| &gaps.values).map(|(motor, seconds)| (motor.as_str(), seconds.as_str()))
 }
 
 /// The lines whose frames are not recorded, and why.

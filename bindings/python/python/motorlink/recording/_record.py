@@ -57,6 +57,8 @@ class Status(NamedTuple):
     refused: tuple[str, ...]
     #: Motors of which no value came: ``st0/motor1``.
     silent: tuple[str, ...]
+    #: How long motors had no values, s, if it was longer than 1 s (at low rates: three periods).
+    gaps: dict[str, float]
     #: Nothing more is recorded: it was closed, has ``max_size``, or the file cannot be written.
     is_over: bool
 
