@@ -49,6 +49,8 @@ export function useMotion(
   const since = useSignal<number | null>(null);
   const isStreamed = useSignal(false);
   const hasRun = useRef(false);
+  /** When the motion began, in ms. */
+  const begun = useRef(0);
   const arrival = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const forget = () => {
     clearTimeout(arrival.current);
@@ -68,7 +70,10 @@ export function useMotion(
     if (state.value === 'lost' || lapsed.value !== null) return end(null);
     const live = liveOf(line, motor);
     void live.tick.value;
-    const value = overview.state !== null && live.age(overview.state) < 1 ? live.values.get(overview.state)?.value : undefined;
+    // An older value may be of a stop before the motion.
+    const longest = Math.min(1, (performance.now() - begun.current) / 1000);
+    const isNew = (name: string) => live.age(name) < longest;
+    const value = overview.state !== null && isNew(overview.state) ? live.values.get(overview.state)?.value : undefined;
     const name = states.find((one) => one.value === value)?.name;
     if (name === undefined) return;
     if (!AT_REST.test(name)) hasRun.current = true;
@@ -85,6 +90,7 @@ export function useMotion(
   useEffect(() => () => clearTimeout(arrival.current), []);
 
   const began = () => {
+    begun.current = performance.now();
     since.value = entries.value.at(-1)?.number ?? 0;
   };
   return {

@@ -32,7 +32,7 @@ describe('the recording in the header', () => {
 
   it('names the motors without values, and for how long', () => {
     const gaps = [
-      { motor: 'st1/motor1', seconds: 88.2 }, { motor: 'st1/motor2', seconds: 87.9 }, { motor: 'rmd0/motor3', seconds: 1.2 },
+      { motor: 'rmd0/motor3', seconds: 1.2 }, { motor: 'st1/motor1', seconds: 87.4 }, { motor: 'st1/motor2', seconds: 88.2 },
     ];
     expect(gapsText(gaps)).toBe('st1/1, st1/2: 88 s without values; rmd0/3: 1.2 s without values');
     // A motor that never gave a value is not named twice.

@@ -13,14 +13,23 @@ export const isActive = (recording: Recorded | null): boolean =>
 /** The name of a motor as the other views write it. */
 const short = (motor: string) => motor.replace('/motor', '/');
 
-/** Motors without values for a time, in words; those with the same time together. Empty without any. */
+/** Times that differ by less than this, in seconds or as a part of the longer one, are of one cause. */
+const SAME = { seconds: 0.5, part: 0.05 };
+
+/** Motors without values for a time, in words; those with about the same time together. Empty without any. */
 export function gapsText(gaps: readonly Gap[]): string {
-  const times = new Map<string, string[]>();
-  for (const { motor, seconds } of gaps) {
-    const time = duration(seconds < 10 ? seconds : Math.round(seconds));
-    times.set(time, [...(times.get(time) ?? []), short(motor)]);
+  const groups: { longest: number; motors: string[] }[] = [];
+  for (const { motor, seconds } of gaps.toSorted((one, other) => other.seconds - one.seconds)) {
+    const last = groups.at(-1);
+    if (last && last.longest - seconds < Math.max(SAME.seconds, SAME.part * last.longest)) last.motors.push(motor);
+    else groups.push({ longest: seconds, motors: [motor] });
   }
-  return [...times].map(([time, motors]) => `${motors.join(', ')}: ${time} without values`).join('; ');
+  return groups
+    .map(({ longest, motors }) => {
+      const time = duration(longest < 10 ? longest : Math.round(longest));
+      return `${motors.map(short).toSorted().join(', ')}: ${time} without values`;
+    })
+    .join('; ');
 }
 
 /** What is missing in a recording, in words; empty if nothing is. */
