@@ -23,9 +23,11 @@ PAGES_VENV := $(CURDIR)/.venv-pages
 T =
 # Tests in Rust that take seconds. `make check` leaves them out, `make test` runs them.
 QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header)
-# Tests that pytest runs at a time. Most of them wait.
+# AGAIN=1: the tests of pytest and Playwright that failed in the last run, or all if that did not come so far.
+FAILED = $(if $(AGAIN),--last-failed)
+# Tests that pytest and cargo run at a time. Most of them wait.
 WORKERS ?= 4
-PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal
+PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # The program with the features of the whole workspace: built once for all parts.
@@ -72,7 +74,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
 unit: ## 5 min: tests in Rust
-	$(CARGO) test --workspace --all-features --locked $(T)
+	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
@@ -90,9 +92,10 @@ web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size
 
 browser: web ## 8 min: the monitor in Debian's Chromium, on simulated drives
+	$(if $(AGAIN),,rm -f web/test-results/.last-run.json)
 	-@tests/install browser
 	$(PROGRAM)
-	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent browser -- $(T)
+	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent browser -- $(FAILED) $(T)
 
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src

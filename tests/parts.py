@@ -3,14 +3,16 @@
 
 A part is a target of the Makefile. Its output goes to target/parts/PART.log and is printed when the
 part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
-the end. A part of --again that fails runs a second time, alone, when the others are over: if it passes
-then, a pause of the machine made it fail, or a defect that is rare. It is reported as flaky.
+the end. A part of --again that fails runs a second time, alone, when the others are over, with the
+tests that failed where its runner can do that (AGAIN=1): if it passes then, a pause of the machine made
+it fail, or a defect that is rare. It is reported as flaky.
 """
 
 import argparse
 import fcntl
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,13 +30,15 @@ LIMIT = 3600
 class Run:
     """One run of a part."""
 
-    def __init__(self, part, label):
+    def __init__(self, part, label, again=False):
         self.part, self.label = part, label
+        if not again:
+            shutil.rmtree(LOGS / f"{part}.cache", ignore_errors=True)
         self.log = LOGS / f"{label}.log"
         self.begun = time.monotonic()
         with self.log.open("wb") as output:
             self.process = subprocess.Popen(
-                ["make", "--no-print-directory", part],
+                ["make", "--no-print-directory", part, *(["AGAIN=1"] if again else [])],
                 cwd=REPOSITORY,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -44,14 +48,14 @@ class Run:
 
     def wait(self):
         try:
-            self.passed = self.process.wait(LIMIT) == 0
-            late = ""
+            self.passed, self.hung = self.process.wait(LIMIT) == 0, False
         except subprocess.TimeoutExpired:
-            self.passed = False
-            late = f"\nended after {LIMIT} s"
+            self.passed, self.hung = False, True
         self.end()
         self.seconds = time.monotonic() - self.begun
-        self.output = self.log.read_text(errors="replace") + late
+        self.output = self.log.read_text(errors="replace")
+        if self.hung:
+            self.output += f"\nended after {LIMIT} s"
         self.tests = sum(map(int, re.findall(r"\b(\d+) passed", self.output)))
         # As cargo says it.
         compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
@@ -105,10 +109,10 @@ class Runner:
 
     def again(self, parts):
         """Runs a second time those of the parts that failed. Gives those that pass now."""
-        failed = [run for run in self.over if not run.passed and run.part in parts]
+        failed = [run for run in self.over if not (run.passed or run.hung) and run.part in parts]
         self.over = [run for run in self.over if run not in failed]
         others = len(self.over)
-        self.waiting.extend((run.part, f"{run.label}-again") for run in failed)
+        self.waiting.extend((run.part, f"{run.label}-again", True) for run in failed)
         self.work()
         return [run.part for run in self.over[others:] if run.passed]
 

@@ -7,7 +7,7 @@ export default defineConfig({
   testDir: 'tests',
   fullyParallel: true,
   forbidOnly: !!process.env.CI,
-  workers: Number(process.env.WORKERS ?? 1),
+  workers: Number(process.env.WORKERS ?? 2),
   timeout: 60_000,
   expect: { timeout: 15_000 },
   reporter: [['list']],
