@@ -1,5 +1,5 @@
 // Simulated drives and a monitor for each test, as processes that the test can end, freeze and cut off.
-import { test as base, expect, type Page } from '@playwright/test';
+import { test as base, expect, type Locator, type Page } from '@playwright/test';
 import { type ChildProcess, spawn } from 'node:child_process';
 import { connect, type Socket } from 'node:net';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -202,14 +202,30 @@ export const VIEWS = ['Motors', 'Plots', 'Registers', 'Step response', 'Wire', '
 /** The card of a motor. */
 export const card = (page: Page, name: string) => page.getByRole('article', { name: `Motor ${name}` });
 
+/** A motor that turns, faster than what it does at rest, in rpm or °/s. */
+export const TURNS = 300;
+export const STILL = 5;
+
+/** Whether a motor runs, as its card says. A loaded machine and a motor that still stops refuse: a person tries again. */
+async function runs(motor: Locator) {
+  const said = motor.locator('form.fields .said').first();
+  await expect(said).toHaveText(/^✓ Running|the command is too old|it is still stopping/);
+  return (await said.innerText()).startsWith('✓ Running');
+}
+
 /** Turns a motor from a page, in rpm or °/s, and waits until the server says that it begins. */
 export async function spin(page: Page, speed: number, name = 'st0/1') {
   const motor = card(page, name);
   const unit = name.startsWith('rmd') ? '°/s' : 'rpm';
   await motor.getByRole('spinbutton', { name: `Target, ${unit}` }).fill(String(speed));
   await motor.getByRole('spinbutton', { name: 'Ramp' }).fill('2000');
-  await motor.getByRole('button', { name: 'Run to target' }).click();
-  await expect(motor.getByText(/^✓ Running/)).toBeVisible();
+  do await motor.getByRole('button', { name: 'Run to target' }).click();
+  while (!(await runs(motor)));
+}
+
+/** Holds a motor from a page, and waits until the server says that it begins. */
+export async function hold(motor: Locator, press: () => Promise<void>, release: () => Promise<void>) {
+  for (await press(); !(await runs(motor)); await press()) await release();
 }
 
 /** Opens a view by its name in the navigation. */

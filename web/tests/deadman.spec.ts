@@ -1,11 +1,8 @@
 // A motor that a page turned stops when the page is gone.
 import type { Page } from '@playwright/test';
 import { Chromium } from './chromium';
-import { card, expect, spin, test } from './bench';
+import { card, expect, hold, spin, STILL, test, TURNS } from './bench';
 import { Network } from './network';
-
-const TURNS = 300;
-const STILL = 5;
 
 interface World {
   chromium: Chromium;
@@ -105,14 +102,14 @@ turning('hold-to-run: motion needs the held button', async ({ bench, world: { pa
   await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
   await motor.getByRole('switch', { name: 'Hold to run' }).check();
   await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill('1000');
-  const hold = motor.getByRole('button', { name: 'Hold to run' });
-  await hold.hover();
-  await page.mouse.down();
+  const button = motor.getByRole('button', { name: 'Hold to run' });
+  await button.hover();
+  await hold(motor, () => page.mouse.down(), () => page.mouse.up());
   await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
   await page.mouse.up();
   await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
-  await hold.focus();
-  await page.keyboard.down('Enter');
+  await button.focus();
+  await hold(motor, () => page.keyboard.down('Enter'), () => page.keyboard.up('Enter'));
   await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
   await page.keyboard.up('Enter');
   await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);

@@ -1,8 +1,5 @@
 // Faults of a drive, a cable that goes and comes back, and a viewer beside an operator.
-import { card, expect, open, spin, test } from './bench';
-
-const TURNS = 300;
-const STILL = 5;
+import { card, expect, open, spin, STILL, test, TURNS } from './bench';
 
 test('a fault is shown in words, with what to do, and acknowledged', async ({ bench, live }) => {
   await spin(live, 1000);

@@ -1,11 +1,9 @@
 // Bad networks between a page and the server. Loss of packets is a stall here: TCP sends again, in order.
 import { expect, test, type Page } from '@playwright/test';
-import { Bench, card, spin } from './bench';
+import { Bench, card, spin, STILL, TURNS } from './bench';
 import { Chromium } from './chromium';
 import { Network } from './network';
 
-const TURNS = 300;
-const STILL = 5;
 /** A value without an age is at most 1 s old. Cards are drawn each 100 ms, and the machine may be loaded. */
 const MOST = 1000 + 500;
 

@@ -1,9 +1,5 @@
 // Stop all: from every view, by button and by key, with and without the WebSocket.
-import { card, expect, open, Program, spin, test, VIEWS } from './bench';
-
-/** A motor that turns, faster than what it does at rest. */
-const TURNS = 300;
-const STILL = 5;
+import { card, expect, open, Program, spin, STILL, test, TURNS, VIEWS } from './bench';
 
 test.describe('stop all', () => {
   test('from every view, by button and by key', async ({ bench, live }) => {
@@ -44,6 +40,7 @@ test.describe('stop all', () => {
     await motor.getByRole('button', { name: 'Stop', exact: true }).click();
     await expect(motor.getByText('Stopped: the motor confirmed it.')).toBeVisible();
     await expect(running).toHaveCount(0);
+    await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
     await spin(live, 1000);
     await expect(motor.getByText('live', { exact: true })).toBeVisible();
     await bench.monitor.end('SIGKILL');

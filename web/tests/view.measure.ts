@@ -116,12 +116,16 @@ async function measure(page: Page, fleet: Fleet): Promise<Cell[][]> {
   ];
 }
 
-/** Ends both recordings, and reads the files. */
-async function recorded(page: Page, fleet: Fleet): Promise<Cell[][]> {
-  const { code, last, info } = await fleet.recorded();
-  if (code !== 0) throw new Error(`the recorder has ended with ${code}`);
+/** Ends the recording of the page. */
+async function endOwn(page: Page) {
   await recording(page).getByRole('button', { name: 'End recording' }).click();
   await expect(recording(page).getByRole('button', { name: '● Record' })).toBeEnabled({ timeout: MINUTE });
+}
+
+/** Ends the recording of all signals, and reads both files. */
+async function recorded(fleet: Fleet): Promise<Cell[][]> {
+  const { code, last, info } = await fleet.recorded();
+  if (code !== 0) throw new Error(`the recorder has ended with ${code}`);
   const own = fleet.ownRecording();
   const lost = ({ lost_messages: messages, unconfirmed_rows: rows, lost: damage }: typeof own) =>
     `${messages}, not confirmed ${rows}${damage ? `, ${damage.why}` : ''}`;
@@ -134,8 +138,9 @@ async function recorded(page: Page, fleet: Fleet): Promise<Cell[][]> {
   ];
 }
 
-/** One window holds a motor, and the one that draws turns another motor. */
+/** One window holds a motor, and the one that draws turns another motor. Ends the recording of the page at FILL. */
 async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
+  for (const one of [page, holder]) await one.evaluate(() => probing.end());
   const motor = card(holder, 'st0/1');
   await motor.getByRole('switch', { name: 'Hold to run' }).check();
   await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(RPM));
@@ -156,9 +161,14 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
   const session = await page.context().newCDPSession(page);
   const samples: { minute: number; sizes: number[] }[] = [];
   let stops = 0;
+  let isRecording = true;
   const began = performance.now();
   for (let next = began; next <= began + (FILL + MINUTES) * MINUTE; next += SAMPLE) {
     await pause(next - performance.now());
+    if (isRecording && next >= began + FILL * MINUTE) {
+      await endOwn(page);
+      isRecording = false;
+    }
     const [held, turned] = await speeds();
     const standing = [held, turned].filter((speed) => speed < RPM / 2).length;
     if (standing > 0) {
@@ -178,18 +188,19 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
   }
   await holder.keyboard.up('h');
 
-  const full = samples.filter(({ minute }) => minute >= FILL);
   const names = [
     'server', 'process of the page that draws', 'process of the page that holds', 'JavaScript: objects', 'JavaScript: samples',
   ];
+  const growth = (index: number, since: number, until: number) => {
+    const part = samples.filter(({ minute }) => minute >= since && minute < until);
+    const sizes = part.map((sample) => sample.sizes[index]! / MB);
+    const day = slope(part.map(({ minute }, at) => [minute / 60 / 24, sizes[at]!] as const));
+    return `${sizes[0]!.toFixed(0)} to ${sizes.at(-1)!.toFixed(0)} MB, ${day.growth.toFixed(0)} ± ${day.error.toFixed(0)} MB`;
+  };
   return [
     ['motors that were found standing', stops, '0'],
-    ...names.map((name, index) => {
-      const points = full.map(({ minute, sizes }) => [minute / 60 / 24, sizes[index]! / MB] as const);
-      const { growth, error } = slope(points);
-      const [begin, end] = [full[0]!, full.at(-1)!].map(({ sizes }) => (sizes[index]! / MB).toFixed(0));
-      return [`${name}: memory, growth in 24 h`, `${begin} to ${end} MB, ${growth.toFixed(0)} ± ${error.toFixed(0)} MB`, 'none'];
-    }),
+    ...names.map((name, index) => [`${name}: memory, growth in 24 h`, growth(index, FILL, Infinity), 'none']),
+    ...(FILL > 0 ? [['server that records: memory, growth in 24 h', growth(0, FILL / 2, FILL), 'the index of the file']] : []),
   ];
 }
 
@@ -216,7 +227,8 @@ test('view', async () => {
     await expect(number(page, HIGH)).toHaveText(/^\d+$/, { timeout: MINUTE });
     add(await measure(page, fleet));
     if (MINUTES > 0) add(await soak(page, await visit(other, fleet), fleet));
-    add(await recorded(page, fleet));
+    else await endOwn(page);
+    add(await recorded(fleet));
     const size = execFileSync('npm', ['run', '--silent', 'size']).toString().trim();
     add([['the page', size.replace('the page: ', ''), '< 200 kB']]);
     publish('view', table(['what', 'measured', 'goal'], rows, 3));
