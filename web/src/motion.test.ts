@@ -1,9 +1,10 @@
 import { describe, expect, it, vi } from 'vitest';
 import type { Entry } from './link';
+import type { Description } from './wire';
 
 vi.mock('./link', () => ({}));
 vi.mock('./overview', () => ({}));
-const { endOf, endOfReferences } = await import('./motion');
+const { endOf, endOfReferences, stateSince } = await import('./motion');
 
 const entry = (number: number, event: string, more: Partial<Entry> = {}): Entry => ({
   number, event, wall: 0, until: 0, times: 1, line: 'st0', motor: 1, by: 'page 1', message: event, ...more,
@@ -41,5 +42,25 @@ describe('the end of references of the server', () => {
     expect(endOfReferences({ ...ran, failure }, '°/s')).toEqual({
       tone: 'bad', text: `The reference got no further than 113 °/s: ${failure}.`,
     });
+  });
+});
+
+describe('the state of a motion', () => {
+  const description = {
+    overview: { state: 'STATUS' }, states: [{ value: 0, name: 'IDLE' }, { value: 6, name: 'RUN' }],
+  } as unknown as Description;
+  const stateAt = (age: number, begun: number, value = 6) =>
+    stateSince({ age: () => age, values: new Map([['STATUS', { value, unit: '', t: 0 }]]) }, description, begun);
+
+  it('is one that was read since the motion began', () => {
+    expect(stateAt(0.2, 0.5)).toBe('RUN');
+    expect(stateAt(0.2, 0.5, 0)).toBe('IDLE');
+    // The end of a stop before the motion.
+    expect(stateAt(0.2, 0.1, 0)).toBeUndefined();
+  });
+  it('is not an old or unknown one', () => {
+    expect(stateAt(1.5, 9)).toBeUndefined();
+    expect(stateAt(NaN, 9)).toBeUndefined();
+    expect(stateAt(0.2, 9, 5)).toBeUndefined();
   });
 });

@@ -3,7 +3,7 @@ import { useSignal, useSignalEffect } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { decimalsOf, nameOf, number, sentence } from './format';
 import { type Entry, entries, lapsed, rans, state, welcome } from './link';
-import { liveOf } from './overview';
+import { type Live, liveOf } from './overview';
 import type { Sentence } from './parts';
 import type { Description, Ran } from './wire';
 
@@ -38,11 +38,18 @@ export function endOfReferences({ reference, failure }: Ran, unit: string): Sent
     : { tone: 'bad', text: sentence(`the reference got no further than ${at}: ${failure}`) };
 }
 
+/** The name of the state, if it was read in the last second and since a motion began: so many seconds ago. */
+export function stateSince(live: Pick<Live, 'age' | 'values'>, { overview, states }: Description, begun: number) {
+  if (overview.state === null || !(live.age(overview.state) < Math.min(1, begun))) return undefined;
+  const value = live.values.get(overview.state)?.value;
+  return states.find((one) => one.value === value)?.name;
+}
+
 /** Follows a motion, and says what ended it. `unit` is that of its reference. */
 export function useMotion(
   line: string,
   motor: number,
-  { overview, states }: Description,
+  description: Description,
   unit: string,
   say: (now: Sentence | null) => void,
 ) {
@@ -70,11 +77,7 @@ export function useMotion(
     if (state.value === 'lost' || lapsed.value !== null) return end(null);
     const live = liveOf(line, motor);
     void live.tick.value;
-    // An older value may be of a stop before the motion.
-    const longest = Math.min(1, (performance.now() - begun.current) / 1000);
-    const isNew = (name: string) => live.age(name) < longest;
-    const value = overview.state !== null && isNew(overview.state) ? live.values.get(overview.state)?.value : undefined;
-    const name = states.find((one) => one.value === value)?.name;
+    const name = stateSince(live, description, (performance.now() - begun.current) / 1000);
     if (name === undefined) return;
     if (!AT_REST.test(name)) hasRun.current = true;
     else if (hasRun.current) end({ tone: 'note', text: `The motor does not run any more: ${name}.` });
