@@ -79,6 +79,14 @@ describe('the latch', () => {
     expect(text()).toBe('Latched by operator, without a stop.');
   });
 
+  it('may be without a stop for a page that was opened later', () => {
+    latchedBy.value = 'operator';
+    expect(text()).toBe('Latched by operator.');
+    happened('commanded', 1);
+    vi.advanceTimersByTime(1000);
+    expect(text()).toBe('Latched by operator.');
+  });
+
   it('is known to a page that was opened later from the lines', () => {
     latchedBy.value = 'page 1';
     lines.value = [{ line: 'st1', unstopped: [1, 2] }];

@@ -40,10 +40,11 @@ export const unstopped = computed<readonly string[]>(() => {
 /** Whether an event of this kind came after the latch. */
 const since = (kind: string) => entries.value.some(({ number, event }) => number > latchedAt && event === kind);
 
-/** Whether no stop came with the latch. It is known as long as all events since the latch are kept. */
-function isLatchAlone(): boolean {
+/** Whether a stop came with the latch; `null`: the page is newer, or the events since the latch are not kept. */
+function isStop(): boolean | null {
+  if (isFresh.value || ['stopping', 'stopped', 'stop-failed'].some(since)) return true;
   const areKept = entries.value.some(({ number }) => number === latchedAt) && !since('later');
-  return areKept && !isFresh.value && !['stopping', 'stopped', 'stop-failed'].some(since);
+  return areKept ? false : null;
 }
 
 /** Who stopped the motors, and what is known of it. `null`: there is no latch. */
@@ -52,7 +53,9 @@ export const latchText = computed<string | null>(() => {
   if (by === null) return null;
   const open = unstopped.value;
   if (isFresh.value && (open.length ? !since('stop-failed') : !since('stopped'))) return `Stop pressed by ${by}.`;
+  if (open.length > 0) return `Stop of all by ${by}. Not confirmed, may be turning: ${named(open)}.`;
+  const isStopped = isStop();
+  if (isStopped === null) return `Latched by ${by}.`;
   // A program can latch motion without a stop: then motors keep turning.
-  if (open.length === 0) return isLatchAlone() ? `Latched by ${by}, without a stop.` : `Stopped by ${by}.`;
-  return `Stop of all by ${by}. Not confirmed, may be turning: ${named(open)}.`;
+  return isStopped ? `Stopped by ${by}.` : `Latched by ${by}, without a stop.`;
 });

@@ -67,6 +67,17 @@ async fn latched_by(program: &Program) -> Option<String> {
     }
 }
 
+/// The code of the first command that ended or began motion of RMD motor 1.
+async fn first_motion(world: &World) -> u8 {
+    let moved = async {
+        while world.rmd_motion(1).is_empty() {
+            tokio::task::yield_now().await;
+        }
+    };
+    timeout(LIMIT, moved).await.unwrap();
+    world.rmd_motion(1)[0][0]
+}
+
 #[tokio::test]
 async fn a_stop_that_a_lost_share_did_not_get_is_sent_before_a_page_can_move_a_motor() {
     let link = lost("link-stop").await;
@@ -82,13 +93,7 @@ async fn a_stop_that_a_lost_share_did_not_get_is_sent_before_a_page_can_move_a_m
     let world = World::new("link-stop", Profile::Spec);
     let page = connected(&link).await;
     assert_eq!(page.ask(turn()).await.unwrap_err().reason, Reason::Latched);
-    let stopped = async {
-        while world.rmd_motion(1).is_empty() {
-            tokio::task::yield_now().await;
-        }
-    };
-    timeout(LIMIT, stopped).await.unwrap();
-    assert_eq!(world.rmd_motion(1)[0][0], STOP);
+    assert_eq!(first_motion(&world).await, STOP);
 
     // It is sent once.
     assert!(matches!(page.ask(Ask::Release).await, Ok(Answer::Release)));
@@ -112,7 +117,7 @@ async fn a_stop_that_is_too_old_is_not_sent() {
 }
 
 #[tokio::test]
-async fn a_latch_holds_for_a_share_that_is_started_again() {
+async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() {
     let world = World::new("link-latch", Profile::Spec);
     let link = Arc::new(Link::new(world.path.clone()));
     let kept = Arc::clone(&link);
@@ -125,6 +130,8 @@ async fn a_latch_holds_for_a_share_that_is_started_again() {
     let page = connected(&link).await;
     assert!(latched_by(&page).await.is_some());
     assert_eq!(page.ask(turn()).await.unwrap_err().reason, Reason::Latched);
+    // They may not have confirmed the stop before.
+    assert_eq!(first_motion(&world).await, STOP);
     // A release holds, too.
     joins(&link, true).await;
     page.ask(Ask::Release).await.unwrap();

@@ -3,65 +3,26 @@
 mod asking;
 mod drives;
 mod shared;
+mod stopping;
 
-use std::collections::BTreeMap;
-use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use asking::{Asker, command};
-use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
-use motorlink_proto::st::{Command, Frame, MAX_FRAME, Ramp, Request};
 use motorlink_telemetry::share::message::*;
 use shared::{LIMIT, Share};
-
-/// RMD motors have this time for a reply. Most of the stops here wait for it several times.
-const SHORT: Duration = Duration::from_millis(500);
+use stopping::{
+    Cable, READ_STATUS, SHORT, START, heard_and_unstopped, motors, share_of_a_turning_motor,
+    stop_all, stop_all_of, stops,
+};
 
 /// The ID of no motor.
 const NOBODY: u8 = 20;
 
-/// GET_REG of STATUS.
-const READ_STATUS: [u8; 2] = [2, 2];
 /// Reads the state of an RMD motor.
 const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 /// Turns it with 10 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
-
-/// Stops all motors: whether each of some confirmed, may turn or is absent. The share also stops the motors
-/// that no program has used.
-fn stop_all_of(
-    program: &mut Asker,
-    line: &str,
-    numbers: &[u8],
-) -> BTreeMap<(String, u8), &'static str> {
-    let mut all = stop_all(program);
-    all.retain(|(of, motor), _| of == line && numbers.contains(motor));
-    all
-}
-
-/// Stops all motors: whether each confirmed, may turn or is absent.
-fn stop_all(program: &mut Asker) -> BTreeMap<(String, u8), &'static str> {
-    let Ok(Answer::Stop { motors }) = program.ask(Ask::Stop { motor: None }) else { panic!() };
-    let taken = |one: &StoppedMotor| match (&one.failure, one.absent) {
-        (None, false) => "confirmed",
-        (Some(_), true) => "absent",
-        (Some(_), false) => "may turn",
-        (None, true) => panic!("{one:?}"),
-    };
-    motors.iter().map(|one| ((one.motor.line.clone(), one.motor.motor), taken(one))).collect()
-}
-
-/// The motors of a line that have answered, and those that have not confirmed their last stop.
-fn heard_and_unstopped(program: &mut Asker, line: &str) -> (Vec<u8>, Vec<u8>) {
-    let line = program.lines().into_iter().find(|one| one.line == line).unwrap();
-    (line.heard, line.unstopped)
-}
-
-fn motors(line: &str, all: &[(u8, &'static str)]) -> BTreeMap<(String, u8), &'static str> {
-    all.iter().map(|(motor, how)| ((line.to_owned(), *motor), *how)).collect()
-}
 
 #[test]
 fn an_id_that_was_only_searched_is_absent_at_every_stop() {
@@ -117,38 +78,6 @@ fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
     assert!(told.is_empty(), "{told:?}");
 }
 
-/// A line that can be cut.
-struct Cable {
-    link: Box<dyn EventBytes>,
-    is_cut: Arc<AtomicBool>,
-}
-
-impl Link for Cable {
-    fn within(&self) -> Option<&dyn Link> {
-        Some(&self.link)
-    }
-}
-
-impl ByteLink for Cable {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        if self.is_cut.load(Ordering::SeqCst) { Ok(()) } else { self.link.write(bytes) }
-    }
-
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.link.read(buffer, timeout)
-    }
-}
-
-impl Evented for Cable {
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.link.descriptor()
-    }
-
-    fn flush(&mut self) -> Result<bool, PortError> {
-        self.link.flush()
-    }
-}
-
 #[test]
 fn a_motor_that_answered_and_is_silent_now_may_turn() {
     let is_cut = Arc::new(AtomicBool::new(false));
@@ -176,18 +105,6 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
     assert!(heard_and_unstopped(&mut other, "st0").1.is_empty());
 }
 
-/// Sends a request to motor 2 as a program that had the port before the share, and awaits the reply.
-fn before_the_share(link: &mut dyn EventBytes, request: Request<'_>) {
-    let mut bytes = [0; MAX_FRAME];
-    link.write(Frame::command(2, &request, &mut bytes).unwrap()).unwrap();
-    while link.flush().unwrap() {}
-    // The acknowledge has no payload.
-    let mut reply = 0;
-    while reply < 3 {
-        reply += link.read(&mut bytes, Some(LIMIT)).unwrap();
-    }
-}
-
 /// The next motor of st0 that confirms a stop.
 fn stopped_on_st0(program: &mut Asker) -> Option<u8> {
     loop {
@@ -200,13 +117,7 @@ fn stopped_on_st0(program: &mut Asker) -> Option<u8> {
 
 #[test]
 fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
-    let share = Share::with("stops-restart", SHORT, |mut link| {
-        let ramp = Ramp { speed_rpm: 1000, duration_ms: 100 };
-        before_the_share(&mut *link, Request::SetRamp(ramp));
-        before_the_share(&mut *link, Request::ExecuteCommand(Command::StartMotor));
-        link
-    });
-    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    let (share, _cut) = share_of_a_turning_motor("stops-restart", false);
     let mut program = Asker::join(&share.path, "reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
@@ -214,14 +125,6 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
 
     // The drive has said which motors it does not have. They get no further stop, and no event.
-    let stops = |program: &mut Asker, motor| {
-        let (from, to, after) = (Some(0.0), None, None);
-        let ask = Ask::Frames { line: "st0".to_owned(), from, to, after, most: 1000 };
-        let Ok(Answer::Frames { frames, .. }) = program.ask(ask) else { panic!() };
-        let is_stop =
-            |frame: &&WireFrame| frame.motor == Some(motor) && frame.words.contains("STOP_MOTOR");
-        frames.iter().filter(is_stop).count()
-    };
     while stops(&mut program, 7) == 0 {}
     assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
@@ -236,16 +139,7 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
 
 #[test]
 fn where_nothing_has_answered_a_stop_is_not_confirmed_and_is_repeated() {
-    let is_cut = Arc::new(AtomicBool::new(false));
-    let cut = Arc::clone(&is_cut);
-    let share = Share::with("stops-unanswered", SHORT, move |mut link| {
-        let ramp = Ramp { speed_rpm: 1000, duration_ms: 100 };
-        before_the_share(&mut *link, Request::SetRamp(ramp));
-        before_the_share(&mut *link, Request::ExecuteCommand(Command::StartMotor));
-        is_cut.store(true, Ordering::SeqCst);
-        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
-    });
-    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    let (share, cut) = share_of_a_turning_motor("stops-unanswered", true);
     let mut program = Asker::join(&share.path, "comes after a restart");
     let mut stopped = stop_all(&mut program);
     assert_eq!(stopped.remove(&("st0".to_owned(), ANY_MOTOR)), Some("may turn"));
@@ -281,7 +175,7 @@ fn a_release_ends_the_repeats_where_nothing_has_answered() {
     cut.store(false, Ordering::SeqCst);
     // Stops of the last round may still be sent: they end after 2 s and a timeout for each number.
     let end = std::time::Instant::now() + LIMIT;
-    while program.ask(command("st0", 1, &[3, 1])).is_err() {
+    while program.ask(command("st0", 1, &START)).is_err() {
         assert!(std::time::Instant::now() < end, "the motor does not start");
     }
 }

@@ -46,9 +46,9 @@ pub struct Link {
 /// What a share gets before anything else.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 struct Pending {
-    /// When a stop of all motors was asked for that no share got.
+    /// Since when a stop of all motors waits that no share got.
     stop: Option<Instant>,
-    /// The share before this one was latched when it ended.
+    /// The share before this one was latched when it ended: its motors may not have confirmed their stop.
     latch: bool,
 }
 
@@ -102,7 +102,7 @@ impl Link {
         connected.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
     }
 
-    /// Latches the share if the one before it was latched. Stops all motors, too, if that was asked for
+    /// Latches the share and stops all motors, if the share before it was latched or if that was asked for
     /// while the share was lost.
     async fn send_pending(&self) -> io::Result<()> {
         let _sending = self.sending.lock().await;
@@ -113,9 +113,7 @@ impl Link {
         }
         let (program, mut listener, _) = self.open(NAME).await?;
         program.pass(&Request { id: 1, ask: Ask::Latch }).await?;
-        if stop.is_some() {
-            program.pass(&Request { id: 2, ask: Ask::Stop { motor: None } }).await?;
-        }
+        program.pass(&Request { id: 2, ask: Ask::Stop { motor: None } }).await?;
         // The share takes the requests of a program in their order: it has them when it answers.
         lines(&program, &mut listener).await?;
         let mut pending = self.pending();
@@ -247,7 +245,8 @@ impl Link {
         self.pending().stop.take_if(|latest| *latest == asked);
         match stop_all(&program).await {
             Err(refusal) if refusal.reason == Reason::Line => {
-                self.pending().stop = Some(asked);
+                // A frozen share may have had it for long.
+                self.pending().stop = Some(Instant::now());
                 Err(until_back(lost("the connection has ended")))
             }
             stopped => stopped,

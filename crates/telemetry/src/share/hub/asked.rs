@@ -2,16 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time;
 
 use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
+use super::Hub;
 use super::feed::Feed;
-use super::line::{self, Held, Motion};
+use super::line::{self, AGAIN, Held, Motion};
 use super::place::SessionId;
 use super::reasons::reason;
 use super::session::Session;
-use super::{Hub, Sent, Work};
+use super::work::{Sent, Work};
 use crate::acquisition::Acquisition;
 use crate::event::CommandError;
 use crate::line::{Request, may_move};
@@ -173,7 +175,7 @@ impl Hub {
             Ask::Release => {
                 self.latch = None;
                 for held in self.lines.values_mut() {
-                    held.unanswered_stop = None;
+                    held.release();
                     let by = Arc::clone(name);
                     held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;
                 }
@@ -352,8 +354,9 @@ impl Hub {
         let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
+                let again = time::Instant::now() + AGAIN;
                 for held in self.lines.values_mut().filter(|held| !held.has_answered()) {
-                    held.unanswered_stop = Some(Arc::clone(name));
+                    held.owe_stop(name, again);
                 }
                 let lines = self.lines.iter();
                 let all =
@@ -361,12 +364,13 @@ impl Hub {
                 all.partition(|(line, motor)| self.lines[line].is_awaited(*motor))
             }
         };
+        let of_all = motor.is_none();
+        let unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
         if awaited.is_empty() {
-            return Ok(Some(Answer::Stop { motors: Vec::new() }));
+            return Ok(Some(Answer::Stop { motors: unreached }));
         }
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
-        let part = asker.gather(id, awaited.len());
-        let of_all = motor.is_none();
+        let part = asker.gather(id, awaited.len(), unreached);
         for (line, motor) in awaited {
             let held = &self.lines[&line];
             if of_all && held.has_answered() && !held.may_turn(motor) {
@@ -392,7 +396,7 @@ impl Hub {
         if self.lines.is_empty() {
             return Ok(Some(Answer::Rates { rates: Vec::new() }));
         }
-        let part = asker.gather(id, self.lines.len());
+        let part = asker.gather(id, self.lines.len(), Vec::new());
         for (line, held) in &self.lines {
             let tell = self.teller(session, None, *line);
             let task = move |engine: &mut Acquisition| {

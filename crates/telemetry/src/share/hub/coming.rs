@@ -2,20 +2,21 @@
 
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use motorlink::port::PortName;
 use motorlink::st::Profile;
 
+use super::Hub;
 use super::asked::{Refused, usage};
 use super::jobs::{Asker, Does, End, Job, JobId, Scanned, found_ports};
 use super::line::Held;
 use super::place::SessionId;
-use super::{Hub, News};
+use super::work::News;
 use crate::line::Stopped;
 use crate::share::message::{
-    Answer, FoundPort, Happening, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName, Protocol,
-    Reason, StoppedMotor,
+    ANY_MOTOR, Answer, FoundPort, Happening, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
+    Protocol, Reason, StoppedMotor,
 };
 use crate::share::opening::{OpenError, Opened, Wish};
 use crate::share::scan::{self, Found};
@@ -155,6 +156,9 @@ impl Hub {
         // Events of the line come before its end.
         let _ = self.collect_events();
         let Some(held) = self.lines.remove(&line) else { return Ok(None) };
+        if let Some(by) = held.owed_stop() {
+            self.owed.insert(held.place(), by);
+        }
         self.sessions.values_mut().for_each(|session| session.forget(line));
         self.again.retain(|(of, _), _| *of != line);
         let place = Some((held.place(), Does::Closes));
@@ -237,10 +241,14 @@ impl Hub {
         let port = opened.port.to_string();
         let name = self.free_name(opened.speaks.protocol());
         let held = Held::start(&name, opened);
-        let held = held.map_err(|error| (Reason::Line, no_thread(&error)))?;
+        let mut held = held.map_err(|error| (Reason::Line, no_thread(&error)))?;
         if let Some(by) = &self.latch {
             // If its engine has ended, the share ends.
             let _ = held.remote().latch_then(by, || {});
+        }
+        // Under a latch nothing turns.
+        if let Some(by) = self.owed.remove(&held.place()).as_ref().or(self.latch.as_ref()) {
+            held.owe_stop(by, Instant::now());
         }
         self.last_line += 1;
         self.lines.insert(self.last_line, held);
@@ -257,6 +265,9 @@ impl Hub {
         port: &PortName,
         stopped: Vec<Stopped>,
     ) -> Answer {
+        if stopped.iter().any(|one| one.result.is_err()) {
+            self.owed.insert(port.place(), Arc::clone(by));
+        }
         let mut motors = Vec::new();
         for Stopped { motor, result } in stopped {
             let number = motor.number();
@@ -273,6 +284,25 @@ impl Hub {
         let message = format!("{name}: {by} closed {port}");
         self.say_of((Some(name), None), Happening::Closed, by, message);
         Answer::Close { motors }
+    }
+
+    /// A stop of all motors while ports are opened or closed: no line of them takes it. The motors are stopped
+    /// when the port is open.
+    pub(super) fn stop_ports(&mut self, by: &Arc<str>) -> Vec<StoppedMotor> {
+        let mut motors = Vec::new();
+        for (place, job) in self.jobs.changing() {
+            let by_whom = &job.asker.by;
+            let failure = match job.does(Does::Opens) {
+                true => format!("{by_whom} opens it at this moment; its motors are stopped then"),
+                false => format!(
+                    "{by_whom} closes it at this moment, which stops the motors that programs turned"
+                ),
+            };
+            let motor = MotorName { line: place.to_owned(), motor: ANY_MOTOR };
+            motors.push(StoppedMotor { motor, failure: Some(failure), absent: false });
+            self.owed.insert(place.to_owned(), Arc::clone(by));
+        }
+        motors
     }
 
     fn free_name(&self, protocol: Protocol) -> String {

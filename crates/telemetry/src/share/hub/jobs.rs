@@ -133,6 +133,12 @@ impl Jobs {
         self.under_way.values().find(is_there)
     }
 
+    /// The ports that are opened or closed.
+    pub(super) fn changing(&self) -> impl Iterator<Item = (&str, &Job)> {
+        let jobs = self.under_way.values().filter(|job| !job.does(Does::Scans));
+        jobs.filter_map(|job| Some((job.place.as_ref()?.0.as_str(), job)))
+    }
+
     /// How many do this.
     pub(super) fn count(&self, what: Does) -> usize {
         self.under_way.values().filter(|job| job.does(what)).count()

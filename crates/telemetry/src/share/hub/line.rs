@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{self, Duration};
 
 use motorlink::Clock;
 use motorlink::port::PortName;
@@ -13,19 +13,21 @@ use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, Re
 use motorlink_proto::time::Instant;
 
 use super::place::{SessionId, seconds, wall_now};
-use super::reasons::may_be_executed;
+use super::reasons::{may_be_executed, reason};
 use crate::acquisition::Tally;
 use crate::event::{CommandError, What};
 use crate::line::{Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
-use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
+use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line, Reason};
 use crate::share::opening::Opened;
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
 
+/// The pause before a stop that failed is repeated.
+pub(super) const AGAIN: Duration = Duration::from_secs(1);
 /// Events of an engine that wait for the share.
 const EVENTS: usize = 10_000;
 
@@ -60,15 +62,31 @@ pub struct Held {
     moved: BTreeSet<Motor>,
     /// Numbers for which the drive says that it has no such motor.
     absent: BTreeSet<Motor>,
-    /// How many stops as a precaution are under way.
-    pub(super) precautions: usize,
-    /// Who stopped all motors while nothing on the line had ever answered: that is repeated until something
-    /// answers.
-    pub(super) unanswered_stop: Option<Arc<str>>,
-    /// The motors that did not confirm a stop, and who asked for it.
+    /// How many stops are under way.
+    pub(super) stops: usize,
+    /// A stop of all motors that is repeated until something on the line answers.
+    unanswered_stop: Option<UnansweredStop>,
+    /// The motors whose last stop failed, and who asked for it. It is repeated when they answer anything.
     pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
     /// The motors whose last stop is not confirmed: it failed, is under way or is repeated.
     pub(super) unconfirmed: BTreeSet<Motor>,
+}
+
+/// A stop of all motors while nothing on the line had ever answered.
+struct UnansweredStop {
+    by: Arc<str>,
+    /// When it is repeated.
+    next: time::Instant,
+}
+
+/// What the end of a stop says about an address.
+pub(super) enum Address {
+    /// Nothing on the line has ever answered: motors may be there.
+    Unanswered,
+    /// No motor was found there, and no program asked for it.
+    Empty,
+    /// Somebody asked for it, or it answered.
+    Motor { is_absent: bool },
 }
 
 /// A data segment that a command configures, for the program that sends it.
@@ -115,7 +133,7 @@ impl Held {
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
             absent: BTreeSet::new(),
-            precautions: 0,
+            stops: 0,
             unanswered_stop: None,
             unstopped: BTreeMap::new(),
             unconfirmed: BTreeSet::new(),
@@ -152,7 +170,6 @@ impl Held {
             return Ok(());
         }
         if moves {
-            self.unanswered_stop = None;
             self.sequences.retain(|one| one.0 != own.0);
         }
         self.sequences.insert(own);
@@ -221,6 +238,77 @@ impl Held {
         !is_turned && !is_known && !self.heard.contains(&motor)
     }
 
+    /// A stop of the motor is over.
+    pub(super) fn after_stop(
+        &mut self,
+        motor: Motor,
+        is_precaution: bool,
+        result: &CommandResult,
+    ) -> Address {
+        self.stops -= 1;
+        if is_precaution && result.is_err() {
+            if !self.has_answered() {
+                return Address::Unanswered;
+            }
+            if !self.known.contains(&motor) {
+                return Address::Empty;
+            }
+        }
+        let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
+        let is_unheard = is_silent && self.is_unheard(motor);
+        // A motor that exists is not stopped as a precaution.
+        Address::Motor { is_absent: is_precaution || is_unheard || self.is_absent(motor) }
+    }
+
+    /// Nothing has answered yet: all motors are stopped at `next`, and again until something answers.
+    pub(super) fn owe_stop(&mut self, by: &Arc<str>, next: time::Instant) {
+        self.unanswered_stop = Some(UnansweredStop { by: Arc::clone(by), next });
+    }
+
+    /// Whose stop of all motors has to be repeated now. It is repeated for the last time when something has
+    /// answered: the motors that turn may not be those that answer first.
+    pub(super) fn due_stop(&mut self, now: time::Instant) -> Option<Arc<str>> {
+        let has_answered = self.has_answered();
+        let stop = self.unanswered_stop.as_mut()?;
+        if self.stops > 0 || !has_answered && now < stop.next {
+            return None;
+        }
+        stop.next = now + AGAIN;
+        let by = Arc::clone(&stop.by);
+        if has_answered {
+            self.unanswered_stop = None;
+        }
+        Some(by)
+    }
+
+    /// Ends the repetition of a stop of all motors. Gives whose it was.
+    pub(super) fn take_unanswered_stop(&mut self) -> Option<Arc<str>> {
+        self.unanswered_stop.take().map(|stop| stop.by)
+    }
+
+    /// Motion is wanted again: addresses where no motor is known are not stopped if one answers there.
+    pub(super) fn release(&mut self) {
+        self.unanswered_stop = None;
+        let unstopped = std::mem::take(&mut self.unstopped).into_iter();
+        self.unstopped = unstopped.filter(|(motor, _)| self.is_there(*motor)).collect();
+    }
+
+    /// Whether a motor is there, as far as it is known.
+    pub(super) fn is_there(&self, motor: Motor) -> bool {
+        self.owners.contains_key(&motor)
+            || self.heard.contains(&motor)
+            || self.moved.contains(&motor)
+    }
+
+    /// Whose stop the motors have not confirmed.
+    pub(super) fn owed_stop(&self) -> Option<Arc<str>> {
+        let of_motor = || {
+            let mut motors = self.unstopped.iter().filter(|(motor, _)| self.is_there(**motor));
+            motors.next().map(|(_, by)| Arc::clone(by))
+        };
+        self.unanswered_stop.as_ref().map(|stop| Arc::clone(&stop.by)).or_else(of_motor)
+    }
+
     /// What its port occupies.
     pub(super) fn place(&self) -> String {
         self.port.place()
@@ -281,7 +369,10 @@ impl Held {
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
-                What::Confirmed(motor, _) => drop(self.heard.insert(*motor)),
+                What::Confirmed(motor, _) => {
+                    self.heard.insert(*motor);
+                    retry.extend(self.unstopped.contains_key(motor).then_some(*motor));
+                }
                 _ => {}
             }
             let told = self.words.of(self.speaks, &event.what);

@@ -4,31 +4,32 @@
 
 mod asked;
 mod coming;
+mod ended;
 mod feed;
 mod jobs;
 mod line;
 mod place;
 mod reasons;
 mod session;
+mod work;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::frame::Frame;
-use super::message::{self, Event, Happening, MotorName, Reason, SignalName, SignalRate};
+use super::message::{self, Event, Happening};
 use super::words;
-use crate::acquisition::Rate;
 use crate::event::CommandError;
-use crate::line::{Reply, Stopped};
-use crate::runner::{CommandResult, Ended};
+use crate::line::Stopped;
+use crate::runner::Ended;
 use crate::signal::Motor;
-use jobs::{JobId, Jobs};
-use line::{Configures, Lines, Motion};
+use jobs::Jobs;
+use line::Lines;
 use place::wall_now;
-use reasons::{may_be_executed, reason};
 use session::{Part, Session};
+use work::{Done, News, Work};
 
 pub use line::Held;
 pub use place::SessionId;
@@ -38,13 +39,6 @@ pub(super) use place::seconds;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}: the engine of this line has ended")]
 pub struct LineEnded(pub String);
-
-/// Why answers are not confirmed.
-const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after the last \
-    confirmation: the answers so far may be those to other commands; ask again";
-
-/// The pause before a stop that failed is repeated.
-const AGAIN: Duration = Duration::from_secs(1);
 
 /// Lines and the programs that use them.
 pub struct Hub {
@@ -60,56 +54,13 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
-    /// Motors that programs turned and whose stop failed, and when it is repeated.
+    /// Motors that are there and whose stop failed, and when it is repeated.
     again: BTreeMap<(usize, Motor), Instant>,
+    /// Ports whose motors have to be stopped when they are opened, and who asked for it.
+    owed: BTreeMap<String, Arc<str>>,
     done: Sender<News>,
     ended: Receiver<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-/// Something that has ended in another thread.
-enum News {
-    Engine(Done),
-    Job(JobId),
-}
-
-/// Something that an engine has finished.
-struct Done {
-    session: SessionId,
-    /// The request; `None` for what nobody asked for.
-    id: Option<u32>,
-    line: usize,
-    /// The name of the line, which may be closed.
-    name: Arc<str>,
-    what: Work,
-}
-
-enum Work {
-    Command(Sent, CommandResult),
-    Confirm {
-        motor: Motor,
-        result: CommandResult,
-    },
-    Stop {
-        part: Option<Part>,
-        motor: Motor,
-        by: Arc<str>,
-        is_precaution: bool,
-        result: CommandResult,
-    },
-    /// A motor that should stop has never answered.
-    Unheard(Part, Motor),
-    Rates(Part, Vec<Rate>),
-}
-
-/// A command that was handed to an engine.
-struct Sent {
-    /// `None`: it is about the drive.
-    motor: Option<Motor>,
-    motion: Motion,
-    /// Whether the motor may turn after it.
-    moves: bool,
-    configures: Option<Configures>,
 }
 
 impl Hub {
@@ -129,6 +80,7 @@ impl Hub {
             latch: None,
             log: VecDeque::new(),
             again: BTreeMap::new(),
+            owed: BTreeMap::new(),
             done,
             ended,
             wake: Arc::new(wake),
@@ -244,25 +196,19 @@ impl Hub {
             self.again.remove(&(line, motor));
             self.stop_again(line, motor);
         }
-        self.repeat_unanswered_stops();
+        for line in self.numbers() {
+            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
+                self.stop_line(line, None, &by);
+            }
+        }
     }
 
-    /// Repeats stops of all motors on lines where nothing has ever answered, and once more when something
-    /// does: the motors that turn may not be those that answer first.
-    fn repeat_unanswered_stops(&mut self) {
-        for line in self.numbers() {
-            let Some(held) = self.lines.get_mut(&line) else { continue };
-            if held.precautions > 0 {
-                continue;
-            }
-            let Some(by) = held.unanswered_stop.clone() else { continue };
-            if held.has_answered() {
-                held.unanswered_stop = None;
-            }
-            let motors: Vec<Motor> = held.stoppable().collect();
-            for motor in motors {
-                self.stop_of(true, line, motor, SessionId::default(), None, &by);
-            }
+    /// Stops all motors that a line can have, but one.
+    fn stop_line(&mut self, line: usize, but: Option<Motor>, by: &Arc<str>) {
+        let Some(held) = self.lines.get(&line) else { return };
+        let motors: Vec<Motor> = held.stoppable().filter(|motor| Some(*motor) != but).collect();
+        for motor in motors {
+            self.stop_of(true, line, motor, SessionId::default(), None, by);
         }
     }
 
@@ -332,185 +278,6 @@ impl Hub {
         self.publish(Event { wall, line, t, since, motor, by, event, message });
     }
 
-    fn finish(&mut self, Done { session, id, line, name, what }: Done) {
-        match what {
-            Work::Command(sent, result) => self.command_over(session, id, line, sent, result),
-            Work::Confirm { motor, result } => {
-                self.told_of(line, motor, &result);
-                // What the engine found before it answered.
-                let _ = self.collect_events();
-                let lane = self.lines.get(&line).and_then(|held| held.lane(motor));
-                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
-                session.pending -= 1;
-                match result {
-                    Ok(_) if session.confirmed(line, lane) => {
-                        session.answer(id, message::Answer::Confirm);
-                    }
-                    Ok(_) => session.refuse(id, Reason::Unconfirmed, UNCONFIRMED),
-                    Err(error) => {
-                        // Without an answer of the drive the doubts stay until they are told.
-                        if reason(&error) == Reason::Unconfirmed {
-                            session.confirmed(line, lane);
-                        }
-                        session.refuse(id, reason(&error), error.to_string());
-                    }
-                }
-            }
-            Work::Stop { part, motor, by, is_precaution, result } => {
-                self.stop_ended(line, motor, by, &result);
-                let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
-                // A line that was closed meanwhile is one that fails.
-                let (mut is_absent, mut has_answered, mut is_known) = (false, true, true);
-                if let Some(held) = self.lines.get_mut(&line) {
-                    held.precautions -= usize::from(is_precaution);
-                    is_absent = held.is_absent(motor) || is_silent && held.is_unheard(motor);
-                    has_answered = held.has_answered();
-                    is_known = held.known.contains(&motor);
-                }
-                let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
-                    return;
-                };
-                let motor = MotorName { line: name.to_string(), motor: motor.number() };
-                match result {
-                    Err(_) if is_precaution && !has_answered => {
-                        session.unanswered(part, motor.line)
-                    }
-                    Err(_) if is_precaution && !is_known => session.left_out(part, &motor.line),
-                    result => {
-                        let failure = result.err().map(|error| error.to_string());
-                        // A motor that exists is not stopped as a precaution.
-                        session.stopped(part, motor, failure, is_absent || is_precaution);
-                    }
-                }
-            }
-            Work::Unheard(part, motor) => {
-                let Some(session) = self.sessions.get_mut(&session) else { return };
-                session.unheard(part, MotorName { line: name.to_string(), motor: motor.number() });
-            }
-            Work::Rates(part, rates) => {
-                let Some(session) = self.sessions.get_mut(&session) else { return };
-                let named = |rate: Rate| SignalRate {
-                    signal: SignalName {
-                        line: name.to_string(),
-                        motor: rate.signal.motor.number(),
-                        name: rate.signal.source.to_string(),
-                    },
-                    asked: rate.asked.0 as f64 / 1e6,
-                    predicted: rate.predicted.0 as f64 / 1e6,
-                    achieved: rate.achieved,
-                };
-                session.rates(part, rates.into_iter().map(named).collect());
-            }
-        }
-    }
-
-    /// A stop is over. If the motor did not confirm it, it is repeated.
-    fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
-        let Some(held) = self.lines.get_mut(&line) else { return };
-        let is_owned = held.owners.contains_key(&motor);
-        match result {
-            Ok(_) => held.stopped(motor),
-            Err(error) if may_be_executed(error) => {
-                held.unstopped.insert(motor, by);
-                held.unconfirmed.insert(motor);
-            }
-            Err(_) => held.ended(motor, false, result),
-        }
-        // The end of these is an event.
-        let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
-        if is_owned && result.is_err() && !is_event {
-            self.again.insert((line, motor), Instant::now() + AGAIN);
-        }
-    }
-
-    fn command_over(
-        &mut self,
-        session: SessionId,
-        id: Option<u32>,
-        line: usize,
-        sent: Sent,
-        result: CommandResult,
-    ) {
-        let Sent { motor, motion, moves, configures } = sent;
-        if let Some(motor) = motor {
-            if let Some(held) = self.lines.get_mut(&line) {
-                held.ended(motor, moves, &result);
-            }
-            self.command_ended(session, line, motor, motion, &result);
-            self.told_of(line, motor, &result);
-        }
-        let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
-        session.pending -= 1;
-        match result {
-            Ok(reply) => {
-                if let Some(motor) = motor {
-                    session.answered(line, motor);
-                }
-                match configures {
-                    Some(Configures { segment, registers }) => {
-                        session.segments.insert((line, segment), registers);
-                        session.answer(id, message::Answer::Command { bytes: Vec::new() });
-                    }
-                    None => session.answer(id, answer(reply)),
-                }
-            }
-            Err(error) => {
-                let code = error.code().map(u8::from);
-                session.refuse_with(id, reason(&error), error.to_string(), code);
-            }
-        }
-    }
-
-    /// Answers from before a failure of the line are not confirmed any more.
-    fn told_of(&mut self, line: usize, motor: Motor, result: &CommandResult) {
-        let is_failure = result.as_ref().is_err_and(|error| match error {
-            CommandError::Line(error) => error.is_line_failure(),
-            _ => false,
-        });
-        if is_failure && let Some(held) = self.lines.get(&line) {
-            self.doubt(line, held.lane(motor));
-        }
-    }
-
-    fn doubt(&mut self, line: usize, motor: Option<Motor>) {
-        self.sessions.values_mut().for_each(|session| session.doubt(line, motor));
-    }
-
-    /// Whose the motor is after a command.
-    fn command_ended(
-        &mut self,
-        session: SessionId,
-        line: usize,
-        motor: Motor,
-        motion: Motion,
-        result: &CommandResult,
-    ) {
-        let Some(held) = self.lines.get_mut(&line) else { return };
-        if let Some(at) = held.starting.iter().position(|it| *it == (motor, session)) {
-            held.starting.remove(at);
-        }
-        match (motion, result) {
-            (Motion::Stops, Ok(_)) => held.stopped(motor),
-            (Motion::Starts, result) => {
-                // The owner stays if the start was refused.
-                if result.as_ref().err().is_none_or(may_be_executed) {
-                    // A stop that is under way is not ended by an earlier start.
-                    if held.unstopped.remove(&motor).is_some() {
-                        held.unconfirmed.remove(&motor);
-                    }
-                    held.owners.insert(motor, session);
-                }
-                self.stop_if_orphaned(line, motor);
-            }
-            (Motion::Stops, Err(error)) if may_be_executed(error) => {
-                let name = self.sessions.get(&session).and_then(|session| session.name.clone());
-                held.unstopped.insert(motor, name.unwrap_or_else(|| "share".into()));
-                held.unconfirmed.insert(motor);
-            }
-            (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
-        }
-    }
-
     /// Repeats a stop that was not confirmed. A motor of a program that left is stopped, too.
     fn stop_again(&mut self, line: usize, motor: Motor) {
         let by = self.lines.get_mut(&line).and_then(|held| held.unstopped.remove(&motor));
@@ -555,8 +322,9 @@ impl Hub {
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
         held.unconfirmed.insert(motor);
+        held.unstopped.remove(&motor);
+        held.stops += 1;
         let is_precaution = of_all && held.is_unheard(motor);
-        held.precautions += usize::from(is_precaution);
         let asker = Arc::clone(by);
         let ended = move |result| {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });
@@ -588,15 +356,6 @@ impl Hub {
             wake();
         }
     }
-}
-
-fn answer(reply: Reply) -> message::Answer {
-    let bytes = match reply {
-        Reply::St(payload) => payload,
-        Reply::Rmd(bytes) => bytes.to_vec(),
-        Reply::Confirmed => Vec::new(),
-    };
-    message::Answer::Command { bytes }
 }
 
 impl From<Ended> for CommandError {

@@ -202,10 +202,11 @@ impl Session {
         self.samples.pop_front()
     }
 
-    /// Waits for several parts of an answer.
-    pub(super) fn gather(&mut self, id: u32, missing: usize) -> Part {
+    /// Waits for several parts of an answer. `stopped` is known.
+    pub(super) fn gather(&mut self, id: u32, missing: usize, stopped: Vec<StoppedMotor>) -> Part {
         self.last_part += 1;
-        self.gathering.insert(self.last_part, Gathering { id, missing, ..Gathering::default() });
+        let gathering = Gathering { id, missing, stopped, ..Gathering::default() };
+        self.gathering.insert(self.last_part, gathering);
         self.last_part
     }
 

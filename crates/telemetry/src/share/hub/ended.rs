@@ -1,0 +1,216 @@
+//! What an engine has carried out: answers, and whose motors are whose after it.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::Hub;
+use super::line::{AGAIN, Address, Configures, Held, Motion};
+use super::place::SessionId;
+use super::reasons::{may_be_executed, reason};
+use super::work::{Done, Sent, Work};
+use crate::acquisition::Rate;
+use crate::event::CommandError;
+use crate::line::Reply;
+use crate::runner::CommandResult;
+use crate::share::message::{self, MotorName, Reason, SignalName, SignalRate};
+use crate::signal::Motor;
+
+/// Why answers are not confirmed.
+const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after the last \
+    confirmation: the answers so far may be those to other commands; ask again";
+
+impl Hub {
+    pub(super) fn finish(&mut self, Done { session, id, line, name, what }: Done) {
+        match what {
+            Work::Command(sent, result) => self.command_over(session, id, line, sent, result),
+            Work::Confirm { motor, result } => {
+                self.told_of(line, motor, &result);
+                // What the engine found before it answered.
+                let _ = self.collect_events();
+                let lane = self.lines.get(&line).and_then(|held| held.lane(motor));
+                let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+                session.pending -= 1;
+                match result {
+                    Ok(_) if session.confirmed(line, lane) => {
+                        session.answer(id, message::Answer::Confirm);
+                    }
+                    Ok(_) => session.refuse(id, Reason::Unconfirmed, UNCONFIRMED),
+                    Err(error) => {
+                        // Without an answer of the drive the doubts stay until they are told.
+                        if reason(&error) == Reason::Unconfirmed {
+                            session.confirmed(line, lane);
+                        }
+                        session.refuse(id, reason(&error), error.to_string());
+                    }
+                }
+            }
+            Work::Stop { part, motor, by, is_precaution, result } => {
+                self.stop_ended(line, motor, by, &result);
+                // A line that was closed meanwhile is one that fails.
+                let address = self
+                    .lines
+                    .get_mut(&line)
+                    .map_or(Address::Motor { is_absent: is_precaution }, |held| {
+                        held.after_stop(motor, is_precaution, &result)
+                    });
+                let Some((part, session)) = part.zip(self.sessions.get_mut(&session)) else {
+                    return;
+                };
+                let motor = MotorName { line: name.to_string(), motor: motor.number() };
+                match address {
+                    Address::Unanswered => session.unanswered(part, motor.line),
+                    Address::Empty => session.left_out(part, &motor.line),
+                    Address::Motor { is_absent } => {
+                        let failure = result.err().map(|error| error.to_string());
+                        session.stopped(part, motor, failure, is_absent);
+                    }
+                }
+            }
+            Work::Unheard(part, motor) => {
+                let Some(session) = self.sessions.get_mut(&session) else { return };
+                session.unheard(part, MotorName { line: name.to_string(), motor: motor.number() });
+            }
+            Work::Rates(part, rates) => {
+                let Some(session) = self.sessions.get_mut(&session) else { return };
+                let named = |rate: Rate| SignalRate {
+                    signal: SignalName {
+                        line: name.to_string(),
+                        motor: rate.signal.motor.number(),
+                        name: rate.signal.source.to_string(),
+                    },
+                    asked: rate.asked.0 as f64 / 1e6,
+                    predicted: rate.predicted.0 as f64 / 1e6,
+                    achieved: rate.achieved,
+                };
+                session.rates(part, rates.into_iter().map(named).collect());
+            }
+        }
+    }
+
+    /// A stop is over. If the motor did not confirm it, it is repeated.
+    fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        let is_there = held.is_there(motor);
+        match result {
+            Ok(_) => held.stopped(motor),
+            Err(error) if may_be_executed(error) => {
+                held.unstopped.insert(motor, by);
+                held.unconfirmed.insert(motor);
+            }
+            Err(_) => held.ended(motor, false, result),
+        }
+        // The end of these is an event.
+        let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
+        if is_there && result.is_err() && !is_event {
+            self.again.insert((line, motor), Instant::now() + AGAIN);
+        }
+    }
+
+    fn command_over(
+        &mut self,
+        session: SessionId,
+        id: Option<u32>,
+        line: usize,
+        sent: Sent,
+        result: CommandResult,
+    ) {
+        let Sent { motor, motion, moves, configures } = sent;
+        if let Some(motor) = motor {
+            if let Some(held) = self.lines.get_mut(&line) {
+                held.ended(motor, moves, &result);
+            }
+            self.command_ended(session, line, motor, motion, &result);
+            let is_owed = |held: &Held| held.unstopped.contains_key(&motor);
+            if result.is_ok() && self.lines.get(&line).is_some_and(is_owed) {
+                self.stop_again(line, motor);
+            }
+            self.told_of(line, motor, &result);
+        }
+        let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
+        session.pending -= 1;
+        match result {
+            Ok(reply) => {
+                if let Some(motor) = motor {
+                    session.answered(line, motor);
+                }
+                match configures {
+                    Some(Configures { segment, registers }) => {
+                        session.segments.insert((line, segment), registers);
+                        session.answer(id, message::Answer::Command { bytes: Vec::new() });
+                    }
+                    None => session.answer(id, answer(reply)),
+                }
+            }
+            Err(error) => {
+                let code = error.code().map(u8::from);
+                session.refuse_with(id, reason(&error), error.to_string(), code);
+            }
+        }
+    }
+
+    /// Answers from before a failure of the line are not confirmed any more.
+    fn told_of(&mut self, line: usize, motor: Motor, result: &CommandResult) {
+        let is_failure = result.as_ref().is_err_and(|error| match error {
+            CommandError::Line(error) => error.is_line_failure(),
+            _ => false,
+        });
+        if is_failure && let Some(held) = self.lines.get(&line) {
+            self.doubt(line, held.lane(motor));
+        }
+    }
+
+    pub(super) fn doubt(&mut self, line: usize, motor: Option<Motor>) {
+        self.sessions.values_mut().for_each(|session| session.doubt(line, motor));
+    }
+
+    /// Whose the motor is after a command.
+    fn command_ended(
+        &mut self,
+        session: SessionId,
+        line: usize,
+        motor: Motor,
+        motion: Motion,
+        result: &CommandResult,
+    ) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        if let Some(at) = held.starting.iter().position(|it| *it == (motor, session)) {
+            held.starting.remove(at);
+        }
+        match (motion, result) {
+            (Motion::Stops, Ok(_)) => held.stopped(motor),
+            (Motion::Starts, result) => {
+                // The owner stays if the start was refused.
+                if result.as_ref().err().is_none_or(may_be_executed) {
+                    held.owners.insert(motor, session);
+                }
+                let mut all = None;
+                if result.is_ok() {
+                    // A stop that is under way is not ended by an earlier start.
+                    if held.unstopped.remove(&motor).is_some() {
+                        held.unconfirmed.remove(&motor);
+                    }
+                    all = held.take_unanswered_stop();
+                }
+                if let Some(by) = all {
+                    self.stop_line(line, Some(motor), &by);
+                }
+                self.stop_if_orphaned(line, motor);
+            }
+            (Motion::Stops, Err(error)) if may_be_executed(error) => {
+                let name = self.sessions.get(&session).and_then(|session| session.name.clone());
+                held.unstopped.insert(motor, name.unwrap_or_else(|| "share".into()));
+                held.unconfirmed.insert(motor);
+            }
+            (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
+        }
+    }
+}
+
+fn answer(reply: Reply) -> message::Answer {
+    let bytes = match reply {
+        Reply::St(payload) => payload,
+        Reply::Rmd(bytes) => bytes.to_vec(),
+        Reply::Confirmed => Vec::new(),
+    };
+    message::Answer::Command { bytes }
+}

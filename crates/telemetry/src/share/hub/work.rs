@@ -1,0 +1,56 @@
+//! What engines and jobs carry out for programs.
+
+use std::sync::Arc;
+
+use super::jobs::JobId;
+use super::line::{Configures, Motion};
+use super::place::SessionId;
+use super::session::Part;
+use crate::acquisition::Rate;
+use crate::runner::CommandResult;
+use crate::signal::Motor;
+
+/// Something that has ended in another thread.
+pub(super) enum News {
+    Engine(Done),
+    Job(JobId),
+}
+
+/// Something that an engine has finished.
+pub(super) struct Done {
+    pub(super) session: SessionId,
+    /// The request; `None` for what nobody asked for.
+    pub(super) id: Option<u32>,
+    pub(super) line: usize,
+    /// The name of the line, which may be closed.
+    pub(super) name: Arc<str>,
+    pub(super) what: Work,
+}
+
+pub(super) enum Work {
+    Command(Sent, CommandResult),
+    Confirm {
+        motor: Motor,
+        result: CommandResult,
+    },
+    Stop {
+        part: Option<Part>,
+        motor: Motor,
+        by: Arc<str>,
+        is_precaution: bool,
+        result: CommandResult,
+    },
+    /// A motor that should stop has never answered.
+    Unheard(Part, Motor),
+    Rates(Part, Vec<Rate>),
+}
+
+/// A command that was handed to an engine.
+pub(super) struct Sent {
+    /// `None`: it is about the drive.
+    pub(super) motor: Option<Motor>,
+    pub(super) motion: Motion,
+    /// Whether the motor may turn after it.
+    pub(super) moves: bool,
+    pub(super) configures: Option<Configures>,
+}

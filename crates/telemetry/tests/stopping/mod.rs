@@ -1,0 +1,138 @@
+//! Stops on lines that are cut, and motors that turned before the share began.
+#![allow(dead_code, reason = "each test uses a part")]
+
+use std::collections::BTreeMap;
+use std::os::fd::BorrowedFd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
+use motorlink_proto::st::{Command, Frame, MAX_FRAME, Ramp, Request};
+use motorlink_telemetry::share::message::*;
+
+use crate::asking::Asker;
+use crate::shared::{LIMIT, Share};
+
+/// RMD motors have this time for a reply. Most of the stops here wait for it several times.
+pub const SHORT: Duration = Duration::from_millis(500);
+
+/// GET_REG of STATUS.
+pub const READ_STATUS: [u8; 2] = [2, 2];
+/// EXECUTE_CMD START_MOTOR.
+pub const START: [u8; 2] = [3, 1];
+
+/// A line that can be cut.
+pub struct Cable {
+    pub link: Box<dyn EventBytes>,
+    pub is_cut: Arc<AtomicBool>,
+}
+
+impl Link for Cable {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
+impl ByteLink for Cable {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        if self.is_cut.load(Ordering::SeqCst) { Ok(()) } else { self.link.write(bytes) }
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.link.read(buffer, timeout)
+    }
+}
+
+impl Evented for Cable {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.link.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.link.flush()
+    }
+}
+
+/// Sends a request to motor 2 as a program that had the port before the share, and awaits the reply.
+fn before_the_share(link: &mut dyn EventBytes, request: Request<'_>) {
+    let mut bytes = [0; MAX_FRAME];
+    link.write(Frame::command(2, &request, &mut bytes).unwrap()).unwrap();
+    while link.flush().unwrap() {}
+    // The acknowledge has no payload.
+    let mut reply = 0;
+    while reply < 3 {
+        reply += link.read(&mut bytes, Some(LIMIT)).unwrap();
+    }
+}
+
+/// Turns motor 2 as a program that had the port before the share.
+pub fn turn_before_the_share(link: &mut dyn EventBytes) {
+    before_the_share(link, Request::SetRamp(Ramp { speed_rpm: 1000, duration_ms: 100 }));
+    before_the_share(link, Request::ExecuteCommand(Command::StartMotor));
+}
+
+/// A share whose motor 2 on st0 turns already, and the cable of st0, which is cut by `true`.
+pub fn share_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
+    let is_cut = Arc::new(AtomicBool::new(false));
+    let cut = Arc::clone(&is_cut);
+    let share = Share::with(name, SHORT, move |mut link| {
+        turn_before_the_share(&mut *link);
+        is_cut.store(begins_cut, Ordering::SeqCst);
+        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+    });
+    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    (share, cut)
+}
+
+/// Stops all motors: whether each of some confirmed, may turn or is absent. The share also stops the motors
+/// that no program has used.
+pub fn stop_all_of(
+    program: &mut Asker,
+    line: &str,
+    numbers: &[u8],
+) -> BTreeMap<(String, u8), &'static str> {
+    let mut all = stop_all(program);
+    all.retain(|(of, motor), _| of == line && numbers.contains(motor));
+    all
+}
+
+/// Stops all motors: whether each confirmed, may turn or is absent.
+pub fn stop_all(program: &mut Asker) -> BTreeMap<(String, u8), &'static str> {
+    let Ok(Answer::Stop { motors }) = program.ask(Ask::Stop { motor: None }) else { panic!() };
+    let taken = |one: &StoppedMotor| match (&one.failure, one.absent) {
+        (None, false) => "confirmed",
+        (Some(_), true) => "absent",
+        (Some(_), false) => "may turn",
+        (None, true) => panic!("{one:?}"),
+    };
+    motors.iter().map(|one| ((one.motor.line.clone(), one.motor.motor), taken(one))).collect()
+}
+
+/// The motors of a line that have answered, and those that have not confirmed their last stop.
+pub fn heard_and_unstopped(program: &mut Asker, line: &str) -> (Vec<u8>, Vec<u8>) {
+    let line = program.lines().into_iter().find(|one| one.line == line).unwrap();
+    (line.heard, line.unstopped)
+}
+
+pub fn motors(line: &str, all: &[(u8, &'static str)]) -> BTreeMap<(String, u8), &'static str> {
+    all.iter().map(|(motor, how)| ((line.to_owned(), *motor), *how)).collect()
+}
+
+/// Waits until this is so.
+pub fn eventually(mut is: impl FnMut() -> bool) {
+    let end = Instant::now() + LIMIT;
+    while !is() {
+        assert!(Instant::now() < end, "it never is");
+    }
+}
+
+/// How many stops of a motor are on the wire of st0.
+pub fn stops(program: &mut Asker, motor: u8) -> usize {
+    let (from, to, after) = (Some(0.0), None, None);
+    let ask = Ask::Frames { line: "st0".to_owned(), from, to, after, most: 1000 };
+    let Ok(Answer::Frames { frames, .. }) = program.ask(ask) else { panic!() };
+    let is_stop =
+        |frame: &&WireFrame| frame.motor == Some(motor) && frame.words.contains("STOP_MOTOR");
+    frames.iter().filter(is_stop).count()
+}
