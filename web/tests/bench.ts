@@ -70,6 +70,9 @@ export function endWithTests(child: ChildProcess, end: (child: ChildProcess) => 
   child.on('exit', () => process.off('exit', endIt));
 }
 
+/** States of an ST drive on the way to RUN. */
+const STARTING = /ALIGN|START|CHARGE|CALIB|CLEAR|SWITCH/;
+
 interface Port {
   motors: Record<string, unknown>[];
 }
@@ -161,10 +164,11 @@ export class Bench {
     return found;
   }
 
-  /** Its speed, rpm or °/s. */
+  /** Its speed without sign, rpm or °/s. NaN while it starts: the alignment swings the rotor to and fro. */
   async speed(line: 'st' | 'rmd', motor: number) {
     const truth = await this.truth(line, motor);
-    return Number(truth[line === 'st' ? 'speed_rpm' : 'speed_dps']);
+    if (line === 'rmd') return Math.abs(Number(truth['speed_dps']));
+    return STARTING.test(String(truth['status'])) ? NaN : Math.abs(Number(truth['speed_rpm']));
   }
 
   async end() {

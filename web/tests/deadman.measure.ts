@@ -117,7 +117,7 @@ async function run({ protocol = 'st', guarded = false, event, from }: Case) {
     // A page that gets no time for its signs of life turns nothing, or not for long.
     if (!(await spin(page, speed, motor).then(() => true, () => false))) return null;
     const late = performance.now() + 5_000;
-    while ((await bench.speed(protocol, 1)) < speed / 2) {
+    while (!((await bench.speed(protocol, 1)) >= speed / 2)) {
       if (performance.now() > late) return null;
     }
     const happens = await event(all);
