@@ -282,9 +282,10 @@ impl Contents {
             self.kinds.iter().map(|(kind, count)| (kind.clone(), (*count).into())).collect();
         add("events", kinds.into());
         add("attachments", recording.attachments().collect());
-        let gaps = gaps(recording).map(
-            |(motor, seconds)| json!({ "motor": motor, "seconds": seconds.parse::<f64>().ok() }),
-        );
+        let gaps = gaps(recording).filter_map(|(motor, seconds)| {
+            let seconds: f64 = seconds.parse().ok()?;
+            Some(json!({ "motor": motor, "seconds": seconds }))
+        });
         add("gaps", gaps.collect());
         let count = |loss| self.lost(loss).map_or(0, |(count, _)| count).into();
         add("lost_messages", count(Loss::Messages));

@@ -7,13 +7,13 @@ use std::time;
 use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
-use super::Hub;
 use super::feed::Feed;
 use super::line::{self, AGAIN, Held, Motion};
 use super::place::SessionId;
 use super::reasons::reason;
 use super::session::Session;
 use super::work::{Sent, Work};
+use super::{Hub, Why};
 use crate::acquisition::Acquisition;
 use crate::event::CommandError;
 use crate::line::{Request, may_move};
@@ -365,6 +365,7 @@ impl Hub {
             }
         };
         let of_all = motor.is_none();
+        let why = if of_all { Why::OfAll } else { Why::Asked };
         let unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
         if awaited.is_empty() {
             return Ok(Some(Answer::Stop { motors: unreached }));
@@ -383,10 +384,10 @@ impl Hub {
                 // If the engine has ended, the stop fails, too.
                 let _ = held.remote().post(task);
             }
-            self.stop_of(of_all, line, motor, session, Some(part), name);
+            self.stop(why, line, motor, session, Some(part), name);
         }
         for (line, motor) in others {
-            self.stop_of(of_all, line, motor, session, None, name);
+            self.stop(why, line, motor, session, None, name);
         }
         Ok(None)
     }

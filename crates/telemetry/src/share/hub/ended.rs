@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::Hub;
 use super::line::{AGAIN, Address, Configures, Held, Motion};
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
 use super::work::{Done, Sent, Work};
+use super::{Hub, Why};
 use crate::acquisition::Rate;
 use crate::event::CommandError;
 use crate::line::Reply;
@@ -122,7 +122,7 @@ impl Hub {
             self.command_ended(session, line, motor, motion, &result);
             let is_owed = |held: &Held| held.unstopped.contains_key(&motor);
             if result.is_ok() && self.lines.get(&line).is_some_and(is_owed) {
-                self.stop_again(line, motor);
+                self.stop_again(line, motor, Why::Asked);
             }
             self.told_of(line, motor, &result);
         }
@@ -194,7 +194,7 @@ impl Hub {
                 if let Some(by) = all {
                     self.stop_line(line, Some(motor), &by);
                 }
-                self.stop_if_orphaned(line, motor);
+                self.stop_if_orphaned(line, motor, Why::Asked);
             }
             (Motion::Stops, Err(error)) if may_be_executed(error) => {
                 let name = self.sessions.get(&session).and_then(|session| session.name.clone());

@@ -62,8 +62,8 @@ pub struct Held {
     moved: BTreeSet<Motor>,
     /// Numbers for which the drive says that it has no such motor.
     absent: BTreeSet<Motor>,
-    /// How many stops are under way.
-    pub(super) stops: usize,
+    /// How many stops of a motor are under way.
+    pub(super) stops: BTreeMap<Motor, usize>,
     /// A stop of all motors that is repeated until something on the line answers.
     unanswered_stop: Option<UnansweredStop>,
     /// The motors whose last stop failed, and who asked for it. It is repeated when they answer anything.
@@ -133,7 +133,7 @@ impl Held {
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
             absent: BTreeSet::new(),
-            stops: 0,
+            stops: BTreeMap::new(),
             unanswered_stop: None,
             unstopped: BTreeMap::new(),
             unconfirmed: BTreeSet::new(),
@@ -245,7 +245,10 @@ impl Held {
         is_precaution: bool,
         result: &CommandResult,
     ) -> Address {
-        self.stops -= 1;
+        if let Some(stops) = self.stops.get_mut(&motor) {
+            *stops -= 1;
+        }
+        self.stops.retain(|_, stops| *stops > 0);
         if is_precaution && result.is_err() {
             if !self.has_answered() {
                 return Address::Unanswered;
@@ -270,7 +273,7 @@ impl Held {
     pub(super) fn due_stop(&mut self, now: time::Instant) -> Option<Arc<str>> {
         let has_answered = self.has_answered();
         let stop = self.unanswered_stop.as_mut()?;
-        if self.stops > 0 || !has_answered && now < stop.next {
+        if !self.stops.is_empty() || !has_answered && now < stop.next {
             return None;
         }
         stop.next = now + AGAIN;

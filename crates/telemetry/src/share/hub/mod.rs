@@ -63,6 +63,16 @@ pub struct Hub {
     wake: Arc<dyn Fn() + Send + Sync>,
 }
 
+/// Why a motor is stopped.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Why {
+    Asked,
+    /// It is one of all that the lines can have.
+    OfAll,
+    /// It did not confirm an earlier stop: those of other motors go first.
+    Repeated,
+}
+
 impl Hub {
     /// Holds these lines. `share` is the name of this program. `wake` is called from other threads when
     /// [`advance`](Self::advance) should be called.
@@ -123,7 +133,7 @@ impl Hub {
                 if let Some((why, held)) = why.zip(self.lines.get_mut(&line)) {
                     held.words.explain(motor, &by, why);
                 }
-                self.stop(line, motor, id, None, &by);
+                self.stop(Why::Asked, line, motor, id, None, &by);
             }
         }
     }
@@ -194,7 +204,7 @@ impl Hub {
             self.again.iter().filter(|(_, at)| **at <= now).map(|(place, _)| *place).collect();
         for (line, motor) in due {
             self.again.remove(&(line, motor));
-            self.stop_again(line, motor);
+            self.stop_again(line, motor, Why::Repeated);
         }
         for line in self.numbers() {
             if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
@@ -208,7 +218,7 @@ impl Hub {
         let Some(held) = self.lines.get(&line) else { return };
         let motors: Vec<Motor> = held.stoppable().filter(|motor| Some(*motor) != but).collect();
         for motor in motors {
-            self.stop_of(true, line, motor, SessionId::default(), None, by);
+            self.stop(Why::OfAll, line, motor, SessionId::default(), None, by);
         }
     }
 
@@ -223,7 +233,7 @@ impl Hub {
             }
             events.into_iter().for_each(|event| self.publish(event));
             for motor in retry {
-                self.stop_again(line, motor);
+                self.stop_again(line, motor, Why::Asked);
             }
         }
         Ok(())
@@ -279,39 +289,31 @@ impl Hub {
     }
 
     /// Repeats a stop that was not confirmed. A motor of a program that left is stopped, too.
-    fn stop_again(&mut self, line: usize, motor: Motor) {
-        let by = self.lines.get_mut(&line).and_then(|held| held.unstopped.remove(&motor));
-        match by {
-            Some(by) => self.stop(line, motor, SessionId::default(), None, &by),
-            None => self.stop_if_orphaned(line, motor),
+    fn stop_again(&mut self, line: usize, motor: Motor, why: Why) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        // One that is under way has another try if it fails.
+        if held.stops.contains_key(&motor) {
+            return;
+        }
+        match held.unstopped.remove(&motor) {
+            Some(by) => self.stop(why, line, motor, SessionId::default(), None, &by),
+            None => self.stop_if_orphaned(line, motor, why),
         }
     }
 
-    fn stop_if_orphaned(&mut self, line: usize, motor: Motor) {
+    fn stop_if_orphaned(&mut self, line: usize, motor: Motor, why: Why) {
         let Some(owner) = self.lines.get(&line).and_then(|held| held.owners.get(&motor)) else {
             return;
         };
         if !self.sessions.contains_key(owner) {
             let owner = *owner;
-            self.stop(line, motor, owner, None, &"share".into());
+            self.stop(why, line, motor, owner, None, &"share".into());
         }
     }
 
     fn stop(
         &mut self,
-        line: usize,
-        motor: Motor,
-        session: SessionId,
-        part: Option<Part>,
-        by: &Arc<str>,
-    ) {
-        self.stop_of(false, line, motor, session, part, by);
-    }
-
-    /// Stops a motor. `of_all`: it is one of all that the lines can have.
-    fn stop_of(
-        &mut self,
-        of_all: bool,
+        why: Why,
         line: usize,
         motor: Motor,
         session: SessionId,
@@ -323,13 +325,13 @@ impl Hub {
         held.interrupt(motor);
         held.unconfirmed.insert(motor);
         held.unstopped.remove(&motor);
-        held.stops += 1;
-        let is_precaution = of_all && held.is_unheard(motor);
+        *held.stops.entry(motor).or_default() += 1;
+        let is_precaution = why == Why::OfAll && held.is_unheard(motor);
         let asker = Arc::clone(by);
         let ended = move |result| {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });
         };
-        let begun = match is_precaution {
+        let begun = match is_precaution || why == Why::Repeated {
             false => held.remote().stop_then(by, line::stop(motor), ended),
             true => held.remote().stop_as_precaution_then(by, line::stop(motor), ended),
         };
