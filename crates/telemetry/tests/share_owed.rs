@@ -5,13 +5,15 @@ mod drives;
 mod shared;
 mod stopping;
 
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use asking::{Asker, command};
 use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
-    READ_STATUS, START, eventually, heard_and_unstopped, motors, share_of_a_turning_motor,
+    Cable, READ_STATUS, START, eventually, heard_and_unstopped, motors, share_of_a_turning_motor,
     stop_all_of, stops,
 };
 
@@ -52,6 +54,27 @@ fn a_motor_that_had_never_answered_is_stopped_when_it_does() {
     cut.store(false, Ordering::SeqCst);
     eventually(|| program.ask(command("st0", 2, &READ_STATUS)).is_ok());
     stands(&share);
+}
+
+#[test]
+fn motors_that_are_silent_do_not_keep_each_other_from_an_end() {
+    let cut = Arc::new(AtomicBool::new(false));
+    let is_cut = Arc::clone(&cut);
+    let share = Share::with("owed-both", Duration::from_secs(1), move |link| {
+        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+    });
+    let mut program = Asker::join(&share.path, "stops");
+    for motor in [1, 2] {
+        program.ask(command("st0", motor, &READ_STATUS)).unwrap();
+    }
+    cut.store(true, Ordering::SeqCst);
+    // The stops of the first answer are repeated meanwhile.
+    for _ in 0..2 {
+        let stopped = stop_all_of(&mut program, "st0", &[1, 2]);
+        assert_eq!(stopped, motors("st0", &[(1, "may turn"), (2, "may turn")]));
+    }
+    cut.store(false, Ordering::SeqCst);
+    eventually(|| heard_and_unstopped(&mut program, "st0").1.is_empty());
 }
 
 #[test]

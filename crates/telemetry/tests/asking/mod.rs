@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::time::Instant;
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
@@ -43,7 +44,10 @@ impl Asker {
     }
 
     pub fn end_of(&mut self, id: u32) -> Result<Answer, Refusal> {
+        // Events may come without an end.
+        let end = Instant::now() + LIMIT;
         loop {
+            assert!(Instant::now() < end, "no answer to request {id}");
             if let Some(at) = self.ended.iter().position(|ended| ended.id == id) {
                 return self.ended.remove(at).unwrap().result;
             }
