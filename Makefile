@@ -57,7 +57,7 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --release --locked -p motorlink-cli -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 25 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
@@ -73,7 +73,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## 5 min: tests in Rust
+unit: ## 8 min: tests in Rust
 	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
@@ -83,7 +83,7 @@ python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, exa
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 5 min: the program against independent clients
+e2e: $(VENV)/ready ## 9 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -91,7 +91,7 @@ e2e: $(VENV)/ready ## 5 min: the program against independent clients
 web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size
 
-browser: web ## 8 min: the monitor in Debian's Chromium, on simulated drives
+browser: web ## 6 min: the monitor in Debian's Chromium, on simulated drives
 	$(if $(AGAIN),,rm -f web/test-results/.last-run.json)
 	-@tests/install browser
 	$(PROGRAM)
@@ -106,13 +106,13 @@ miri: ## 3 min: proto and the C face without undefined behaviour
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
-firmware-test: $(VENV)/ready ## 4 min: boards in QEMU against the conformance kit and hosts
+firmware-test: $(VENV)/ready ## 6 min: boards in QEMU against the conformance kit and hosts
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
 # The fuzz targets are a workspace of their own with the same dependencies.
 FUZZ_TARGET := --target-dir $(DEBUG)/..
-lint: ## 2 min: format, clippy, rustdoc: no warning
+lint: ## 6 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
