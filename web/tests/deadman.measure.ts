@@ -1,6 +1,6 @@
 // How long a motor keeps turning after what moved it is gone: `make deadman`, docs/BENCHMARKS.md.
 import { test } from '@playwright/test';
-import { Bench, Program, spin } from './bench';
+import { Bench, Program, spin, STILL } from './bench';
 import { Chromium } from './chromium';
 import { Network, Wire } from './network';
 import { type Cell, publish, quantile, row, table } from './report';
@@ -15,8 +15,6 @@ const KINDS = {
   // Motor stop, in the text of slcan.
   rmd: { served: 'slcan-pty:', port: 'slcan:', motor: 'rmd0/1', speed: 600, stop: Buffer.from('t141881') },
 };
-/** Below this a motor stands still, rpm or °/s. */
-const STILL = 5;
 
 /** What one run has: simulated drives, a wire that is watched, a server, a network, a browser. */
 interface World {
@@ -127,7 +125,7 @@ async function run({ protocol = 'st', guarded = false, event, from }: Case) {
     const patience = at + 20_000;
     let still: number | null = null;
     while (still === null && performance.now() < patience) {
-      if (Math.abs(await bench.speed(protocol, 1)) < STILL) still = performance.now() - at;
+      if ((await bench.speed(protocol, 1)) < STILL) still = performance.now() - at;
     }
     const stop = wire.when(wanted, at);
     return { stop: stop === undefined ? null : stop - at, still };

@@ -4,7 +4,7 @@ mod asking;
 mod drives;
 mod shared;
 
-use asking::{Asker, command};
+use asking::{Asker, close, command, open};
 use drives::served;
 use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
@@ -23,14 +23,6 @@ fn a_line_counts_its_exchanges_and_what_went_wrong() {
     let after = counts(&mut program);
     assert!(after.exchanges >= before.exchanges + 2, "{before:?} {after:?}");
     assert_eq!((after.refused, after.silent, after.failed, after.lost), (1, 0, 0, 0));
-}
-
-fn open(port: &str, protocol: Protocol) -> Ask {
-    Ask::Open { port: port.to_owned(), protocol, profile: None, timeout: Some(5.0) }
-}
-
-fn close(line: &str) -> Ask {
-    Ask::Close { line: line.to_owned() }
 }
 
 fn opened(answer: Result<Answer, Refusal>) -> String {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use asking::{Asker, command};
+use asking::{Asker, close, command, open};
 use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
@@ -108,14 +108,6 @@ fn motion_that_is_refused_does_not_end_a_stop_where_nothing_has_answered() {
     stands(&share);
 }
 
-fn open(port: &str) -> Ask {
-    Ask::Open { port: port.to_owned(), protocol: Protocol::St, profile: None, timeout: Some(5.0) }
-}
-
-fn close(line: &str) -> Ask {
-    Ask::Close { line: line.to_owned() }
-}
-
 /// The port of st0.
 fn port(program: &mut Asker) -> String {
     program.lines()[0].port.clone()
@@ -129,7 +121,7 @@ fn a_port_that_is_opened_under_a_latch_has_its_motors_stopped() {
     program.ask(close("st0")).unwrap();
     program.ask(Ask::Latch).unwrap();
     cut.store(false, Ordering::SeqCst);
-    program.ask(open(&port)).unwrap();
+    program.ask(open(&port, Protocol::St)).unwrap();
     stands(&share);
 }
 
@@ -142,7 +134,7 @@ fn a_stop_of_a_port_that_was_closed_is_sent_when_it_is_opened() {
     assert_eq!(stopped, motors("st0", &[(ANY_MOTOR, "may turn")]));
     program.ask(close("st0")).unwrap();
     cut.store(false, Ordering::SeqCst);
-    program.ask(open(&port)).unwrap();
+    program.ask(open(&port, Protocol::St)).unwrap();
     stands(&share);
 }
 
@@ -165,6 +157,6 @@ fn a_stop_of_all_names_a_port_that_is_being_closed() {
     let Ok(Answer::Close { motors }) = program.end_of(closing) else { panic!() };
     assert!(motors[0].failure.is_some(), "{motors:?}");
     cut.store(false, Ordering::SeqCst);
-    other.ask(open(&port)).unwrap();
+    other.ask(open(&port, Protocol::St)).unwrap();
     stands(&share);
 }

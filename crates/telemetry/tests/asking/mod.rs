@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
-use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Line, Text};
+use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Line, Protocol, Text};
 
 use crate::shared::LIMIT;
 
@@ -90,6 +90,15 @@ impl Asker {
             }
         }
     }
+}
+
+/// Opens a port whose drives have a long time for a reply.
+pub fn open(port: &str, protocol: Protocol) -> Ask {
+    Ask::Open { port: port.to_owned(), protocol, profile: None, timeout: Some(5.0) }
+}
+
+pub fn close(line: &str) -> Ask {
+    Ask::Close { line: line.to_owned() }
 }
 
 /// A command of a program that is patient.

@@ -19,7 +19,7 @@ pub(super) enum News {
 /// Something that an engine has finished.
 pub(super) struct Done {
     pub(super) session: SessionId,
-    /// The request; `None` for what nobody asked for.
+    /// The request; `None`: no program asked for it.
     pub(super) id: Option<u32>,
     pub(super) line: usize,
     /// The name of the line, which may be closed.
