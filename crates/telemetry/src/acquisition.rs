@@ -477,7 +477,8 @@ impl Acquisition {
         match (shows, verdict) {
             (Shows::Match, _) => {
                 self.confirmed.insert(lane, sent);
-                self.tell_each(lane, |motor| What::Confirmed(motor, sent));
+                let is_answer = result.as_ref().err().is_none_or(LineError::is_answer);
+                self.tell_each(lane, |motor| What::Confirmed { motor, until: sent, is_answer });
             }
             // The reason of a failed poll comes first.
             (Shows::Nothing, _) | (Shows::Doubt, Some(Verdict::Poll(_))) => {}

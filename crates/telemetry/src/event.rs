@@ -38,7 +38,14 @@ pub enum What {
     /// those of other signals.
     Doubtful(Motor, Instant),
     /// The values of this motor up to this moment belong to their signals.
-    Confirmed(Motor, Instant),
+    Confirmed {
+        /// The motor.
+        motor: Motor,
+        /// The moment.
+        until: Instant,
+        /// Whether its drive answered. Silence shows it, too, where a shifted reply would have come.
+        is_answer: bool,
+    },
     /// A command was sent.
     Commanded(CommandId, Arc<str>, Request),
     /// A stop was asked for.

@@ -85,7 +85,7 @@ fn four_motors_are_read_at_100_hz_without_a_gap() {
         assert_eq!((rate.asked, rate.predicted), (CENTISECOND, CENTISECOND));
         assert!((rate.achieved - 100.0).abs() < 1.5, "{}", rate.achieved);
     }
-    assert!(got.events().all(|what| matches!(what, What::Confirmed(..))));
+    assert!(got.events().all(|what| matches!(what, What::Confirmed { .. })));
 }
 
 #[test]
@@ -209,7 +209,7 @@ fn name(what: &What) -> &'static str {
         What::Answers(_) => "Answers",
         What::Refused(..) => "Refused",
         What::Doubtful(..) => "Doubtful",
-        What::Confirmed(..) => "Confirmed",
+        What::Confirmed { .. } => "Confirmed",
         What::Commanded(..) => "Commanded",
         What::Stopping(..) => "Stopping",
         What::Stopped(_) => "Stopped",
@@ -269,7 +269,8 @@ fn an_absent_motor_is_said_once_and_slows_no_other() {
     let got = Got::of(&subscription);
     assert!(got.values(wanted[0]).len() >= 998, "{}", got.values(wanted[0]).len());
     assert!(got.values(wanted[1]).is_empty());
-    let silent: Vec<_> = got.events().filter(|what| !matches!(what, What::Confirmed(..))).collect();
+    let silent: Vec<_> =
+        got.events().filter(|what| !matches!(what, What::Confirmed { .. })).collect();
     assert!(
         matches!(silent[..], [What::Unanswered(first, _), What::Silent(motor, _)]
             if [first, motor] == [&rmd(9); 2]),

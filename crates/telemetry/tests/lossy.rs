@@ -139,7 +139,7 @@ fn judged(mut engine: Engine, constants: &[Constant], line: &str) -> (usize, usi
                     doubts += 1;
                     open.retain(|(at, _)| *at <= since);
                 }
-                What::Confirmed(_, until) => {
+                What::Confirmed { until, .. } => {
                     let mut is_right = |(at, right): &(Instant, bool)| *at > until || *right;
                     assert!(open.iter().all(&mut is_right), "{line}: {event:?}");
                     let before = open.len();

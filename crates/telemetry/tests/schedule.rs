@@ -456,6 +456,28 @@ fn precautions_on_a_silent_line_give_way_to_a_stop_and_end_soon() {
 }
 
 #[test]
+fn a_stop_that_is_asked_again_and_again_leaves_others_their_turn() {
+    let sent = RefCell::default();
+    let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
+    let (first, _) = line.schedule.stop(line.now, Lane(0), "first", |_| true);
+    let mut again = line.schedule.stop(line.now, Lane(0), "again", |_| true).0;
+    for _ in 0..200 {
+        line.run(SECOND / 10);
+        if line.at(&Event::Over(Verdict::StopFailed(again))).is_some() {
+            again = line.schedule.stop(line.now, Lane(0), "again", |_| true).0;
+        }
+    }
+    let failed = line.at(&Event::Over(Verdict::StopFailed(first)));
+    drop(line);
+    let firsts: Vec<_> =
+        sent.borrow().iter().filter(|(_, name)| *name == "first").map(|(at, _)| *at).collect();
+    assert_eq!(firsts.len(), 4, "{firsts:?}");
+    // Each waits for one exchange of the other, and once for the first one of a stop that comes anew.
+    assert!(firsts.windows(2).all(|it| it[1].since(it[0]).0 <= 3 * SECOND + 100_000), "{firsts:?}");
+    assert!(failed.is_some_and(|at| at.0 < 10 * SECOND), "{failed:?}");
+}
+
+#[test]
 fn a_precaution_is_repeated_until_it_is_confirmed() {
     let (sent, mut lost) = (RefCell::default(), 10);
     let mut line = Line::new(

@@ -13,8 +13,8 @@ use asking::{Asker, close, command, open};
 use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
-    Cable, READ_STATUS, START, eventually, heard_and_unstopped, motors, share_of_a_turning_motor,
-    stop_all_of, stops,
+    Cable, READ_STATUS, START, eventually, heard_and_unstopped, motors, read,
+    share_of_a_turning_motor, stop_all_of, stops,
 };
 
 fn stands(share: &Share) {
@@ -64,9 +64,9 @@ fn motors_that_are_silent_do_not_keep_each_other_from_an_end() {
         Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
     });
     let mut program = Asker::join(&share.path, "stops");
-    for motor in [1, 2] {
-        program.ask(command("st0", motor, &READ_STATUS)).unwrap();
-    }
+    // Their silence is no answer.
+    program.ask(read("st0", &[1, 2])).unwrap();
+    eventually(|| heard_and_unstopped(&mut program, "st0").0 == [1, 2]);
     cut.store(true, Ordering::SeqCst);
     // The stops of the first answer are repeated meanwhile.
     for _ in 0..2 {
@@ -75,6 +75,20 @@ fn motors_that_are_silent_do_not_keep_each_other_from_an_end() {
     }
     cut.store(false, Ordering::SeqCst);
     eventually(|| heard_and_unstopped(&mut program, "st0").1.is_empty());
+}
+
+#[test]
+fn a_motor_that_is_read_and_has_never_answered_is_not_heard() {
+    let (share, _cut) = share_of_a_turning_motor("owed-unheard", true);
+    let mut program = Asker::join(&share.path, "reads");
+    program.ask(read("st0", &[2])).unwrap();
+    program.ask(read("rmd0", &[9])).unwrap();
+    for _ in 0..2 {
+        program.event(Happening::Silent);
+    }
+    for line in ["st0", "rmd0"] {
+        assert!(heard_and_unstopped(&mut program, line).0.is_empty(), "{line}");
+    }
 }
 
 #[test]

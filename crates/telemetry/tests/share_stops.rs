@@ -97,6 +97,8 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
         let stopped = stop_all_of(&mut program, "st0", &[1, 5]);
         assert_eq!(stopped, motors("st0", &[(1, "may turn"), (5, "absent")]));
     }
+    let absent = stops(&mut program, 5);
+    assert!(absent <= 3, "{absent} stops to a number that the drive does not have");
     assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
     let mut other = Asker::join(&share.path, "comes later");
     assert_eq!(heard_and_unstopped(&mut other, "st0"), (vec![1], vec![1]));

@@ -57,7 +57,7 @@ fn motor_of(what: &What) -> Option<Motor> {
         | What::Silent(motor, _)
         | What::Answers(motor)
         | What::Doubtful(motor, _)
-        | What::Confirmed(motor, _) => Some(*motor),
+        | What::Confirmed { motor, .. } => Some(*motor),
         What::Refused(signals, _) => signals.first().map(|signal| signal.motor),
         _ => None,
     }

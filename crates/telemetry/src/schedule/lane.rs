@@ -116,22 +116,26 @@ impl<C: Clone> LaneState<C> {
         Some(begun)
     }
 
-    /// What was never sent goes first.
+    /// What was never sent goes first. Then each has its turn.
     fn due_stop(&self, now: Instant) -> Option<usize> {
-        let is_first_due = || self.stops.front().is_some_and(|stop| stop.not_before <= now);
-        self.unsent_stop().or_else(|| is_first_due().then_some(0))
+        let is_due = |(_, stop): &(_, &Stop<C>)| stop.not_before <= now;
+        self.unsent_stop().or_else(|| self.first_stops().find(is_due).map(|(at, _)| at))
     }
 
     fn unsent_stop(&self) -> Option<usize> {
+        self.first_stops().find(|(_, stop)| stop.attempts == 0).map(|(at, _)| at)
+    }
+
+    /// The stops, and where they are. Precautions wait until there are no others.
+    fn first_stops(&self) -> impl Iterator<Item = (usize, &Stop<C>)> {
         let has_others = self.stops.iter().any(|stop| !stop.is_precaution);
-        let is_next = |stop: &Stop<C>| stop.attempts == 0 && !(stop.is_precaution && has_others);
-        self.stops.iter().position(is_next)
+        self.stops.iter().enumerate().filter(move |(_, stop)| !(stop.is_precaution && has_others))
     }
 
     /// When a stop is repeated.
     pub(super) fn next_retry(&self) -> Option<Instant> {
-        let stop = self.stops.front().filter(|_| self.under_way.is_none())?;
-        Some(stop.not_before)
+        let stops = self.first_stops().filter(|_| self.under_way.is_none());
+        stops.map(|(_, stop)| stop.not_before).min()
     }
 
     /// Whether a stop waits that may begin at this time.
@@ -275,7 +279,7 @@ impl<C: Clone> LaneState<C> {
             Outcome::Failed | Outcome::Closed => {}
         }
         stop.not_before = now + STOP_PAUSE;
-        self.stops.push_front(stop);
+        self.stops.push_back(stop);
         Verdict::StopAgain(id)
     }
 }

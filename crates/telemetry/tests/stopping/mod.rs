@@ -119,6 +119,15 @@ pub fn motors(line: &str, all: &[(u8, &'static str)]) -> BTreeMap<(String, u8), 
     all.iter().map(|(motor, how)| ((line.to_owned(), *motor), *how)).collect()
 }
 
+/// Reads a value of motors without an end.
+pub fn read(line: &str, motors: &[u8]) -> Ask {
+    let name = if line.starts_with("st") { "STATUS" } else { "temperature_celsius" };
+    let signal =
+        |motor: &u8| SignalName { line: line.to_owned(), motor: *motor, name: name.to_owned() };
+    let signals = motors.iter().map(signal).collect();
+    Ask::Subscribe { signals, period: 0.05, queue: 100, drop: DropRule::Oldest, rows: true }
+}
+
 /// Waits until this is so.
 pub fn eventually(mut is: impl FnMut() -> bool) {
     let end = Instant::now() + LIMIT;

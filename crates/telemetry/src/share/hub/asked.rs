@@ -11,7 +11,7 @@ use super::feed::Feed;
 use super::line::{self, AGAIN, Held, Motion};
 use super::place::SessionId;
 use super::reasons::reason;
-use super::session::Session;
+use super::session::{NO_MOTOR, Session};
 use super::work::{Sent, Work};
 use super::{Hub, Why};
 use crate::acquisition::Acquisition;
@@ -374,7 +374,12 @@ impl Hub {
         let part = asker.gather(id, awaited.len(), unreached);
         for (line, motor) in awaited {
             let held = &self.lines[&line];
-            if of_all && held.has_answered() && !held.may_turn(motor) {
+            if of_all && held.is_absent(motor) {
+                let name = MotorName { line: held.name.clone(), motor: motor.number() };
+                if let Some(asker) = self.sessions.get_mut(&session) {
+                    asker.unheard(part, name, NO_MOTOR);
+                }
+            } else if of_all && held.has_answered() && !held.may_turn(motor) {
                 let tell = self.teller(session, None, line);
                 let task = move |engine: &mut Acquisition| {
                     if !engine.has_answered(&line::stop(motor)) {

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::line::{AGAIN, Address, Configures, Held, Motion};
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
+use super::session::UNHEARD;
 use super::work::{Done, Sent, Work};
 use super::{Hub, Why};
 use crate::acquisition::Rate;
@@ -68,7 +69,8 @@ impl Hub {
             }
             Work::Unheard(part, motor) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
-                session.unheard(part, MotorName { line: name.to_string(), motor: motor.number() });
+                let motor = MotorName { line: name.to_string(), motor: motor.number() };
+                session.unheard(part, motor, UNHEARD);
             }
             Work::Rates(part, rates) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };

@@ -238,6 +238,11 @@ impl Held {
         !is_turned && !is_known && !self.heard.contains(&motor)
     }
 
+    /// Whether its stop is a precaution: there may be no such motor.
+    pub(super) fn is_doubtful(&self, motor: Motor) -> bool {
+        self.is_unheard(motor) || self.is_absent(motor)
+    }
+
     /// A stop of the motor is over.
     pub(super) fn after_stop(
         &mut self,
@@ -372,7 +377,7 @@ impl Held {
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
-                What::Confirmed(motor, _) => {
+                What::Confirmed { motor, is_answer: true, .. } => {
                     self.heard.insert(*motor);
                     retry.extend(self.unstopped.contains_key(motor).then_some(*motor));
                 }

@@ -326,7 +326,7 @@ impl Hub {
         held.unconfirmed.insert(motor);
         held.unstopped.remove(&motor);
         *held.stops.entry(motor).or_default() += 1;
-        let is_precaution = why == Why::OfAll && held.is_unheard(motor);
+        let is_precaution = why == Why::OfAll && held.is_doubtful(motor);
         let asker = Arc::clone(by);
         let ended = move |result| {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });

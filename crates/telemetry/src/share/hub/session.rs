@@ -66,8 +66,8 @@ struct Gathering {
     id: u32,
     missing: usize,
     stopped: Vec<StoppedMotor>,
-    /// Motors whose part is missing, and that have never answered.
-    unheard: BTreeSet<MotorName>,
+    /// Motors whose part is missing and that may not exist, and why.
+    unheard: BTreeMap<MotorName, &'static str>,
     /// Lines on which nothing has ever answered.
     unanswered: BTreeSet<String>,
     rates: Option<Vec<SignalRate>>,
@@ -76,8 +76,11 @@ struct Gathering {
 /// What is said of a line on which nothing has ever answered.
 const UNANSWERED: &str = "nothing on this line has answered since it was opened; motors that were turned \
     before may keep turning; the stop is repeated until something answers";
-/// What is said of a motor that is not waited for.
-const UNHEARD: &str = "it has never answered; it is unknown whether it received the stop";
+/// What is said of motors that are not waited for.
+pub(super) const NO_MOTOR: &str =
+    "the drive says that it has no such motor; it is sent a stop, too";
+pub(super) const UNHEARD: &str =
+    "it has never answered; it is unknown whether it received the stop";
 
 impl Session {
     pub(super) fn answer(&mut self, id: u32, answer: Answer) {
@@ -222,9 +225,9 @@ impl Session {
             if failure.is_none() {
                 gathering.unanswered.remove(&motor.line);
             }
-            let is_unheard = gathering.unheard.remove(&motor);
-            let absent = failure.is_some() && (is_absent || is_unheard);
-            let failure = failure.map(|why| if is_unheard { UNHEARD.to_owned() } else { why });
+            let unheard = gathering.unheard.remove(&motor);
+            let absent = failure.is_some() && (is_absent || unheard.is_some());
+            let failure = failure.map(|why| unheard.map_or(why, str::to_owned));
             gathering.stopped.push(StoppedMotor { motor, failure, absent });
             gathering.missing -= 1;
             self.gathered(part);
@@ -249,10 +252,10 @@ impl Session {
         }
     }
 
-    /// A motor that should stop has never answered. The answer for the others does not wait for it.
-    pub(super) fn unheard(&mut self, part: Part, motor: MotorName) {
+    /// There may be no such motor to stop, and why. The answer for the others does not wait for it.
+    pub(super) fn unheard(&mut self, part: Part, motor: MotorName, why: &'static str) {
         if let Some(gathering) = self.gathering.get_mut(&part) {
-            gathering.unheard.insert(motor);
+            gathering.unheard.insert(motor, why);
             self.gathered(part);
         }
     }
@@ -280,8 +283,8 @@ impl Session {
             return;
         };
         self.pending -= 1;
-        stopped.extend(unheard.into_iter().map(|motor| {
-            let failure = Some(UNHEARD.to_owned());
+        stopped.extend(unheard.into_iter().map(|(motor, why)| {
+            let failure = Some(why.to_owned());
             StoppedMotor { motor, failure, absent: true }
         }));
         stopped.extend(unanswered.into_iter().map(|line| {
