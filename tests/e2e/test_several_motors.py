@@ -11,7 +11,7 @@ def on_a_bus(sim):
 @pytest.fixture(name="rmd")
 def on_its_port(run, bench):
     port = bench.port("slcan")
-    return lambda *words: run("rmd", "-p", port, "--timeout", "500ms", *words)
+    return lambda *words: run("rmd", "-p", port, "--timeout", "1s", *words)
 
 
 def modes(bench):
@@ -137,7 +137,7 @@ def test_a_move_that_fails_is_the_last_and_the_motors_before_it_are_stopped(run,
     config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 10\n")
     bus = sim(config, st=())
     words = ("--id", "1,9,10", "position", 90, "--max-speed", 720, "--wait")
-    done = run("rmd", "-p", bus.port("slcan"), "--timeout", "500ms", *words).ended(3)
+    done = run("rmd", "-p", bus.port("slcan"), "--timeout", "1s", *words).ended(3)
     assert "motor 9 does not answer" in done.err and "motor 1 was stopped" in done.err
     assert [bus.motor(number)["mode"] for number in (1, 10)] == ["stopped", "off"]
 

@@ -18,7 +18,7 @@ def rmd(run, sim):
 
     def rmd(*words, geared=False):
         gear = ("--gear-ratio", RATIO) if geared else ()
-        return run("rmd", "-p", port, "--timeout", "500ms", *gear, *words)
+        return run("rmd", "-p", port, "--timeout", "1s", *gear, *words)
 
     return rmd
 
