@@ -52,6 +52,7 @@ beforeEach(async () => {
       },
     },
     lastWelcome: signal({ deadline: 300 }),
+    lines: signal([{ line: 'st0' }, { line: 'rmd0' }]),
     motors: signal(new Map([['st0', [1, 2]], ['rmd0', [1, 2]]])),
     ask: (ask: { ask: string }) =>
       welcome.value
@@ -204,6 +205,18 @@ describe('stop all', () => {
     asked[2]!.done({ motors: [{ line: 'rmd0', motor: 2, failure: 'no reply', absent: true }] });
     await pass(0);
     expect(report().message).toContain('rmd0/2 did not confirm: it may still be turning');
+  });
+
+  it('tells a line that never answered from a port that is being opened', async () => {
+    stop.stopAll();
+    const silent = { line: 'st0', motor: 0, failure: 'nothing on this line has answered' };
+    const port = { line: '/dev/ttyUSB0', motor: 0, failure: 'page 2 opens it at this moment' };
+    asked[0]!.done({ motors: [silent, port, { line: 'rmd0', motor: 1 }] });
+    await pass(0);
+    expect(report().message).toBe(
+      'Nothing has ever answered on st0: motors there may be turning. ' +
+        '/dev/ttyUSB0 is being opened or closed: motors there may be turning. 1 of 1 motors confirmed.',
+    );
   });
 
   it('says that the server is not reachable, whether that fails or hangs', async () => {

@@ -1,7 +1,7 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
 import { signal } from '@preact/signals';
 import { nameOf } from './format';
-import { Refused, ask, entries, held, lastWelcome, latchedBy, motors, sayAlive, shareLost, state, welcome } from './link';
+import { Refused, ask, entries, held, lastWelcome, latchedBy, lines, motors, sayAlive, shareLost, state, welcome } from './link';
 import type { StoppedMotor } from './wire';
 
 export interface StopReport {
@@ -154,7 +154,11 @@ function confirmed({ known, others }: Answered): StopReport {
     failure && !(motor === 0 ? [...later].some((name) => name.startsWith(`${line}/`)) : later.has(nameOf(line, motor)));
   const open = known.filter(isOpen);
   const failures = open.filter(({ motor }) => motor !== 0);
-  const silent = open.filter(({ motor }) => motor === 0).map(({ line }) => line);
+  const whole = open.filter(({ motor }) => motor === 0).map(({ line }) => line);
+  const isLine = (name: string) => lines.value.some(({ line }) => line === name);
+  const silent = whole.filter(isLine);
+  // They have no line yet, or no more.
+  const ports = whole.filter((name) => !isLine(name));
   const all = known.filter(({ motor }) => motor !== 0).length;
   const addresses = others === 1 ? 'address' : 'addresses';
   const note = others ? { note: `The stop also went to ${others} ${addresses} where no motor was found.` } : {};
@@ -164,6 +168,7 @@ function confirmed({ known, others }: Answered): StopReport {
     const sentences = [
       ...(names.length ? [`${named(names)} did not confirm: ${turning} still be turning.`] : []),
       ...(silent.length ? [`Nothing has ever answered on ${named(silent)}: motors there may be turning.`] : []),
+      ...(ports.length ? [`${named(ports)} is being opened or closed: motors there may be turning.`] : []),
       `${all - failures.length} of ${all} motors confirmed.`,
     ];
     return {
