@@ -19,7 +19,7 @@ use crate::event::{CommandError, Event, What};
 use crate::line::{Line, LineError, Over, Reply, Request, Shows, Stopped, may_move};
 use crate::plan::{Poll, Wants};
 use crate::schedule::{
-    CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Schedule, Verdict,
+    CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Quiet, Schedule, Verdict,
 };
 use crate::signal::{Motor, Signal};
 use crate::subscription::{Consumer, Subscription};
@@ -62,8 +62,10 @@ pub struct Acquisition {
     consumers: BTreeMap<ConsumerId, Consumer>,
     /// Events that are told once the stops that they are about have gone out.
     untold: Vec<Arc<Event>>,
-    /// The stops as a precaution that no drive has confirmed. They are told once a drive confirms them.
-    precautions: BTreeMap<CommandId, (Arc<str>, Request)>,
+    /// The quiet stops that no drive has confirmed. They are told once a drive confirms them.
+    untold_stops: BTreeMap<CommandId, (Arc<str>, Request)>,
+    /// The motors that were read since an exchange of their lane had no answer.
+    answering: BTreeSet<Motor>,
     last_consumer: u64,
     tally: Tally,
     /// Who stopped the motors.
@@ -141,7 +143,8 @@ impl Acquisition {
             last_poll: 0,
             consumers: BTreeMap::new(),
             untold: Vec::new(),
-            precautions: BTreeMap::new(),
+            untold_stops: BTreeMap::new(),
+            answering: BTreeSet::new(),
             last_consumer: 0,
             tally: Tally::default(),
             latch: None,
@@ -241,7 +244,8 @@ impl Acquisition {
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
         let keep =
             |queued: &Arc<Command>| !may_move(&queued.request) || is_other(queued.request.motor());
-        let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), keep);
+        let is_same = |queued: &Arc<Command>| queued.request == request;
+        let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), is_same, keep);
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
         }
@@ -250,15 +254,17 @@ impl Acquisition {
         id
     }
 
-    /// Stops a motor of which nothing is known, in case that it exists: behind all other stops. Events
-    /// tell of it only if the motor confirms it. It withdraws no commands.
-    pub fn stop_as_precaution(&mut self, by: &Arc<str>, request: Request) -> CommandId {
+    /// Stops a motor that nobody asks to stop now: it gives way to other stops. Events tell of it only if
+    /// the motor confirms it. It withdraws no commands.
+    pub fn stop_quietly(&mut self, by: &Arc<str>, request: Request, quiet: Quiet) -> CommandId {
         let lane = self.line.lane(&request);
         let told = (Arc::clone(by), request.clone());
+        let is_same = |queued: &Arc<Command>| queued.request == told.1;
         let by = Arc::clone(by);
         let command = Arc::new(Command { by, request, is_stop: true, deadline: None });
-        let id = self.schedule.stop_as_precaution(self.clock.now(), lane, command);
-        self.precautions.insert(id, told);
+        let now = self.clock.now();
+        let id = self.schedule.stop_quietly(now, lane, command, is_same, quiet);
+        self.untold_stops.insert(id, told);
         id
     }
 
@@ -467,6 +473,11 @@ impl Acquisition {
             Err(error) if !error.is_answer() => Outcome::Failed,
             Err(_) => Outcome::Refused,
         };
+        if matches!(outcome, Outcome::Failed | Outcome::GivenUp) {
+            for motor in self.motors(over.lane) {
+                self.answering.remove(&motor);
+            }
+        }
         let verdict = self.schedule.ended(at, over.lane, outcome);
         Finished { over, at, verdict }
     }
@@ -474,11 +485,10 @@ impl Acquisition {
     /// Tells those who wait for an exchange how it ended.
     fn pass_on(&mut self, finished: Finished, ended: &mut Ended<'_>) {
         let Finished { over: Over { lane, result, sent, shows }, at, verdict } = finished;
-        match (shows, verdict) {
+        match (shows, &verdict) {
             (Shows::Match, _) => {
                 self.confirmed.insert(lane, sent);
-                let is_answer = result.as_ref().err().is_none_or(LineError::is_answer);
-                self.tell_each(lane, |motor| What::Confirmed { motor, until: sent, is_answer });
+                self.tell_each(lane, |motor| What::Confirmed(motor, sent));
             }
             // The reason of a failed poll comes first.
             (Shows::Nothing, _) | (Shows::Doubt, Some(Verdict::Poll(_))) => {}
@@ -492,21 +502,26 @@ impl Acquisition {
                 }
             }
             Some(Verdict::Command(id)) => ended(id, result.map_err(CommandError::Line)),
-            Some(Verdict::Stopped(id)) => {
-                if let Some((by, request)) = self.precautions.remove(&id) {
-                    self.tell(What::Stopping(id, by, request));
-                }
-                self.tell(What::Stopped(id));
-                ended(id, result.map_err(CommandError::Line));
-            }
-            Some(Verdict::StopFailed(id)) => {
+            Some(Verdict::Stopped(ids)) => {
                 let result = result.map_err(CommandError::Line);
-                if let Err(error) = &result {
-                    self.stop_failed(id, error);
+                for id in ids {
+                    if let Some((by, request)) = self.untold_stops.remove(&id) {
+                        self.tell(What::Stopping(id, by, request));
+                    }
+                    self.tell(What::Stopped(id));
+                    ended(id, result.clone());
                 }
-                ended(id, result);
             }
-            Some(Verdict::StopAgain(_) | Verdict::Recovered) | None => {}
+            Some(Verdict::StopFailed(ids)) => {
+                let result = result.map_err(CommandError::Line);
+                for id in ids {
+                    if let Err(error) = &result {
+                        self.stop_failed(id, error);
+                    }
+                    ended(id, result.clone());
+                }
+            }
+            Some(Verdict::StopAgain | Verdict::Recovered) | None => {}
         }
     }
 
@@ -520,7 +535,7 @@ impl Acquisition {
     }
 
     fn stop_failed(&mut self, id: CommandId, why: &CommandError) {
-        if self.precautions.remove(&id).is_none() {
+        if self.untold_stops.remove(&id).is_none() {
             self.tell(What::StopFailed(id, Arc::new(why.clone())));
         }
     }
@@ -529,19 +544,22 @@ impl Acquisition {
     fn closed(&mut self, why: LineError, ended: &mut Ended<'_>) -> Option<Duration> {
         let now = self.clock.now();
         self.is_open = false;
+        self.answering.clear();
         self.tally.lost();
         // It may be another drive after that.
         self.derivations.iter_mut().for_each(|it| it.forget(|_| true));
         for (_, verdict) in self.schedule.closed(now) {
             match verdict {
                 Verdict::Command(id) => ended(id, Err(CommandError::Closed)),
-                Verdict::StopFailed(id) => {
-                    self.stop_failed(id, &CommandError::Closed);
-                    ended(id, Err(CommandError::Closed));
+                Verdict::StopFailed(ids) => {
+                    for id in ids {
+                        self.stop_failed(id, &CommandError::Closed);
+                        ended(id, Err(CommandError::Closed));
+                    }
                 }
                 Verdict::Poll(_)
                 | Verdict::Stopped(_)
-                | Verdict::StopAgain(_)
+                | Verdict::StopAgain
                 | Verdict::Recovered => {}
             }
         }

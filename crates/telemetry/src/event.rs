@@ -31,6 +31,8 @@ pub enum What {
     Silent(Motor, Arc<LineError>),
     /// A silent motor answers again.
     Answers(Motor),
+    /// A motor was read: for the first time, or since something on its line had no answer.
+    Heard(Motor),
     /// The drive refuses to give signals, or their values are not plausible. Said once, until they
     /// come.
     Refused(Vec<Signal>, Arc<LineError>),
@@ -38,14 +40,7 @@ pub enum What {
     /// those of other signals.
     Doubtful(Motor, Instant),
     /// The values of this motor up to this moment belong to their signals.
-    Confirmed {
-        /// The motor.
-        motor: Motor,
-        /// The moment.
-        until: Instant,
-        /// Whether its drive answered. Silence shows it, too, where a shifted reply would have come.
-        is_answer: bool,
-    },
+    Confirmed(Motor, Instant),
     /// A command was sent.
     Commanded(CommandId, Arc<str>, Request),
     /// A stop was asked for.

@@ -150,7 +150,7 @@ impl Rows {
 
     fn event(&mut self, event: &Event) {
         match &event.what {
-            What::Confirmed { motor, until, .. } => drop(self.confirmed.insert(*motor, *until)),
+            What::Confirmed(motor, until) => drop(self.confirmed.insert(*motor, *until)),
             What::Doubtful(motor, since) if self.has(*motor) => {
                 self.partial = None;
                 let unconfirmed = self.drop_unconfirmed(|row| {
@@ -294,7 +294,7 @@ mod tests {
     }
 
     fn confirmed(until: u64) -> Record {
-        event(until, What::Confirmed { motor: motor(), until: Instant(until), is_answer: true })
+        event(until, What::Confirmed(motor(), Instant(until)))
     }
 
     fn trouble() -> Arc<LineError> {

@@ -18,7 +18,7 @@ use crate::acquisition::{Acquisition, ConsumerId, Rate};
 use crate::event::CommandError;
 use crate::line::{Reply, Request, Stopped};
 use crate::plan::Wants;
-use crate::schedule::CommandId;
+use crate::schedule::{CommandId, Quiet};
 use crate::subscription::{Full, Subscription};
 
 /// The result of a command or a stop.
@@ -256,19 +256,20 @@ impl Remote {
         })
     }
 
-    /// As [`stop_then`](Self::stop_then), with [`Acquisition::stop_as_precaution`].
+    /// As [`stop_then`](Self::stop_then), with [`Acquisition::stop_quietly`].
     ///
     /// # Errors
     /// The engine has ended. If it ends later, `ended` receives that it has.
-    pub fn stop_as_precaution_then(
+    pub fn stop_quietly_then(
         &self,
         by: &Arc<str>,
         request: Request,
+        quiet: Quiet,
         ended: impl FnOnce(CommandResult) + Send + 'static,
     ) -> Result<(), Ended> {
         let by = Arc::clone(by);
         self.send(move |Engine { acquisition, waiting }| {
-            let id = acquisition.stop_as_precaution(&by, request);
+            let id = acquisition.stop_quietly(&by, request, quiet);
             waiting.insert(id, Box::new(ended));
         })
     }

@@ -85,7 +85,9 @@ fn four_motors_are_read_at_100_hz_without_a_gap() {
         assert_eq!((rate.asked, rate.predicted), (CENTISECOND, CENTISECOND));
         assert!((rate.achieved - 100.0).abs() < 1.5, "{}", rate.achieved);
     }
-    assert!(got.events().all(|what| matches!(what, What::Confirmed { .. })));
+    assert!(got.events().all(is_good));
+    let heard = got.events().filter(|what| matches!(what, What::Heard(_))).count();
+    assert_eq!(heard, 4);
 }
 
 #[test]
@@ -200,6 +202,11 @@ fn a_motor_is_commanded_watched_and_stopped() {
     assert!(told.ends_with(&["Released"]), "{told:?}");
 }
 
+/// What a good line tells.
+fn is_good(what: &What) -> bool {
+    matches!(what, What::Heard(_) | What::Confirmed(..))
+}
+
 fn name(what: &What) -> &'static str {
     match what {
         What::Lost(_) => "Lost",
@@ -207,9 +214,10 @@ fn name(what: &What) -> &'static str {
         What::Unanswered(..) => "Unanswered",
         What::Silent(..) => "Silent",
         What::Answers(_) => "Answers",
+        What::Heard(_) => "Heard",
         What::Refused(..) => "Refused",
         What::Doubtful(..) => "Doubtful",
-        What::Confirmed { .. } => "Confirmed",
+        What::Confirmed(..) => "Confirmed",
         What::Commanded(..) => "Commanded",
         What::Stopping(..) => "Stopping",
         What::Stopped(_) => "Stopped",
@@ -269,8 +277,7 @@ fn an_absent_motor_is_said_once_and_slows_no_other() {
     let got = Got::of(&subscription);
     assert!(got.values(wanted[0]).len() >= 998, "{}", got.values(wanted[0]).len());
     assert!(got.values(wanted[1]).is_empty());
-    let silent: Vec<_> =
-        got.events().filter(|what| !matches!(what, What::Confirmed { .. })).collect();
+    let silent: Vec<_> = got.events().filter(|what| !is_good(what)).collect();
     assert!(
         matches!(silent[..], [What::Unanswered(first, _), What::Silent(motor, _)]
             if [first, motor] == [&rmd(9); 2]),

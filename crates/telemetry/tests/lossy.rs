@@ -139,14 +139,18 @@ fn judged(mut engine: Engine, constants: &[Constant], line: &str) -> (usize, usi
                     doubts += 1;
                     open.retain(|(at, _)| *at <= since);
                 }
-                What::Confirmed { until, .. } => {
+                What::Confirmed(_, until) => {
                     let mut is_right = |(at, right): &(Instant, bool)| *at > until || *right;
                     assert!(open.iter().all(&mut is_right), "{line}: {event:?}");
                     let before = open.len();
                     open.retain(|(at, _)| *at > until);
                     confirmed += before - open.len();
                 }
-                What::Unanswered(..) | What::Silent(..) | What::Answers(_) | What::Refused(..) => {}
+                What::Unanswered(..)
+                | What::Silent(..)
+                | What::Answers(_)
+                | What::Heard(_)
+                | What::Refused(..) => {}
                 _ => panic!("{event:?}"),
             },
             Record::Lost(_) => panic!("the queue is long enough"),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::schedule::{
-    CommandId, Displaced, Job, Lane, LineRules, Next, Outcome, PollId, Schedule, Verdict,
+    CommandId, Displaced, Job, Lane, LineRules, Next, Outcome, PollId, Quiet, Schedule, Verdict,
 };
 use proptest::prelude::*;
 
@@ -321,7 +321,7 @@ fn a_stop_overtakes_commands_and_waits_for_one_exchange() {
         line.events.clear();
         let asked = line.now;
         let keep = |name: &&str| *name == "gain";
-        let (id, overtaken) = line.schedule.stop(line.now, Lane(0), "stop", keep);
+        let (id, overtaken) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), keep);
         assert_eq!(overtaken.iter().map(|(_, name)| *name).collect::<Vec<_>>(), ["start"]);
         line.run(50 * MILLISECOND);
         let begun = line.at(&Event::Stop(None)).unwrap();
@@ -330,7 +330,7 @@ fn a_stop_overtakes_commands_and_waits_for_one_exchange() {
             *at <= begun && matches!(event, Event::Poll(..) | Event::Command(_))
         });
         assert_eq!(before.count(), 0);
-        assert!(line.at(&Event::Over(Verdict::Stopped(id))).is_some());
+        assert!(line.at(&Event::Over(Verdict::Stopped(vec![id]))).is_some());
         assert!(line.at(&Event::Command("gain")).is_some());
         assert_eq!(line.at(&Event::Command("start")), None);
     }
@@ -343,7 +343,7 @@ fn a_stop_on_a_bus_replaces_the_exchange_of_its_motor() {
     line.command(2, "start", SECOND);
     line.run(1_000);
     for lane in [0, 2] {
-        line.schedule.stop(line.now, Lane(lane), "stop", |_| false);
+        line.schedule.stop(line.now, Lane(lane), "stop", is("stop"), |_| false);
     }
     line.run(1_000);
     let stops: Vec<_> = line
@@ -370,11 +370,11 @@ fn a_stop_is_repeated_until_it_is_confirmed() {
             let outcome = if asked > lost { Outcome::Answered } else { Outcome::Failed };
             (Micros(1_000), outcome)
         });
-        let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", |_| false);
+        let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| false);
         line.run(10 * SECOND);
         let sent = line.events.iter().filter(|(_, _, event)| *event == Event::Stop(None)).count();
-        let confirmed = line.at(&Event::Over(Verdict::Stopped(id)));
-        (sent, confirmed, line.at(&Event::Over(Verdict::StopFailed(id))))
+        let confirmed = line.at(&Event::Over(Verdict::Stopped(vec![id])));
+        (sent, confirmed, line.at(&Event::Over(Verdict::StopFailed(vec![id]))))
     };
     assert_eq!(stops(0), (1, Some(Instant(1_000)), None));
     assert_eq!(stops(10), (11, Some(Instant(11_000 + 10 * 10_000)), None));
@@ -384,6 +384,11 @@ fn a_stop_is_repeated_until_it_is_confirmed() {
         failed.is_some_and(|at| (2 * SECOND..2 * SECOND + 20_000).contains(&at.0)),
         "{failed:?}"
     );
+}
+
+/// Whether a stop is the same as this one.
+fn is(name: &'static str) -> impl Fn(&&'static str) -> bool {
+    move |other| *other == name
 }
 
 /// The stops that begin: when, and which.
@@ -415,66 +420,85 @@ fn stops_go_ahead_of_precautions_on_every_lane() {
             }),
         );
         let lanes = if rules.window == 1 { [0, 0, 0] } else { [1, 2, 3] };
-        for lane in &lanes[..2] {
-            line.schedule.stop_as_precaution(line.now, Lane(*lane), "other");
+        for (lane, name) in lanes.into_iter().zip(["first", "second"]) {
+            let (lane, quiet) = (Lane(lane), Quiet::Precaution);
+            line.schedule.stop_quietly(line.now, lane, name, is(name), quiet);
         }
-        line.schedule.stop(line.now, Lane(lanes[2]), "known", |_| true);
+        line.schedule.stop(line.now, Lane(lanes[2]), "known", is("known"), |_| true);
         line.run(SECOND);
         drop(line);
         let names: Vec<_> = sent.borrow().iter().map(|(_, name)| *name).collect();
-        let expected = match rules.window {
-            1 => ["known", "known", "known", "known", "other", "other"],
-            _ => ["known", "other", "other", "known", "known", "known"],
-        };
-        assert_eq!(names, expected);
+        assert_eq!(names, ["known", "first", "second", "known", "known", "known"]);
     }
 }
 
 #[test]
-fn precautions_on_a_silent_line_give_way_to_a_stop_and_end_soon() {
-    for pressed in (SECOND..12 * SECOND).step_by(300_000) {
+fn quiet_stops_on_a_silent_line_give_way_to_others_and_have_their_turns() {
+    const QUIET: [&str; 4] = ["a", "b", "c", "d"];
+    for quiet in [Quiet::Again, Quiet::Precaution] {
+        for pressed in (SECOND..12 * SECOND).step_by(300_000) {
+            let sent = RefCell::default();
+            let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
+            line.schedule.stop(line.now, Lane(0), "known", is("known"), |_| true);
+            for name in QUIET {
+                line.schedule.stop_quietly(line.now, Lane(0), name, is(name), quiet);
+            }
+            line.run(pressed);
+            line.schedule.stop(line.now, Lane(0), "new", is("new"), |_| true);
+            line.run(30 * SECOND);
+            assert_eq!(line.schedule.next(line.now), Next::Wait(None), "{pressed}");
+            drop(line);
+            let sent = sent.into_inner();
+            let at = sent.iter().position(|(_, name)| *name == "new").unwrap();
+            let is_quiet = QUIET.contains(&sent[at - 1].1);
+            // Any other exchange continues until its timeout.
+            let longest = if is_quiet { 100_000 } else { SECOND };
+            assert!(sent[at].0.0 - pressed <= longest, "{pressed}: {sent:?}");
+            let count = |wanted| sent.iter().filter(|(_, name)| *name == wanted).count();
+            assert_eq!((count("known"), count("new")), (4, 4), "{pressed}: {sent:?}");
+            // Each is sent before the others are over.
+            let last = sent.iter().rposition(|(_, name)| ["known", "new"].contains(name)).unwrap();
+            for name in QUIET {
+                assert!(sent[..last].iter().any(|(_, it)| *it == name), "{pressed}: {sent:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stop_that_is_pressed_without_an_end_leaves_others_their_turns_and_ends_for_each() {
+    for quiet in [None, Some(Quiet::Again), Some(Quiet::Precaution)] {
         let sent = RefCell::default();
         let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
-        line.schedule.stop(line.now, Lane(0), "known", |_| true);
-        for _ in 0..6 {
-            line.schedule.stop_as_precaution(line.now, Lane(0), "other");
+        let (now, owed) = (line.now, "owed");
+        match quiet {
+            Some(quiet) => {
+                line.schedule.stop_quietly(now, Lane(0), owed, is(owed), quiet);
+            }
+            None => drop(line.schedule.stop(now, Lane(0), owed, is(owed), |_| true)),
         }
-        line.run(pressed);
-        line.schedule.stop(line.now, Lane(0), "again", |_| true);
-        line.run(20 * SECOND);
+        let mut pressed = Vec::new();
+        for _ in 0..60 {
+            let stop = line.schedule.stop(line.now, Lane(0), "pressed", is("pressed"), |_| true);
+            pressed.push((line.now, stop.0));
+            line.run(SECOND / 2);
+        }
+        line.run(10 * SECOND);
+        for (at, id) in pressed {
+            let is_end = |event: &Event| matches!(event, Event::Over(Verdict::StopFailed(ids)) if ids.contains(&id));
+            let end = line.events.iter().find(|(_, _, event)| is_end(event)).map(|(end, ..)| *end);
+            let longest = 9 * SECOND;
+            assert!(end.is_some_and(|end| end.since(at).0 <= longest), "{quiet:?}: {at:?} {end:?}");
+        }
         drop(line);
-        let sent = sent.into_inner();
-        let at = sent.iter().position(|(_, name)| *name == "again").unwrap();
-        let (before, under_way) = sent[at - 1];
-        let gave_way = under_way == "other" && before.0 + SECOND > pressed;
-        // Any other exchange continues until its timeout.
-        let longest = if gave_way { 100_000 } else { SECOND };
-        assert!(sent[at].0.0 - pressed <= longest, "{pressed}: {sent:?}");
-        // Each precaution is sent once here, or again if it gave way. The others are sent four times.
-        assert_eq!(sent.len(), 4 + 6 + 4 + usize::from(gave_way), "{pressed}: {sent:?}");
-    }
-}
-
-#[test]
-fn a_stop_that_is_asked_again_and_again_leaves_others_their_turn() {
-    let sent = RefCell::default();
-    let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
-    let (first, _) = line.schedule.stop(line.now, Lane(0), "first", |_| true);
-    let mut again = line.schedule.stop(line.now, Lane(0), "again", |_| true).0;
-    for _ in 0..200 {
-        line.run(SECOND / 10);
-        if line.at(&Event::Over(Verdict::StopFailed(again))).is_some() {
-            again = line.schedule.stop(line.now, Lane(0), "again", |_| true).0;
+        let owed: Vec<_> =
+            sent.borrow().iter().filter(|(_, name)| *name == "owed").map(|(at, _)| at.0).collect();
+        assert!(owed[0] <= SECOND + 20_000, "{quiet:?}: {owed:?}");
+        if quiet.is_none() {
+            assert_eq!(owed.len(), 4, "{owed:?}");
+            assert!(owed.windows(2).all(|it| it[1] - it[0] <= 2 * SECOND + 50_000), "{owed:?}");
         }
     }
-    let failed = line.at(&Event::Over(Verdict::StopFailed(first)));
-    drop(line);
-    let firsts: Vec<_> =
-        sent.borrow().iter().filter(|(_, name)| *name == "first").map(|(at, _)| *at).collect();
-    assert_eq!(firsts.len(), 4, "{firsts:?}");
-    // Each waits for one exchange of the other, and once for the first one of a stop that comes anew.
-    assert!(firsts.windows(2).all(|it| it[1].since(it[0]).0 <= 3 * SECOND + 100_000), "{firsts:?}");
-    assert!(failed.is_some_and(|at| at.0 < 10 * SECOND), "{failed:?}");
 }
 
 #[test]
@@ -487,9 +511,10 @@ fn a_precaution_is_repeated_until_it_is_confirmed() {
             (Micros(1_000), if lost < 0 { Outcome::Answered } else { Outcome::Failed })
         }),
     );
-    let id = line.schedule.stop_as_precaution(line.now, Lane(0), "other");
+    let quiet = Quiet::Precaution;
+    let id = line.schedule.stop_quietly(line.now, Lane(0), "other", is("other"), quiet);
     line.run(SECOND);
-    assert!(line.at(&Event::Over(Verdict::Stopped(id))).is_some(), "{:?}", line.events);
+    assert!(line.at(&Event::Over(Verdict::Stopped(vec![id]))).is_some(), "{:?}", line.events);
     drop(line);
     assert_eq!(sent.into_inner().len(), 11);
 }
@@ -497,9 +522,9 @@ fn a_precaution_is_repeated_until_it_is_confirmed() {
 #[test]
 fn a_refused_stop_is_not_repeated() {
     let mut line = Line::new(SERIAL, |_, _, _: &Job<_>| (Micros(1_000), Outcome::Refused));
-    let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", |_| false);
+    let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| false);
     line.run(SECOND);
-    assert_eq!(line.at(&Event::Over(Verdict::StopFailed(id))), Some(Instant(1_000)));
+    assert_eq!(line.at(&Event::Over(Verdict::StopFailed(vec![id]))), Some(Instant(1_000)));
     assert_eq!(line.events.len(), 2);
 }
 
@@ -548,7 +573,7 @@ fn a_line_that_goes_away_and_comes_back_keeps_its_instants() {
     line.under_way.clear();
     line.events.clear();
     line.command(0, "set", 100 * MILLISECOND);
-    let (_, _) = line.schedule.stop(line.now, Lane(0), "stop", |_| true);
+    let (_, _) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), |_| true);
     line.run(5 * SECOND);
     assert_eq!(line.events.len(), 2, "{:?}", line.events);
     assert_eq!(line.at(&Event::Expired("set")), Some(Instant(SECOND + 100_501)));
@@ -564,10 +589,10 @@ fn a_line_that_goes_away_and_comes_back_keeps_its_instants() {
 #[test]
 fn a_stop_survives_a_short_interruption() {
     let mut line = Line::new(SERIAL, taking(1_000));
-    line.schedule.stop(Instant(0), Lane(0), "stop", |_| true);
+    line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| true);
     line.run(500);
     let lost = line.schedule.closed(line.now);
-    assert!(matches!(lost[..], [(Lane(0), Verdict::StopAgain(_))]), "{lost:?}");
+    assert!(matches!(lost[..], [(Lane(0), Verdict::StopAgain)]), "{lost:?}");
     line.under_way.clear();
     line.run(SECOND);
     line.schedule.reopened(line.now);
@@ -627,13 +652,16 @@ proptest! {
                     schedule.set_polls(now, &polls, BTreeMap::new());
                 }
                 1 => drop(schedule.command(lane, "set", now + Micros(number))),
-                2 => drop(schedule.stop(now, lane, "stop", |_| number % 2 == 0)),
+                2 => drop(schedule.stop(now, lane, "stop", is("stop"), |_| number % 2 == 0)),
                 3 => {
                     under_way.clear();
                     schedule.closed(now);
                 }
                 4 => schedule.reopened(now),
-                8 => drop(schedule.stop_as_precaution(now, lane, "precaution")),
+                8 => {
+                    let quiet = [Quiet::Again, Quiet::Precaution][number as usize % 2];
+                    schedule.stop_quietly(now, lane, "quiet", is("quiet"), quiet);
+                }
                 5 => {
                     let outcome = [Outcome::Answered, Outcome::Refused, Outcome::Failed][number as usize % 3];
                     if let Some(at) = under_way.iter().position(|busy| *busy == lane) {

@@ -338,7 +338,7 @@ impl Model {
                 self.ports[port].latched = None;
                 self.say(None, format!("{label}: {by} released the latch"), false);
             }
-            What::Unanswered(..) | What::Confirmed { .. } | What::Commanded(..) => {}
+            What::Unanswered(..) | What::Confirmed(..) | What::Heard(_) | What::Commanded(..) => {}
         }
     }
 

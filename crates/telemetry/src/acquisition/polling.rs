@@ -48,6 +48,9 @@ impl Acquisition {
         if result.as_ref().err().is_none_or(LineError::is_answer) {
             self.answered(lane);
         }
+        if result.is_ok() && self.answering.insert(poll.motor) {
+            self.tell(What::Heard(poll.motor));
+        }
         match result {
             Ok(Reply::Confirmed) => {}
             Ok(reply) => match self.line.samples(&poll, &reply) {

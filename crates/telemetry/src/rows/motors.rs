@@ -56,8 +56,9 @@ fn motor_of(what: &What) -> Option<Motor> {
         What::Unanswered(motor, _)
         | What::Silent(motor, _)
         | What::Answers(motor)
+        | What::Heard(motor)
         | What::Doubtful(motor, _)
-        | What::Confirmed { motor, .. } => Some(*motor),
+        | What::Confirmed(motor, _) => Some(*motor),
         What::Refused(signals, _) => signals.first().map(|signal| signal.motor),
         _ => None,
     }

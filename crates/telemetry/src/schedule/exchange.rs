@@ -45,7 +45,7 @@ pub enum Outcome {
 }
 
 /// What an exchange was that is over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// A poll.
     Poll(PollId),
@@ -53,17 +53,17 @@ pub enum Verdict {
     Command(CommandId),
     /// A recovery of the lane. The command that it was for waits again, or is over.
     Recovered,
-    /// A stop that the drive confirmed.
-    Stopped(CommandId),
+    /// A stop that the drive confirmed, for these who asked for it.
+    Stopped(Vec<CommandId>),
     /// A stop that is repeated.
-    StopAgain(CommandId),
-    /// A stop that is not repeated. The motor may still be turning.
-    StopFailed(CommandId),
+    StopAgain,
+    /// A stop that is not repeated for these who asked for it. The motor may still be turning.
+    StopFailed(Vec<CommandId>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    Stop(CommandId),
+    Stop,
     Command(CommandId),
     Poll(PollId),
     /// The lane is brought in sync for a command that waits.
@@ -89,7 +89,7 @@ impl UnderWay {
             Kind::Command(id) if self.is_unsent => Displaced::Unsent(id),
             Kind::Command(id) => Displaced::Command(id),
             Kind::Recovery(_) => Displaced::Recovery,
-            Kind::Stop(_) => Displaced::Stop,
+            Kind::Stop => Displaced::Stop,
         }
     }
 }

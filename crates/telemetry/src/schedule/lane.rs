@@ -2,35 +2,22 @@
 
 use std::collections::VecDeque;
 
-use motorlink::{STOP_ATTEMPTS, STOP_PAUSE, STOP_TIME};
 use motorlink_proto::time::{Instant, Micros};
 
 use super::exchange::{CommandId, Kind, Outcome, PollId, UnderWay, Verdict};
+use super::stops::{Quiet, Stops};
 
 /// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
 /// silence: on a line that loses bytes they are common.
 const PATIENCE: Micros = Micros::from_millis(2_000);
-/// A precaution that got no reply for so long gives way to another stop.
-const GIVES_WAY: Micros = Micros::from_millis(100);
 /// The pause before its next poll.
 const PAUSE: Micros = Micros::from_millis(500);
-
-#[derive(Debug)]
-struct Stop<C> {
-    id: CommandId,
-    command: C,
-    /// It waits until the lane has no other stops.
-    is_precaution: bool,
-    attempts: u32,
-    not_before: Instant,
-    give_up: Instant,
-}
 
 #[derive(Debug)]
 pub(super) struct LaneState<C> {
     pub(super) under_way: Option<UnderWay>,
     /// The first one is under way if [`under_way`](Self::under_way) is a stop.
-    stops: VecDeque<Stop<C>>,
+    stops: Stops<C>,
     pub(super) commands: VecDeque<(CommandId, C, Instant)>,
     /// The command that has begun last.
     begun: Option<(CommandId, C, Instant)>,
@@ -52,7 +39,7 @@ impl<C> Default for LaneState<C> {
     fn default() -> Self {
         LaneState {
             under_way: None,
-            stops: VecDeque::new(),
+            stops: Stops::default(),
             commands: VecDeque::new(),
             begun: None,
             commands_in_a_row: 0,
@@ -83,12 +70,11 @@ impl<C: Clone> LaneState<C> {
     pub(super) fn add_stop(
         &mut self,
         now: Instant,
-        id: CommandId,
+        asked: (CommandId, Option<Quiet>),
         command: C,
-        is_precaution: bool,
+        is_same: impl Fn(&C) -> bool,
     ) {
-        let (not_before, give_up) = (now, now + STOP_TIME);
-        self.stops.push_back(Stop { id, command, is_precaution, attempts: 0, not_before, give_up });
+        self.stops.add(now, asked, command, is_same);
     }
 
     /// Takes out a command whose time is over, or on a closed line a stop.
@@ -96,73 +82,46 @@ impl<C: Clone> LaneState<C> {
         if let Some(at) = self.commands.iter().position(|(_, _, deadline)| *deadline < now) {
             return self.commands.remove(at).map(|(id, command, _)| (id, command));
         }
-        let at = self.stops.iter().position(|stop| !is_open && stop.give_up <= now)?;
-        self.stops.remove(at).map(|stop| (stop.id, stop.command))
+        if is_open { None } else { self.stops.take_expired(now) }
     }
 
     /// When the next command or stop expires.
     pub(super) fn first_deadline(&self, is_open: bool) -> Option<Instant> {
         let commands = self.commands.iter().map(|(_, _, deadline)| *deadline + Micros(1));
-        let stops = self.stops.iter().filter(|_| !is_open).map(|stop| stop.give_up);
+        let stops = self.stops.first_expiry().filter(|_| !is_open);
         commands.chain(stops).min()
     }
 
-    /// The stop to begin now. It becomes the first one.
-    pub(super) fn next_stop(&mut self, now: Instant) -> Option<(CommandId, C)> {
-        let mut stop = self.stops.remove(self.due_stop(now)?)?;
-        stop.attempts += 1;
-        let begun = (stop.id, stop.command.clone());
-        self.stops.push_front(stop);
-        Some(begun)
+    /// The stop to begin now, if the lane is free for it or what is under way gives way to it.
+    fn due_stop(&self, now: Instant, preempts: bool) -> Option<usize> {
+        let Some(exchange) = self.under_way else { return self.stops.in_turn(now) };
+        if !matches!(exchange.kind, Kind::Stop) {
+            return self.stops.in_turn(now).filter(|_| preempts || exchange.is_unsent);
+        }
+        let ahead = || self.stops.unsent_behind_first().filter(|_| !preempts && exchange.is_unsent);
+        self.stops.replacement(exchange.since, now).or_else(ahead)
     }
 
-    /// What was never sent goes first. Then each has its turn.
-    fn due_stop(&self, now: Instant) -> Option<usize> {
-        let is_due = |(_, stop): &(_, &Stop<C>)| stop.not_before <= now;
-        self.unsent_stop().or_else(|| self.first_stops().find(is_due).map(|(at, _)| at))
+    /// Whether a stop may begin at this time, and whether it is a precaution.
+    pub(super) fn is_precaution_due(&self, now: Instant, preempts: bool) -> Option<bool> {
+        Some(self.stops.is_precaution(self.due_stop(now, preempts)?))
     }
 
-    fn unsent_stop(&self) -> Option<usize> {
-        self.first_stops().find(|(_, stop)| stop.attempts == 0).map(|(at, _)| at)
-    }
-
-    /// The stops, and where they are. Precautions wait until there are no others.
-    fn first_stops(&self) -> impl Iterator<Item = (usize, &Stop<C>)> {
-        let has_others = self.stops.iter().any(|stop| !stop.is_precaution);
-        self.stops.iter().enumerate().filter(move |(_, stop)| !(stop.is_precaution && has_others))
+    /// Begins the stop that is due.
+    pub(super) fn begin_stop(&mut self, now: Instant, preempts: bool) -> Option<C> {
+        let is_under_way = self.under_way.is_some_and(|it| matches!(it.kind, Kind::Stop));
+        self.stops.begin(self.due_stop(now, preempts)?, is_under_way)
     }
 
     /// When a stop is repeated.
     pub(super) fn next_retry(&self) -> Option<Instant> {
-        let stops = self.first_stops().filter(|_| self.under_way.is_none());
-        stops.map(|(_, stop)| stop.not_before).min()
+        self.stops.next_retry().filter(|_| self.under_way.is_none())
     }
 
-    /// Whether a stop waits that may begin at this time.
-    pub(super) fn is_stop_due(&self, now: Instant) -> bool {
-        self.due_stop(now).is_some()
-    }
-
-    /// Whether the stop that may begin at this time is a precaution.
-    pub(super) fn is_precaution_due(&self, now: Instant) -> Option<bool> {
-        Some(self.stops[self.due_stop(now)?].is_precaution)
-    }
-
-    /// Whether a stop may begin: nothing is under way, or what gives way to it.
-    pub(super) fn may_stop(&self, now: Instant, preempts: bool) -> bool {
-        self.under_way.is_none_or(|exchange| match exchange.kind {
-            Kind::Stop(_) if self.gives_way_at().is_some_and(|at| at <= now) => true,
-            Kind::Stop(_) => !preempts && exchange.is_unsent && self.unsent_stop().is_some(),
-            _ => preempts || exchange.is_unsent,
-        })
-    }
-
-    /// When the precaution that is under way gives way to a stop that waits behind it.
+    /// When the stop that is under way gives way to another one.
     pub(super) fn gives_way_at(&self) -> Option<Instant> {
-        let exchange = self.under_way.filter(|exchange| matches!(exchange.kind, Kind::Stop(_)))?;
-        let is_precaution = self.stops.front().is_some_and(|stop| stop.is_precaution);
-        let waits = self.unsent_stop().is_some_and(|at| !self.stops[at].is_precaution);
-        (is_precaution && waits).then_some(exchange.since + GIVES_WAY)
+        let exchange = self.under_way.filter(|exchange| matches!(exchange.kind, Kind::Stop))?;
+        self.stops.gives_way_at(exchange.since)
     }
 
     /// Whether a command or a poll may begin: nothing is under way, and no stop is due.
@@ -253,7 +212,7 @@ impl<C: Clone> LaneState<C> {
             Kind::Poll(poll) => Verdict::Poll(poll),
             Kind::Command(id) => Verdict::Command(id),
             Kind::Recovery(id) => self.judge_recovery(id, outcome),
-            Kind::Stop(id) => self.judge_stop(now, id, outcome),
+            Kind::Stop => self.stops.judge(now, outcome),
         }
     }
 
@@ -265,21 +224,5 @@ impl<C: Clone> LaneState<C> {
         if now.since(self.silent_since) >= PATIENCE {
             self.quiet_until = now + PAUSE;
         }
-    }
-
-    fn judge_stop(&mut self, now: Instant, id: CommandId, outcome: Outcome) -> Verdict {
-        let Some(mut stop) = self.stops.pop_front() else { return Verdict::StopFailed(id) };
-        // Precautions must not occupy a silent line for several timeouts each.
-        let has_tried = stop.is_precaution || stop.attempts >= STOP_ATTEMPTS;
-        let is_given_up = has_tried && now >= stop.give_up;
-        match outcome {
-            Outcome::Answered => return Verdict::Stopped(id),
-            Outcome::Refused | Outcome::GivenUp => return Verdict::StopFailed(id),
-            Outcome::Failed | Outcome::Closed if is_given_up => return Verdict::StopFailed(id),
-            Outcome::Failed | Outcome::Closed => {}
-        }
-        stop.not_before = now + STOP_PAUSE;
-        self.stops.push_back(stop);
-        Verdict::StopAgain(id)
     }
 }

@@ -181,7 +181,7 @@ impl Load {
                     cost.pace.came(now);
                 }
             }
-            Kind::Command(_) | Kind::Stop(_) | Kind::Recovery(_) => self.of_commands += span.0,
+            Kind::Command(_) | Kind::Stop | Kind::Recovery(_) => self.of_commands += span.0,
         }
     }
 

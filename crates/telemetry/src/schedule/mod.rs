@@ -20,9 +20,9 @@
 //!
 //! **Stops.** A stop is repeated until the drive confirms it. At most one exchange of its lane goes
 //! ahead of it, and none that was not sent yet. In a lane that is brought in sync each stop is sent
-//! ahead, one after the other. A stop as a precaution is for a motor that may not exist. It never goes
-//! ahead of other stops, and those of its lane end before it begins. If it gets no reply at once, it
-//! gives way to a stop that comes later.
+//! ahead, one after the other. All who ask for the same stop wait for the same exchanges. Then the stops
+//! of a lane take turns. One that is not asked for now ([`Quiet`]) gives way to a more urgent one that
+//! waits, if it gets no reply at once.
 //!
 //! **Silence.** A lane that has not answered for some time rests before each poll, so that it takes
 //! little of the line.
@@ -31,6 +31,7 @@ mod exchange;
 mod lane;
 mod load;
 mod pace;
+mod stops;
 
 use std::collections::BTreeMap;
 
@@ -41,6 +42,7 @@ use exchange::{Kind, UnderWay};
 use lane::LaneState;
 pub use load::Load;
 use load::{Rhythm, stretched};
+pub use stops::Quiet;
 
 /// Commands of a lane that go ahead of a poll that is due. Then the poll goes first once, so that
 /// signals are read also while a program sends commands without a pause.
@@ -64,8 +66,6 @@ pub enum Next<C> {
 pub enum Job<C> {
     /// A stop. It replaces `displaced`, which is still under way: cancel it.
     Stop {
-        /// The stop.
-        id: CommandId,
         /// The request.
         command: C,
         /// The exchange that the stop replaces.
@@ -223,28 +223,36 @@ impl<C: Clone> Schedule<C> {
         Ok(id)
     }
 
-    /// Queues a stop ahead of all commands and polls. It is repeated until [`Outcome::Answered`], or
-    /// until it has failed for good. Gives the commands of the lane that wait and do not pass `keep`:
-    /// they are not sent any more.
+    /// Queues a stop ahead of all commands and polls, unless the same one waits already. It is repeated
+    /// until [`Outcome::Answered`], or until it has failed for good. Gives the commands of the lane that
+    /// wait and do not pass `keep`: they are not sent any more.
     pub fn stop(
         &mut self,
         now: Instant,
         lane: Lane,
         command: C,
+        is_same: impl Fn(&C) -> bool,
         keep: impl Fn(&C) -> bool,
     ) -> (CommandId, Vec<(CommandId, C)>) {
         let id = self.new_id();
         let state = self.lanes.entry(lane).or_default();
         let overtaken = state.overtake(keep);
-        state.add_stop(now, id, command, false);
+        state.add_stop(now, (id, None), command, is_same);
         (id, overtaken)
     }
 
-    /// Queues a stop as a precaution: behind all other stops, ahead of all commands and polls. It is
-    /// repeated for [`STOP_TIME`](motorlink::STOP_TIME), or sent once if it comes later.
-    pub fn stop_as_precaution(&mut self, now: Instant, lane: Lane, command: C) -> CommandId {
+    /// Queues a stop that gives way to others, ahead of all commands and polls. It is repeated for
+    /// [`STOP_TIME`](motorlink::STOP_TIME), or sent once if it comes later.
+    pub fn stop_quietly(
+        &mut self,
+        now: Instant,
+        lane: Lane,
+        command: C,
+        is_same: impl Fn(&C) -> bool,
+        quiet: Quiet,
+    ) -> CommandId {
         let id = self.new_id();
-        self.lanes.entry(lane).or_default().add_stop(now, id, command, true);
+        self.lanes.entry(lane).or_default().add_stop(now, (id, Some(quiet)), command, is_same);
         id
     }
 
@@ -279,25 +287,26 @@ impl<C: Clone> Schedule<C> {
     pub fn has_stop(&self, now: Instant) -> bool {
         let preempts = self.rules.stop_preempts;
         self.is_open
-            && self.lanes.values().any(|lane| lane.may_stop(now, preempts) && lane.is_stop_due(now))
+            && self.lanes.values().any(|lane| lane.is_precaution_due(now, preempts).is_some())
     }
 
     fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
         let preempts = self.rules.stop_preempts;
-        let ready = self.lanes.iter().filter(|(_, state)| state.may_stop(now, preempts));
-        let due = ready.filter_map(|(lane, state)| Some((state.is_precaution_due(now)?, *lane)));
+        let lanes = self.lanes.iter();
+        let due = lanes
+            .filter_map(|(lane, state)| Some((state.is_precaution_due(now, preempts)?, *lane)));
         let (_, lane) = due.min()?;
         let state = self.lanes.get_mut(&lane)?;
-        let (id, command) = state.next_stop(now)?;
+        let command = state.begin_stop(now, preempts)?;
         let displaced = state.under_way.take();
         match displaced {
             Some(displaced) => self.load.over(now, displaced.since),
             None => self.under_way += 1,
         }
-        state.begin(now, Kind::Stop(id));
+        state.begin(now, Kind::Stop);
         self.load.began(now);
         let displaced = displaced.map(UnderWay::displaced);
-        Some((lane, Job::Stop { id, command, displaced }))
+        Some((lane, Job::Stop { command, displaced }))
     }
 
     fn next_command(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {

@@ -83,7 +83,7 @@ impl Words {
     ) {
         match what {
             What::Back => retry.extend(motors),
-            What::Answers(motor) => retry.extend(motors.filter(|it| *it == motor)),
+            What::Heard(motor) => retry.extend(motors.filter(|it| *it == motor)),
             _ => {}
         }
     }
@@ -124,7 +124,9 @@ impl Words {
                 let message = format!("{by} sends {}", described(speaks, request));
                 event(Happening::Commanded, request.motor(), Some(by), message)
             }
-            What::Unanswered(..) | What::Confirmed { .. } | What::Commanded(..) => None,
+            What::Unanswered(..) | What::Confirmed(..) | What::Heard(_) | What::Commanded(..) => {
+                None
+            }
             What::Stopping(id, by, request) => {
                 self.stops.insert(*id, (request.motor(), Arc::clone(by)));
                 let reason = request.motor().map(|motor| (motor, Arc::clone(by)));

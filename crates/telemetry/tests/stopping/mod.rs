@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
-use motorlink_proto::st::{Command, Frame, MAX_FRAME, Ramp, Request};
+use motorlink_proto::st::{Command, Frame, MAX_FRAME, Ramp, Request, checksum};
 use motorlink_telemetry::share::message::*;
 
 use crate::asking::Asker;
@@ -22,10 +22,47 @@ pub const READ_STATUS: [u8; 2] = [2, 2];
 /// EXECUTE_CMD START_MOTOR.
 pub const START: [u8; 2] = [3, 1];
 
-/// A line that can be cut.
+/// What becomes of a request on its way to the drive.
+pub type Passes = dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync;
+
+/// A line that loses or changes requests.
 pub struct Cable {
-    pub link: Box<dyn EventBytes>,
-    pub is_cut: Arc<AtomicBool>,
+    link: Box<dyn EventBytes>,
+    passes: Arc<Passes>,
+}
+
+impl Cable {
+    pub fn with(link: Box<dyn EventBytes>, passes: &Arc<Passes>) -> Box<Self> {
+        Box::new(Cable { link, passes: Arc::clone(passes) })
+    }
+
+    /// One that is cut while this is so.
+    pub fn cut_while(link: Box<dyn EventBytes>, is_cut: &Arc<AtomicBool>) -> Box<Self> {
+        let is_cut = Arc::clone(is_cut);
+        let passes: Arc<Passes> =
+            Arc::new(move |bytes| (!is_cut.load(Ordering::SeqCst)).then(|| bytes.to_vec()));
+        Self::with(link, &passes)
+    }
+}
+
+/// The motor of a request, and what it is without its number.
+pub fn request_of(bytes: &[u8]) -> (u8, Vec<u8>) {
+    let mut request = bytes.to_vec();
+    let motor =
+        request.first_mut().map_or(0, |header| std::mem::replace(header, *header & 0x1f) >> 5);
+    request.pop();
+    (motor, request)
+}
+
+/// EXECUTE_CMD STOP_MOTOR, as [`request_of`] gives it.
+pub const STOP: [u8; 3] = [3, 1, 2];
+
+/// The request with this header and payload.
+pub fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![header, payload.len() as u8];
+    bytes.extend(payload);
+    bytes.push(checksum(&bytes));
+    bytes
 }
 
 impl Link for Cable {
@@ -36,7 +73,7 @@ impl Link for Cable {
 
 impl ByteLink for Cable {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        if self.is_cut.load(Ordering::SeqCst) { Ok(()) } else { self.link.write(bytes) }
+        (self.passes)(bytes).map_or(Ok(()), |bytes| self.link.write(&bytes))
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
@@ -79,7 +116,7 @@ pub fn share_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<Ato
     let share = Share::with(name, SHORT, move |mut link| {
         turn_before_the_share(&mut *link);
         is_cut.store(begins_cut, Ordering::SeqCst);
-        Box::new(Cable { link, is_cut: Arc::clone(&is_cut) })
+        Cable::cut_while(link, &is_cut)
     });
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     (share, cut)

@@ -8,10 +8,11 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::feed::Feed;
-use super::line::{self, AGAIN, Held, Motion};
+use super::line::{self, Held, Motion};
+use super::owed::AGAIN;
 use super::place::SessionId;
 use super::reasons::reason;
-use super::session::{NO_MOTOR, Session};
+use super::session::{NO_MOTOR, Session, UNANSWERED};
 use super::work::{Sent, Work};
 use super::{Hub, Why};
 use crate::acquisition::Acquisition;
@@ -21,8 +22,9 @@ use crate::line::{Request, may_move};
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
 use crate::share::message::{
-    self, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE, LONGEST_SCAN,
-    LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason, SignalName,
+    self, ANY_MOTOR, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE,
+    LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason,
+    SignalName, StoppedMotor,
 };
 use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
@@ -366,7 +368,19 @@ impl Hub {
         };
         let of_all = motor.is_none();
         let why = if of_all { Why::OfAll } else { Why::Asked };
-        let unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
+        let mut unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
+        for (line, motor) in others {
+            self.stop(why, line, motor, session, None, name);
+        }
+        // The drive says of each number that it has no such motor.
+        let is_left = |(line, held): &(&usize, &Held)| {
+            of_all && !held.has_answered() && !awaited.iter().any(|(of, _)| of == *line)
+        };
+        unreached.extend(self.lines.iter().filter(is_left).map(|(_, held)| StoppedMotor {
+            motor: MotorName { line: held.name.clone(), motor: ANY_MOTOR },
+            failure: Some(UNANSWERED.to_owned()),
+            absent: false,
+        }));
         if awaited.is_empty() {
             return Ok(Some(Answer::Stop { motors: unreached }));
         }
@@ -390,9 +404,6 @@ impl Hub {
                 let _ = held.remote().post(task);
             }
             self.stop(why, line, motor, session, Some(part), name);
-        }
-        for (line, motor) in others {
-            self.stop(why, line, motor, session, None, name);
         }
         Ok(None)
     }

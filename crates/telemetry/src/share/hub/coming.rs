@@ -160,7 +160,6 @@ impl Hub {
             self.owed.insert(held.place(), by);
         }
         self.sessions.values_mut().for_each(|session| session.forget(line));
-        self.again.retain(|(of, _), _| *of != line);
         let place = Some((held.place(), Does::Closes));
         self.begin(session, by, id, place, move || {
             let (name, port) = (held.name.clone(), held.port.clone());

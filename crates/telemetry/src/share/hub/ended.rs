@@ -1,9 +1,9 @@
 //! What an engine has carried out: answers, and whose motors are whose after it.
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use super::line::{AGAIN, Address, Configures, Held, Motion};
+use super::line::{Configures, Held, Motion};
+use super::owed::Address;
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
@@ -46,7 +46,7 @@ impl Hub {
                 }
             }
             Work::Stop { part, motor, by, is_precaution, result } => {
-                self.stop_ended(line, motor, by, &result);
+                self.stop_ended(line, motor, &by, &result);
                 // A line that was closed meanwhile is one that fails.
                 let address = self
                     .lines
@@ -90,21 +90,14 @@ impl Hub {
     }
 
     /// A stop is over. If the motor did not confirm it, it is repeated.
-    fn stop_ended(&mut self, line: usize, motor: Motor, by: Arc<str>, result: &CommandResult) {
+    fn stop_ended(&mut self, line: usize, motor: Motor, by: &Arc<str>, result: &CommandResult) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        let is_there = held.is_there(motor);
         match result {
             Ok(_) => held.stopped(motor),
-            Err(error) if may_be_executed(error) => {
-                held.unstopped.insert(motor, by);
-                held.unconfirmed.insert(motor);
+            Err(error) => {
+                held.ended(motor, false, result);
+                held.not_stopped(motor, by, error);
             }
-            Err(_) => held.ended(motor, false, result),
-        }
-        // The end of these is an event.
-        let is_event = matches!(result, Err(CommandError::Closed | CommandError::Ended));
-        if is_there && result.is_err() && !is_event {
-            self.again.insert((line, motor), Instant::now() + AGAIN);
         }
     }
 
@@ -122,7 +115,7 @@ impl Hub {
                 held.ended(motor, moves, &result);
             }
             self.command_ended(session, line, motor, motion, &result);
-            let is_owed = |held: &Held| held.unstopped.contains_key(&motor);
+            let is_owed = |held: &Held| held.owed.contains_key(&motor);
             if result.is_ok() && self.lines.get(&line).is_some_and(is_owed) {
                 self.stop_again(line, motor, Why::Asked);
             }
@@ -187,10 +180,7 @@ impl Hub {
                 }
                 let mut all = None;
                 if result.is_ok() {
-                    // A stop that is under way is not ended by an earlier start.
-                    if held.unstopped.remove(&motor).is_some() {
-                        held.unconfirmed.remove(&motor);
-                    }
+                    held.started(motor);
                     all = held.take_unanswered_stop();
                 }
                 if let Some(by) = all {
@@ -198,12 +188,11 @@ impl Hub {
                 }
                 self.stop_if_orphaned(line, motor, Why::Asked);
             }
-            (Motion::Stops, Err(error)) if may_be_executed(error) => {
+            (Motion::Stops, Err(error)) => {
                 let name = self.sessions.get(&session).and_then(|session| session.name.clone());
-                held.unstopped.insert(motor, name.unwrap_or_else(|| "share".into()));
-                held.unconfirmed.insert(motor);
+                held.not_stopped(motor, &name.unwrap_or_else(|| "share".into()), error);
             }
-            (Motion::Stops, Err(_)) | (Motion::Keeps, _) => {}
+            (Motion::Keeps, _) => {}
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::Arc;
-use std::time::{self, Duration};
+use std::sync::mpsc;
+use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::port::PortName;
@@ -12,22 +12,21 @@ use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 use motorlink_proto::time::Instant;
 
+use super::owed::{Owed, UnansweredStop};
 use super::place::{SessionId, seconds, wall_now};
-use super::reasons::{may_be_executed, reason};
+use super::reasons::may_be_executed;
 use crate::acquisition::Tally;
 use crate::event::{CommandError, What};
-use crate::line::{Request, Stopped, may_move};
+use crate::line::{LineError, Request, Stopped, may_move};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
-use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line, Reason};
+use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
 use crate::share::opening::Opened;
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
 
-/// The pause before a stop that failed is repeated.
-pub(super) const AGAIN: Duration = Duration::from_secs(1);
 /// Events of an engine that wait for the share.
 const EVENTS: usize = 10_000;
 
@@ -59,34 +58,15 @@ pub struct Held {
     /// The motors that have answered.
     pub(super) heard: BTreeSet<Motor>,
     /// The motors that programs commanded to move, unless that was refused.
-    moved: BTreeSet<Motor>,
+    pub(super) moved: BTreeSet<Motor>,
     /// Numbers for which the drive says that it has no such motor.
-    absent: BTreeSet<Motor>,
+    pub(super) absent: BTreeSet<Motor>,
     /// How many stops of a motor are under way.
     pub(super) stops: BTreeMap<Motor, usize>,
     /// A stop of all motors that is repeated until something on the line answers.
-    unanswered_stop: Option<UnansweredStop>,
-    /// The motors whose last stop failed, and who asked for it. It is repeated when they answer anything.
-    pub(super) unstopped: BTreeMap<Motor, Arc<str>>,
-    /// The motors whose last stop is not confirmed: it failed, is under way or is repeated.
-    pub(super) unconfirmed: BTreeSet<Motor>,
-}
-
-/// A stop of all motors while nothing on the line had ever answered.
-struct UnansweredStop {
-    by: Arc<str>,
-    /// When it is repeated.
-    next: time::Instant,
-}
-
-/// What the end of a stop says about an address.
-pub(super) enum Address {
-    /// Nothing on the line has ever answered: motors may be there.
-    Unanswered,
-    /// No motor was found there, and no program asked for it.
-    Empty,
-    /// Somebody asked for it, or it answered.
-    Motor { is_absent: bool },
+    pub(super) unanswered_stop: Option<UnansweredStop>,
+    /// The stops that motors have not confirmed: they are under way, or are repeated.
+    pub(super) owed: BTreeMap<Motor, Owed>,
 }
 
 /// A data segment that a command configures, for the program that sends it.
@@ -135,19 +115,9 @@ impl Held {
             absent: BTreeSet::new(),
             stops: BTreeMap::new(),
             unanswered_stop: None,
-            unstopped: BTreeMap::new(),
-            unconfirmed: BTreeSet::new(),
+            owed: BTreeMap::new(),
             runner: Runner::start(name, acquisition)?,
         })
-    }
-
-    /// A motor has confirmed a stop: no program owns it any more.
-    pub(super) fn stopped(&mut self, motor: Motor) {
-        self.heard.insert(motor);
-        self.absent.remove(&motor);
-        self.owners.remove(&motor);
-        self.unstopped.remove(&motor);
-        self.unconfirmed.remove(&motor);
     }
 
     /// Records a command of a program to a motor.
@@ -205,116 +175,9 @@ impl Held {
         is_starting || self.moved.contains(&motor)
     }
 
-    /// Whether the drive says that it has no such motor, and no program turned it.
+    /// Whether the drive says that it has no such motor, no program turned it and it has never answered.
     pub(super) fn is_absent(&self, motor: Motor) -> bool {
-        self.absent.contains(&motor) && !self.may_turn(motor)
-    }
-
-    /// The motors that a stop of all motors is sent to: all that the line can have, because a share
-    /// before this one may have turned any of them. Numbers that the drive does not have are left out,
-    /// unless somebody asked for them.
-    pub(super) fn stoppable(&self) -> impl Iterator<Item = Motor> {
-        let all = (1..=u8::MAX).filter_map(|number| self.speaks.motor(number));
-        all.filter(|motor| self.known.contains(motor) || !self.absent.contains(motor))
-    }
-
-    /// Whether anything on the line has answered since it was opened. Until then silence shows nothing: a
-    /// share before this one may have turned motors that do not hear the stop now.
-    pub(super) fn has_answered(&self) -> bool {
-        !self.heard.is_empty() || !self.absent.is_empty()
-    }
-
-    /// Whether the answer to a stop of all waits for this motor: programs know it, or it has answered.
-    /// Where nothing has answered, for all that the line can have.
-    pub(super) fn is_awaited(&self, motor: Motor) -> bool {
-        self.known.contains(&motor) || self.heard.contains(&motor) || !self.has_answered()
-    }
-
-    /// Whether nothing shows that the motor exists: no program has turned it and it has never answered.
-    /// Where something else has answered, no program has read it, either.
-    pub(super) fn is_unheard(&self, motor: Motor) -> bool {
-        let is_turned = self.owners.contains_key(&motor) || self.may_turn(motor);
-        let is_known = self.known.contains(&motor) && self.has_answered();
-        !is_turned && !is_known && !self.heard.contains(&motor)
-    }
-
-    /// Whether its stop is a precaution: there may be no such motor.
-    pub(super) fn is_doubtful(&self, motor: Motor) -> bool {
-        self.is_unheard(motor) || self.is_absent(motor)
-    }
-
-    /// A stop of the motor is over.
-    pub(super) fn after_stop(
-        &mut self,
-        motor: Motor,
-        is_precaution: bool,
-        result: &CommandResult,
-    ) -> Address {
-        if let Some(stops) = self.stops.get_mut(&motor) {
-            *stops -= 1;
-        }
-        self.stops.retain(|_, stops| *stops > 0);
-        if is_precaution && result.is_err() {
-            if !self.has_answered() {
-                return Address::Unanswered;
-            }
-            if !self.known.contains(&motor) {
-                return Address::Empty;
-            }
-        }
-        let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
-        let is_unheard = is_silent && self.is_unheard(motor);
-        // A motor that exists is not stopped as a precaution.
-        Address::Motor { is_absent: is_precaution || is_unheard || self.is_absent(motor) }
-    }
-
-    /// Nothing has answered yet: all motors are stopped at `next`, and again until something answers.
-    pub(super) fn owe_stop(&mut self, by: &Arc<str>, next: time::Instant) {
-        self.unanswered_stop = Some(UnansweredStop { by: Arc::clone(by), next });
-    }
-
-    /// Whose stop of all motors has to be repeated now. It is repeated for the last time when something has
-    /// answered: the motors that turn may not be those that answer first.
-    pub(super) fn due_stop(&mut self, now: time::Instant) -> Option<Arc<str>> {
-        let has_answered = self.has_answered();
-        let stop = self.unanswered_stop.as_mut()?;
-        if !self.stops.is_empty() || !has_answered && now < stop.next {
-            return None;
-        }
-        stop.next = now + AGAIN;
-        let by = Arc::clone(&stop.by);
-        if has_answered {
-            self.unanswered_stop = None;
-        }
-        Some(by)
-    }
-
-    /// Ends the repetition of a stop of all motors. Gives whose it was.
-    pub(super) fn take_unanswered_stop(&mut self) -> Option<Arc<str>> {
-        self.unanswered_stop.take().map(|stop| stop.by)
-    }
-
-    /// Motion is wanted again: addresses where no motor is known are not stopped if one answers there.
-    pub(super) fn release(&mut self) {
-        self.unanswered_stop = None;
-        let unstopped = std::mem::take(&mut self.unstopped).into_iter();
-        self.unstopped = unstopped.filter(|(motor, _)| self.is_there(*motor)).collect();
-    }
-
-    /// Whether a motor is there, as far as it is known.
-    pub(super) fn is_there(&self, motor: Motor) -> bool {
-        self.owners.contains_key(&motor)
-            || self.heard.contains(&motor)
-            || self.moved.contains(&motor)
-    }
-
-    /// Whose stop the motors have not confirmed.
-    pub(super) fn owed_stop(&self) -> Option<Arc<str>> {
-        let of_motor = || {
-            let mut motors = self.unstopped.iter().filter(|(motor, _)| self.is_there(**motor));
-            motors.next().map(|(_, by)| Arc::clone(by))
-        };
-        self.unanswered_stop.as_ref().map(|stop| Arc::clone(&stop.by)).or_else(of_motor)
+        self.absent.contains(&motor) && !self.may_turn(motor) && !self.heard.contains(&motor)
     }
 
     /// What its port occupies.
@@ -338,7 +201,7 @@ impl Held {
         let may_be_there = |motor: &&Motor| {
             (self.heard.contains(motor) || self.may_turn(**motor)) && !self.is_absent(**motor)
         };
-        let unstopped = self.unconfirmed.iter().filter(may_be_there).map(|motor| motor.number());
+        let unstopped = self.owed.keys().filter(may_be_there).map(|motor| motor.number());
         let any = self.unanswered_stop.as_ref().filter(|_| !self.has_answered());
         let unstopped = any.map(|_| ANY_MOTOR).into_iter().chain(unstopped).collect();
         Line { line, protocol, port, profile, timeout, t, wall, counts, heard, unstopped }
@@ -366,7 +229,7 @@ impl Held {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
-            let motors = self.owners.keys().chain(self.unstopped.keys());
+            let motors = self.owners.keys().chain(self.owed.keys());
             self.words.retries(&event.what, motors, retry);
             match &event.what {
                 What::Lost(_) => {
@@ -377,9 +240,9 @@ impl Held {
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
-                What::Confirmed { motor, is_answer: true, .. } => {
+                What::Heard(motor) => {
                     self.heard.insert(*motor);
-                    retry.extend(self.unstopped.contains_key(motor).then_some(*motor));
+                    self.absent.remove(motor);
                 }
                 _ => {}
             }
@@ -502,9 +365,29 @@ impl Held {
         }
     }
 
-    /// Ends the engine; gives the motors that were stopped.
+    /// Ends the engine, after the stops that motors have not confirmed; gives the motors of both.
     pub(super) fn end(self) -> Vec<Stopped> {
-        self.runner.end()
+        let (ended, results) = mpsc::channel();
+        // The engine stops those that programs moved.
+        for (motor, by) in self.owing().filter(|(motor, _)| !self.moved.contains(motor)) {
+            let ended = ended.clone();
+            let tell = move |result| drop(ended.send((motor, result)));
+            // An engine that has ended has stopped its motors.
+            let _ = self.remote().stop_then(by, stop(motor), tell);
+        }
+        drop(ended);
+        let owed: Vec<(Motor, CommandResult)> = results.iter().collect();
+        let mut stopped = self.runner.end();
+        for (motor, result) in owed {
+            if stopped.iter().all(|one| one.motor != motor) {
+                let result = result.map(drop).map_err(|error| match error {
+                    CommandError::Line(error) => error,
+                    _ => LineError::Closed,
+                });
+                stopped.push(Stopped { motor, result });
+            }
+        }
+        stopped
     }
 }
 

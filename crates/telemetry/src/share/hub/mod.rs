@@ -8,6 +8,7 @@ mod ended;
 mod feed;
 mod jobs;
 mod line;
+mod owed;
 mod place;
 mod reasons;
 mod session;
@@ -24,6 +25,7 @@ use super::words;
 use crate::event::CommandError;
 use crate::line::Stopped;
 use crate::runner::Ended;
+use crate::schedule::Quiet;
 use crate::signal::Motor;
 use jobs::Jobs;
 use line::Lines;
@@ -54,8 +56,6 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
-    /// Motors that are there and whose stop failed, and when it is repeated.
-    again: BTreeMap<(usize, Motor), Instant>,
     /// Ports whose motors have to be stopped when they are opened, and who asked for it.
     owed: BTreeMap<String, Arc<str>>,
     done: Sender<News>,
@@ -69,7 +69,7 @@ enum Why {
     Asked,
     /// It is one of all that the lines can have.
     OfAll,
-    /// It did not confirm an earlier stop: those of other motors go first.
+    /// It did not confirm an earlier stop. Stops that are asked for now go first.
     Repeated,
 }
 
@@ -89,7 +89,6 @@ impl Hub {
             last_session: 0,
             latch: None,
             log: VecDeque::new(),
-            again: BTreeMap::new(),
             owed: BTreeMap::new(),
             done,
             ended,
@@ -200,23 +199,23 @@ impl Hub {
     /// Repeats stops that no drive has confirmed.
     fn repeat_stops(&mut self) {
         let now = Instant::now();
-        let due: Vec<_> =
-            self.again.iter().filter(|(_, at)| **at <= now).map(|(place, _)| *place).collect();
-        for (line, motor) in due {
-            self.again.remove(&(line, motor));
-            self.stop_again(line, motor, Why::Repeated);
-        }
         for line in self.numbers() {
+            let due = self.lines.get_mut(&line).map(|held| held.due_again(now));
+            for motor in due.into_iter().flatten() {
+                self.stop_again(line, motor, Why::Repeated);
+            }
             if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
                 self.stop_line(line, None, &by);
             }
         }
     }
 
-    /// Stops all motors that a line can have, but one.
+    /// Stops all motors that a line can have, but one and those whose stop is under way.
     fn stop_line(&mut self, line: usize, but: Option<Motor>, by: &Arc<str>) {
         let Some(held) = self.lines.get(&line) else { return };
-        let motors: Vec<Motor> = held.stoppable().filter(|motor| Some(*motor) != but).collect();
+        // Those that are under way have more tries.
+        let is_meant = |motor: &Motor| Some(*motor) != but && !held.stops.contains_key(motor);
+        let motors: Vec<Motor> = held.stoppable().filter(is_meant).collect();
         for motor in motors {
             self.stop(Why::OfAll, line, motor, SessionId::default(), None, by);
         }
@@ -295,7 +294,7 @@ impl Hub {
         if held.stops.contains_key(&motor) {
             return;
         }
-        match held.unstopped.remove(&motor) {
+        match held.owed.get(&motor).map(|owed| Arc::clone(&owed.by)) {
             Some(by) => self.stop(why, line, motor, SessionId::default(), None, &by),
             None => self.stop_if_orphaned(line, motor, why),
         }
@@ -323,17 +322,21 @@ impl Hub {
         let tell = self.teller(session, None, line);
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.interrupt(motor);
-        held.unconfirmed.insert(motor);
-        held.unstopped.remove(&motor);
+        held.owe(motor, by);
         *held.stops.entry(motor).or_default() += 1;
-        let is_precaution = why == Why::OfAll && held.is_doubtful(motor);
+        let quiet = match why {
+            Why::OfAll if held.is_doubtful(motor) => Some(Quiet::Precaution),
+            Why::Repeated => Some(Quiet::Again),
+            Why::Asked | Why::OfAll => None,
+        };
+        let is_precaution = quiet == Some(Quiet::Precaution);
         let asker = Arc::clone(by);
         let ended = move |result| {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });
         };
-        let begun = match is_precaution || why == Why::Repeated {
-            false => held.remote().stop_then(by, line::stop(motor), ended),
-            true => held.remote().stop_as_precaution_then(by, line::stop(motor), ended),
+        let begun = match quiet {
+            None => held.remote().stop_then(by, line::stop(motor), ended),
+            Some(quiet) => held.remote().stop_quietly_then(by, line::stop(motor), quiet, ended),
         };
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));

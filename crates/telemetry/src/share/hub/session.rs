@@ -73,9 +73,9 @@ struct Gathering {
     rates: Option<Vec<SignalRate>>,
 }
 
-/// What is said of a line on which nothing has ever answered.
-const UNANSWERED: &str = "nothing on this line has answered since it was opened; motors that were turned \
-    before may keep turning; the stop is repeated until something answers";
+/// What is said of a line of which no motor has ever answered.
+pub(super) const UNANSWERED: &str = "no motor of this line has answered since it was opened; motors that \
+    were turned before may keep turning; the stop is repeated until one answers";
 /// What is said of motors that are not waited for.
 pub(super) const NO_MOTOR: &str =
     "the drive says that it has no such motor; it is sent a stop, too";
