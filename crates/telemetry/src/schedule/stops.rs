@@ -133,7 +133,7 @@ impl<C: Clone> Stops<C> {
     /// until there are no others.
     pub(super) fn unsent_behind_first(&self) -> Option<usize> {
         let has_others = self.0.iter().any(|stop| !stop.is_precaution());
-        let is_next = |stop: &Stop<C>| !stop.is_sent && !(stop.is_precaution() && has_others);
+        let is_next = |stop: &Stop<C>| !(stop.is_sent || stop.is_precaution() && has_others);
         self.0.iter().skip(1).position(is_next).map(|at| at + 1)
     }
 

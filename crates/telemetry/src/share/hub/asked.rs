@@ -369,9 +369,6 @@ impl Hub {
         let of_all = motor.is_none();
         let why = if of_all { Why::OfAll } else { Why::Asked };
         let mut unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
-        for (line, motor) in others {
-            self.stop(why, line, motor, session, None, name);
-        }
         // The drive says of each number that it has no such motor.
         let is_left = |(line, held): &(&usize, &Held)| {
             of_all && !held.has_answered() && !awaited.iter().any(|(of, _)| of == *line)
@@ -381,9 +378,6 @@ impl Hub {
             failure: Some(UNANSWERED.to_owned()),
             absent: false,
         }));
-        if awaited.is_empty() {
-            return Ok(Some(Answer::Stop { motors: unreached }));
-        }
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
         let part = asker.gather(id, awaited.len(), unreached);
         for (line, motor) in awaited {
@@ -404,6 +398,9 @@ impl Hub {
                 let _ = held.remote().post(task);
             }
             self.stop(why, line, motor, session, Some(part), name);
+        }
+        for (line, motor) in others {
+            self.stop(why, line, motor, session, None, name);
         }
         Ok(None)
     }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::line::{Configures, Held, Motion};
-use super::owed::Address;
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
+use super::stopping::Address;
 use super::work::{Done, Sent, Work};
 use super::{Hub, Why};
 use crate::acquisition::Rate;

@@ -12,6 +12,7 @@ mod owed;
 mod place;
 mod reasons;
 mod session;
+mod stopping;
 mod work;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

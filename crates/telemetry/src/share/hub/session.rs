@@ -210,6 +210,7 @@ impl Session {
         self.last_part += 1;
         let gathering = Gathering { id, missing, stopped, ..Gathering::default() };
         self.gathering.insert(self.last_part, gathering);
+        self.gathered(self.last_part);
         self.last_part
     }
 

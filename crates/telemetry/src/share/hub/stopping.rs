@@ -1,0 +1,171 @@
+//! Which motors of a line a stop is sent to, and what becomes of it.
+
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::line::Held;
+use super::owed::{AGAIN, Owed, UnansweredStop};
+use super::reasons::reason;
+use crate::event::CommandError;
+use crate::runner::CommandResult;
+use crate::share::message::Reason;
+use crate::signal::Motor;
+
+/// What the end of a stop says about an address.
+pub(super) enum Address {
+    /// No motor of the line has ever answered: motors may be there.
+    Unanswered,
+    /// No motor was found there, and no program asked for it.
+    Empty,
+    /// Somebody asked for it, or it answered.
+    Motor { is_absent: bool },
+}
+
+impl Held {
+    /// A stop is asked for.
+    pub(super) fn owe(&mut self, motor: Motor, by: &Arc<str>) {
+        self.owed.insert(motor, Owed { by: Arc::clone(by), again: None });
+    }
+
+    /// A motor has confirmed a stop: no program owns it any more.
+    pub(super) fn stopped(&mut self, motor: Motor) {
+        self.heard.insert(motor);
+        self.absent.remove(&motor);
+        self.owners.remove(&motor);
+        self.owed.remove(&motor);
+    }
+
+    /// A motor has not confirmed a stop. It is repeated soon if the motor is there.
+    pub(super) fn not_stopped(&mut self, motor: Motor, by: &Arc<str>, why: &CommandError) {
+        // The end of these is an event.
+        let is_event = matches!(why, CommandError::Closed | CommandError::Ended);
+        let again = (self.is_there(motor) && !is_event).then(|| Instant::now() + AGAIN);
+        match self.owed.entry(motor) {
+            Entry::Occupied(mut owed) => owed.get_mut().again = again,
+            Entry::Vacant(place) => drop(place.insert(Owed { by: Arc::clone(by), again })),
+        }
+    }
+
+    /// A motor has confirmed motion. A stop that is under way is not ended by an earlier start.
+    pub(super) fn started(&mut self, motor: Motor) {
+        if !self.stops.contains_key(&motor) {
+            self.owed.remove(&motor);
+        }
+    }
+
+    /// The motors whose stop is repeated now.
+    pub(super) fn due_again(&mut self, now: Instant) -> Vec<Motor> {
+        let due = |(motor, owed): (&Motor, &mut Owed)| {
+            owed.again.take_if(|at| *at <= now).map(|_| *motor)
+        };
+        self.owed.iter_mut().filter_map(due).collect()
+    }
+
+    /// The motors that a stop of all motors is sent to: all that the line can have, because a share
+    /// before this one may have turned any of them.
+    pub(super) fn stoppable(&self) -> impl Iterator<Item = Motor> {
+        (1..=u8::MAX).filter_map(|number| self.speaks.motor(number))
+    }
+
+    /// Whether any motor of the line has answered since it was opened. Until then silence shows nothing: a
+    /// share before this one may have turned motors that do not hear the stop now.
+    pub(super) fn has_answered(&self) -> bool {
+        !self.heard.is_empty()
+    }
+
+    /// Whether the answer to a stop of all waits for this motor: programs know it, or it has answered.
+    /// Where none has answered, for all that the line can have.
+    pub(super) fn is_awaited(&self, motor: Motor) -> bool {
+        let may_be_there = !self.has_answered() && !self.is_absent(motor);
+        self.known.contains(&motor) || self.heard.contains(&motor) || may_be_there
+    }
+
+    /// Whether nothing shows that the motor exists: no program has turned it and it has never answered.
+    /// Where another one has answered, no program has read it, either.
+    pub(super) fn is_unheard(&self, motor: Motor) -> bool {
+        let is_turned = self.owners.contains_key(&motor) || self.may_turn(motor);
+        let is_known = self.known.contains(&motor) && self.has_answered();
+        !is_turned && !is_known && !self.heard.contains(&motor)
+    }
+
+    /// Whether its stop is a precaution: there may be no such motor.
+    pub(super) fn is_doubtful(&self, motor: Motor) -> bool {
+        self.is_unheard(motor) || self.is_absent(motor)
+    }
+
+    /// A stop of the motor is over.
+    pub(super) fn after_stop(
+        &mut self,
+        motor: Motor,
+        is_precaution: bool,
+        result: &CommandResult,
+    ) -> Address {
+        if let Some(stops) = self.stops.get_mut(&motor) {
+            *stops -= 1;
+        }
+        self.stops.retain(|_, stops| *stops > 0);
+        if is_precaution && result.is_err() {
+            if !self.has_answered() {
+                return Address::Unanswered;
+            }
+            if !self.known.contains(&motor) {
+                return Address::Empty;
+            }
+        }
+        let is_silent = result.as_ref().is_err_and(|why| reason(why) == Reason::Silent);
+        let is_unheard = is_silent && self.is_unheard(motor);
+        // A motor that exists is not stopped as a precaution.
+        Address::Motor { is_absent: is_precaution || is_unheard || self.is_absent(motor) }
+    }
+
+    /// No motor has answered yet: all are stopped at `next`, and again until one answers.
+    pub(super) fn owe_stop(&mut self, by: &Arc<str>, next: Instant) {
+        self.unanswered_stop = Some(UnansweredStop { by: Arc::clone(by), next });
+    }
+
+    /// Whose stop of all motors has to be repeated now. It is repeated for the last time when one has
+    /// answered: the motors that turn may not be those that answer first.
+    pub(super) fn due_stop(&mut self, now: Instant) -> Option<Arc<str>> {
+        let has_answered = self.has_answered();
+        let stop = self.unanswered_stop.as_mut().filter(|stop| has_answered || stop.next <= now)?;
+        stop.next = now + AGAIN;
+        let by = Arc::clone(&stop.by);
+        if has_answered {
+            self.unanswered_stop = None;
+        }
+        Some(by)
+    }
+
+    /// Ends the repetition of a stop of all motors. Gives whose it was.
+    pub(super) fn take_unanswered_stop(&mut self) -> Option<Arc<str>> {
+        self.unanswered_stop.take().map(|stop| stop.by)
+    }
+
+    /// Motion is wanted again: addresses that no program asked for are not stopped if a motor answers there.
+    pub(super) fn release(&mut self) {
+        self.unanswered_stop = None;
+        let owed = std::mem::take(&mut self.owed).into_iter();
+        let is_meant = |motor| self.is_there(motor) || self.known.contains(&motor);
+        self.owed = owed.filter(|(motor, _)| is_meant(*motor)).collect();
+    }
+
+    /// Whether a motor is there, as far as it is known.
+    pub(super) fn is_there(&self, motor: Motor) -> bool {
+        self.owners.contains_key(&motor)
+            || self.heard.contains(&motor)
+            || self.moved.contains(&motor)
+    }
+
+    /// The motors that are there and have not confirmed a stop.
+    pub(super) fn owing(&self) -> impl Iterator<Item = (Motor, &Arc<str>)> {
+        let owed = self.owed.iter().filter(|(motor, _)| self.is_there(**motor));
+        owed.map(|(motor, owed)| (*motor, &owed.by))
+    }
+
+    /// Whose stop the motors have not confirmed.
+    pub(super) fn owed_stop(&self) -> Option<Arc<str>> {
+        let of_all = self.unanswered_stop.as_ref().map(|stop| &stop.by);
+        of_all.or_else(|| self.owing().next().map(|(_, by)| by)).cloned()
+    }
+}
