@@ -254,8 +254,8 @@ impl Acquisition {
         id
     }
 
-    /// Stops a motor that nobody asks to stop now: it gives way to other stops. Events tell of it only if
-    /// the motor confirms it. It withdraws no commands.
+    /// Queues a stop that gives way to those that somebody asks for now. Events tell of it only if the motor
+    /// confirms it. It withdraws no commands.
     pub fn stop_quietly(&mut self, by: &Arc<str>, request: Request, quiet: Quiet) -> CommandId {
         let lane = self.line.lane(&request);
         let told = (Arc::clone(by), request.clone());
