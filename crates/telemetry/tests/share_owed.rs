@@ -13,8 +13,8 @@ use asking::{Asker, close, command, open};
 use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
-    Cable, Passes, READ_STATUS, SHORT, START, STOP, eventually, frame, heard_and_unstopped, motors,
-    read, request_of, share_of_a_turning_motor, stop_all_of, stops, turn_before_the_share,
+    Cable, READ_STATUS, START, STOP, eventually, frame, heard_and_unstopped, motors, read,
+    request_of, share_of_a_turning_motor, share_while, stop_all_of, stops,
 };
 
 fn stands(share: &Share) {
@@ -64,7 +64,7 @@ fn motors_that_are_silent_do_not_keep_each_other_from_an_end() {
         Cable::cut_while(link, &is_cut)
     });
     let mut program = Asker::join(&share.path, "stops");
-    // Their silence is no answer.
+    // A motor that is read and silent has not answered.
     program.ask(read("st0", &[1, 2])).unwrap();
     eventually(|| heard_and_unstopped(&mut program, "st0").0 == [1, 2]);
     cut.store(true, Ordering::SeqCst);
@@ -175,30 +175,11 @@ fn a_stop_of_all_names_a_port_that_is_being_closed() {
     stands(&share);
 }
 
-/// A share whose motor 2 on st0 turns already. While this is so, `passes` has the requests.
-fn share_while(
-    name: &str,
-    passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
-) -> (Share, Arc<AtomicBool>) {
-    let is_so = Arc::new(AtomicBool::new(true));
-    let now = Arc::clone(&is_so);
-    let passes: Arc<Passes> = Arc::new(move |bytes| match now.load(Ordering::SeqCst) {
-        true => passes(bytes),
-        false => Some(bytes.to_vec()),
-    });
-    let share = Share::with(name, SHORT, move |mut link| {
-        turn_before_the_share(&mut *link);
-        Cable::with(link, &passes)
-    });
-    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
-    (share, is_so)
-}
-
 #[test]
 fn numbers_that_the_drive_does_not_have_are_no_answer_of_its_motors() {
     let is_of_motor = |bytes: &[u8]| [1, 2].contains(&request_of(bytes).0);
     let (share, is_lost) =
-        share_while("owed-lost", move |bytes| (!is_of_motor(bytes)).then(|| bytes.to_vec()));
+        share_while("owed-lost", true, move |bytes| (!is_of_motor(bytes)).then(|| bytes.to_vec()));
     let mut program = Asker::join(&share.path, "stops");
     for _ in 0..2 {
         let stopped = stop_all_of(&mut program, "st0", &[ANY_MOTOR, 1, 2]);
@@ -211,7 +192,7 @@ fn numbers_that_the_drive_does_not_have_are_no_answer_of_its_motors() {
 #[test]
 fn a_drive_that_refuses_all_numbers_has_no_motor_that_stands() {
     let (share, is_refused) =
-        share_while("owed-none", |bytes| Some(frame(5 << 5 | bytes[0] & 0x1f, &[2])));
+        share_while("owed-none", true, |bytes| Some(frame(5 << 5 | bytes[0] & 0x1f, &[2])));
     let mut program = Asker::join(&share.path, "stops");
     for _ in 0..2 {
         let stopped = stop_all_of(&mut program, "st0", &[ANY_MOTOR]);
@@ -226,7 +207,7 @@ fn a_stop_that_the_drive_refuses_is_repeated() {
     // As one for a motor that the drive does not have, and as a command that it does not know.
     for refused in [frame(5 << 5 | 3, &[2]), frame(2 << 5 | 3, &[0x7f])] {
         let is_stop = |bytes: &[u8]| request_of(bytes) == (2, STOP.to_vec());
-        let (share, is_refused) = share_while("owed-refusal", move |bytes| {
+        let (share, is_refused) = share_while("owed-refusal", true, move |bytes| {
             Some(if is_stop(bytes) { refused.clone() } else { bytes.to_vec() })
         });
         let mut program = Asker::join(&share.path, "stops");
@@ -260,8 +241,9 @@ fn a_line_that_is_closed_during_a_stop_owes_it() {
 #[test]
 fn a_release_keeps_the_stop_of_a_motor_that_is_read() {
     let is_of_motor = |bytes: &[u8]| request_of(bytes).0 == 2;
-    let (share, is_lost) =
-        share_while("owed-release", move |bytes| (!is_of_motor(bytes)).then(|| bytes.to_vec()));
+    let (share, is_lost) = share_while("owed-release", true, move |bytes| {
+        (!is_of_motor(bytes)).then(|| bytes.to_vec())
+    });
     let mut program = Asker::join(&share.path, "stops");
     program.ask(read("st0", &[1, 2])).unwrap();
     eventually(|| heard_and_unstopped(&mut program, "st0").0 == [1]);

@@ -12,8 +12,8 @@ use asking::{Asker, command};
 use motorlink_telemetry::share::message::*;
 use shared::{LIMIT, Share};
 use stopping::{
-    Cable, READ_STATUS, SHORT, START, heard_and_unstopped, motors, share_of_a_turning_motor,
-    stop_all, stop_all_of, stops,
+    Cable, READ_STATUS, SHORT, START, eventually, heard_and_unstopped, motors,
+    share_of_a_turning_motor, stop_all, stop_all_of, stops,
 };
 
 /// The ID of no motor.
@@ -128,6 +128,7 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
     while stops(&mut program, 7) == 0 {}
     assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
+    eventually(|| [1, 2, 3, 7].map(|motor| stops(&mut program, motor)) == [2; 4]);
     // The drive has motors 1 and 2, the bus has 1 to 4.
     let is_of_no_motor = |event: &&Event| {
         event.motor > Some(if event.line.as_deref() == Some("st0") { 2 } else { 4 })

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::exchange::{CommandId, Kind, Outcome, PollId, UnderWay, Verdict};
-use super::stops::{Quiet, Stops};
+use super::stops::Stops;
 
 /// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
 /// silence: on a line that loses bytes they are common.
@@ -17,7 +17,7 @@ const PAUSE: Micros = Micros::from_millis(500);
 pub(super) struct LaneState<C> {
     pub(super) under_way: Option<UnderWay>,
     /// The first one is under way if [`under_way`](Self::under_way) is a stop.
-    stops: Stops<C>,
+    pub(super) stops: Stops<C>,
     pub(super) commands: VecDeque<(CommandId, C, Instant)>,
     /// The command that has begun last.
     begun: Option<(CommandId, C, Instant)>,
@@ -65,16 +65,6 @@ impl<C: Clone> LaneState<C> {
             }
         }
         overtaken
-    }
-
-    pub(super) fn add_stop(
-        &mut self,
-        now: Instant,
-        asked: (CommandId, Option<Quiet>),
-        command: C,
-        is_same: impl Fn(&C) -> bool,
-    ) {
-        self.stops.add(now, asked, command, is_same);
     }
 
     /// Takes out a command whose time is over, or on a closed line a stop.

@@ -237,7 +237,7 @@ impl<C: Clone> Schedule<C> {
         let id = self.new_id();
         let state = self.lanes.entry(lane).or_default();
         let overtaken = state.overtake(keep);
-        state.add_stop(now, (id, None), command, is_same);
+        state.stops.add(now, (id, None), command, is_same);
         (id, overtaken)
     }
 
@@ -252,7 +252,7 @@ impl<C: Clone> Schedule<C> {
         quiet: Quiet,
     ) -> CommandId {
         let id = self.new_id();
-        self.lanes.entry(lane).or_default().add_stop(now, (id, Some(quiet)), command, is_same);
+        self.lanes.entry(lane).or_default().stops.add(now, (id, Some(quiet)), command, is_same);
         id
     }
 

@@ -8,7 +8,7 @@ use motorlink_proto::time::{Instant, Micros};
 use super::exchange::{CommandId, Outcome, Verdict};
 
 /// A stop that got no reply for so long gives way to one that is more urgent.
-pub(super) const GIVES_WAY: Micros = Micros::from_millis(100);
+const GIVES_WAY: Micros = Micros::from_millis(100);
 
 /// A stop that is less urgent than one that somebody asks for now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -23,25 +23,23 @@ pub const READ_STATUS: [u8; 2] = [2, 2];
 pub const START: [u8; 2] = [3, 1];
 
 /// What becomes of a request on its way to the drive.
-pub type Passes = dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync;
+type Passes = dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync;
 
-/// A line that loses or changes requests.
+/// A line that loses or changes requests while this is so.
 pub struct Cable {
     link: Box<dyn EventBytes>,
+    is_so: Arc<AtomicBool>,
     passes: Arc<Passes>,
 }
 
 impl Cable {
-    pub fn with(link: Box<dyn EventBytes>, passes: &Arc<Passes>) -> Box<Self> {
-        Box::new(Cable { link, passes: Arc::clone(passes) })
+    fn with(link: Box<dyn EventBytes>, is_so: &Arc<AtomicBool>, passes: &Arc<Passes>) -> Box<Self> {
+        Box::new(Cable { link, is_so: Arc::clone(is_so), passes: Arc::clone(passes) })
     }
 
-    /// One that is cut while this is so.
     pub fn cut_while(link: Box<dyn EventBytes>, is_cut: &Arc<AtomicBool>) -> Box<Self> {
-        let is_cut = Arc::clone(is_cut);
-        let passes: Arc<Passes> =
-            Arc::new(move |bytes| (!is_cut.load(Ordering::SeqCst)).then(|| bytes.to_vec()));
-        Self::with(link, &passes)
+        let passes: Arc<Passes> = Arc::new(|_| None);
+        Self::with(link, is_cut, &passes)
     }
 }
 
@@ -73,6 +71,9 @@ impl Link for Cable {
 
 impl ByteLink for Cable {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        if !self.is_so.load(Ordering::SeqCst) {
+            return self.link.write(bytes);
+        }
         (self.passes)(bytes).map_or(Ok(()), |bytes| self.link.write(&bytes))
     }
 
@@ -104,22 +105,30 @@ fn before_the_share(link: &mut dyn EventBytes, request: Request<'_>) {
 }
 
 /// Turns motor 2 as a program that had the port before the share.
-pub fn turn_before_the_share(link: &mut dyn EventBytes) {
+fn turn_before_the_share(link: &mut dyn EventBytes) {
     before_the_share(link, Request::SetRamp(Ramp { speed_rpm: 1000, duration_ms: 100 }));
     before_the_share(link, Request::ExecuteCommand(Command::StartMotor));
 }
 
 /// A share whose motor 2 on st0 turns already, and the cable of st0, which is cut by `true`.
 pub fn share_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
-    let is_cut = Arc::new(AtomicBool::new(false));
-    let cut = Arc::clone(&is_cut);
+    share_while(name, begins_cut, |_| None)
+}
+
+/// A share whose motor 2 on st0 turns already. While this is so, `passes` has the requests.
+pub fn share_while(
+    name: &str,
+    begins: bool,
+    passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
+) -> (Share, Arc<AtomicBool>) {
+    let is_so = Arc::new(AtomicBool::new(begins));
+    let (now, passes): (_, Arc<Passes>) = (Arc::clone(&is_so), Arc::new(passes));
     let share = Share::with(name, SHORT, move |mut link| {
         turn_before_the_share(&mut *link);
-        is_cut.store(begins_cut, Ordering::SeqCst);
-        Cable::cut_while(link, &is_cut)
+        Cable::with(link, &now, &passes)
     });
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
-    (share, cut)
+    (share, is_so)
 }
 
 /// Stops all motors: whether each of some confirmed, may turn or is absent. The share also stops the motors

@@ -163,7 +163,10 @@ impl Hub {
                 self.confirm(session, name, id, &MotorName { line, motor })?;
                 Ok(None)
             }
-            Ask::Stop { motor } => self.stop_asked(session, name, id, motor.as_ref()),
+            Ask::Stop { motor } => {
+                self.stop_asked(session, name, id, motor.as_ref())?;
+                Ok(None)
+            }
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
                 for held in self.lines.values_mut() {
@@ -352,7 +355,7 @@ impl Hub {
         name: &Arc<str>,
         id: u32,
         motor: Option<&MotorName>,
-    ) -> Result<Option<Answer>, Refused> {
+    ) -> Result<(), Refused> {
         let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
@@ -378,7 +381,7 @@ impl Hub {
             failure: Some(UNANSWERED.to_owned()),
             absent: false,
         }));
-        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
+        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(()) };
         let part = asker.gather(id, awaited.len(), unreached);
         for (line, motor) in awaited {
             let held = &self.lines[&line];
@@ -402,7 +405,7 @@ impl Hub {
         for (line, motor) in others {
             self.stop(why, line, motor, session, None, name);
         }
-        Ok(None)
+        Ok(())
     }
 
     fn rates(&mut self, session: SessionId, id: u32) -> Result<Option<Answer>, Refused> {
