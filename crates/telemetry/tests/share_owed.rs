@@ -14,7 +14,7 @@ use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
     Cable, READ_STATUS, START, STOP, eventually, frame, heard_and_unstopped, motors, read,
-    request_of, share_of_a_turning_motor, share_while, stop_all_of, stops,
+    request_of, share_of_a_turning_motor, share_while, stop_all_of, stop_times, stops,
 };
 
 fn stands(share: &Share) {
@@ -54,6 +54,28 @@ fn a_motor_that_had_never_answered_is_stopped_when_it_does() {
     cut.store(false, Ordering::SeqCst);
     eventually(|| program.ask(command("st0", 2, &READ_STATUS)).is_ok());
     stands(&share);
+}
+
+#[test]
+fn a_motor_that_nobody_reads_is_searched_until_it_stands() {
+    let is_of_motor = |bytes: &[u8]| request_of(bytes).0 == 2;
+    let (share, is_lost) = share_while("owed-search", true, move |bytes| {
+        (!is_of_motor(bytes)).then(|| bytes.to_vec())
+    });
+    let mut program = Asker::join(&share.path, "stops");
+    program.ask(command("st0", 1, &READ_STATUS)).unwrap();
+    let stopped = stop_all_of(&mut program, "st0", &[1, 2]);
+    assert_eq!(stopped, motors("st0", &[(1, "confirmed")]));
+    // All are tried for 2 s.
+    let mut is_late = |motor| {
+        let times = stop_times(&mut program, motor);
+        times.first().zip(times.last()).is_some_and(|(first, last)| last - first > 3.0)
+    };
+    eventually(|| is_late(2));
+    assert!(!is_late(5), "the drive says that it has no motor 5");
+    is_lost.store(false, Ordering::SeqCst);
+    stands(&share);
+    eventually(|| heard_and_unstopped(&mut program, "st0") == (vec![1, 2], vec![]));
 }
 
 #[test]

@@ -184,10 +184,15 @@ pub fn eventually(mut is: impl FnMut() -> bool) {
 
 /// How many stops of a motor are on the wire of st0.
 pub fn stops(program: &mut Asker, motor: u8) -> usize {
+    stop_times(program, motor).len()
+}
+
+/// When the stops of a motor are on the wire of st0, in seconds.
+pub fn stop_times(program: &mut Asker, motor: u8) -> Vec<f64> {
     let (from, to, after) = (Some(0.0), None, None);
     let ask = Ask::Frames { line: "st0".to_owned(), from, to, after, most: 1000 };
     let Ok(Answer::Frames { frames, .. }) = program.ask(ask) else { panic!() };
     let is_stop =
         |frame: &&WireFrame| frame.motor == Some(motor) && frame.words.contains("STOP_MOTOR");
-    frames.iter().filter(is_stop).count()
+    frames.iter().filter(is_stop).map(|frame| frame.t).collect()
 }

@@ -67,6 +67,12 @@ impl Hub {
                     }
                 }
             }
+            Work::Search(motor, result) => {
+                let Some(held) = self.lines.get_mut(&line) else { return };
+                if held.search_ended(motor, &result) {
+                    self.stop_again(line, motor, Why::Asked);
+                }
+            }
             Work::Unheard(part, motor) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
                 let motor = MotorName { line: name.to_string(), motor: motor.number() };

@@ -67,6 +67,8 @@ pub struct Held {
     pub(super) unanswered_stop: Option<UnansweredStop>,
     /// The stops that motors have not confirmed: they are under way, or are repeated.
     pub(super) owed: BTreeMap<Motor, Owed>,
+    /// A number that may have no motor, and that a stop is sent to now.
+    pub(super) searched: Option<Motor>,
 }
 
 /// A data segment that a command configures, for the program that sends it.
@@ -116,6 +118,7 @@ impl Held {
             stops: BTreeMap::new(),
             unanswered_stop: None,
             owed: BTreeMap::new(),
+            searched: None,
             runner: Runner::start(name, acquisition)?,
         })
     }
@@ -171,8 +174,12 @@ impl Held {
 
     /// Whether a program turned a motor, or tried to.
     pub(super) fn may_turn(&self, motor: Motor) -> bool {
-        let is_starting = self.starting.iter().any(|(it, _)| *it == motor);
-        is_starting || self.moved.contains(&motor)
+        self.is_starting(motor) || self.moved.contains(&motor)
+    }
+
+    /// Whether a start of the motor is under way.
+    pub(super) fn is_starting(&self, motor: Motor) -> bool {
+        self.starting.iter().any(|(it, _)| *it == motor)
     }
 
     /// Whether the drive says that it has no such motor, no program turned it and it has never answered.

@@ -30,6 +30,7 @@ use crate::schedule::Quiet;
 use crate::signal::Motor;
 use jobs::Jobs;
 use line::Lines;
+use owed::LONGEST_PAUSE;
 use place::wall_now;
 use session::{Part, Session};
 use work::{Done, News, Work};
@@ -201,9 +202,12 @@ impl Hub {
     fn repeat_stops(&mut self) {
         let now = Instant::now();
         for line in self.numbers() {
-            let due = self.lines.get_mut(&line).map(|held| held.due_again(now));
+            let due = self.lines.get(&line).map(|held| held.due_again(now));
             for motor in due.into_iter().flatten() {
                 self.stop_again(line, motor, Why::Repeated);
+            }
+            if let Some(motor) = self.lines.get_mut(&line).and_then(|held| held.due_search(now)) {
+                self.search(line, motor);
             }
             if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
                 self.stop_line(line, None, &by);
@@ -345,6 +349,16 @@ impl Hub {
             let what = Work::Stop { part, motor, by, is_precaution, result };
             self.finish(Done { session, id: None, line, name, what });
         }
+    }
+
+    /// Stops a motor that may not exist, behind the commands of programs.
+    fn search(&mut self, line: usize, motor: Motor) {
+        let tell = self.teller(SessionId::default(), None, line);
+        let Some(held) = self.lines.get(&line) else { return };
+        let by = held.owed.get(&motor).map_or_else(|| "share".into(), |owed| Arc::clone(&owed.by));
+        let ended = move |result| tell(Work::Search(motor, result));
+        // The end of the engine is told elsewhere.
+        let _ = held.remote().command_then(&by, line::stop(motor), LONGEST_PAUSE.into(), ended);
     }
 
     /// Receives the end of something in an engine's thread.

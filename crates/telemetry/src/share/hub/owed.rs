@@ -6,11 +6,57 @@ use std::time::{Duration, Instant};
 /// The pause before a stop that failed is repeated.
 pub(super) const AGAIN: Duration = Duration::from_secs(1);
 
+/// The longest pause before a number is searched again.
+pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+
 /// A stop that a motor has not confirmed.
 pub(super) struct Owed {
     pub(super) by: Arc<str>,
-    /// When it is repeated; `None`: when the motor answers anything.
-    pub(super) again: Option<Instant>,
+    next: Next,
+    /// The pause before the next search.
+    pause: Duration,
+}
+
+/// When a stop is sent again. If the motor answers anything, that is at once.
+enum Next {
+    Answer,
+    Repeat(Instant),
+    /// There may be no such motor: the stop is one command among others.
+    Search(Instant),
+}
+
+impl Owed {
+    /// It is asked for now.
+    pub(super) fn new(by: &Arc<str>) -> Self {
+        Owed { by: Arc::clone(by), next: Next::Answer, pause: AGAIN }
+    }
+
+    pub(super) fn await_answer(&mut self) {
+        self.next = Next::Answer;
+    }
+
+    pub(super) fn repeat(&mut self, now: Instant) {
+        self.next = Next::Repeat(now + AGAIN);
+    }
+
+    /// Each search waits longer than the one before it.
+    pub(super) fn search(&mut self, now: Instant) {
+        self.next = Next::Search(now + self.pause);
+        self.pause = (self.pause * 2).min(LONGEST_PAUSE);
+    }
+
+    /// Whether it is repeated now.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        matches!(self.next, Next::Repeat(at) if at <= now)
+    }
+
+    /// Since when the motor should be searched.
+    pub(super) fn search_due(&self, now: Instant) -> Option<Instant> {
+        match self.next {
+            Next::Search(at) if at <= now => Some(at),
+            _ => None,
+        }
+    }
 }
 
 /// A stop of all motors while no motor of the line had ever answered.

@@ -1,6 +1,5 @@
 //! Which motors of a line a stop is sent to, and what becomes of it.
 
-use std::collections::btree_map::Entry;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -25,7 +24,7 @@ pub(super) enum Address {
 impl Held {
     /// A stop is asked for.
     pub(super) fn owe(&mut self, motor: Motor, by: &Arc<str>) {
-        self.owed.insert(motor, Owed { by: Arc::clone(by), again: None });
+        self.owed.insert(motor, Owed::new(by));
     }
 
     /// A motor has confirmed a stop: no program owns it any more.
@@ -36,14 +35,24 @@ impl Held {
         self.owed.remove(&motor);
     }
 
-    /// A motor has not confirmed a stop. It is repeated soon if the motor is there.
+    /// A motor has not confirmed a stop.
     pub(super) fn not_stopped(&mut self, motor: Motor, by: &Arc<str>, why: &CommandError) {
-        // The end of these is an event.
-        let is_event = matches!(why, CommandError::Closed | CommandError::Ended);
-        let again = (self.is_there(motor) && !is_event).then(|| Instant::now() + AGAIN);
-        match self.owed.entry(motor) {
-            Entry::Occupied(mut owed) => owed.get_mut().again = again,
-            Entry::Vacant(place) => drop(place.insert(Owed { by: Arc::clone(by), again })),
+        self.owed.entry(motor).or_insert_with(|| Owed::new(by));
+        self.repeat(motor, why);
+    }
+
+    /// Repeats a stop that failed.
+    fn repeat(&mut self, motor: Motor, why: &CommandError) {
+        let (now, is_there) = (Instant::now(), self.is_there(motor));
+        // All are stopped again and again while none has answered.
+        let is_of_all = self.unanswered_stop.is_some();
+        let Some(owed) = self.owed.get_mut(&motor) else { return };
+        match why {
+            // The end of these is an event.
+            CommandError::Closed | CommandError::Ended => owed.await_answer(),
+            _ if is_there => owed.repeat(now),
+            _ if is_of_all || why.is_of_no_motor() => owed.await_answer(),
+            _ => owed.search(now),
         }
     }
 
@@ -55,11 +64,32 @@ impl Held {
     }
 
     /// The motors whose stop is repeated now.
-    pub(super) fn due_again(&mut self, now: Instant) -> Vec<Motor> {
-        let due = |(motor, owed): (&Motor, &mut Owed)| {
-            owed.again.take_if(|at| *at <= now).map(|_| *motor)
-        };
-        self.owed.iter_mut().filter_map(due).collect()
+    pub(super) fn due_again(&self, now: Instant) -> Vec<Motor> {
+        self.owed.iter().filter(|(_, owed)| owed.is_due(now)).map(|(motor, _)| *motor).collect()
+    }
+
+    /// The number that is searched now, one after the other: a silent line has time for others between
+    /// them.
+    pub(super) fn due_search(&mut self, now: Instant) -> Option<Motor> {
+        if self.searched.is_some() {
+            return None;
+        }
+        // A start that is under way ends the search if it is confirmed.
+        let is_free = |it: &Motor| !(self.stops.contains_key(it) || self.is_starting(*it));
+        let free = self.owed.iter().filter(|(motor, _)| is_free(motor));
+        let due = free.filter_map(|(motor, owed)| Some((owed.search_due(now)?, *motor)));
+        self.searched = due.min().map(|(_, motor)| motor);
+        self.searched
+    }
+
+    /// A search is over. Gives whether a motor is there, which has to be stopped then.
+    pub(super) fn search_ended(&mut self, motor: Motor, result: &CommandResult) -> bool {
+        self.searched = None;
+        self.ended(motor, false, result);
+        if let Err(why) = result {
+            self.repeat(motor, why);
+        }
+        result.is_ok()
     }
 
     /// The motors that a stop of all motors is sent to: all that the line can have, because a share

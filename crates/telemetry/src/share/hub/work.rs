@@ -40,6 +40,8 @@ pub(super) enum Work {
         is_precaution: bool,
         result: CommandResult,
     },
+    /// The stop of a number that may have no motor.
+    Search(Motor, CommandResult),
     /// A motor that should stop has never answered.
     Unheard(Part, Motor),
     Rates(Part, Vec<Rate>),
