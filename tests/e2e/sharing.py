@@ -50,9 +50,29 @@ class Client:
                 return message
             self.others.append(message)
 
-    def command(self, line, motor, *code, within=1.0):
+    def command(self, line, motor, *code, within=30):
         """The answer to a command of these bytes."""
         return self.ask("command", line=line, motor=motor, bytes=list(code), time_to_live=within)
+
+    def read(self, line, motor, *code):
+        """The bytes of a reply. A stop may replace a read, which is asked again then."""
+        while True:
+            answer = self.command(line, motor, *code)
+            if answer.get("reason") not in ("displaced", "overtaken"):
+                assert answer["kind"] == "answer", answer
+                return bytes(answer["bytes"])
+
+    def status(self, motor=1):
+        """STATUS of a motor of st0."""
+        return self.read("st0", motor, 2, 2)[0]
+
+    def rpm(self, motor=1):
+        """The speed of a motor of st0, by its drive."""
+        return struct.unpack("<i", self.read("st0", motor, 2, 30))[0]
+
+    def dps(self, motor, line="rmd0"):
+        """The speed of an RMD motor in °/s, by itself."""
+        return struct.unpack_from("<h", self.read(line, motor, 0x9C, *7 * [0]), 4)[0]
 
     def subscribe(self, *signals, period=0.01, queue=1000):
         """Subscribes to (line, motor, name)s."""
@@ -84,9 +104,7 @@ def event(name, **members):
 
 def speeds(client):
     """The speeds of ST motor 1 and RMD motor 2, by the drives themselves."""
-    rpm = client.command("st0", 1, 2, 30, within=30)["bytes"]
-    dps = client.command("rmd0", 2, 0x9C, *7 * [0], within=30)["bytes"]
-    return struct.unpack("<i", bytes(rpm))[0], struct.unpack_from("<h", bytes(dps), 4)[0]
+    return client.rpm(), client.dps(2)
 
 
 def are_still(client):

@@ -15,6 +15,8 @@ import pyte
 
 from program import environment, eventually
 
+#: What the terminal gets after all that a program wrote. It shows nothing.
+LAST = b"\0"
 KEYS = {
     "up": "\x1b[A", "down": "\x1b[B", "enter": "\r", "esc": "\x1b", "backspace": "\x7f", "F12": "\x1b[24~",
     "space": " ", "ctrl-c": "\x03", "ctrl-x": "\x18", "ctrl-z": "\x1a", "end": "\x1b[F", "home": "\x1b[H",
@@ -127,7 +129,12 @@ class Terminal:
         os.kill(self.process.pid, number)
 
     def wait(self, within=20):
-        return self.process.wait(within)
+        """Waits for the end, and for all that the program wrote; gives the exit code."""
+        code = self.process.wait(within)
+        if not self._ended.is_set():
+            os.write(self._theirs, LAST)
+            eventually(lambda: self.raw.endswith(LAST), "the end of the output", within)
+        return code
 
     def hang_up(self):
         """Takes the terminal away, as when its window is closed."""

@@ -76,8 +76,7 @@ def turns_too(watcher):
     watcher.command("rmd0", 1, SET_SPEED, 0, 0, 0, *struct.pack("<i", 9000))
 
     def turns_still():
-        status = bytes(watcher.command("rmd0", 1, 0x9C, *7 * [0])["bytes"])
-        return struct.unpack_from("<h", status, 4)[0] > 60
+        return watcher.dps(1) > 60
 
     def check():
         assert turns_still()

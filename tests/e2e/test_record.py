@@ -370,7 +370,7 @@ def test_a_refused_signal_is_named_and_the_others_keep_their_rate(run, drives, t
 
 def test_the_current_of_an_st_drive_is_an_effort_with_its_full_scale(run, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    words = ("TORQUE_MEAS", "--motor", "1", "--no-settings", "--duration", "500ms", *QUICK)
+    words = ("TORQUE_MEAS", "--motor", "1", "--no-settings", "--duration", "2s", *QUICK)
     run("record", "-p", drives.st, "-o", path, *words, "--full-scale", "16.5").ended(0)
     file = File(path)
     rows, joints = file.of("/st0/motor1/signals"), file.of("/joint_states")

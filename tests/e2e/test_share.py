@@ -103,8 +103,7 @@ def test_the_motors_of_a_killed_program_stop_and_a_viewer_misses_nothing(share):
         times.setdefault(group, []).extend(t0 + t for t in columns[0])
         lost += missing
     assert lost == 0
-    dps = bytes(tuner.command("rmd0", 1, 0x9C, *7 * [0])["bytes"])
-    assert struct.unpack_from("<h", dps, 4)[0] > 60
+    assert tuner.dps(1) > 60
     gaps = [b - a for t in times.values() for a, b in zip(t, t[1:])]
     gaps.sort()
     late = sum(gap > 0.02 for gap in gaps)
@@ -118,7 +117,7 @@ def test_a_killed_viewer_disturbs_nobody(share):
         assert tuner.command("st0", 1, *START)["kind"] == "answer"
         killed(process)
         tuner.until(event("left", by="watches"))
-        eventually(lambda: tuner.command("st0", 1, 2, 2)["bytes"] == [RUNNING], "a motor that runs")
+        eventually(lambda: tuner.status() == RUNNING, "a motor that runs")
         assert tuner.command("st0", 1, *STOP)["kind"] == "answer"
         eventually(lambda: are_still(tuner), "motors that stop")
 

@@ -32,12 +32,6 @@ def names(client):
     return [line["line"] for line in client.ask("lines")["lines"]]
 
 
-def speed(client, line, motor):
-    """The speed of an RMD motor, by the drive itself."""
-    dps = client.command(line, motor, 0x9C, *7 * [0], within=30)["bytes"]
-    return struct.unpack_from("<h", bytes(dps), 4)[0]
-
-
 def test_a_line_is_opened_turned_and_closed(share, drives):
     program, other = Client(share.path, "opens"), Client(share.path, "sees")
     port = f"slcan:{drives.can}"
@@ -45,9 +39,9 @@ def test_a_line_is_opened_turned_and_closed(share, drives):
     assert (answer["to"], answer["line"]) == ("open", "rmd0")
     assert other.until(event("opened", line="rmd0", by="opens"))["message"] == f"rmd0: opens opened {port}"
     assert names(other) == ["st0", "rmd0"]
-    turned = program.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000), within=30)
+    turned = program.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
     assert turned["kind"] == "answer"
-    eventually(lambda: speed(program, "rmd0", 2) > 100, "a motor that turns")
+    eventually(lambda: program.dps(2, "rmd0") > 100, "a motor that turns")
     closed = other.ask("close", line="rmd0")
     assert closed["motors"] == [{"line": "rmd0", "motor": 2}]
     program.until(event("stopped", line="rmd0", motor=2))
@@ -56,13 +50,13 @@ def test_a_line_is_opened_turned_and_closed(share, drives):
     assert program.command("rmd0", 2, 0x9C, *7 * [0])["reason"] == "usage"
     # The port is free, and the name is not used again.
     assert program.ask("open", port=port, protocol="rmd", timeout=10)["line"] == "rmd1"
-    eventually(lambda: speed(program, "rmd1", 2) == 0, "a motor that stands")
+    eventually(lambda: program.dps(2, "rmd1") == 0, "a motor that stands")
 
 
 def test_a_close_says_that_a_motor_did_not_confirm(share, drives):
     program = Client(share.path, "turns")
-    assert program.command("st0", 1, 7, *struct.pack("<iH", 1000, 100), within=30)["kind"] == "answer"
-    assert program.command("st0", 1, 3, 1, within=30)["kind"] == "answer"
+    assert program.command("st0", 1, 7, *struct.pack("<iH", 1000, 100))["kind"] == "answer"
+    assert program.command("st0", 1, 3, 1)["kind"] == "answer"
     drives.process.send_signal(signal.SIGSTOP)
     try:
         closed = program.ask("close", line="st0")

@@ -41,19 +41,9 @@ def direct(share):
     return Client(share.path, "looks")
 
 
-def rpm(client, motor=1):
-    """The speed of an ST motor, rpm."""
-    return struct.unpack("<i", bytes(client.command("st0", motor, 2, 30)["bytes"]))[0]
-
-
-def is_idle(client, motor=1):
-    """Whether an ST motor rests and can be started."""
-    return client.command("st0", motor, 2, 2)["bytes"] == [0]
-
-
-def dps(client, motor):
-    """The speed of an RMD motor, °/s."""
-    return struct.unpack_from("<h", bytes(client.command("rmd0", motor, 0x9C, *7 * [0])["bytes"]), 4)[0]
+def is_idle(client):
+    """Whether the ST motor rests and can be started."""
+    return client.status() == 0
 
 
 def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
@@ -90,7 +80,7 @@ def test_rmd_commands_work_as_on_a_port_of_their_own(share, run, direct):
     run(*rmd, "torque4", "0", "0", "0", "0.1").ended(0)
     run(*rmd, "status", "--every", "20ms", "--count", "10").ended(0)
     assert "does not answer" in run(*rmd, "--id", "9", "status").ended(3).err
-    eventually(lambda: all(abs(dps(direct, motor)) < 5 for motor in (1, 2, 3, 4)), "motors that stop")
+    eventually(lambda: all(abs(direct.dps(motor)) < 5 for motor in (1, 2, 3, 4)), "motors that stop")
 
 
 def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path, start, drives):
@@ -137,7 +127,7 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     waited = run("rmd", "-p", share.rmd, "--id", "3", "position", "90", "--max-speed", "360", "--wait")
     assert said not in waited.ended(0).err
     assert said not in run("st", "-p", share.st, "ramp", "1000", "100").ended(0).err
-    eventually(lambda: abs(rpm(direct)) < 30 and abs(dps(direct, 3)) < 5, "motors that stop")
+    eventually(lambda: abs(direct.rpm()) < 30 and abs(direct.dps(3)) < 5, "motors that stop")
 
 
 def test_a_command_latches_stops_and_releases(share, run, direct):
@@ -215,7 +205,7 @@ def test_a_guard_is_refused_in_front_of_a_share(share, run, tmp_path):
 def test_watch_shows_and_stops_motors_of_a_share(share, motorlink, direct):
     direct.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
     direct.command("st0", 1, 3, 1)
-    eventually(lambda: rpm(direct) > 1000, "a motor that turns")
+    eventually(lambda: direct.rpm() > 1000, "a motor that turns")
     terminal = Terminal([motorlink, "watch", "-p", share.st, "-p", share.rmd], 80, 24)
     try:
         terminal.shows("st0:1", "rmd0:2", "RUN", "6 motors on 2 ports")
@@ -265,14 +255,14 @@ def test_each_program_can_be_killed_and_the_others_go_on(share, start, direct, t
     recorder, path = records("all")
     viewer, tuner = watches(), tunes()
     for turn in range(ROUNDS):
-        eventually(lambda: rpm(direct) > 1000, "a motor that turns")
+        eventually(lambda: direct.rpm() > 1000, "a motor that turns")
         # A program that only looks is killed: the motor keeps turning.
         other, _ = records(f"killed-{turn}")
         other.process.kill()
         viewer.process.kill()
         viewer.wait()
         viewer = watches()
-        assert rpm(direct) > 1000
+        assert direct.rpm() > 1000
         # The tuner leaves: its motor stops, and the recorder continues.
         tuner.socket.close()
         eventually(lambda: is_idle(direct), "a motor that stops")
