@@ -347,6 +347,13 @@ def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share)
         turns_on()
 
 
+def test_a_running_share_with_another_profile_is_not_shown(run, share):
+    share()
+    words = ("monitor", "--listen", "127.0.0.1:0", "--share", f"unix:{share.path}", "--profile", "mcsdk-5.4")
+    refused = run(*words).ended(2)
+    assert "st0 of the share has the profile spec, not mcsdk-5.4" in refused.err
+
+
 def test_pages_are_told_that_the_share_is_lost_and_back(serve, share):
     running = share()
     _, site = serve("--share", f"unix:{share.path}")

@@ -173,8 +173,8 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
     const standing = [held, turned].filter((speed) => speed < RPM / 2).length;
     if (standing > 0) {
       stops += standing;
-      const why = await Promise.all([holder, page].map((one) => one.getByText(/sign of life|were stopped/).allTextContents()));
-      console.log(`a motor stands: ${held.toFixed(0)} and ${turned.toFixed(0)} rpm`, ...why);
+      const told = fleet.monitor.lines.filter(({ line, event }) => String(line).startsWith('st') || event === 'left');
+      console.log(`a motor stands: ${held.toFixed(0)} and ${turned.toFixed(0)} rpm`, ...told.slice(-6).map(({ message }) => message));
       // What fails now is done again after the next look.
       if (held < RPM / 2) await holder.keyboard.up('h').then(hold).catch(console.log);
       if (turned < RPM / 2) await turn().catch(console.log);

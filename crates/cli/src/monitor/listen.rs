@@ -31,7 +31,8 @@ pub struct Listen {
     /// Where programs read the same data that have no token, PlotJuggler for one: 127.0.0.1:8765
     #[arg(long, value_name = "ADDRESS:PORT")]
     foxglove: Option<SocketAddr>,
-    /// Listen on an address of the network without TLS. Anybody there can read the tokens
+    /// Let --listen and --foxglove have an address of the network without TLS. Anybody there can read
+    /// the tokens
     #[arg(long)]
     insecure: bool,
     /// Let operators open lines at any TCP address that this computer reaches. Without --listen, or

@@ -35,7 +35,7 @@ const SIMULATED_TIMEOUT: Duration = Duration::from_millis(500);
 #[command(after_help = "\
 Without -p the drives are simulated. -p and --profile are as for `motorlink share`, and the monitor is \
 a share: other programs use the drives at the same time at --at. With --share, or with -p \
-share:PATH/LINE, it shows a share that runs already.
+share:PATH/LINE, it shows all lines of a share that runs already.
 
 Who may do what: the first address is for operators. The second one is for viewers, who see everything \
 and can stop, nothing else. The third one is for programs that speak Foxglove's protocol, and read \
@@ -45,9 +45,9 @@ computer can connect, unless --listen has another address. That needs --tls-cert
 
 Safety: a motor that a page turned stops when the page ends, or gives no sign of life for --deadline: \
 the browser hangs, the tab is hidden, the network fails. The monitor cannot stop a motor if it is \
-killed with SIGKILL, if the cable to the drive is cut, or if the computer stops. `motorlink guard` \
-between monitor and drive stops it after SIGKILL. If people can be hurt, use an emergency stop in \
-hardware.
+killed with SIGKILL or frozen, if the cable to the drive is cut, or if the computer stops. `motorlink \
+guard` between monitor and drive stops it after SIGKILL, and with --silence if the monitor is frozen. \
+If people can be hurt, use an emergency stop in hardware.
 
 Output: the addresses, then one line per event. SIGINT, SIGTERM and the other signals that end a program \
 stop the motors first. Exit code 0, or 3 if a motor did not confirm that it stops.")]
@@ -110,7 +110,8 @@ fn running_share(args: &Args) -> Result<Option<PathBuf>, Failure> {
     if let Some(share) = &args.share {
         return match args.lines.is_empty() {
             true => Ok(Some(share::path(share)?)),
-            false => Err(Failure::usage("--share shows a share that has its ports; leave -p out")),
+            false => Err(Failure::usage("--share shows a share that has its ports")
+                .trying("leave -p out, and unset MOTORLINK_PORT")),
         };
     }
     let places: Vec<_> = args.lines.ports.iter().map(|port| place_of(port)).collect();
@@ -140,6 +141,7 @@ fn show(args: &Args, path: PathBuf, web: Web) -> Result<(), Failure> {
         return Err(failed(io::Error::other("it gives another answer")));
     };
     drop(share);
+    args.lines.check(&lines)?;
     let monitor = start(args, path.clone(), true, web)?;
     ready(args, &monitor, &path, &lines, false)?;
     while interrupt::wait(Duration::from_secs(3600)) {}

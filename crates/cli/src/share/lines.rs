@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::Held;
-use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::message::{Line, Protocol};
 use motorlink_telemetry::share::opening::{OpenError, Wish};
 
 use crate::connection::missing_port;
@@ -30,6 +30,19 @@ impl Lines {
     /// Whether no port is named.
     pub fn is_empty(&self) -> bool {
         self.ports.iter().all(String::is_empty)
+    }
+
+    /// Refuses a share whose ST drives have another profile than the one that was asked for.
+    pub fn check(&self, lines: &[Line]) -> Result<(), Failure> {
+        let asked = self.profile.name();
+        let mut profiles = lines.iter().filter_map(|one| Some((&one.line, one.profile.as_ref()?)));
+        match profiles.find(|(_, profile)| *profile != asked) {
+            Some((line, profile)) if self.profile != Profile::default() => Err(Failure::usage(
+                format!("{line} of the share has the profile {profile}, not {asked}"),
+            )
+            .trying("leave --profile out, and unset MOTORLINK_PROFILE")),
+            _ => Ok(()),
+        }
     }
 
     /// Opens each port, once for each protocol that it can have.
