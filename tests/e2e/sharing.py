@@ -66,9 +66,9 @@ class Client:
         """STATUS of a motor of st0."""
         return self.read("st0", motor, 2, 2)[0]
 
-    def rpm(self, motor=1):
-        """The speed of a motor of st0, by its drive."""
-        return struct.unpack("<i", self.read("st0", motor, 2, 30))[0]
+    def rpm(self, motor=1, line="st0"):
+        """The speed of an ST motor, by its drive."""
+        return struct.unpack("<i", self.read(line, motor, 2, 30))[0]
 
     def dps(self, motor, line="rmd0"):
         """The speed of an RMD motor in °/s, by itself."""

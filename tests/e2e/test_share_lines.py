@@ -53,10 +53,55 @@ def test_a_line_is_opened_turned_and_closed(share, drives):
     eventually(lambda: program.dps(2, "rmd1") == 0, "a motor that stands")
 
 
-def test_a_close_says_that_a_motor_did_not_confirm(share, drives):
-    program = Client(share.path, "turns")
+def turn(program):
+    """Turns the ST motor."""
     assert program.command("st0", 1, 7, *struct.pack("<iH", 1000, 100))["kind"] == "answer"
     assert program.command("st0", 1, 3, 1)["kind"] == "answer"
+
+
+def turned(run, drives):
+    """Turns the ST motor of drives that no program has open."""
+    run("st", "-p", drives.st, "start", "--ramp", "1000", "100ms").ended(0)
+    eventually(lambda: drives.motor(1)["speed_rpm"] > 500, "a motor that turns")
+
+
+def stands(program, line):
+    """Waits until ST motor 1 of a line stands."""
+    eventually(lambda: abs(program.rpm(line=line)) < 30, "a motor that stands")
+
+
+def test_a_line_that_is_closed_while_its_drive_is_away_owes_its_stop(share, drives, sim, run):
+    program = Client(share.path, "turns")
+    turn(program)
+    drives.end()
+    program.until(event("lost", line="st0"))
+    assert program.ask("close", line="st0")["motors"][0]["failure"]
+    other = sim("--stdin", rmd=())
+    turned(run, other)
+    assert program.ask("open", port=other.st, protocol="st", timeout=10)["line"] == "st1"
+    stands(program, "st1")
+
+
+def test_a_drive_that_comes_under_a_latch_is_stopped(share, drives, sim, run, tmp_path):
+    program = Client(share.path, "latches")
+    link = tmp_path / "drive"
+    link.symlink_to(drives.st)
+    assert program.ask("close", line="st0")["to"] == "close"
+    assert program.ask("open", port=str(link), protocol="st", timeout=10)["line"] == "st1"
+    program.ask("latch")
+    assert "failure" not in program.ask("stop")["motors"][0]
+    other = sim("--stdin", st=(f"pty:{tmp_path}/other",), rmd=())
+    turned(run, other)
+    (tmp_path / "next").symlink_to(other.st)
+    (tmp_path / "next").replace(link)
+    drives.end()
+    program.until(event("back", line="st1"))
+    stands(program, "st1")
+
+
+def test_a_close_says_that_a_motor_did_not_confirm(share, drives):
+    program = Client(share.path, "turns")
+    turn(program)
     drives.process.send_signal(signal.SIGSTOP)
     try:
         closed = program.ask("close", line="st0")

@@ -8,6 +8,7 @@ use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError};
+use super::place::Place;
 
 /// One kind of port: the syntax and the meaning of its names. Everything about the kind is defined
 /// in its implementation. [`register`](super::register) makes it known to the whole program.
@@ -127,9 +128,9 @@ pub trait Port: fmt::Debug + Send + Sync {
         false
     }
 
-    /// What it occupies: the same for all names and options of a device.
-    fn place(&self) -> String {
-        self.body()
+    /// What it occupies: the same for all options of a device.
+    fn place(&self) -> Place {
+        Place::new(vec![self.body()])
     }
 }
 
@@ -234,7 +235,7 @@ impl PortName {
     }
 
     /// As [`Port::place`].
-    pub fn place(&self) -> String {
+    pub fn place(&self) -> Place {
         self.0.place()
     }
 

@@ -5,6 +5,7 @@
 //! `ASYNC_LOW_LATENCY` would do the same for some other drivers. It is not set, because it needs an
 //! unsafe call.
 
+use std::iter;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
@@ -22,9 +23,13 @@ use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError};
+use super::super::place::Place;
 use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
 use super::super::system;
+
+/// Links that lead to each other have an end.
+const MOST_LINKS: usize = 8;
 
 /// Default baud rate of a serial line.
 pub const DEFAULT_BAUD: u32 = 115_200;
@@ -118,9 +123,10 @@ impl Port for Device {
         marked_link(&self.path).is_some() || self.path.canonicalize().is_ok_and(|it| is_listed(&it))
     }
 
-    fn place(&self) -> String {
-        let path = self.path.canonicalize();
-        format!("serial:{}", path.as_ref().unwrap_or(&self.path).display())
+    /// Also its links: they stay when the device is away, or gets another number.
+    fn place(&self) -> Place {
+        let name = |path: PathBuf| format!("serial:{}", in_real_folder(&path).display());
+        Place::new(links(&self.path).map(name).collect())
     }
 }
 
@@ -248,14 +254,24 @@ fn is_stale(path: &Path, pty: &OwnedFd) -> bool {
 
 /// The inode of the link of a server of ours, if `path` is one or leads to one.
 fn marked_link(path: &Path) -> Option<u64> {
-    let mut link = PathBuf::from(path);
-    // A path with a loop cannot be opened, so this ends.
-    loop {
-        let target = std::fs::read_link(&link).ok()?;
-        if target.as_os_str().as_bytes().starts_with(MARKED_LINK.as_bytes()) {
-            return Some(link.symlink_metadata().ok()?.ino());
-        }
-        link = link.parent()?.join(target);
+    let is_marked =
+        |target: PathBuf| target.as_os_str().as_bytes().starts_with(MARKED_LINK.as_bytes());
+    let link = links(path).find(|link| link.read_link().is_ok_and(is_marked))?;
+    Some(link.symlink_metadata().ok()?.ino())
+}
+
+/// A path, and each one that it leads to.
+fn links(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let next = |link: &PathBuf| Some(link.parent()?.join(link.read_link().ok()?));
+    iter::successors(Some(path.to_owned()), next).take(MOST_LINKS)
+}
+
+/// The path without links in its folder. The folder may exist when the device does not.
+fn in_real_folder(path: &Path) -> PathBuf {
+    let folder = path.parent().map(|folder| Path::new(".").join(folder).canonicalize());
+    match (folder, path.file_name()) {
+        (Some(Ok(folder)), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
     }
 }
 

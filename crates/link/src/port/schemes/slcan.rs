@@ -7,6 +7,7 @@ use super::super::error::PortError;
 use super::super::event::EventCan;
 use super::super::link::CanLink;
 use super::super::name::{Given, NameError};
+use super::super::place::Place;
 use super::super::scheme::{CanPort, Carries, Form, LinePort, Port, PortName, Scheme, parse};
 use super::super::slcan::SlcanLink;
 use super::serial::{Device, Serial};
@@ -124,7 +125,7 @@ impl Port for Adapter {
         self.line.is_address()
     }
 
-    fn place(&self) -> String {
+    fn place(&self) -> Place {
         self.line.place()
     }
 }

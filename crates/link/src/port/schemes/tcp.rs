@@ -12,6 +12,7 @@ use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError, host_and_port};
+use super::super::place::Place;
 use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
 
@@ -115,16 +116,17 @@ impl Port for TcpBytes {
     }
 
     /// Other names of a host than those of this computer are not looked up: that may take seconds.
-    fn place(&self) -> String {
+    fn place(&self) -> Place {
         let TcpAddress { host, port } = &self.address;
-        let host = match unbracketed(host).parse::<IpAddr>() {
-            Ok(IpAddr::V4(Ipv4Addr::LOCALHOST) | IpAddr::V6(Ipv6Addr::LOCALHOST)) => {
+        let host = match numeric(unbracketed(host)) {
+            Some(address) if address.is_unspecified() => "localhost".to_owned(),
+            Some(IpAddr::V4(Ipv4Addr::LOCALHOST) | IpAddr::V6(Ipv6Addr::LOCALHOST)) => {
                 "localhost".to_owned()
             }
-            Ok(address) => address.to_string(),
-            Err(_) => host.to_ascii_lowercase(),
+            Some(address) => address.to_string(),
+            None => host.to_ascii_lowercase(),
         };
-        format!("tcp:{host}:{port}")
+        Place::new(vec![format!("tcp:{host}:{port}")])
     }
 }
 
@@ -185,6 +187,16 @@ pub(crate) fn keep_alive(stream: &TcpStream) {
         .and_then(|()| {
             sockopt::set_tcp_user_timeout(stream, PROBE_PERIOD.as_millis() as u32 * PROBES)
         });
+}
+
+/// The address of a host that is given by numbers, in any of their forms: 127.1 is 127.0.0.1.
+fn numeric(host: &str) -> Option<IpAddr> {
+    let is_number = |part: &str| part.starts_with(|first: char| first.is_ascii_digit());
+    if !host.contains(':') && !host.split('.').all(is_number) {
+        return None;
+    }
+    let mut found = (host, 0).to_socket_addrs().ok()?;
+    found.next().map(|address| address.ip().to_canonical())
 }
 
 /// The address without the brackets of an IPv6 address.

@@ -4,12 +4,12 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use motorlink::port::PortName;
+use motorlink::port::{Place, PortName};
 use motorlink::st::Profile;
 
 use super::Hub;
 use super::asked::{Refused, usage};
-use super::jobs::{Asker, Does, End, Job, JobId, Scanned, found_ports};
+use super::jobs::{Asker, Closed, Does, End, Job, JobId, Scanned, found_ports};
 use super::line::Held;
 use super::place::SessionId;
 use super::work::News;
@@ -89,7 +89,7 @@ impl Hub {
             )));
         }
         let place = port.place();
-        if let Some(held) = self.lines.values().find(|held| held.place() == place) {
+        if let Some(held) = self.lines.values().find(|held| held.place().is(&place)) {
             return Err(usage(format!("{port} is open already: it is the line {}", held.name)));
         }
         match self.jobs.at(&place) {
@@ -157,13 +157,13 @@ impl Hub {
         let _ = self.collect_events();
         let Some(held) = self.lines.remove(&line) else { return Ok(None) };
         if let Some(by) = held.owed_stop() {
-            self.owed.insert(held.place(), by);
+            self.owed.add(held.places(), &by);
         }
         self.sessions.values_mut().for_each(|session| session.forget(line));
-        let place = Some((held.place(), Does::Closes));
-        self.begin(session, by, id, place, move || {
+        let place = held.places();
+        self.begin(session, by, id, Some((place.clone(), Does::Closes)), move || {
             let (name, port) = (held.name.clone(), held.port.clone());
-            End::Closed(name, port, held.end())
+            End::Closed(Closed { name, port, place, stopped: held.end() })
         })
     }
 
@@ -172,7 +172,7 @@ impl Hub {
         session: SessionId,
         by: &Arc<str>,
         id: u32,
-        place: Option<(String, Does)>,
+        place: Option<(Place, Does)>,
         work: impl FnOnce() -> End + Send + 'static,
     ) -> Result<Option<Answer>, Refused> {
         if !self.jobs.has_room(place.as_ref().map(|(_, does)| *does)) {
@@ -200,7 +200,7 @@ impl Hub {
             Some(End::Listed(ports)) => Ok(self.listed(ports)),
             Some(End::Scanned(scanned)) => self.scanned(&by, scanned),
             Some(End::Opened(opened)) => self.opened(&by, *opened),
-            Some(End::Closed(name, port, stopped)) => Ok(self.closed(&by, &name, &port, stopped)),
+            Some(End::Closed(closed)) => Ok(self.closed(&by, closed)),
             None => Err((Reason::Line, "the share has a fault".to_owned())),
         };
         let Some(session) = self.sessions.get_mut(&session) else { return };
@@ -211,9 +211,10 @@ impl Hub {
         }
     }
 
-    fn listed(&self, ports: Vec<(FoundPort, String)>) -> Answer {
-        let with_line = |(port, place): (FoundPort, String)| {
-            let held = self.lines.values().find(|held| held.place() == place);
+    fn listed(&self, ports: Vec<(FoundPort, Option<Place>)>) -> Answer {
+        let with_line = |(port, place): (FoundPort, Option<Place>)| {
+            let is_there = |held: &&Held| place.as_ref().is_some_and(|it| it.is(&held.place()));
+            let held = self.lines.values().find(is_there);
             FoundPort { line: held.map(|held| held.name.clone()), ..port }
         };
         Answer::Ports { ports: ports.into_iter().map(with_line).collect() }
@@ -246,7 +247,7 @@ impl Hub {
             let _ = held.remote().latch_then(by, || {});
         }
         // Under a latch nothing turns.
-        if let Some(by) = self.owed.remove(&held.place()).as_ref().or(self.latch.as_ref()) {
+        if let Some(by) = self.owed.take(&held.place()).as_ref().or(self.latch.as_ref()) {
             held.owe_stop(by, Instant::now());
         }
         self.last_line += 1;
@@ -257,15 +258,10 @@ impl Hub {
         Ok(Answer::Open { line: name })
     }
 
-    fn closed(
-        &mut self,
-        by: &Arc<str>,
-        name: &str,
-        port: &PortName,
-        stopped: Vec<Stopped>,
-    ) -> Answer {
+    fn closed(&mut self, by: &Arc<str>, closed: Closed) -> Answer {
+        let Closed { name, port, place, stopped } = closed;
         if stopped.iter().any(|one| one.result.is_err()) {
-            self.owed.insert(port.place(), Arc::clone(by));
+            self.owed.add(place, by);
         }
         let mut motors = Vec::new();
         for Stopped { motor, result } in stopped {
@@ -275,13 +271,13 @@ impl Hub {
                 Err(error) => (Happening::StopFailed, format!("it may still be turning: {error}")),
             };
             let message = format!("{name}, motor {number}: {words}");
-            self.say_of((Some(name), Some(number)), event, by, message);
-            let motor = MotorName { line: name.to_owned(), motor: number };
+            self.say_of((Some(&name), Some(number)), event, by, message);
+            let motor = MotorName { line: name.clone(), motor: number };
             let failure = result.err().map(|it| it.to_string());
             motors.push(StoppedMotor { motor, failure, absent: false });
         }
         let message = format!("{name}: {by} closed {port}");
-        self.say_of((Some(name), None), Happening::Closed, by, message);
+        self.say_of((Some(&name), None), Happening::Closed, by, message);
         Answer::Close { motors }
     }
 
@@ -297,9 +293,9 @@ impl Hub {
                     "{by_whom} closes it at this moment, which stops the motors that programs turned"
                 ),
             };
-            let motor = MotorName { line: place.to_owned(), motor: ANY_MOTOR };
+            let motor = MotorName { line: place.to_string(), motor: ANY_MOTOR };
             motors.push(StoppedMotor { motor, failure: Some(failure), absent: false });
-            self.owed.insert(place.to_owned(), Arc::clone(by));
+            self.owed.add(place.clone(), by);
         }
         motors
     }

@@ -6,7 +6,7 @@ use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use motorlink::port::{Carries, PortName};
+use motorlink::port::{Carries, Place, PortName};
 use motorlink_link::list;
 
 use super::place::SessionId;
@@ -42,7 +42,7 @@ pub(super) struct Asker {
 pub(super) struct Job {
     pub(super) asker: Asker,
     /// What the job occupies, and what it does there.
-    place: Option<(String, Does)>,
+    place: Option<(Place, Does)>,
     thread: JoinHandle<End>,
 }
 
@@ -56,10 +56,18 @@ pub(super) enum Does {
 
 /// What a job came to.
 pub(super) enum End {
-    Listed(Vec<(FoundPort, String)>),
+    Listed(Vec<(FoundPort, Option<Place>)>),
     Scanned(Scanned),
     Opened(Box<Result<Opened, OpenError>>),
-    Closed(String, PortName, Vec<Stopped>),
+    Closed(Closed),
+}
+
+/// A line that was closed.
+pub(super) struct Closed {
+    pub(super) name: String,
+    pub(super) port: PortName,
+    pub(super) place: Place,
+    pub(super) stopped: Vec<Stopped>,
 }
 
 /// A port that was scanned.
@@ -86,7 +94,7 @@ impl Jobs {
         let closing = self.under_way.into_values().filter(|job| job.does(Does::Closes));
         closing
             .filter_map(|job| match job.thread.join() {
-                Ok(End::Closed(name, _, stopped)) => Some((name, stopped)),
+                Ok(End::Closed(Closed { name, stopped, .. })) => Some((name, stopped)),
                 _ => None,
             })
             .collect()
@@ -107,7 +115,7 @@ impl Jobs {
     pub(super) fn begin(
         &mut self,
         asker: Asker,
-        place: Option<(String, Does)>,
+        place: Option<(Place, Does)>,
         work: impl FnOnce() -> End + Send + 'static,
         ended: impl Fn(JobId) + Send + 'static,
     ) -> io::Result<()> {
@@ -128,15 +136,15 @@ impl Jobs {
     }
 
     /// The job that occupies a place.
-    pub(super) fn at(&self, place: &str) -> Option<&Job> {
-        let is_there = |job: &&Job| job.place.as_ref().is_some_and(|(other, _)| other == place);
+    pub(super) fn at(&self, place: &Place) -> Option<&Job> {
+        let is_there = |job: &&Job| job.place.as_ref().is_some_and(|(other, _)| other.is(place));
         self.under_way.values().find(is_there)
     }
 
     /// The ports that are opened or closed.
-    pub(super) fn changing(&self) -> impl Iterator<Item = (&str, &Job)> {
+    pub(super) fn changing(&self) -> impl Iterator<Item = (&Place, &Job)> {
         let jobs = self.under_way.values().filter(|job| !job.does(Does::Scans));
-        jobs.filter_map(|job| Some((job.place.as_ref()?.0.as_str(), job)))
+        jobs.filter_map(|job| Some((&job.place.as_ref()?.0, job)))
     }
 
     /// How many do this.
@@ -167,9 +175,9 @@ impl Job {
 }
 
 /// The ports of this computer, and what each occupies.
-pub(super) fn found_ports() -> Vec<(FoundPort, String)> {
+pub(super) fn found_ports() -> Vec<(FoundPort, Option<Place>)> {
     let found = list::ports().into_iter().map(|port| {
-        let place = port.name.parse::<PortName>().map_or_else(|_| String::new(), |it| it.place());
+        let place = port.name.parse::<PortName>().ok().map(|name| name.place());
         let protocol = match port.carries {
             Carries::Frames => Protocol::Rmd,
             Carries::Bytes | Carries::Both => Protocol::St,

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use motorlink::Clock;
-use motorlink::port::PortName;
+use motorlink::port::{Place, PortName};
 use motorlink_proto::rmd::{Code, MotorId, Stop};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
@@ -37,6 +37,7 @@ pub(super) type Lines = BTreeMap<usize, Held>;
 pub struct Held {
     pub(super) name: String,
     pub(super) port: PortName,
+    opened_at: Place,
     pub(super) speaks: Speaks,
     timeout: Duration,
     runner: Runner,
@@ -99,6 +100,7 @@ impl Held {
         acquisition.subscribe(events.clone(), Wants::new());
         Ok(Held {
             name: name.to_owned(),
+            opened_at: port.place(),
             port,
             speaks,
             timeout: acquisition.timeout(),
@@ -187,9 +189,14 @@ impl Held {
         self.absent.contains(&motor) && !self.may_turn(motor) && !self.heard.contains(&motor)
     }
 
-    /// What its port occupies.
-    pub(super) fn place(&self) -> String {
+    /// What its port occupies now.
+    pub(super) fn place(&self) -> Place {
         self.port.place()
+    }
+
+    /// The place of its port, also if the device is away now.
+    pub(super) fn places(&self) -> Place {
+        self.opened_at.clone().and(&self.place())
     }
 
     pub(super) fn remote(&self) -> &Remote {

@@ -30,7 +30,7 @@ use crate::schedule::Quiet;
 use crate::signal::Motor;
 use jobs::Jobs;
 use line::Lines;
-use owed::LONGEST_PAUSE;
+use owed::{LONGEST_PAUSE, OwedPorts};
 use place::wall_now;
 use session::{Part, Session};
 use work::{Done, News, Work};
@@ -58,8 +58,7 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     log: VecDeque<Event>,
-    /// Ports whose motors have to be stopped when they are opened, and who asked for it.
-    owed: BTreeMap<String, Arc<str>>,
+    owed: OwedPorts,
     done: Sender<News>,
     ended: Receiver<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
@@ -91,7 +90,7 @@ impl Hub {
             last_session: 0,
             latch: None,
             log: VecDeque::new(),
-            owed: BTreeMap::new(),
+            owed: OwedPorts::default(),
             done,
             ended,
             wake: Arc::new(wake),
@@ -232,6 +231,12 @@ impl Hub {
             let Some(held) = self.lines.get_mut(&line) else { continue };
             let events = held.take_events(&mut retry, &mut doubts);
             let events = events.ok_or_else(|| LineEnded(held.name.clone()))?;
+            // It may be another drive, whose motors turn.
+            if events.iter().any(|event| event.event == Happening::Back)
+                && let Some(by) = &self.latch
+            {
+                held.owe_stop(by, Instant::now());
+            }
             for motor in doubts {
                 self.doubt(line, motor);
             }

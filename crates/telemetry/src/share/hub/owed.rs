@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use motorlink::port::Place;
+
 /// The pause before a stop that failed is repeated.
 pub(super) const AGAIN: Duration = Duration::from_secs(1);
 
@@ -56,6 +58,23 @@ impl Owed {
             Next::Search(at) if at <= now => Some(at),
             _ => None,
         }
+    }
+}
+
+/// Ports whose motors have to be stopped when they are opened, and who asked for it.
+#[derive(Default)]
+pub(super) struct OwedPorts(Vec<(Place, Arc<str>)>);
+
+impl OwedPorts {
+    pub(super) fn add(&mut self, place: Place, by: &Arc<str>) {
+        self.take(&place);
+        self.0.push((place, Arc::clone(by)));
+    }
+
+    /// Who asked for the stop of a port that is open now.
+    pub(super) fn take(&mut self, place: &Place) -> Option<Arc<str>> {
+        let taken = self.0.extract_if(.., |(other, _)| other.is(place));
+        taken.map(|(_, by)| by).last()
     }
 }
 
