@@ -10,6 +10,8 @@ const FAST = 0.1;
 const SLOW = 0.5;
 /** How often cards are drawn, in ms. */
 const DRAW = 100;
+/** Cards that are not in view are drawn each `OUT_OF_VIEW`th time. */
+const OUT_OF_VIEW = 10;
 /** For so long a card may be without a value, in ms. */
 const NEW = 1500;
 /** Points of the history of a card: one each `DRAW`. */
@@ -28,6 +30,7 @@ export class Live {
   readonly history = new Float64Array(HISTORY).fill(NaN);
   /** Counts the drawings of the card. */
   readonly tick = signal(0);
+  isInView = true;
   lost = 0;
   /** When it was made, in ms. */
   private readonly since = performance.now();
@@ -58,6 +61,17 @@ export function liveOf(line: string, motor: number): Live {
   const known = lives.get(name) ?? new Live(line);
   lives.set(name, known);
   return known;
+}
+
+/** Draws a card often while it is in view or near to it. Returns what ends that. */
+export function watchView(card: Element, live: Live): () => void {
+  const seen = (entries: IntersectionObserverEntry[]) => (live.isInView = entries.at(-1)!.isIntersecting);
+  const observer = new IntersectionObserver(seen, { rootMargin: '50%' });
+  observer.observe(card);
+  return () => {
+    observer.disconnect();
+    live.isInView = true;
+  };
 }
 
 /** Why there are no values, or null. */
@@ -98,7 +112,9 @@ export function watchOverview(): () => void {
     return () => ends.forEach((end) => end());
   });
 
+  let turn = 0;
   const timer = setInterval(() => {
+    turn += 1;
     for (const { line, motor } of allMotors.peek()) {
       const live = liveOf(line, motor);
       const speed = descriptions.peek().get(line)?.overview.speed;
@@ -106,7 +122,7 @@ export function watchOverview(): () => void {
       live.history.copyWithin(0, 1);
       // An old value is a gap in the history.
       live.history[HISTORY - 1] = last && age(line, last.t) < 1 ? last.value : NaN;
-      live.tick.value += 1;
+      if (live.isInView || turn % OUT_OF_VIEW === 0) live.tick.value += 1;
     }
   }, DRAW);
   return () => {

@@ -1,9 +1,9 @@
 // A card a motor: what it does, and the controls that move it.
-import { useEffect } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { allMotors, describeFailed, descriptions, isSearched, isSilent, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
 import { nameOf } from '../format';
 import { found, lines, refreshMotors, searchFailed, searching, welcome } from '../link';
-import { liveOf, overviewRefused, watchOverview } from '../overview';
+import { liveOf, overviewRefused, watchOverview, watchView } from '../overview';
 import { Said } from '../parts';
 import { Control } from './control';
 import './motors.css';
@@ -42,9 +42,11 @@ function Silent({ line, motor, speed }: SilentProps) {
 function Card({ line, motor }: { line: string; motor: number }) {
   const description = descriptions.value.get(line);
   const name = nameOf(line, motor);
+  const card = useRef<HTMLElement>(null);
+  useEffect(() => watchView(card.current!, liveOf(line, motor)), [line, motor]);
   return (
     <li>
-      <article class="card" aria-label={`Motor ${name}`}>
+      <article ref={card} class="card" aria-label={`Motor ${name}`}>
         <header>
           <h3>{name}</h3>
           {description && <span class="muted">{description.protocol.toUpperCase()}</span>}
