@@ -9,6 +9,7 @@ import { CLOCK, Fleet, ofAll, RATE, type SignalOf } from './fleet';
 import { heap, ofRenderers, resident } from './memory';
 import { pageTime, type Places, probe } from './probe';
 import { type Cell, publish, quantile, row, slope, table } from './report';
+import { Stalls, STALL } from './stalls';
 
 const SECONDS = Number(process.env.SECONDS ?? 60);
 const MINUTES = Number(process.env.MINUTES ?? 10);
@@ -161,6 +162,7 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
   const session = await page.context().newCDPSession(page);
   const samples: { minute: number; sizes: number[] }[] = [];
   let stops = 0;
+  const stalls = new Stalls();
   let isRecording = true;
   const began = performance.now();
   for (let next = began; next <= began + (FILL + MINUTES) * MINUTE; next += SAMPLE) {
@@ -174,7 +176,7 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
     if (standing > 0) {
       stops += standing;
       const told = fleet.monitor.lines.filter(({ line, event }) => String(line).startsWith('st') || event === 'left');
-      console.log(`a motor stands: ${held.toFixed(0)} and ${turned.toFixed(0)} rpm`, ...told.slice(-6).map(({ message }) => message));
+      console.log(`a motor stands: ${held.toFixed(0)} and ${turned.toFixed(0)} rpm`, stalls.found.slice(-3), ...told.slice(-6).map(({ message }) => message));
       // What fails now is done again after the next look.
       if (held < RPM / 2) await holder.keyboard.up('h').then(hold).catch(console.log);
       if (turned < RPM / 2) await turn().catch(console.log);
@@ -187,6 +189,7 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
     console.log(row([`${minute.toFixed(1)} min`, ...sizes.map((bytes) => `${(bytes / MB).toFixed(1)} MB`)]));
   }
   await holder.keyboard.up('h');
+  const stalled = await stalls.end();
 
   const names = [
     'server', 'process of the page that draws', 'process of the page that holds', 'JavaScript: objects', 'JavaScript: samples',
@@ -199,6 +202,7 @@ async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
   };
   return [
     ['motors that were found standing', stops, '0'],
+    [`- stalls of the computer above ${STALL} ms, longest`, `${stalled.length}, ${Math.max(0, ...stalled).toFixed(0)} ms`, ''],
     ...names.map((name, index) => [`${name}: memory, growth in 24 h`, growth(index, FILL, Infinity), 'none']),
     ...(FILL > 0 ? [['server that records: memory, growth in 24 h', growth(0, FILL / 2, FILL), 'the index of the file']] : []),
   ];
