@@ -14,7 +14,8 @@ use motorlink_telemetry::share::message::*;
 use shared::Share;
 use stopping::{
     Cable, READ_STATUS, START, STOP, eventually, frame, heard_and_unstopped, motors, read,
-    request_of, share_of_a_turning_motor, share_while, stop_all_of, stop_times, stops,
+    request_of, share_of_a_lost_motor, share_of_a_turning_motor, share_while, stop_all_of,
+    stop_times, stops,
 };
 
 fn stands(share: &Share) {
@@ -58,10 +59,7 @@ fn a_motor_that_had_never_answered_is_stopped_when_it_does() {
 
 #[test]
 fn a_motor_that_nobody_reads_is_searched_until_it_stands() {
-    let is_of_motor = |bytes: &[u8]| request_of(bytes).0 == 2;
-    let (share, is_lost) = share_while("owed-search", true, move |bytes| {
-        (!is_of_motor(bytes)).then(|| bytes.to_vec())
-    });
+    let (share, is_lost) = share_of_a_lost_motor("owed-search");
     let mut program = Asker::join(&share.path, "stops");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     let stopped = stop_all_of(&mut program, "st0", &[1, 2]);
@@ -262,10 +260,7 @@ fn a_line_that_is_closed_during_a_stop_owes_it() {
 
 #[test]
 fn a_release_keeps_the_stop_of_a_motor_that_is_read() {
-    let is_of_motor = |bytes: &[u8]| request_of(bytes).0 == 2;
-    let (share, is_lost) = share_while("owed-release", true, move |bytes| {
-        (!is_of_motor(bytes)).then(|| bytes.to_vec())
-    });
+    let (share, is_lost) = share_of_a_lost_motor("owed-release");
     let mut program = Asker::join(&share.path, "stops");
     program.ask(read("st0", &[1, 2])).unwrap();
     eventually(|| heard_and_unstopped(&mut program, "st0").0 == [1]);

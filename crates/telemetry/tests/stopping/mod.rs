@@ -115,6 +115,11 @@ pub fn share_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<Ato
     share_while(name, begins_cut, |_| None)
 }
 
+/// A share whose motor 2 on st0 turns already. Its requests alone are lost, until this is `false`.
+pub fn share_of_a_lost_motor(name: &str) -> (Share, Arc<AtomicBool>) {
+    share_while(name, true, |bytes| (request_of(bytes).0 != 2).then(|| bytes.to_vec()))
+}
+
 /// A share whose motor 2 on st0 turns already. While this is so, `passes` has the requests.
 pub fn share_while(
     name: &str,

@@ -362,7 +362,7 @@ impl Hub {
         let Some(held) = self.lines.get(&line) else { return };
         let by = held.owed.get(&motor).map_or_else(|| "share".into(), |owed| Arc::clone(&owed.by));
         let ended = move |result| tell(Work::Search(motor, result));
-        // The end of the engine is told elsewhere.
+        // If the engine has ended, the share ends.
         let _ = held.remote().command_then(&by, line::stop(motor), LONGEST_PAUSE.into(), ended);
     }
 
