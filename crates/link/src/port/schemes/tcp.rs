@@ -119,10 +119,7 @@ impl Port for TcpBytes {
     fn place(&self) -> Place {
         let TcpAddress { host, port } = &self.address;
         let host = match numeric(unbracketed(host)) {
-            Some(address) if address.is_unspecified() => "localhost".to_owned(),
-            Some(IpAddr::V4(Ipv4Addr::LOCALHOST) | IpAddr::V6(Ipv6Addr::LOCALHOST)) => {
-                "localhost".to_owned()
-            }
+            Some(address) if is_local(address) => "localhost".to_owned(),
             Some(address) => address.to_string(),
             None => host.to_ascii_lowercase(),
         };
@@ -197,6 +194,11 @@ fn numeric(host: &str) -> Option<IpAddr> {
     }
     let mut found = (host, 0).to_socket_addrs().ok()?;
     found.next().map(|address| address.ip().to_canonical())
+}
+
+/// Whether a connection to it goes where one to `localhost` goes.
+fn is_local(address: IpAddr) -> bool {
+    address == Ipv4Addr::LOCALHOST || address == Ipv6Addr::LOCALHOST || address.is_unspecified()
 }
 
 /// The address without the brackets of an IPv6 address.
