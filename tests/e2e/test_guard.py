@@ -91,11 +91,14 @@ def test_a_killed_program_leaves_no_motor_spinning(sim, guard, client):
         assert line.get(STATUS, motor=1) == 0
 
 
-def test_a_motor_that_coasts_is_not_said_to_rest(sim, guard, client):
-    drives = sim(rmd=())
+def test_a_motor_that_coasts_is_not_said_to_rest(sim, guard, client, tmp_path):
+    # A flywheel: it takes seconds to stop.
+    config = tmp_path / "flywheel.toml"
+    config.write_text("[[st.motor]]\npreset = 'servo'\nplant.load.inertia = 3e-4\n")
+    drives = sim(config, rmd=())
     process = guard(drives.st)
     program = client(process.port, "1:1")
-    runs(drives, 1)
+    eventually(lambda: drives.motor(1)["speed_rpm"] > 500, "motor 1 turns fast")
     program.kill()
     process.says("the program ended or closed the port: motor 1 is stopping (")
     assert any(": its rotor may still coast" in text for text in process.err), process.err

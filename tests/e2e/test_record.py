@@ -360,8 +360,10 @@ def test_a_refused_signal_is_named_and_the_others_keep_their_rate(run, drives, t
     path = tmp_path / "run.mcap"
     # Motor 2 of the simulated drive has no flux weakening.
     words = ("SPEED_MEAS", "FLUXWK_BUS", "--motor", "2", "--no-settings", "--duration", "3s", *QUICK)
-    told = run("record", "-p", drives.st, "-o", path, *words, "--json").ended(0).lines[-1]
-    assert told["refused"] == ["st0/motor2/FLUXWK_BUS"] and told["achieved_hz"] > 0, told
+    said = run("record", "-p", drives.st, "-o", path, *words, "--json").ended(0).lines
+    assert said[-1]["refused"] == ["st0/motor2/FLUXWK_BUS"]
+    # It is that of the last second, in which a busy machine may read nothing.
+    assert any(told.get("achieved_hz") for told in said), said
     row = File(path).of("/st0/motor2/signals")[-1]
     assert math.isnan(row.fluxwk_bus) and row.speed_meas == 0
     text = run("record", "-p", drives.st, "-o", path, "--force", *words).ended(0).out

@@ -59,7 +59,7 @@ def set_speed_kp(run, tmp_path):
         left, written = list(replies), []
         link = tmp_path / f"drive{len(list(tmp_path.iterdir()))}"
         with device(link, drive(lambda: left.pop(0), written.append)) as port:
-            words = ("--timeout", "100ms", "set", "SPEED_KP", 800, *options)
+            words = ("--timeout", "500ms", "set", "SPEED_KP", 800, *options)
             return run("st", "-p", port, *words).ended(code), written
 
     return set_speed_kp

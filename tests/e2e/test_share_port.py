@@ -197,6 +197,32 @@ def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path)
     reads.more_lines()
 
 
+def test_reads_that_wait_too_long_in_a_share_do_not_end_a_program(start, sim, tmp_path):
+    drives = sim(rmd=())
+    share = start("share", "-p", drives.st, "--at", f"unix:{tmp_path}/share", "--timeout", "1s")
+    share.line(0)
+    # Requests of one wait behind those of the other.
+    reads = [
+        start("st", "-p", f"share:{tmp_path}/share/st0", "get", "STATUS", "--every", "10ms", "--json")
+        for _ in range(2)
+    ]
+    for program in reads:
+        program.line(3)
+    looks = Client(tmp_path / "share", "looks")
+    drives.process.send_signal(signal.SIGSTOP)
+    try:
+        for program in reads:
+            program.until(lambda: any('"outage"' in line for line in program.out), "an outage")
+        expired = 0
+        while expired < 3:
+            expired += looks.command("st0", 1, 2, 2, within=0.3).get("reason") == "expired"
+    finally:
+        drives.process.send_signal(signal.SIGCONT)
+    for program in reads:
+        program.until(lambda: any('"back"' in line for line in program.out), "the end of the outage")
+        program.more_lines()
+
+
 def test_a_guard_is_refused_in_front_of_a_share(share, run, tmp_path):
     guard = run("guard", "st", "-p", share.st, "--serve", f"pty:{tmp_path}/guarded").ended(2)
     assert "use it without a guard" in guard.err

@@ -389,6 +389,8 @@ impl From<rmd::Error> for Failure {
 impl From<&LineError> for Failure {
     fn from(error: &LineError) -> Self {
         match error {
+            // The next request may be sent.
+            error if error.is_unsent() => Problem::new(Kind::Silent, error.to_string()).into(),
             LineError::St(error) => error.clone().into(),
             LineError::Rmd(error) => error.clone().into(),
             LineError::Closed => Failure::link(error.to_string()),

@@ -88,18 +88,20 @@ impl LineError {
         }
     }
 
+    /// Whether a share refused the request before it was sent: it waited too long, or too much waits.
+    pub fn is_unsent(&self) -> bool {
+        use motorlink::{rmd, st};
+        let (LineError::St(st::Error::Port(error)) | LineError::Rmd(rmd::Error::Port(error))) =
+            self
+        else {
+            return false;
+        };
+        matches!(error, PortError::NotDone { kind: NotDone::Unsent, .. })
+    }
+
     /// Whether something was sent, and the line did not fail.
     pub(crate) fn is_answer(&self) -> bool {
-        use motorlink::{rmd, st};
-        let is_unsent = matches!(
-            self,
-            LineError::St(st::Error::Port(PortError::NotDone { kind: NotDone::Unsent, .. }))
-                | LineError::Rmd(rmd::Error::Port(PortError::NotDone {
-                    kind: NotDone::Unsent,
-                    ..
-                }))
-        );
-        !is_unsent && !self.is_line_failure()
+        !self.is_unsent() && !self.is_line_failure()
     }
 
     /// Whether the reply has the size of the other profile.
