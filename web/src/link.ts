@@ -86,7 +86,7 @@ export const delay = signal(0);
 export const held = signal(false);
 
 const RECONNECT = 1000;
-const ALIVE = 100;
+const ALIVE = 50;
 const SILENT = 500;
 /** A connection that gives nothing for so long is given up. The browser may not notice for minutes. */
 const DEAD = 5000;
@@ -246,7 +246,7 @@ export function sayAlive() {
 function drawn() {
   frame += 1;
   drawnBeat = beat;
-  // The timer may have run before this frame: its sign then proved nothing, and the next is 100 ms away.
+  // The timer may have run before this frame: its sign then proved nothing, and the next is `ALIVE` away.
   if (performance.now() - aliveAt > ALIVE) sayAlive();
   requestAnimationFrame(drawn);
 }

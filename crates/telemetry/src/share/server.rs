@@ -19,7 +19,7 @@ use super::message::{Event, Line};
 use crate::line::Stopped;
 
 /// How often samples and events are sent.
-const BATCH: Duration = Duration::from_millis(16);
+const BATCH: Duration = Duration::from_millis(25);
 /// Bytes that wait for a program outside the queues of its subscriptions.
 const WAITING: usize = 1 << 16;
 /// How long a connection may have no name: it takes the place of another program.
