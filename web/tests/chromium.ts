@@ -18,15 +18,23 @@ export class Chromium {
   private constructor(
     private readonly process: ChildProcess,
     private readonly folder: string,
-    readonly browser: Browser,
+    private readonly address: string,
+    private connected: Browser,
   ) {}
+
+  get browser(): Browser {
+    return this.connected;
+  }
 
   static async open({ proxy }: { proxy?: { server: string; bypass: string } } = {}) {
     const folder = mkdtempSync(join(tmpdir(), 'chromium-'));
     const through = proxy ? [`--proxy-server=${proxy.server}`, `--proxy-bypass-list=${proxy.bypass}`] : [];
     const started = spawn(
       PROGRAM,
-      [...ARGUMENTS, ...through, '--headless', '--remote-debugging-port=0', `--user-data-dir=${folder}`, 'about:blank'],
+      [
+        ...ARGUMENTS, ...through, '--headless', '--window-size=1280,900', '--remote-debugging-port=0',
+        `--user-data-dir=${folder}`, 'about:blank',
+      ],
       { stdio: 'ignore', detached: true },
     );
     endWithTests(started, end);
@@ -35,10 +43,18 @@ export class Chromium {
       if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);
       await new Promise((done) => setTimeout(done, 20));
     }
-    const port = readFileSync(file, 'utf8').split('\n')[0];
-    // The defaults of Playwright keep every tab visible.
-    const browser = await chromium.connectOverCDP(`http://127.0.0.1:${port}`, { noDefaults: true });
-    return new Chromium(started, folder, browser);
+    const address = `http://127.0.0.1:${readFileSync(file, 'utf8').split('\n')[0]}`;
+    return new Chromium(started, folder, address, await connect(address));
+  }
+
+  /** Leaves the browser alone, which goes on: it tells tests of each message of its pages. */
+  async leave() {
+    await this.browser.close();
+  }
+
+  /** Goes back after `leave`. */
+  async join() {
+    this.connected = await connect(this.address);
   }
 
   /** Opens a tab, in front of the others. */
@@ -46,8 +62,13 @@ export class Chromium {
     return this.browser.contexts()[0]!.newPage();
   }
 
+  /** The tab that `tab` opened last. */
+  get page(): Page {
+    return this.browser.contexts()[0]!.pages().at(-1)!;
+  }
+
   /** The processes that run pages. */
-  private async renderers() {
+  async renderers() {
     const session = await this.browser.newBrowserCDPSession();
     const { processInfo } = await session.send('SystemInfo.getProcessInfo');
     return processInfo.filter(({ type }) => type === 'renderer').map(({ id }) => id);
@@ -73,6 +94,9 @@ export class Chromium {
     rmSync(this.folder, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
   }
 }
+
+/** The defaults of Playwright keep every tab visible. */
+const connect = (address: string) => chromium.connectOverCDP(address, { noDefaults: true });
 
 /** Ends a browser with the processes that it started. */
 function end({ pid }: ChildProcess) {

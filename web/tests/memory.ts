@@ -1,5 +1,5 @@
 // The memory of processes and pages.
-import type { Browser, CDPSession } from '@playwright/test';
+import type { Page } from '@playwright/test';
 import { readFileSync } from 'node:fs';
 
 /** The memory of a process in bytes. */
@@ -8,17 +8,11 @@ export function resident(id: number): number {
   return 1024 * Number(line![1]);
 }
 
-/** The memory of all processes of a browser that run pages, in bytes. */
-export async function ofRenderers(browser: Browser): Promise<number> {
-  const session = await browser.newBrowserCDPSession();
-  const { processInfo } = await session.send('SystemInfo.getProcessInfo');
-  await session.detach();
-  return processInfo.filter(({ type }) => type === 'renderer').reduce((sum, { id }) => sum + resident(id), 0);
-}
-
 /** The memory of a page after a collection of garbage, in bytes: objects, and the arrays of samples. */
-export async function heap(session: CDPSession) {
+export async function heap(page: Page) {
+  const session = await page.context().newCDPSession(page);
   await session.send('HeapProfiler.collectGarbage');
   const use = await session.send('Runtime.getHeapUsage');
+  await session.detach();
   return { objects: use.usedSize, arrays: use.backingStorageSize };
 }

@@ -1,12 +1,12 @@
 // How old what the page draws is, how smoothly it draws, and what it needs for long: `make view`,
 // docs/BENCHMARKS.md. SECONDS: of the first part. MINUTES: of the second one, 0 without it; FILL: minutes before.
-import { type Browser, chromium, type Page, test } from '@playwright/test';
+import { chromium, type Page, test } from '@playwright/test';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
-import { card, expect, open, spin } from './bench';
-import { ARGUMENTS, PROGRAM } from './chromium';
+import { card, expect, open } from './bench';
+import { ARGUMENTS, Chromium, PROGRAM } from './chromium';
 import { CLOCK, Fleet, ofAll, RATE, type SignalOf } from './fleet';
-import { heap, ofRenderers, resident } from './memory';
+import { heap, resident } from './memory';
 import { pageTime, type Places, probe } from './probe';
 import { type Cell, publish, quantile, row, slope, table } from './report';
 import { Stalls, STALL } from './stalls';
@@ -34,7 +34,6 @@ const DRAWN: readonly SignalOf[] = [
 ];
 const [THE_CLOCK, LOW, HIGH] = DRAWN as [SignalOf, SignalOf, SignalOf];
 
-const launch = () => chromium.launch({ executablePath: PROGRAM, args: ARGUMENTS });
 const pause = (ms: number) => new Promise((done) => setTimeout(done, ms));
 const inMs = (all: number[]) => [0.5, 0.99, 1].map((share) => `${quantile(all, share).toFixed(0)} ms`).join(', ');
 const recording = (page: Page) => page.locator('.top').getByRole('group', { name: 'Recording' });
@@ -43,14 +42,12 @@ const number = (page: Page, { line, motor, name }: SignalOf) =>
   page.locator(`tr[data-key="${line}/${motor}/${name}"] [data-is="now"]`);
 
 /** The page of an operator, with 40 chosen signals. */
-async function visit(browser: Browser, fleet: Fleet): Promise<Page> {
-  const page = await browser.newPage({ viewport: { width: 1280, height: 900 } });
+async function visit(page: Page, fleet: Fleet) {
   await probe(page);
   const settings = { signals: DRAWN.map((one) => ({ ...one, rate: RATE })), span: 60, layout: 'one' };
   await page.addInitScript((text) => localStorage.setItem('motorlink.plots', text), JSON.stringify(settings));
   await page.goto(fleet.url);
   await expect(page.getByRole('article')).toHaveCount(36, { timeout: MINUTE });
-  return page;
 }
 
 /** The samples of each signal in a CSV file of the page. */
@@ -139,72 +136,109 @@ async function recorded(fleet: Fleet): Promise<Cell[][]> {
   ];
 }
 
-/** One window holds a motor, and the one that draws turns another motor. Ends the recording of the page at FILL. */
-async function soak(page: Page, holder: Page, fleet: Fleet): Promise<Cell[][]> {
-  for (const one of [page, holder]) await one.evaluate(() => probing.end());
-  const motor = card(holder, 'st0/1');
-  await motor.getByRole('switch', { name: 'Hold to run' }).check();
-  await motor.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(RPM));
-  const hold = async () => {
-    await motor.getByRole('button', { name: 'Hold to run' }).focus();
-    await holder.keyboard.down('h');
-  };
-  const turn = async () => {
-    await open(page, 'Motors');
-    await spin(page, RPM, 'st1/1');
-    await open(page, 'Plots');
-  };
-  const speeds = async () => [await fleet.speedAt(0, 1), await fleet.speedAt(1, 1)] as const;
-  await hold();
-  await turn();
-  await expect.poll(async () => Math.min(...(await speeds())), { timeout: MINUTE }).toBeGreaterThan(RPM / 2);
+const megabytes = (bytes: number) => (bytes / MB).toFixed(1);
 
-  const session = await page.context().newCDPSession(page);
+/** The memory of processes each 10 s, with the time in minutes. `look` is called before each. */
+async function watch(minutes: number, processes: () => number[], look = async () => {}) {
   const samples: { minute: number; sizes: number[] }[] = [];
-  let stops = 0;
-  const stalls = new Stalls();
-  let isRecording = true;
   const began = performance.now();
-  for (let next = began; next <= began + (FILL + MINUTES) * MINUTE; next += SAMPLE) {
+  for (let next = began; next <= began + minutes * MINUTE; next += SAMPLE) {
     await pause(next - performance.now());
-    if (isRecording && next >= began + FILL * MINUTE) {
-      await endOwn(page);
-      isRecording = false;
-    }
-    const [held, turned] = await speeds();
-    const standing = [held, turned].filter((speed) => speed < RPM / 2).length;
-    if (standing > 0) {
-      stops += standing;
-      const told = fleet.monitor.lines.filter(({ line, event }) => String(line).startsWith('st') || event === 'left');
-      console.log(`a motor stands: ${held.toFixed(0)} and ${turned.toFixed(0)} rpm`, stalls.found.slice(-3), ...told.slice(-6).map(({ message }) => message));
-      // What fails now is done again after the next look.
-      if (held < RPM / 2) await holder.keyboard.up('h').then(hold).catch(console.log);
-      if (turned < RPM / 2) await turn().catch(console.log);
-    }
-    const { objects, arrays } = await heap(session);
-    const processes = await Promise.all([page, holder].map((one) => ofRenderers(one.context().browser()!)));
-    const sizes = [resident(fleet.monitor.process.pid!), ...processes, objects, arrays];
+    await look();
+    const sizes = processes().map(resident);
     const minute = (performance.now() - began) / MINUTE;
     samples.push({ minute, sizes });
-    console.log(row([`${minute.toFixed(1)} min`, ...sizes.map((bytes) => `${(bytes / MB).toFixed(1)} MB`)]));
+    console.log(row([`${minute.toFixed(1)} min`, ...sizes.map((size) => `${megabytes(size)} MB`)]));
   }
-  await holder.keyboard.up('h');
-  const stalled = await stalls.end();
-
-  const names = [
-    'server', 'process of the page that draws', 'process of the page that holds', 'JavaScript: objects', 'JavaScript: samples',
-  ];
-  const growth = (index: number, since: number, until: number) => {
-    const part = samples.filter(({ minute }) => minute >= since && minute < until);
+  /** The memory of the process at `index`, from the minute `since` on. */
+  return (index: number, since = 0) => {
+    const part = samples.filter(({ minute }) => minute >= since);
     const sizes = part.map((sample) => sample.sizes[index]! / MB);
     const day = slope(part.map(({ minute }, at) => [minute / 60 / 24, sizes[at]!] as const));
     return `${sizes[0]!.toFixed(0)} to ${sizes.at(-1)!.toFixed(0)} MB, ${day.growth.toFixed(0)} ± ${day.error.toFixed(0)} MB`;
   };
+}
+
+/**
+ * One window holds a motor, and the one that draws turns another motor. Before, plots fill their memory while the
+ * page records.
+ */
+async function soak(draws: Chromium, holds: Chromium, fleet: Fleet): Promise<Cell[][]> {
+  const windows = [draws, holds];
+  const server = fleet.monitor.process.pid!;
+  for (const one of windows) {
+    const page = await one.tab();
+    await visit(page, fleet);
+    await page.evaluate(() => probing.end());
+  }
+  await open(draws.page, 'Plots');
+  const filled = FILL > 0 ? await watch(FILL, () => [server]) : undefined;
+  await endOwn(draws.page);
+
+  const motor = () => card(holds.page, 'st0/1');
+  await motor().getByRole('switch', { name: 'Hold to run' }).check();
+  await motor().getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(RPM));
+  const hold = async () => {
+    await holds.page.keyboard.up('h');
+    await motor().getByRole('button', { name: 'Hold to run' }).focus();
+    await holds.page.keyboard.down('h');
+  };
+  // The test does not look whether it runs: what it looks for in a page takes up to 0.3 s of the page's time.
+  const turn = async () => {
+    await open(draws.page, 'Motors');
+    const turned = card(draws.page, 'st1/1');
+    await turned.getByRole('spinbutton', { name: 'Target, rpm' }).fill(String(RPM));
+    await turned.getByRole('button', { name: 'Run to target' }).click();
+    await draws.page.getByRole('navigation').getByRole('link', { name: 'Plots' }).click();
+  };
+  const standing = async () => {
+    const speeds = [await fleet.speedAt(0, 1), await fleet.speedAt(1, 1)];
+    return speeds.map((speed) => speed < RPM / 2) as [held: boolean, turned: boolean];
+  };
+  const run = async () => {
+    for (let [held, turned] = await standing(); held || turned; [held, turned] = await standing()) {
+      if (held) await hold();
+      if (turned) await turn();
+      await pause(SAMPLE);
+    }
+  };
+  const heaps = () => Promise.all(windows.map(({ page }) => heap(page)));
+  const before = await heaps();
+  await run();
+
+  // The others have no page.
+  const largest = (all: number[]) => all.reduce((one, other) => (resident(one) > resident(other) ? one : other));
+  const pages = (await Promise.all(windows.map((one) => one.renderers()))).map(largest);
+  for (const one of windows) await one.leave();
+  let stops = 0;
+  const stalls = new Stalls();
+  const memory = await watch(MINUTES, () => [server, ...pages], async () => {
+    const count = (await standing()).filter(Boolean).length;
+    if (count === 0) return;
+    stops += count;
+    const told = fleet.monitor.lines.filter(({ line, event }) => String(line).startsWith('st') || event === 'left');
+    console.log('a motor stands', stalls.found.slice(-3), ...told.slice(-6).map(({ message }) => message));
+    for (const one of windows) await one.join();
+    await run();
+    for (const one of windows) await one.leave();
+  });
+  const stalled = await stalls.end();
+  for (const one of windows) await one.join();
+  await holds.page.keyboard.up('h');
+  const after = await heaps();
+
+  const objects = (at: number) => `${megabytes(before[at]!.objects)} to ${megabytes(after[at]!.objects)} MB`;
+  const samples = (at: number) => `${megabytes(before[at]!.arrays)} to ${megabytes(after[at]!.arrays)} MB`;
   return [
     ['motors that were found standing', stops, '0'],
     [`- stalls of the computer above ${STALL} ms, longest`, `${stalled.length}, ${Math.max(0, ...stalled).toFixed(0)} ms`, ''],
-    ...names.map((name, index) => [`${name}: memory, growth in 24 h`, growth(index, FILL, Infinity), 'none']),
-    ...(FILL > 0 ? [['server that records: memory, growth in 24 h', growth(0, FILL / 2, FILL), 'the index of the file']] : []),
+    ['server: memory, growth in 24 h', memory(0), 'none'],
+    ...(['page that draws', 'page that holds'] as const).flatMap((name, at) => [
+      [`${name}: memory of its process, growth in 24 h`, memory(at + 1), 'none'],
+      ['- objects, after a collection of garbage', objects(at), 'none'],
+      ['- samples', samples(at), 'none'],
+    ]),
+    ...(filled ? [['server that records: memory, growth in 24 h', filled(0, FILL / 2), 'the index of the file']] : []),
   ];
 }
 
@@ -217,27 +251,33 @@ test('view', async () => {
     for (const one of more) console.log(row(one));
   };
   const fleet = new Fleet();
-  const browser = await launch();
-  // A browser draws one of its pages only.
-  const other = await launch();
+  const browsers: { close: () => Promise<void> }[] = [];
+  const opened = <B extends { close: () => Promise<void> }>(browser: B) => {
+    browsers.push(browser);
+    return browser;
+  };
   try {
     await fleet.plug();
     fleet.turn('rmd0');
-    const page = await visit(browser, fleet);
+    const browser = opened(await chromium.launch({ executablePath: PROGRAM, args: ARGUMENTS }));
+    const page = await browser.newPage({ viewport: { width: 1280, height: 900 } });
+    await visit(page, fleet);
     await recording(page).getByRole('button', { name: '● Record' }).click();
     await expect(recording(page)).toContainText(/REC \d\d:0[1-9]/, { timeout: MINUTE });
     await fleet.record();
     await open(page, 'Plots');
     await expect(number(page, HIGH)).toHaveText(/^\d+$/, { timeout: MINUTE });
     add(await measure(page, fleet));
-    if (MINUTES > 0) add(await soak(page, await visit(other, fleet), fleet));
-    else await endOwn(page);
+    if (MINUTES === 0) await endOwn(page);
+    await browser.close();
+    // A browser draws one of its pages only.
+    if (MINUTES > 0) add(await soak(opened(await Chromium.open()), opened(await Chromium.open()), fleet));
     add(await recorded(fleet));
     const size = execFileSync('npm', ['run', '--silent', 'size']).toString().trim();
     add([['the page', size.replace('the page: ', ''), '< 200 kB']]);
     publish('view', table(['what', 'measured', 'goal'], rows, 3));
   } finally {
-    await Promise.all([browser.close(), other.close()]);
+    await Promise.all(browsers.map((browser) => browser.close()));
     await fleet.end();
   }
 });
