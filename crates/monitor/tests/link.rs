@@ -8,7 +8,7 @@ use std::time::Duration;
 use motorlink_monitor::program::{Listener, Program};
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
-use motorlink_telemetry::share::message::{Answer, Ask, Reason};
+use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, Text, decode};
 use tokio::time::timeout;
 use world::{LIMIT, World};
 
@@ -58,6 +58,15 @@ async fn connected(link: &Link) -> Program {
 
 async fn listen(mut listener: Listener) {
     while listener.next().await.is_ok() {}
+}
+
+async fn released(events: &mut Listener) {
+    loop {
+        let text = decode(&events.next().await.unwrap().payload);
+        if matches!(text, Ok(Text::Event(event)) if event.event == Happening::Released) {
+            return;
+        }
+    }
 }
 
 async fn latched_by(program: &Program) -> Option<String> {
@@ -134,8 +143,11 @@ async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() 
     assert_eq!(first_motion(&world).await, STOP);
     // A release holds, too.
     joins(&link, true).await;
+    let (_program, mut events, _) = link.connect("looks").await.unwrap();
     page.ask(Ask::Release).await.unwrap();
     page.ask(turn()).await.unwrap();
+    // The link was told before: it was there first.
+    timeout(LIMIT, released(&mut events)).await.unwrap();
     drop(world);
     joins(&link, false).await;
     let _world = World::new("link-latch", Profile::Spec);
