@@ -87,6 +87,8 @@ export const held = signal(false);
 
 const RECONNECT = 1000;
 const ALIVE = 50;
+/** A page that looks at the connection later than this did not run meanwhile. */
+const PAUSED = 200;
 const SILENT = 500;
 /** A connection that gives nothing for so long is given up. The browser may not notice for minutes. */
 const DEAD = 5000;
@@ -295,7 +297,7 @@ function connect(url: URL) {
 function look(url: URL) {
   const now = performance.now();
   // A page that did not run has not looked at what was received.
-  quiet += Math.min(now - lookedAt, 2 * ALIVE);
+  quiet += Math.min(now - lookedAt, PAUSED);
   lookedAt = now;
   if (socket && quiet > DEAD) {
     const silent = socket;
