@@ -62,9 +62,9 @@ export class Chromium {
     return this.browser.contexts()[0]!.newPage();
   }
 
-  /** The tab that `tab` opened last. */
+  /** The tab that shows a page. After `join` the tabs have another order. */
   get page(): Page {
-    return this.browser.contexts()[0]!.pages().at(-1)!;
+    return this.browser.contexts()[0]!.pages().find((page) => page.url() !== 'about:blank')!;
   }
 
   /** The processes that run pages. */

@@ -16,7 +16,7 @@ export interface Seen {
 }
 
 declare global {
-  var probing: { clear: () => void; end: () => void; seen: () => Seen; watch: (cell: Element) => void };
+  var probing: { clear: () => void; seen: () => Seen; watch: (cell: Element) => void };
 }
 
 /** Runs in the page, before its scripts. */
@@ -27,7 +27,6 @@ function install() {
   let draws = 0;
   let strokes: number[] = [];
   let number: number | null = null;
-  let isOn = true;
 
   class Path extends Path2D {
     newest = NaN;
@@ -56,7 +55,7 @@ function install() {
   };
   // The first callback of each frame: what the frame before has drawn is on its way to the screen.
   const begin = () => {
-    if (isOn) requestAnimationFrame(begin);
+    requestAnimationFrame(begin);
     const at = performance.now();
     frames.push(at);
     const y = strokes.slice(0, 3) as Places;
@@ -70,10 +69,6 @@ function install() {
     clear: () => {
       [frames, curves, numbers] = [[], [], []];
       draws = 0;
-    },
-    end: () => {
-      isOn = false;
-      globalThis.probing.clear();
     },
     seen: () => ({ frames, draws, curves, numbers }),
     watch: (cell) =>

@@ -43,7 +43,6 @@ const number = (page: Page, { line, motor, name }: SignalOf) =>
 
 /** The page of an operator, with 40 chosen signals. */
 async function visit(page: Page, fleet: Fleet) {
-  await probe(page);
   const settings = { signals: DRAWN.map((one) => ({ ...one, rate: RATE })), span: 60, layout: 'one' };
   await page.addInitScript((text) => localStorage.setItem('motorlink.plots', text), JSON.stringify(settings));
   await page.goto(fleet.url);
@@ -166,11 +165,7 @@ async function watch(minutes: number, processes: () => number[], look = async ()
 async function soak(draws: Chromium, holds: Chromium, fleet: Fleet): Promise<Cell[][]> {
   const windows = [draws, holds];
   const server = fleet.monitor.process.pid!;
-  for (const one of windows) {
-    const page = await one.tab();
-    await visit(page, fleet);
-    await page.evaluate(() => probing.end());
-  }
+  for (const one of windows) await visit(await one.tab(), fleet);
   await open(draws.page, 'Plots');
   const filled = FILL > 0 ? await watch(FILL, () => [server]) : undefined;
   await endOwn(draws.page);
@@ -227,16 +222,16 @@ async function soak(draws: Chromium, holds: Chromium, fleet: Fleet): Promise<Cel
   await holds.page.keyboard.up('h');
   const after = await heaps();
 
-  const objects = (at: number) => `${megabytes(before[at]!.objects)} to ${megabytes(after[at]!.objects)} MB`;
-  const samples = (at: number) => `${megabytes(before[at]!.arrays)} to ${megabytes(after[at]!.arrays)} MB`;
+  const use = (at: number, part: 'objects' | 'arrays') =>
+    `${megabytes(before[at]![part])} to ${megabytes(after[at]![part])} MB`;
   return [
     ['motors that were found standing', stops, '0'],
     [`- stalls of the computer above ${STALL} ms, longest`, `${stalled.length}, ${Math.max(0, ...stalled).toFixed(0)} ms`, ''],
     ['server: memory, growth in 24 h', memory(0), 'none'],
     ...(['page that draws', 'page that holds'] as const).flatMap((name, at) => [
       [`${name}: memory of its process, growth in 24 h`, memory(at + 1), 'none'],
-      ['- objects, after a collection of garbage', objects(at), 'none'],
-      ['- samples', samples(at), 'none'],
+      ['- objects, after a collection of garbage', use(at, 'objects'), 'none'],
+      ['- samples', use(at, 'arrays'), 'none'],
     ]),
     ...(filled ? [['server that records: memory, growth in 24 h', filled(0, FILL / 2), 'the index of the file']] : []),
   ];
@@ -261,6 +256,7 @@ test('view', async () => {
     fleet.turn('rmd0');
     const browser = opened(await chromium.launch({ executablePath: PROGRAM, args: ARGUMENTS }));
     const page = await browser.newPage({ viewport: { width: 1280, height: 900 } });
+    await probe(page);
     await visit(page, fleet);
     await recording(page).getByRole('button', { name: '● Record' }).click();
     await expect(recording(page)).toContainText(/REC \d\d:0[1-9]/, { timeout: MINUTE });
