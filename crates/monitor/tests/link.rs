@@ -146,7 +146,7 @@ async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() 
     let (_program, mut events, _) = link.connect("looks").await.unwrap();
     page.ask(Ask::Release).await.unwrap();
     page.ask(turn()).await.unwrap();
-    // The link was told before: it was there first.
+    // The share tells programs in the order in which they came, and the link came before.
     timeout(LIMIT, released(&mut events)).await.unwrap();
     drop(world);
     joins(&link, false).await;
