@@ -24,7 +24,7 @@ def test_all_motors_come_to_rest(bench, rmd, command, mode):
     assert modes(bench) == ["speed"] * 4
     done = rmd("--json", command, "--all").ended(0)
     assert [(line["motor"], line["ok"]) for line in done.lines] == [(n, True) for n in (1, 2, 3, 4)]
-    assert "28 IDs did not answer 4 requests: no motor, or no supply" in done.err
+    assert "28 IDs did not answer 4 requests: no motor, no supply, or no connection to it" in done.err
     assert modes(bench) == [mode] * 4
 
 

@@ -453,7 +453,7 @@ line: string,
  */
 motor: number, };
 
-export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
+export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unheard" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
 
 export type Recorded = { 
 /**

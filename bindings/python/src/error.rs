@@ -277,7 +277,7 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
             let kind = match kind {
                 NotDone::Refused | NotDone::Latched | NotDone::Unsent => Kind::Refused,
                 NotDone::Usage => Kind::InvalidValue,
-                NotDone::Silent => Kind::ReplyTimeout,
+                NotDone::Silent | NotDone::Unheard => Kind::ReplyTimeout,
                 NotDone::Unconfirmed | NotDone::Line => Kind::Link,
             };
             let motor = Some(*motor).filter(|motor| *motor != 0);

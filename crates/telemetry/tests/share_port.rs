@@ -474,3 +474,16 @@ fn a_stop_of_all_ids_of_a_share_is_certain_of_the_ids_without_a_motor() {
     // The IDs without a motor are no alarm.
     assert!(operator.stops() <= stopping.confirmed.len());
 }
+
+#[test]
+fn a_stop_of_all_ids_of_a_share_fails_for_a_motor_that_was_turned_and_is_silent() {
+    let share = deaf("all-turned");
+    let client = share.rmd();
+    // Its replies are lost: only the share knows of it.
+    share.rmd().ask(id(9), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap_err();
+    let stopping = client.stop_all_until_confirmed(Default::default());
+    let failed: MotorSet = stopping.failed.iter().map(|(id, _)| *id).collect();
+    assert_eq!(failed, id(9).into(), "{stopping:?}");
+    assert!(!stopping.silent.contains(id(9)), "{stopping:?}");
+    assert!(stopping.is_silence_certain(), "{stopping:?}");
+}

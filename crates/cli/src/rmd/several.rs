@@ -84,7 +84,7 @@ fn halt_several(
     let loss = format!("{lost} of {sent} requests to the other motors had no reply");
     if stopping.is_silence_certain() {
         let loss = if lost == 0 { String::new() } else { format!("; {loss}") };
-        note(format!("{fact}: no motor, or no supply{loss}"));
+        note(format!("{fact}: no motor, no supply, or no connection to it{loss}"));
     } else {
         let loss = if confirmed.is_empty() { "no motor confirmed" } else { &loss };
         let failure = Failure::link(format!("{fact}, and {loss}: motors may still be turning"))

@@ -303,6 +303,8 @@ pub enum NotDone {
     Usage,
     /// The motor does not answer.
     Silent,
+    /// As `Silent`, and nothing shows that a motor is there.
+    Unheard,
     /// It was not sent: it waited too long, or too much waits.
     Unsent,
     /// The drive answered, but replies before may have been those to other requests.
@@ -329,7 +331,8 @@ impl PortError {
     /// Whether the program that holds the port has no reply of the drive. What stops a motor it has
     /// repeated before.
     pub fn is_given_up(&self) -> bool {
-        matches!(self, PortError::NotDone { kind: NotDone::Silent | NotDone::Line, .. })
+        use NotDone::{Line, Silent, Unheard};
+        matches!(self, PortError::NotDone { kind: Silent | Unheard | Line, .. })
     }
 
     /// Whether a wait was ended because the caller wants to do something else. The port stays open,

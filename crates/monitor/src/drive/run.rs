@@ -243,8 +243,10 @@ impl<M: Motion> Begun<'_, M> {
         let references = self.references(stream);
         if let Err(why) = self.command(&stream.request(from)?).await {
             // The motor may have the reference, whose reply was lost.
-            let is_unknown =
-                matches!(why.reason, Reason::Silent | Reason::Unconfirmed | Reason::Line);
+            let is_unknown = matches!(
+                why.reason,
+                Reason::Silent | Reason::Unheard | Reason::Unconfirmed | Reason::Line
+            );
             let message = if is_unknown { references.stop(&why).await } else { why.message };
             return Err(Refusal { message, ..why });
         }

@@ -268,6 +268,11 @@ impl Client {
         self.turns.take().session.is_held
     }
 
+    /// The motors that a program that holds the port knows, and of which it had no reply.
+    pub(super) fn missed(&self) -> MotorSet {
+        self.turns.take().session.missed
+    }
+
     /// Whether this is what a program that holds the port says after it has repeated a stop.
     pub(super) fn is_given_up(&self, error: &Error) -> bool {
         self.turns.take().session.is_given_up(error)

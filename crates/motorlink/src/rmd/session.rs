@@ -52,6 +52,8 @@ pub(super) struct Session {
     is_retired: bool,
     /// Whether another program holds the port.
     pub(super) is_held: bool,
+    /// Motors of which that program has no reply, and knows that they are there.
+    pub(super) missed: MotorSet,
     timeout: Duration,
     /// What the program that holds the port has no reply to, and why.
     not_done: Vec<(MotorId, PortError)>,
@@ -113,6 +115,7 @@ impl Session {
             losses: [0; MotorId::COUNT],
             is_retired: false,
             is_held: false,
+            missed: MotorSet::EMPTY,
             timeout: options.timeout,
             not_done: Vec::new(),
         }
@@ -145,6 +148,9 @@ impl Session {
 
     /// The program that holds the port has no reply to the request of this motor.
     pub(super) fn not_done(&mut self, now: Instant, id: MotorId, why: PortError) {
+        if matches!(why, PortError::NotDone { kind: NotDone::Silent, .. }) {
+            self.missed.insert(id);
+        }
         if self.busy().contains(id) {
             self.cancel(now, id);
             self.host.trust(id.into());
@@ -515,7 +521,7 @@ impl Session {
             PortError::NotDone { kind: NotDone::Unconfirmed, .. } => {
                 Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }
             }
-            PortError::NotDone { kind: NotDone::Silent, .. } => {
+            PortError::NotDone { kind: NotDone::Silent | NotDone::Unheard, .. } => {
                 let [code, ..] = self.pending[id.index()].request;
                 let port = Arc::clone(&self.port);
                 Error::Timeout { port, motor: id, request: Code::from(code) }

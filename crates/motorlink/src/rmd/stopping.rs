@@ -82,7 +82,8 @@ impl Client {
 
     /// As [`stop_until_confirmed`](Self::stop_until_confirmed), for all IDs. An ID may have no motor.
     /// After 4 attempts the silent IDs are asked until their silence is certain
-    /// ([`Stopping::is_silence_certain`]), for at most 2 s.
+    /// ([`Stopping::is_silence_certain`]), for at most 2 s. If another program holds the port and knows
+    /// that a motor is at an ID, its silence is a failure.
     pub fn stop_all_until_confirmed(&self, action: StopAction) -> Stopping {
         self.stop_repeatedly(MotorSet::ALL, action, MotorSet::EMPTY)
     }
@@ -94,8 +95,14 @@ impl Client {
         self.stop_repeatedly(moving.union(unexpected), action, moving)
     }
 
-    /// Motors in `expected` have to confirm. Another ID may have no motor.
-    fn stop_repeatedly(&self, ids: MotorSet, action: StopAction, expected: MotorSet) -> Stopping {
+    /// Motors in `expected` have to confirm, and those that the program that holds the port knows. Another
+    /// ID may have no motor.
+    fn stop_repeatedly(
+        &self,
+        ids: MotorSet,
+        action: StopAction,
+        mut expected: MotorSet,
+    ) -> Stopping {
         let mut stopping = Stopping {
             confirmed: MotorSet::EMPTY,
             failed: Vec::new(),
@@ -109,6 +116,7 @@ impl Client {
         let mut left = ids;
         while !left.is_empty() {
             let port = stopping.attempt(self, left, action, !left.without(expected).is_empty());
+            expected = expected.union(self.missed());
             left = self.repeatable(&stopping.failed);
             if stopping.attempts >= STOP_ATTEMPTS && port.is_ok() {
                 stopping.measure(self);

@@ -144,7 +144,13 @@ impl Hub {
             }
             Err(error) => {
                 let code = error.code().map(u8::from);
-                session.refuse_with(id, reason(&error), error.to_string(), code);
+                let is_there =
+                    |motor| self.lines.get(&line).is_none_or(|held| held.is_there(motor));
+                let reason = match reason(&error) {
+                    Reason::Silent if !motor.is_none_or(is_there) => Reason::Unheard,
+                    reason => reason,
+                };
+                session.refuse_with(id, reason, error.to_string(), code);
             }
         }
     }

@@ -186,7 +186,7 @@ impl Held {
 
     /// Whether the drive says that it has no such motor, no program turned it and it has never answered.
     pub(super) fn is_absent(&self, motor: Motor) -> bool {
-        self.absent.contains(&motor) && !self.may_turn(motor) && !self.heard.contains(&motor)
+        self.absent.contains(&motor) && !self.is_there(motor)
     }
 
     /// What its port occupies now.
@@ -212,10 +212,7 @@ impl Held {
         let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
         let heard = self.heard.iter().map(|motor| motor.number()).collect();
         // A stop of all motors is also sent to addresses where no motor has ever answered.
-        let may_be_there = |motor: &&Motor| {
-            (self.heard.contains(motor) || self.may_turn(**motor)) && !self.is_absent(**motor)
-        };
-        let unstopped = self.owed.keys().filter(may_be_there).map(|motor| motor.number());
+        let unstopped = self.owing().map(|(motor, _)| motor.number());
         let any = self.unanswered_stop.as_ref().filter(|_| !self.has_answered());
         let unstopped = any.map(|_| ANY_MOTOR).into_iter().chain(unstopped).collect();
         Line { line, protocol, port, profile, timeout, t, wall, counts, heard, unstopped }

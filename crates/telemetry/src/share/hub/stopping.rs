@@ -182,9 +182,7 @@ impl Held {
 
     /// Whether a motor is there, as far as it is known.
     pub(super) fn is_there(&self, motor: Motor) -> bool {
-        self.owners.contains_key(&motor)
-            || self.heard.contains(&motor)
-            || self.moved.contains(&motor)
+        self.owners.contains_key(&motor) || self.heard.contains(&motor) || self.may_turn(motor)
     }
 
     /// The motors that are there and have not confirmed a stop.

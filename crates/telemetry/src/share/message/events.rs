@@ -105,6 +105,9 @@ pub enum Reason {
     Refused,
     /// The motor does not answer. It is unknown whether it executed it.
     Silent,
+    /// As `silent`, and nothing shows that a motor is there: none has answered at this address, and no
+    /// program turned it.
+    Unheard,
     /// Answers may be those to other commands: a reply came twice or late.
     Unconfirmed,
     /// The line failed. It is unknown whether the drive executed it.

@@ -43,6 +43,7 @@ impl Place {
             Reason::Overtaken | Reason::Refused => NotDone::Refused,
             Reason::Expired | Reason::Busy => NotDone::Unsent,
             Reason::Silent => NotDone::Silent,
+            Reason::Unheard => NotDone::Unheard,
             Reason::Unconfirmed => NotDone::Unconfirmed,
             // It is unknown what the drive did.
             Reason::Displaced
