@@ -16,6 +16,8 @@ pub(super) struct Condition {
     overview: Overview,
     /// The last value of each signal.
     last: Vec<(Source, Sample)>,
+    /// Whether its faults are read.
+    reads_faults: bool,
     /// When the last values were read.
     at: Option<Time>,
     /// It does not answer, or its port is closed.
@@ -61,6 +63,7 @@ impl Condition {
             port: port.to_owned(),
             overview: Overview::of(motor),
             last: Vec::new(),
+            reads_faults: false,
             at: None,
             is_silent: false,
             rates: None,
@@ -101,6 +104,7 @@ impl Condition {
         let mut has_value = false;
         for (Signal { source, .. }, sample) in values {
             has_value |= sample.is_some();
+            self.reads_faults |= source == self.overview.faults;
             self.last.retain(|(it, _)| *it != source);
             self.last.extend(sample.map(|sample| (source, sample)));
         }
@@ -127,40 +131,55 @@ impl Condition {
         overview::faults(self.motor, self.value(self.overview.faults)?)
     }
 
-    fn level_and_message(&self) -> (Level, String) {
+    /// Whether its values are old: it does not answer, or not to all that is asked.
+    fn is_stale(&self, now: Time) -> bool {
+        self.is_silent || self.at.is_none() || self.presence.open(now) > 0
+    }
+
+    fn level_and_message(&self, now: Time) -> (Level, String) {
         let (state, faults) = (self.state(), self.faults());
+        let is_unknown = self.reads_faults && self.value(self.overview.faults).is_none();
         let slow = self.rates.filter(|(asked, got)| *got < asked * ENOUGH);
         let too_slow = slow.map(|(asked, got)| format!("read {got:.1} times a second of {asked}"));
         let level = match () {
-            () if self.is_silent || self.at.is_none() => Level::Stale,
+            () if self.is_stale(now) => Level::Stale,
             () if overview::is_present(self.motor, self.value(self.overview.faults)) => {
                 Level::Error
             }
-            () if faults.is_some() || too_slow.is_some() => Level::Warn,
+            () if faults.is_some() || too_slow.is_some() || is_unknown => Level::Warn,
             () => Level::Ok,
         };
-        let silence = (level == Level::Stale).then(|| "does not answer".to_owned());
-        let parts = [silence, state, faults, too_slow].into_iter().flatten();
+        let silence = match level {
+            Level::Stale if self.is_silent || self.at.is_none() => {
+                Some("does not answer".to_owned())
+            }
+            Level::Stale => Some("no new values".to_owned()),
+            _ => None,
+        };
+        let unknown = is_unknown.then(|| "faults not known".to_owned());
+        let parts = [silence, state, faults, unknown, too_slow].into_iter().flatten();
         (level, parts.collect::<Vec<_>>().join(": "))
     }
 
     /// Whether it is another than when it was said last.
-    pub(super) fn has_changed(&self) -> bool {
-        self.said.as_ref() != Some(&self.level_and_message())
+    pub(super) fn has_changed(&self, now: Time) -> bool {
+        self.said.as_ref() != Some(&self.level_and_message(now))
     }
 
     /// The diagnosis.
     pub(super) fn say(&mut self, now: Time) -> DiagnosticStatus {
-        let (level, message) = self.level_and_message();
+        let (level, message) = self.level_and_message(now);
         self.said = Some((level, message.clone()));
         let age = self.at.map(|at| format!("{:.3}", now.0.saturating_sub(at.0) as f64 / 1e9));
         let rate = |which: fn((f64, f64)) -> f64| self.rates.map(|it| format!("{:.1}", which(it)));
+        let faults = || self.faults().unwrap_or_else(|| "none".to_owned());
+        let achieved = rate(|(_, achieved)| achieved).filter(|_| level != Level::Stale);
         let values = [
             ("state", self.state()),
-            ("faults", Some(self.faults().unwrap_or_else(|| "none".to_owned()))),
+            ("faults", self.value(self.overview.faults).map(|_| faults())),
             ("age of data [s]", age),
             ("asked rate [Hz]", rate(|(asked, _)| asked)),
-            ("achieved rate [Hz]", rate(|(_, achieved)| achieved)),
+            ("achieved rate [Hz]", achieved),
         ];
         let known = values.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
         DiagnosticStatus {
@@ -223,6 +242,36 @@ mod tests {
         assert_eq!(condition.without_values(time(108_000)), 88_010 * MS);
         let mean = condition.mean_rate(time(108_000)).unwrap();
         assert!((18.0..19.0).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn values_that_are_old_or_were_never_read_are_not_said_to_be_live() {
+        let motor = Motor::St(MotorNumber::FIRST);
+        let (status, flags) = (Overview::of(motor).state.unwrap(), Overview::of(motor).faults);
+        let mut condition = Condition::new(motor, "st1", "port", Micros(100_000));
+        let time = |ms: u64| Time(1_000_000 * MS + ms * MS);
+        let row = |condition: &mut Condition, ms, flags_are: Option<f64>| {
+            let values = [(status, Some(6.0)), (flags, flags_are)];
+            let values = values.map(|(source, value)| (Signal { motor, source }, value));
+            let samples = values.map(|(signal, value)| (signal, value.map(Sample::told)));
+            condition.take(time(ms), true, samples.into_iter());
+        };
+        let said = |condition: &mut Condition, ms| {
+            let DiagnosticStatus { level, message, values, .. } = condition.say(time(ms));
+            let faults = values.into_iter().find(|(key, _)| key == "faults").map(|(_, is)| is);
+            (level, message, faults)
+        };
+        assert_eq!(said(&mut condition, 0), (Level::Stale, "does not answer".to_owned(), None));
+        row(&mut condition, 0, None);
+        let unknown = (Level::Warn, "RUN: faults not known".to_owned(), None);
+        assert_eq!(said(&mut condition, 10), unknown);
+        row(&mut condition, 100, Some(0.0));
+        let none = Some("none".to_owned());
+        assert_eq!(said(&mut condition, 110), (Level::Ok, "RUN".to_owned(), none.clone()));
+        assert!(!condition.has_changed(time(1_000)));
+        assert!(condition.has_changed(time(1_200)));
+        let old = (Level::Stale, "no new values: RUN".to_owned(), none);
+        assert_eq!(said(&mut condition, 1_200), old);
     }
 
     #[test]

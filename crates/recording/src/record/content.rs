@@ -250,7 +250,7 @@ impl Content {
             self.tell_unconfirmed(now, put);
         }
         let conditions = self.conditions.values_mut();
-        let told = conditions.filter(|it| is_due || it.has_changed()).map(|it| it.say(now));
+        let told = conditions.filter(|it| is_due || it.has_changed(now)).map(|it| it.say(now));
         let status: Vec<_> = told.collect();
         if is_due {
             self.said_at = now;

@@ -194,7 +194,7 @@ pub enum Level {
     Warn = 1,
     /// The motor has a fault.
     Error = 2,
-    /// The motor does not answer.
+    /// The motor does not answer, or its values are old.
     Stale = 3,
 }
 
