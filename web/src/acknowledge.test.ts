@@ -12,8 +12,8 @@ vi.mock('./drives', () => ({
   }]])),
 }));
 vi.mock('./stop', () => ({}));
-vi.mock('./link', () => ({ age: (_: string, t: number) => performance.now() / 1000 - t }));
-const values = new Map<string, { value: number; t: number }>();
+vi.mock('./link', () => ({ age: (wall: number) => performance.now() / 1000 - wall }));
+const values = new Map<string, { value: number; wall: number }>();
 vi.mock('./overview', () => ({ liveOf: () => ({ values }) }));
 const { afterAcknowledge } = await import('./acknowledge');
 
@@ -26,10 +26,10 @@ describe('after an acknowledge', () => {
 
   const after = async (value: number | null) => {
     // This was read before it.
-    values.set('FLAGS', { value: 2 + 2 ** 17, t: performance.now() / 1000 - 0.01 });
+    values.set('FLAGS', { value: 2 + 2 ** 17, wall: performance.now() / 1000 - 0.01 });
     const said = afterAcknowledge('st0', 1);
     await vi.advanceTimersByTimeAsync(200);
-    if (value !== null) values.set('FLAGS', { value, t: performance.now() / 1000 - 0.02 });
+    if (value !== null) values.set('FLAGS', { value, wall: performance.now() / 1000 - 0.02 });
     await vi.advanceTimersByTimeAsync(5000);
     return said;
   };

@@ -16,7 +16,7 @@ export async function afterAcknowledge(line: string, motor: number): Promise<Sen
   for (;;) {
     const passed = performance.now() - since;
     const last = description && liveOf(line, motor).values.get(description.overview.faults);
-    if (last && age(line, last.t) * 1000 < passed) {
+    if (last && age(last.wall) * 1000 < passed) {
       const names = told(last.value, description.faults).shown.flatMap(({ name, present }) => (present ? [name] : []));
       if (names.length === 0) return { tone: 'ok', text: 'Faults acknowledged.' };
       const verb = names.length === 1 ? 'is' : 'are';

@@ -31,6 +31,21 @@ describe('a motor', () => {
     expect(drives.isSilent('st0', 1)).toBe(false);
   });
 
+  it('is silent while its line is lost', () => {
+    happened('answers');
+    link.entries.value = [...link.entries.value, { event: 'lost', line: 'st0' }];
+    expect(drives.isSilent('st0', 1)).toBe(true);
+    link.entries.value = [...link.entries.value, { event: 'back', line: 'st0' }];
+    expect(drives.isSilent('st0', 1)).toBe(false);
+  });
+
+  it('is not silent by an event from before its line was opened', () => {
+    link.entries.value = [{ event: 'lost', line: 'st0', wall: 50 }, { event: 'silent', line: 'st0', motor: 1, wall: 50 }];
+    expect(drives.isSilent('st0', 1)).toBe(true);
+    link.lines.value = [{ line: 'st0', t: 10, wall: 100 }];
+    expect(drives.isSilent('st0', 1)).toBe(false);
+  });
+
   it('that did not confirm a stop is silent unless its values come', () => {
     happened('stop-failed');
     expect(drives.isSilent('st0', 1)).toBe(true);

@@ -48,18 +48,25 @@ export async function describeLines(): Promise<string | null> {
 /** Describes lines, again with each connection and each answer to `lines`. Returns what ends it. */
 export const watchDescriptions = (): (() => void) => effect(() => void describeLines());
 
-/** The newest event of the given kinds about each line or motor, by name. */
+/** Rounding of times, in seconds. */
+const ROUNDING = 0.001;
+
+/**
+ * The newest event of the given kinds about each line or motor, by name. Events from before the line was opened
+ * are of another share, or of another port.
+ */
 function newest(all: readonly DriveEvent[], kinds: ReadonlySet<string>, isOfMotor: boolean) {
+  const opened = new Map(lines.value.map(({ line, t, wall }) => [line, wall - t - ROUNDING]));
   const found = new Map<string, DriveEvent>();
   for (const event of all) {
-    if (!event.line || !kinds.has(event.event)) continue;
+    if (!event.line || !kinds.has(event.event) || event.wall < (opened.get(event.line) ?? 0)) continue;
     if (!isOfMotor) found.set(event.line, event);
     else if (event.motor != null) found.set(nameOf(event.line, event.motor), event);
   }
   return found;
 }
 
-const LINE_KINDS = new Set(['lost', 'back']);
+const LINE_KINDS = new Set(['lost', 'back', 'opened']);
 const MOTOR_KINDS = new Set(['silent', 'answers', 'stop-failed', 'stopped']);
 
 /** The last loss or return of each line since the page was opened. */
@@ -81,9 +88,10 @@ export const rates = signal<readonly SignalRate[]>([]);
 
 /**
  * Whether a motor does not answer. Without an event about it that is a motor which the last search did
- * not find, and of which no values come.
+ * not find, and of which no values come. No motor of a lost line answers.
  */
 export function isSilent(line: string, motor: number): boolean {
+  if (lineEvents.value.get(line)?.event === 'lost') return true;
   const last = motorEvents.value.get(nameOf(line, motor))?.event;
   if (last === 'silent') return true;
   if (last === 'answers' || last === 'stopped') return false;

@@ -35,7 +35,7 @@ describe('faults', () => {
       addEventListener: (_: string, listener: () => void) => (look = listener),
       removeEventListener: () => {},
     });
-    vi.doMock('./link', () => ({ age: (_: string, t: number) => now - t, subscribe }));
+    vi.doMock('./link', () => ({ age: (wall: number) => now - wall, subscribe, wallAt: (_: string, t: number) => t }));
     vi.doMock('./drives', () => ({
       allMotors: signal([1, 2, 3].map((motor) => ({ line: 'st0', motor }))),
       descriptions: signal(new Map([['st0', { faults: FAULTS, overview: { faults: 'FLAGS' } }]])),

@@ -2,7 +2,7 @@
 import { effect, signal } from '@preact/signals';
 import { allMotors, descriptions } from './drives';
 import { nameOf } from './format';
-import { type Rows, age, subscribe } from './link';
+import { type Rows, age, subscribe, wallAt } from './link';
 import { named } from './stop';
 import type { Fault, SignalName } from './wire';
 
@@ -37,7 +37,7 @@ export function countOf(value: number, faults: readonly Fault[]): number {
 export const faultsText = (count: number) => `${count || 'no'} ${count === 1 ? 'fault' : 'faults'}`;
 
 /** The last value of the faults of each motor, by name. */
-const last = new Map<string, { value: number; t: number }>();
+const last = new Map<string, { value: number; wall: number }>();
 
 /** The faults of all motors in words. Empty if there is none. */
 export const faultSummary = signal('');
@@ -52,7 +52,7 @@ function summary(): string {
     if (!faults) continue;
     count += faults;
     // NaN: the age is unknown.
-    names.push(age(line, known.t) <= OLD ? name : `${name} (old)`);
+    names.push(age(known.wall) <= OLD ? name : `${name} (old)`);
   }
   return count ? `${faultsText(count)}: ${named(names)}` : '';
 }
@@ -61,7 +61,7 @@ function take({ line, motor, t0, t, values }: Rows) {
   const row = t.length - 1;
   const value = values[0]?.[row];
   if (value === undefined || Number.isNaN(value)) return;
-  last.set(nameOf(line, motor), { value, t: t0 + t[row]! });
+  last.set(nameOf(line, motor), { value, wall: wallAt(line, t0 + t[row]!) });
   faultSummary.value = summary();
 }
 

@@ -247,17 +247,42 @@ describe('motors', () => {
 });
 
 describe('ages', () => {
+  const age = () => link.age(link.wallAt('st0', 10));
+  const lines = (t: number) => {
+    const { id } = Socket.last.asked('lines').at(-1)!;
+    const wall = Date.now() / 1000;
+    Socket.last.give({ kind: 'answer', id, to: 'lines', lines: [{ line: 'st0', protocol: 'st', port: 'p', timeout: 1, t, wall }] });
+    return vi.advanceTimersByTimeAsync(0);
+  };
+
   it('are unknown before the clocks are known, and grow while nothing is received', async () => {
     Socket.last.welcome();
-    expect(link.age('st0', 10)).toBeNaN();
-    const { id } = Socket.last.asked('lines')[0]!;
-    Socket.last.give({ kind: 'answer', id, to: 'lines', lines: [{ line: 'st0', protocol: 'st', port: 'p', timeout: 1, t: 10, wall: Date.now() / 1000 }] });
-    await vi.advanceTimersByTimeAsync(0);
-    expect(link.age('st0', 10)).toBeNaN();
+    expect(age()).toBeNaN();
+    await lines(10);
+    expect(age()).toBeNaN();
     beat();
-    expect(link.age('st0', 10)).toBeCloseTo(0);
+    expect(age()).toBeCloseTo(0);
     vi.advanceTimersByTime(3000);
-    expect(link.age('st0', 10)).toBeCloseTo(3);
+    expect(age()).toBeCloseTo(3);
+  });
+
+  it('stay those of a value when another share begins the clocks anew', async () => {
+    Socket.last.welcome();
+    await lines(10);
+    beat();
+    const read = link.wallAt('st0', 10);
+    vi.advanceTimersByTime(3000);
+    Socket.last.give({ kind: 'event', wall: 1, event: 'back', line: 'st0', message: '' });
+    await lines(0.5);
+    expect(link.age(read)).toBeCloseTo(3);
+  });
+
+  it('of a time to come are unknown: it is of another clock', async () => {
+    Socket.last.welcome();
+    await lines(10);
+    beat();
+    expect(link.age(link.wallAt('st0', 10.5))).toBeCloseTo(-0.5);
+    expect(link.age(link.wallAt('st0', 30))).toBeNaN();
   });
 });
 

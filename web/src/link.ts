@@ -1,7 +1,7 @@
 // The connection to the server: requests, subscriptions, signs of life, and what the server said last.
 import { signal } from '@preact/signals';
 import { ServerClock } from './clock';
-import { nameOf } from './format';
+import { LIVE, nameOf } from './format';
 import { type Rows, decode, groupOf } from './rows';
 import type {
   Beat, Event as DriveEvent, Group, Line, Ran, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
@@ -210,9 +210,14 @@ export function wallAt(line: string, t: number): number {
   return known ? known.wall + (t - known.t) : NaN;
 }
 
-/** How old a value of a line is, in seconds. NaN until it is known: such a value is not live. */
-export function age(line: string, t: number): number {
-  return wallNow() - wallAt(line, t);
+/**
+ * How old a value is, in seconds, by its time of the wall clock. Convert it with `wallAt` when it arrives: another
+ * share at the same place begins its clocks anew. NaN if it is not known, also for a time to come: such a value is
+ * not live.
+ */
+export function age(wall: number): number {
+  const seconds = wallNow() - wall;
+  return seconds > -LIVE ? seconds : NaN;
 }
 
 /** Sends a text at once, if there is a connection. */

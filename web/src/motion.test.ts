@@ -50,7 +50,7 @@ describe('the state of a motion', () => {
     overview: { state: 'STATUS' }, states: [{ value: 0, name: 'IDLE' }, { value: 6, name: 'RUN' }],
   } as unknown as Description;
   const stateAt = (age: number, begun: number, value = 6) =>
-    stateSince({ age: () => age, values: new Map([['STATUS', { value, unit: '', t: 0 }]]) }, description, begun);
+    stateSince({ age: () => age, values: new Map([['STATUS', { value, unit: '', wall: 0 }]]) }, description, begun);
 
   it('is one that was read since the motion began', () => {
     expect(stateAt(0.2, 0.5)).toBe('RUN');

@@ -2,7 +2,7 @@
 import { type Signal, effect, signal } from '@preact/signals';
 import { allMotors, descriptions } from './drives';
 import { nameOf, tooOld } from './format';
-import { type Refused, type Rows, age, state, subscribe } from './link';
+import { type Refused, type Rows, age, state, subscribe, wallAt } from './link';
 import type { Overview, SignalName } from './wire';
 
 /** How often the values of the cards are read, in seconds. */
@@ -20,8 +20,8 @@ export const HISTORY = 200;
 export interface Last {
   value: number;
   unit: string;
-  /** The line's clock, in seconds. */
-  t: number;
+  /** When it was read, by the wall clock in seconds. */
+  wall: number;
 }
 
 export class Live {
@@ -35,12 +35,10 @@ export class Live {
   /** When it was made, in ms. */
   private readonly since = performance.now();
 
-  constructor(readonly line: string) {}
-
   /** How old the value of a signal is, in seconds. */
   age(name: string): number {
     const last = this.values.get(name);
-    return last ? age(this.line, last.t) : NaN;
+    return last ? age(last.wall) : NaN;
   }
 
   /** Whether a value of the last second is there, or may come: the card is new. */
@@ -58,7 +56,7 @@ const lives = new Map<string, Live>();
 
 export function liveOf(line: string, motor: number): Live {
   const name = nameOf(line, motor);
-  const known = lives.get(name) ?? new Live(line);
+  const known = lives.get(name) ?? new Live();
   lives.set(name, known);
   return known;
 }
@@ -82,8 +80,9 @@ function take({ line, motor, columns, t0, t, values, lost }: Rows) {
   live.lost += lost;
   const row = t.length - 1;
   if (row < 0) return;
+  const wall = wallAt(line, t0 + t[row]!);
   columns.forEach(({ name, unit }, at) => {
-    live.values.set(name, { value: values[at]![row]!, unit, t: t0 + t[row]! });
+    live.values.set(name, { value: values[at]![row]!, unit, wall });
   });
 }
 
@@ -121,7 +120,7 @@ export function watchOverview(): () => void {
       const last = speed === undefined ? undefined : live.values.get(speed);
       live.history.copyWithin(0, 1);
       // An old value is a gap in the history.
-      live.history[HISTORY - 1] = last && age(line, last.t) < 1 ? last.value : NaN;
+      live.history[HISTORY - 1] = last && age(last.wall) < 1 ? last.value : NaN;
       if (live.isInView || turn % OUT_OF_VIEW === 0) live.tick.value += 1;
     }
   }, DRAW);

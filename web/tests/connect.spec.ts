@@ -1,8 +1,9 @@
 // Ports of the computer, and lines that are opened and closed while the server runs.
 import AxeBuilder from '@axe-core/playwright';
 import type { Page } from '@playwright/test';
+import { writeFileSync } from 'node:fs';
 import { type AddressInfo, connect, createServer } from 'node:net';
-import { Bench, card, expect, open, test as base } from './bench';
+import { Bench, card, expect, open, Program, test as base } from './bench';
 
 /** A monitor with the ST drive alone. */
 const test = base.extend<{ bench: Bench }>({
@@ -184,5 +185,50 @@ test('a scan finds the bit rate and the motors of a bus, after a question', asyn
   } finally {
     bus.close();
     await more.end();
+  }
+});
+
+/** The values of a card that look like present ones. */
+const liveOnes = async (page: Page, name: string) =>
+  (await card(page, name).locator('.value:not(.old) .digits').allInnerTexts()).filter((text) => text !== '–');
+
+test('no old value looks live after the share was started again with other drives', async ({ bench, page }) => {
+  await bench.monitor.end();
+  const at = `unix:${bench.folder}/share`;
+  const begin = async () => {
+    const share = new Program(['share', '-p', `slcan:${bench.folder}/can0`, '--at', at, '--json'], bench.folder);
+    await share.line(({ event }) => event === 'ready');
+    return share;
+  };
+  const first = await begin();
+  const begun = performance.now();
+  let second: Program | undefined;
+  try {
+    await bench.serve(['--share', at]);
+    await page.goto(bench.url);
+    // The clock of the second share is that of the first one again only after this time.
+    await expect
+      .poll(async () => performance.now() - begun > 8000 && (await liveOnes(page, 'rmd0/4')).length > 0, { timeout: 20_000 })
+      .toBe(true);
+    await first.end('SIGKILL');
+    await bench.drives.end();
+    await expect.poll(() => liveOnes(page, 'rmd0/4')).toEqual([]);
+    writeFileSync(`${bench.folder}/one.toml`, '[[rmd.motor]]\nid = 1\n');
+    bench.drives = new Program(
+      ['sim', `${bench.folder}/one.toml`, '--rmd', `slcan-pty:${bench.folder}/can0`, '--stdin', '--json'],
+      bench.folder,
+    );
+    await bench.drives.line((line) => line['protocol'] === 'rmd');
+    second = await begin();
+    const until = performance.now() + 3000;
+    let isBack = false;
+    while (!isBack || performance.now() < until) {
+      expect(await liveOnes(page, 'rmd0/4')).toEqual([]);
+      isBack ||= (await liveOnes(page, 'rmd0/1')).length > 0;
+    }
+    await expect(card(page, 'rmd0/4').locator('.value.old').first()).toBeVisible();
+  } finally {
+    await first.end();
+    await second?.end();
   }
 });

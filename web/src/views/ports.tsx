@@ -56,7 +56,7 @@ function LineState({ line }: { line: string }) {
   if (last) {
     return (
       <>
-        <span class="chip ok">● open</span> again since {timeOfDay(last.wall)}
+        <span class="chip ok">● open</span> {last.event === 'back' && 'again '}since {timeOfDay(last.wall)}
       </>
     );
   }

@@ -3,7 +3,7 @@ import { type Signal, signal, useSignal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
 import { descriptions } from '../drives';
 import { nameOf, number, tooOld } from '../format';
-import { age, latchedBy, state, subscribe, welcome } from '../link';
+import { age, latchedBy, state, subscribe, wallAt, welcome } from '../link';
 import { Said, type Sentence, useSaid } from '../parts';
 import { numberOf } from '../registers/model';
 import { MotorPicker } from '../registers/picker';
@@ -309,7 +309,7 @@ function Explanation({ plan }: { plan: Plan }) {
 
 /** The measured value now, to choose the start by. */
 function Now({ motor, controlled, isBusy }: { motor: MotorName; controlled: Controlled; isBusy: boolean }) {
-  const last = useSignal<{ value: number; t: number } | null>(null);
+  const last = useSignal<{ value: number; wall: number } | null>(null);
   const tick = useSignal(0);
   useEffect(() => {
     last.value = null;
@@ -317,7 +317,7 @@ function Now({ motor, controlled, isBusy }: { motor: MotorName; controlled: Cont
       [{ ...motor, name: controlled.measured }], 0.2,
       ({ values, t, t0 }) => {
         const row = t.length - 1;
-        if (row >= 0) last.value = { value: values[0]![row]!, t: t0 + t[row]! };
+        if (row >= 0) last.value = { value: values[0]![row]!, wall: wallAt(motor.line, t0 + t[row]!) };
       },
       // A step reads faster than the line carries: confirmed rows then come seconds late.
       { rows: !isBusy },
@@ -329,7 +329,7 @@ function Now({ motor, controlled, isBusy }: { motor: MotorName; controlled: Cont
     };
   }, [motor.line, motor.motor, controlled.measured, isBusy]);
   void tick.value;
-  const old = last.value && tooOld(age(motor.line, last.value.t));
+  const old = last.value && tooOld(age(last.value.wall));
   return (
     <p class="now">
       {controlled.measured}{' '}

@@ -132,7 +132,6 @@ export function Values({ line, motor, description }: Props) {
     ['Temperature', overview.temperature],
     ['Voltage', overview.voltage],
   ];
-  const age = live.age(overview.speed);
   return (
     <div class="values">
       <p class="state">
@@ -166,10 +165,10 @@ export function Values({ line, motor, description }: Props) {
       </dl>
       <Spark live={live} />
       <p class="muted rates">
-        <span>{Number.isNaN(age) ? 'no value yet' : old(overview.speed) ? 'not live' : 'live'}</span>
+        <span>{!last(overview.speed) ? 'no value yet' : old(overview.speed) ? 'not live' : 'live'}</span>
         {speedRate && state.value === 'open' && (
           <span>
-            asked {rate(1 / speedRate.asked)}, achieved {rate(speedRate.achieved || NaN)}
+            asked {rate(1 / speedRate.asked)}, achieved {rate(old(overview.speed) ? NaN : speedRate.achieved || NaN)}
           </span>
         )}
         {live.lost > 0 && <span>{live.lost} lost: page too slow</span>}
