@@ -1,6 +1,6 @@
 // Simulated drives and a monitor for each test, as processes that the test can end, freeze and cut off.
 import { test as base, expect, type Locator, type Page } from '@playwright/test';
-import { type ChildProcess, spawn } from 'node:child_process';
+import { type ChildProcess, spawn, type SpawnOptions } from 'node:child_process';
 import { connect, type Socket } from 'node:net';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -17,8 +17,7 @@ export class Program {
   private wakes: (() => void)[] = [];
 
   constructor(args: string[], cwd: string) {
-    this.process = spawn(PROGRAM, args, { cwd, stdio: ['pipe', 'pipe', 'pipe'] });
-    endWithTests(this.process, (child) => child.kill('SIGKILL'));
+    this.process = spawnWithTests(PROGRAM, args, { cwd, stdio: ['pipe', 'pipe', 'pipe'] });
     this.process.stderr!.on('data', (bytes: Buffer) => (this.stderr += bytes.toString()));
     createInterface({ input: this.process.stdout! }).on('line', (line) => {
       this.lines.push(JSON.parse(line) as Record<string, unknown>);
@@ -63,12 +62,9 @@ export class Program {
   }
 }
 
-/** Ends a child also if the test is given up. */
-export function endWithTests(child: ChildProcess, end: (child: ChildProcess) => void) {
-  const endIt = () => end(child);
-  process.on('exit', endIt);
-  child.on('exit', () => process.off('exit', endIt));
-}
+/** Starts a process that the kernel ends when this one ends, also if it is killed. */
+export const spawnWithTests = (program: string, args: string[], options: SpawnOptions): ChildProcess =>
+  spawn('setpriv', ['--pdeathsig', 'KILL', '--', program, ...args], options);
 
 /** States of an ST drive on the way to RUN. */
 const STARTING = /ALIGN|START|CHARGE|CALIB|CLEAR|SWITCH/;

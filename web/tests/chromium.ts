@@ -1,11 +1,11 @@
 // A browser as people have it: its tabs are hidden when another one is in front, and its processes can be
 // killed and frozen.
 import { chromium, type Browser, type Page } from '@playwright/test';
-import { type ChildProcess, spawn } from 'node:child_process';
+import type { ChildProcess } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { endWithTests } from './bench';
+import { spawnWithTests } from './bench';
 
 export const PROGRAM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 /** Its background services would look for the network. Root has no sandbox. */
@@ -29,7 +29,7 @@ export class Chromium {
   static async open({ proxy }: { proxy?: { server: string; bypass: string } } = {}) {
     const folder = mkdtempSync(join(tmpdir(), 'chromium-'));
     const through = proxy ? [`--proxy-server=${proxy.server}`, `--proxy-bypass-list=${proxy.bypass}`] : [];
-    const started = spawn(
+    const started = spawnWithTests(
       PROGRAM,
       [
         ...ARGUMENTS, ...through, '--headless', '--window-size=1280,900', '--remote-debugging-port=0',
@@ -37,7 +37,6 @@ export class Chromium {
       ],
       { stdio: 'ignore', detached: true },
     );
-    endWithTests(started, end);
     const file = join(folder, 'DevToolsActivePort');
     while (!existsSync(file) || !readFileSync(file, 'utf8').includes('\n')) {
       if (started.exitCode !== null) throw new Error(`${PROGRAM} has ended`);
@@ -71,6 +70,7 @@ export class Chromium {
   async renderers() {
     const session = await this.browser.newBrowserCDPSession();
     const { processInfo } = await session.send('SystemInfo.getProcessInfo');
+    await session.detach();
     return processInfo.filter(({ type }) => type === 'renderer').map(({ id }) => id);
   }
 
