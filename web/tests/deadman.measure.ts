@@ -4,10 +4,9 @@ import { Bench, Program, spin, STILL } from './bench';
 import { Chromium } from './chromium';
 import { Network, Wire } from './network';
 import { type Cell, publish, quantile, row, table } from './report';
+import { Stalls } from './stalls';
 
 const RUNS = Number(process.env.RUNS ?? 50);
-/** Cases that are measured at the same time. Most of a run is waiting. */
-const LANES = Number(process.env.LANES ?? 2);
 /** What differs between the protocols, for motor 1. */
 const KINDS = {
   // EXECUTE_CMD STOP_MOTOR, without its checksum.
@@ -147,30 +146,28 @@ function quantiles(all: (number | null)[]) {
 async function measure(one: Case): Promise<Cell[]> {
   const results: NonNullable<Awaited<ReturnType<typeof run>>>[] = [];
   let early = 0;
+  const stalls = new Stalls();
   while (results.length < RUNS) {
     const result = await run(one);
     if (result) results.push(result);
     // A loaded machine gives a browser no time.
     else if ((early += 1) > RUNS + 5) throw new Error(`${one.name}: motors stop before the event`);
   }
+  const stalled = await stalls.end();
   const left = results.filter(({ still }) => still === null).length;
   return [
     one.name, results.length, ...quantiles(results.map(({ stop }) => stop)),
-    ...quantiles(results.map(({ still }) => still)), left, early,
+    ...quantiles(results.map(({ still }) => still)), left, early, stalled.length,
   ];
 }
 
 test('dead-man', async () => {
   test.setTimeout(4 * 3600 * 1000);
   const rows: Cell[][] = [];
-  let next = 0;
-  const lane = async () => {
-    for (let at = next++; at < CASES.length; at = next++) {
-      rows[at] = await measure(CASES[at]!);
-      console.log(row(rows[at]!));
-    }
-  };
-  await Promise.all(Array.from({ length: LANES }, lane));
-  const head = ['event', 'runs', 'STOP min', 'p50', 'p95', 'max', 'still min', 'p50', 'p95', 'max', 'left turning', 'repeated'];
+  for (const one of CASES) {
+    rows.push(await measure(one));
+    console.log(row(rows.at(-1)!));
+  }
+  const head = ['event', 'runs', 'STOP min', 'p50', 'p95', 'max', 'still min', 'p50', 'p95', 'max', 'left turning', 'repeated', 'stalls'];
   publish('dead-man', table(head, rows));
 });
