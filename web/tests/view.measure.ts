@@ -229,7 +229,7 @@ async function soak(draws: Chromium, holds: Chromium, fleet: Fleet): Promise<Cel
     [`- stalls of the computer above ${STALL} ms, longest`, `${stalled.length}, ${Math.max(0, ...stalled).toFixed(0)} ms`, ''],
     ['server: memory, growth in 24 h', memory(0), 'none'],
     ...(['page that draws', 'page that holds'] as const).flatMap((name, at) => [
-      [`${name}: memory of its process, growth in 24 h`, memory(at + 1), 'none'],
+      [`${name}: memory of its process, growth in 24 h`, memory(at + 1, MINUTES / 2), 'none'],
       ['- objects, after a collection of garbage', use(at, 'objects'), 'none'],
       ['- samples', use(at, 'arrays'), 'none'],
     ]),
