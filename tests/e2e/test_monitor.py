@@ -137,11 +137,12 @@ def test_hold_to_run_ends_with_the_key(site, watcher):
         page.held = False
         assert page.lapsed() == "the key or the finger of hold-to-run is up"
         rests(watcher)
-        # Without the key the next sign of life ends it, or says so before it is sent.
+        # Without the key the next sign of life ends it, before or after it is sent.
         page.forget()
         answer = page.act("rmd0", 2, "set_speed", hold=True, speed_dps=360)
         why = page.lapsed() if answer["kind"] == "answer" else answer["message"]
-        assert why == "the key or the finger of hold-to-run is up"
+        # The sign of life may also come while it waits: the stop is ahead of it then.
+        assert why in ("the key or the finger of hold-to-run is up", "a stop came first; nothing was sent")
         rests(watcher)
 
 
