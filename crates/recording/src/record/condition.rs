@@ -131,30 +131,23 @@ impl Condition {
         overview::faults(self.motor, self.value(self.overview.faults)?)
     }
 
-    /// Whether its values are old: it does not answer, or not to all that is asked.
-    fn is_stale(&self, now: Time) -> bool {
-        self.is_silent || self.at.is_none() || self.presence.open(now) > 0
-    }
-
     fn level_and_message(&self, now: Time) -> (Level, String) {
         let (state, faults) = (self.state(), self.faults());
         let is_unknown = self.reads_faults && self.value(self.overview.faults).is_none();
         let slow = self.rates.filter(|(asked, got)| *got < asked * ENOUGH);
         let too_slow = slow.map(|(asked, got)| format!("read {got:.1} times a second of {asked}"));
+        let silence = match () {
+            () if self.is_silent || self.at.is_none() => Some("does not answer".to_owned()),
+            () if self.presence.open(now) > 0 => Some("no new values".to_owned()),
+            () => None,
+        };
         let level = match () {
-            () if self.is_stale(now) => Level::Stale,
+            () if silence.is_some() => Level::Stale,
             () if overview::is_present(self.motor, self.value(self.overview.faults)) => {
                 Level::Error
             }
             () if faults.is_some() || too_slow.is_some() || is_unknown => Level::Warn,
             () => Level::Ok,
-        };
-        let silence = match level {
-            Level::Stale if self.is_silent || self.at.is_none() => {
-                Some("does not answer".to_owned())
-            }
-            Level::Stale => Some("no new values".to_owned()),
-            _ => None,
         };
         let unknown = is_unknown.then(|| "faults not known".to_owned());
         let parts = [silence, state, faults, unknown, too_slow].into_iter().flatten();

@@ -144,10 +144,11 @@ impl Hub {
             }
             Err(error) => {
                 let code = error.code().map(u8::from);
-                let is_there =
-                    |motor| self.lines.get(&line).is_none_or(|held| held.is_there(motor));
+                let is_unheard = motor
+                    .zip(self.lines.get(&line))
+                    .is_some_and(|(motor, held)| !held.is_there(motor));
                 let reason = match reason(&error) {
-                    Reason::Silent if !motor.is_none_or(is_there) => Reason::Unheard,
+                    Reason::Silent if is_unheard => Reason::Unheard,
                     reason => reason,
                 };
                 session.refuse_with(id, reason, error.to_string(), code);
