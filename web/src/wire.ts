@@ -294,7 +294,7 @@ motor: number,
  */
 columns: Array<Column>, };
 
-export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "scanned" | "later";
+export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "taken" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "scanned" | "later";
 
 export type Limit = { 
 /**
@@ -453,7 +453,7 @@ line: string,
  */
 motor: number, };
 
-export type Reason = "usage" | "version" | "latched" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unheard" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
+export type Reason = "usage" | "version" | "latched" | "held" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unheard" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
 
 export type Recorded = { 
 /**
@@ -915,7 +915,11 @@ motor: number, } | { "ask": "stop",
 /**
  * The motor; all motors that the lines can have, without it.
  */
-motor?: MotorName | null, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "scan", 
+motor?: MotorName | null, } | { "ask": "take", 
+/**
+ * The motor.
+ */
+motor: MotorName, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "scan", 
 /**
  * The port, as `open` takes it.
  */
@@ -1017,7 +1021,7 @@ bytes: Array<number>, } | { "to": "confirm" } | { "to": "stop",
 /**
  * The motors and how they took it.
  */
-motors: Array<StoppedMotor>, } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
+motors: Array<StoppedMotor>, } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
 /**
  * Those of all signals that are read.
  */

@@ -275,7 +275,9 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
         }
         PortError::NotDone { port, motor, kind, .. } => {
             let kind = match kind {
-                NotDone::Refused | NotDone::Latched | NotDone::Unsent => Kind::Refused,
+                NotDone::Refused | NotDone::Latched | NotDone::Held | NotDone::Unsent => {
+                    Kind::Refused
+                }
                 NotDone::Usage => Kind::InvalidValue,
                 NotDone::Silent | NotDone::Unheard => Kind::ReplyTimeout,
                 NotDone::Unconfirmed | NotDone::Line => Kind::Link,

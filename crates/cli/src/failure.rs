@@ -419,7 +419,7 @@ impl From<&PortError> for Failure {
             | PortError::HeldInProfile { .. }
             | PortError::NotDone { kind: NotDone::Usage, .. } => Kind::Usage,
             PortError::NotDone {
-                kind: NotDone::Refused | NotDone::Latched | NotDone::Unsent,
+                kind: NotDone::Refused | NotDone::Latched | NotDone::Held | NotDone::Unsent,
                 ..
             } => Kind::Refused,
             _ => Kind::Link,

@@ -11,9 +11,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::share::message::{MotorName, Reason};
+use motorlink_telemetry::share::program::Refusal;
 
 use crate::message::{Alive, Beat};
-use crate::program::Refusal;
 
 /// The dead-man of one page.
 #[derive(Debug)]

@@ -3,7 +3,6 @@
 //! - [`message`] has the texts between a page and the server, besides those of the share.
 //! - [`drive`] carries out what pages ask of drives.
 //! - [`foxglove`] is for other viewers of the same data.
-//! - [`program`] is a program at a share, without blocking.
 //! - [`alive`] is the dead-man of a page.
 //! - [`recordings`] makes recordings, lists them, and reads them for plots.
 //! - [`server`] serves the page, and connects pages to the share.
@@ -14,7 +13,6 @@ pub mod drive;
 pub mod foxglove;
 pub mod message;
 mod page;
-pub mod program;
 pub mod recordings;
 pub mod server;
 mod socket;

@@ -8,6 +8,7 @@ use motorlink::port::PortName;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{self as share, Event, Happening, MotorName, Reason};
+use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
@@ -15,7 +16,6 @@ use tokio::task::JoinSet;
 use crate::alive::{DeadMan, Lapse, Ticket};
 use crate::drive::Motion;
 use crate::message::{Answer, Ask, FromPage, Ran, Request, Role, Text};
-use crate::program::{Listener, OWN_IDS, Program, Refusal};
 use crate::recordings::Recordings;
 use crate::server::link::{Link, lost, stop_all};
 
@@ -194,7 +194,11 @@ impl Page {
                 self.check_operator()?;
                 self.check_port(port)?;
             }
-            Ask::Hello { .. } | Ask::Command { .. } | Ask::Confirm { .. } | Ask::Leave { .. } => {
+            Ask::Hello { .. }
+            | Ask::Command { .. }
+            | Ask::Confirm { .. }
+            | Ask::Take { .. }
+            | Ask::Leave { .. } => {
                 let message = "a page may not send this request".to_owned();
                 return Err(Refusal { reason: Reason::Forbidden, message, code: None });
             }

@@ -5,10 +5,10 @@ mod world;
 use std::time::Duration;
 
 use motorlink_monitor::message::{Answer, Ask, Mode};
-use motorlink_monitor::program::Refusal;
 use motorlink_proto::rmd::{Code, Payload, SetPositionLimited, SetSpeed, SetTorque};
 use motorlink_proto::st::{CurrentReference, Profile, Ramp, Request, TorqueRamp};
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
+use motorlink_telemetry::share::program::Refusal;
 use world::{Page, Sent, World, connect, rmd, st};
 
 fn run(motor: MotorName, mode: Mode, target: f64, rate: f64) -> Ask {

@@ -2,9 +2,9 @@
 
 mod world;
 
-use motorlink_monitor::program::{Listener, Program, Refusal};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Reason, Text, decode};
+use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::time::timeout;
 use world::{LIMIT, World, connect};
 

@@ -5,10 +5,10 @@ mod world;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_monitor::program::{Listener, Program};
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, Text, decode};
+use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::time::timeout;
 use world::{LIMIT, World};
 

@@ -14,13 +14,13 @@ use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
 use motorlink_monitor::message::{
     Answer, Ask, Condition, Phase, Recorded, RecordingContent, RecordingFile, RecordingPart,
 };
-use motorlink_monitor::program::{Program, Refusal};
 use motorlink_monitor::recordings::{Recordings, Wanted};
 use motorlink_proto::st::Profile;
 use motorlink_recording::read::Recording;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{Kind, Reader};
 use motorlink_telemetry::share::message::{Reason, decode};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::time::timeout;
 use world::{LIMIT, World, connect};
 

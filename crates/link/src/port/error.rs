@@ -299,6 +299,8 @@ pub enum NotDone {
     Refused,
     /// Motion is refused until a latch is released.
     Latched,
+    /// Another program may change the motor now.
+    Held,
     /// The request is not possible.
     Usage,
     /// The motor does not answer.
@@ -322,9 +324,11 @@ impl PortError {
 
     /// Whether nothing can be said about the drives, because the port failed.
     pub fn is_line_failure(&self) -> bool {
-        use NotDone::{Latched, Refused, Unsent, Usage};
-        let is_answered =
-            matches!(self, PortError::NotDone { kind: Refused | Latched | Usage | Unsent, .. });
+        use NotDone::{Held, Latched, Refused, Unsent, Usage};
+        let is_answered = matches!(
+            self,
+            PortError::NotDone { kind: Refused | Latched | Held | Usage | Unsent, .. }
+        );
         !self.is_interruption() && !is_answered
     }
 

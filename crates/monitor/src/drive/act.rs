@@ -6,13 +6,13 @@ use motorlink_proto::rmd::Code;
 use motorlink_proto::st::{Command as StCommand, Effect, Request as StRequest, Starting};
 use motorlink_telemetry::line::{Request, may_move};
 use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::program::{Program, Refusal};
 
 use super::commands::Command;
 use super::control::{Control, Motion, Permitted};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::Value;
-use crate::program::{Program, Refusal};
 
 /// A command of a page.
 pub(super) struct Act {

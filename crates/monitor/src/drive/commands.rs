@@ -11,13 +11,13 @@ use motorlink_proto::st::{
 use motorlink_proto::units::{Rounding, Scale};
 use motorlink_spec::st_messages::{self, Content, Value as StField};
 use motorlink_telemetry::line::{Request, may_move};
+use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::target::{Target, usage};
 use super::value;
 use crate::message::{self, Field, Value};
-use crate::program::Refusal;
 
 /// A command of a protocol.
 #[derive(Clone, Copy)]

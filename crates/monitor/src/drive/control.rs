@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::{MotorName, Reason};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 
@@ -12,7 +13,6 @@ use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
 use super::target::{Target, refusal};
 use crate::message::Ran;
-use crate::program::{Program, Refusal};
 
 /// How a page's motion is permitted.
 pub trait Motion: Send + Sync {

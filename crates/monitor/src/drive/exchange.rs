@@ -4,12 +4,12 @@ use motorlink_proto::rmd::{Command as _, MotorId, ReadMotionStatus};
 use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, RegisterId, Request};
 use motorlink_telemetry::line::Request as LineRequest;
 use motorlink_telemetry::share::message::{Answer, Ask, Reason};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::OwnedMutexGuard;
 
 use super::target::{Target, refusal, usage};
-use crate::program::{Program, Refusal};
 
 /// How long a request that moves nothing may wait until it is sent, in seconds.
 const TIME_TO_LIVE: f64 = 2.0;

@@ -5,11 +5,11 @@ use motorlink_proto::st::register::Unit;
 use motorlink_proto::st::{self, Account, Counters, Effect, LimitError, Ramp};
 use motorlink_proto::units::{CentiDegrees, IqCommand, Quantity, Rounding, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::signal::Motor;
 
 use super::target::usage;
 use crate::message::Mode;
-use crate::program::Refusal;
 
 /// The limits of a motor, and what they need to know of it.
 #[derive(Default)]

@@ -23,10 +23,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use motorlink_telemetry::share::message::{Line, MotorName, Protocol};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 
 use crate::message::{Answer, Ask, Limit, Mode};
-use crate::program::{Program, Refusal};
 use control::Control;
 use exchange::Exchanges;
 use target::{Target, usage};

@@ -8,6 +8,7 @@ use motorlink_proto::st::{
 };
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Quantity};
 
@@ -15,7 +16,6 @@ use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, usage};
 use super::value;
 use crate::message::{Register, Value};
-use crate::program::Refusal;
 
 /// The heading of values that RMD motors measure.
 const MEASURED: &str = "Measured values";

@@ -17,6 +17,7 @@ use motorlink_proto::st::{
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::{Answer as ShareAnswer, Ask, Reason};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::watch;
@@ -27,7 +28,6 @@ use super::control::{Control, Motion, Permitted, Running, send};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::{Target, refusal, usage};
 use crate::message::{Answer, Mode, Ran};
-use crate::program::{Program, Refusal};
 
 /// The time between two references.
 const PERIOD: Duration = Duration::from_millis(20);

@@ -2,12 +2,12 @@
 
 use motorlink_proto::rmd::{Command, MotorSet, ReadStatus};
 use motorlink_proto::st::{ErrorCode, RegisterId, Request};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use tokio::task::JoinSet;
 
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
 use super::target::Target;
-use crate::program::{Program, Refusal};
 
 /// The motors that reply.
 ///

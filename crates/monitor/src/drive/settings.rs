@@ -10,6 +10,7 @@ use motorlink::settings::{
 use motorlink_proto::st::ErrorCode;
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
@@ -17,7 +18,6 @@ use super::control::Control;
 use super::exchange::Exchanges;
 use super::target::{Target, refusal, usage};
 use crate::message::{self, Answer};
-use crate::program::{Program, Refusal};
 
 /// The settings of a motor of either protocol.
 pub(super) trait Tuned: Tuning<Id: 'static> + Copy + Send + Sync + 'static {

@@ -1,10 +1,9 @@
 //! A motor of a line, and refusals of this side.
 
 use motorlink_telemetry::share::message::{MotorName, Reason};
+use motorlink_telemetry::share::program::{Lane, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
-
-use crate::program::{Lane, Refusal};
 
 /// A motor of a line.
 #[derive(Debug, Clone)]

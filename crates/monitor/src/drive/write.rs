@@ -6,6 +6,7 @@ use motorlink_proto::st::{
 };
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::program::{Program, Refusal};
 
 use super::control::{Control, Motion, Permitted, send};
 use super::exchange::Exchanges;
@@ -14,7 +15,6 @@ use super::settings;
 use super::target::{Target, refusal, usage};
 use super::value;
 use crate::message::Value;
-use crate::program::{Program, Refusal};
 
 /// A write of a page.
 pub(super) struct Write {

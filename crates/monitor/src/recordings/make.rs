@@ -13,11 +13,11 @@ use motorlink_recording::schema::name;
 use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::message::{Line, Reason};
+use motorlink_telemetry::share::program::Refusal;
 use tokio::sync::{oneshot, watch};
 
 use super::folder::Name;
 use crate::message::{Gap, MeanRate, Phase, Recorded};
-use crate::program::Refusal;
 
 /// How often pages are told how far it is.
 const TOLD: Duration = Duration::from_millis(500);

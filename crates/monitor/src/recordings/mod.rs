@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::message::{self as share, Reason};
+use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio::task::spawn_blocking;
 
@@ -25,7 +26,6 @@ pub use folder::Name;
 pub use part::{MOST_SIGNALS, Wanted};
 
 use crate::message::{Answer, Ask, Recorded};
-use crate::program::{Program, Refusal};
 use folder::Folder;
 use make::{Making, Order, usage};
 

@@ -10,12 +10,12 @@ use motorlink_telemetry::share::frame::Kind;
 use motorlink_telemetry::share::message::{
     Answer, Ask, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
 };
+use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, watch};
 use tokio::time::{Instant, sleep, timeout};
 
 use crate::alive::Stops;
 use crate::drive::Drives;
-use crate::program::{Listener, Program, Refusal};
 
 /// The name of the server at the share.
 const NAME: &str = "monitor";

@@ -9,6 +9,7 @@ use futures_util::stream::{SplitStream, StreamExt};
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message as share;
+use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
@@ -18,7 +19,6 @@ use super::state::{Settings, State};
 use crate::alive::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page::{Broken, May, Page, encode};
-use crate::program::{Listener, Program};
 use crate::socket::{Budget, PATIENCE, Sink, close};
 
 /// The longest text of a page.

@@ -10,13 +10,13 @@ use motorlink::port::{Direction, EventBytes, EventCan, PortName, TapBytes, TapCa
 use motorlink::{rmd, st};
 use motorlink_monitor::drive::{Drives, Motion};
 use motorlink_monitor::message::{Answer, Ask, Ran};
-use motorlink_monitor::program::{Program, Refusal};
 use motorlink_proto::st::{Frame, Parse, Profile};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
 use motorlink_telemetry::share::opening::Opened;
+use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;

@@ -32,7 +32,8 @@ pub struct Ended {
 }
 
 /// Why a share did not carry a request out.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{message}")]
 pub struct Refusal {
     /// The reason, for programs.
     pub reason: Reason,

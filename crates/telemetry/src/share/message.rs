@@ -117,6 +117,11 @@ pub enum Ask {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motor: Option<MotorName>,
     },
+    /// Takes a motor from the program that may change it. It keeps turning.
+    Take {
+        /// The motor.
+        motor: MotorName,
+    },
     /// Refuses motion of all programs until it is released.
     Latch,
     /// Allows motion again.
@@ -283,6 +288,8 @@ pub enum Answer {
         /// The motors and how they took it.
         motors: Vec<StoppedMotor>,
     },
+    /// To take.
+    Take,
     /// To latch.
     Latch,
     /// To release.

@@ -3,10 +3,13 @@
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
-//! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port.
+//! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port, [`address`] the
+//! way to a share. With the feature `tokio` `program` is a program that does not block. [`request`] reads
+//! the bytes of a command.
 //! [`opening`] opens the ports of lines, [`scan`] asks what answers on others. [`words`] makes sentences
 //! of the events of an engine. [`wire`] keeps the frames of a line.
 
+pub mod address;
 pub mod data;
 pub mod dialogue;
 pub mod frame;
@@ -14,6 +17,9 @@ pub mod hub;
 pub mod message;
 pub mod opening;
 pub mod port;
+#[cfg(feature = "tokio")]
+pub mod program;
+pub mod request;
 pub mod scan;
 pub mod server;
 pub mod stream;

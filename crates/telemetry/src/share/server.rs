@@ -92,6 +92,11 @@ impl Server {
         Ok(Server { hub, socket, clients: Vec::new(), woken, due, clock, accepted })
     }
 
+    /// One program at a time changes a motor: [`Hub::lease`].
+    pub fn lease(&mut self, length: Duration) {
+        self.hub.lease(length);
+    }
+
     /// The lines.
     pub fn lines(&self) -> Vec<Line> {
         self.hub.lines()

@@ -47,6 +47,16 @@ impl Share {
     pub fn with(
         name: &str,
         timeout: Duration,
+        around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+    ) -> Self {
+        Self::leasing(name, timeout, None, around)
+    }
+
+    /// As [`with`](Self::with), with leases of this length.
+    pub fn leasing(
+        name: &str,
+        timeout: Duration,
+        lease: Option<Duration>,
         mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
     ) -> Self {
         let (bench, serving, st, rmd) = served(&format!("share-{name}"));
@@ -74,6 +84,9 @@ impl Share {
         let rmd = Held::start("rmd0", Opened { port, speaks: Speaks::Rmd, engine, tap }).unwrap();
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
+        if let Some(lease) = lease {
+            server.lease(lease);
+        }
         let ends = Arc::new(AtomicBool::new(false));
         let (holds, held) = channel::<Receiver<()>>();
         let told = Arc::clone(&ends);

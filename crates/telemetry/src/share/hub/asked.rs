@@ -8,7 +8,7 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::feed::Feed;
-use super::line::{self, Held, Motion};
+use super::line::{self, Held};
 use super::owed::AGAIN;
 use super::place::SessionId;
 use super::reasons::reason;
@@ -26,6 +26,7 @@ use crate::share::message::{
     LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason,
     SignalName, StoppedMotor,
 };
+use crate::share::request::{Kind as CommandKind, Motion};
 use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
 use crate::subscription::Full;
@@ -167,6 +168,7 @@ impl Hub {
                 self.stop_asked(session, name, id, motor.as_ref())?;
                 Ok(None)
             }
+            Ask::Take { motor } => self.take(session, name, &motor),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
                 for held in self.lines.values_mut() {
@@ -241,7 +243,10 @@ impl Hub {
         })
     }
 
-    fn motor(&self, MotorName { line, motor }: &MotorName) -> Result<(usize, Motor), Refused> {
+    pub(super) fn motor(
+        &self,
+        MotorName { line, motor }: &MotorName,
+    ) -> Result<(usize, Motor), Refused> {
         let line = self.line(line)?;
         Ok((line, self.lines[&line].motor(*motor).map_err(usage)?))
     }
@@ -314,6 +319,7 @@ impl Hub {
                 time_to_live.ok_or_else(|| refused(&CommandError::Expired))?
             }
         };
+        self.claim((session, name), line, motor, CommandKind::of(&request))?;
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {

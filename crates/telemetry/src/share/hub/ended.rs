@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::line::{Configures, Held, Motion};
+use super::line::Held;
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
@@ -14,6 +14,7 @@ use crate::event::CommandError;
 use crate::line::Reply;
 use crate::runner::CommandResult;
 use crate::share::message::{self, MotorName, Reason, SignalName, SignalRate};
+use crate::share::request::{Configures, Motion};
 use crate::signal::Motor;
 
 /// Why answers are not confirmed.

@@ -7,21 +7,23 @@ use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::port::{Place, PortName};
-use motorlink_proto::rmd::{Code, MotorId, Stop};
+use motorlink_proto::rmd::Stop;
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
+use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
+use super::leases::Lease;
 use super::owed::{Owed, UnansweredStop};
 use super::place::{SessionId, seconds, wall_now};
 use super::reasons::may_be_executed;
 use crate::acquisition::Tally;
 use crate::event::{CommandError, What};
-use crate::line::{LineError, Request, Stopped, may_move};
+use crate::line::{LineError, Request, Stopped};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
 use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
 use crate::share::opening::Opened;
+use crate::share::request::{self, Configures, Motion};
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
@@ -50,6 +52,8 @@ pub struct Held {
     pub(super) words: Words,
     /// Who turned a motor last. They may have left; then its stop is not confirmed.
     pub(super) owners: BTreeMap<Motor, SessionId>,
+    /// Who may change a motor, if one program at a time may.
+    pub(super) leases: BTreeMap<Motor, Lease>,
     /// Starts that the engine has not finished, and who sent them.
     pub(super) starting: Vec<(Motor, SessionId)>,
     /// Programs whose commands to a motor nothing has interrupted: no stop, and no motion of another program.
@@ -70,21 +74,6 @@ pub struct Held {
     pub(super) owed: BTreeMap<Motor, Owed>,
     /// A number that may have no motor, and that a stop is sent to now.
     pub(super) searched: Option<Motor>,
-}
-
-/// A data segment that a command configures, for the program that sends it.
-pub(super) struct Configures {
-    pub(super) segment: u8,
-    pub(super) registers: Vec<RegisterId>,
-}
-
-/// What a command does to the motion of its motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Motion {
-    /// Whoever sends it is responsible for the stop.
-    Starts,
-    Stops,
-    Keeps,
 }
 
 impl Held {
@@ -111,6 +100,7 @@ impl Held {
             events,
             words: Words::default(),
             owners: BTreeMap::new(),
+            leases: BTreeMap::new(),
             starting: Vec::new(),
             sequences: BTreeSet::new(),
             known: BTreeSet::new(),
@@ -308,17 +298,7 @@ impl Held {
 
     /// The motor of this number.
     pub(super) fn motor(&self, number: u8) -> Result<Motor, String> {
-        match self.speaks {
-            Speaks::St(_) => MotorNumber::new(number).map(Motor::St).ok_or_else(|| {
-                format!("{}: an ST motor of a share has a number from 1 to 7", self.name)
-            }),
-            Speaks::Rmd => self.rmd_motor(number).map(Motor::Rmd),
-        }
-    }
-
-    fn rmd_motor(&self, id: u8) -> Result<MotorId, String> {
-        let refused = || format!("{}: an ID is 1 to {}", self.name, MotorId::COUNT);
-        MotorId::new(id).ok_or_else(refused)
+        request::motor(self.speaks, number).map_err(|why| format!("{}: {why}", self.name))
     }
 
     /// The request of these bytes, and what it does besides. `segments` are the registers of the
@@ -329,51 +309,8 @@ impl Held {
         bytes: &[u8],
         segments: impl Fn(u8) -> Option<Vec<RegisterId>>,
     ) -> Result<(Request, Option<Configures>), String> {
-        let profile = match self.speaks {
-            Speaks::St(profile) => profile,
-            Speaks::Rmd => {
-                let id = self.rmd_motor(motor)?;
-                let bytes = <[u8; 8]>::try_from(bytes)
-                    .map_err(|_| format!("a request has 8 bytes, not {}", bytes.len()))?;
-                return Ok((Request::Rmd(id, bytes), None));
-            }
-        };
-        let Some((code, payload)) = bytes.split_first() else {
-            return Err("a request has at least its frame code".to_owned());
-        };
-        if Frame::header(*code, 0) != *code || payload.len() > MAX_PAYLOAD {
-            return Err("a frame code has 5 bits, and a payload at most 128 bytes".to_owned());
-        }
-        let request = proto::Request::decode(profile, *code, payload).ok();
-        // More bytes than the request has are sent as they are: the drive decides.
-        let mut frame = [0; MAX_FRAME];
-        let is_whole = |request: &proto::Request<'_>| {
-            let whole = Frame::command(motor, request, &mut frame);
-            whole.is_some_and(|whole| whole[2..whole.len() - 1] == *payload)
-        };
-        let request = request.filter(is_whole);
-        let is_about_drive = matches!(
-            request,
-            Some(proto::Request::GetBoardInfo | proto::Request::GetFirmwareVersion)
-        );
-        if motor != 0 || !is_about_drive {
-            self.motor(motor)?;
-        }
-        match request {
-            Some(proto::Request::ConfigureSegment { segment, registers }) => {
-                let registers: Vec<_> = registers.iter().copied().map(RegisterId).collect();
-                let request = Request::Segment(motor, segment, registers.clone());
-                Ok((request, Some(Configures { segment, registers })))
-            }
-            Some(proto::Request::GetSegment(segment)) => match segments(segment) {
-                Some(registers) => Ok((Request::Segment(motor, segment, registers), None)),
-                None => Err(format!(
-                    "data segment {segment} has the registers of another program: configure it first"
-                )),
-            },
-            Some(request) => Ok((Request::st(motor, request), None)),
-            None => Ok((Request::Raw(motor, *code, payload.to_vec()), None)),
-        }
+        request::of(self.speaks, motor, bytes, segments)
+            .map_err(|why| format!("{}: {why}", self.name))
     }
 
     /// Ends the engine, after the stops that motors have not confirmed; gives the motors of both.
@@ -399,28 +336,6 @@ impl Held {
             }
         }
         stopped
-    }
-}
-
-impl Motion {
-    pub(super) fn of(request: &Request) -> Self {
-        match request {
-            Request::St(_, request) => match Effect::of(&request.request()) {
-                Effect::Starts => Motion::Starts,
-                Effect::Stops => Motion::Stops,
-                _ => Motion::Keeps,
-            },
-            Request::Raw(motor, code, payload) => {
-                let frame = Frame { header: Frame::header(*code, *motor), payload };
-                match Effect::of_frame(&frame) {
-                    Effect::Starts => Motion::Starts,
-                    _ => Motion::Keeps,
-                }
-            }
-            Request::Rmd(_, [code, ..]) if Code::from(*code).ends_motion() => Motion::Stops,
-            _ if may_move(request) => Motion::Starts,
-            _ => Motion::Keeps,
-        }
     }
 }
 

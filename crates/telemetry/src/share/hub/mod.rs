@@ -7,6 +7,7 @@ mod coming;
 mod ended;
 mod feed;
 mod jobs;
+mod leases;
 mod line;
 mod owed;
 mod place;
@@ -18,7 +19,7 @@ mod work;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::frame::Frame;
 use super::message::{self, Event, Happening};
@@ -57,6 +58,8 @@ pub struct Hub {
     sessions: BTreeMap<SessionId, Session>,
     last_session: u64,
     latch: Option<Arc<str>>,
+    /// How long a motor stays with the program that changed it. `None`: others may change it at any time.
+    lease: Option<Duration>,
     log: VecDeque<Event>,
     owed: OwedPorts,
     done: Sender<News>,
@@ -89,6 +92,7 @@ impl Hub {
             sessions: BTreeMap::new(),
             last_session: 0,
             latch: None,
+            lease: None,
             log: VecDeque::new(),
             owed: OwedPorts::default(),
             done,
@@ -120,6 +124,7 @@ impl Hub {
         let Some(session) = self.sessions.remove(&id) else { return };
         for held in self.lines.values_mut() {
             held.sequences.retain(|(_, program)| *program != id);
+            held.give_leases_back(id);
         }
         for (_, feed) in session.feeds {
             feed.end(&self.lines);

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::jobs::JobId;
-use super::line::{Configures, Motion};
 use super::place::SessionId;
 use super::session::Part;
 use crate::acquisition::Rate;
 use crate::runner::CommandResult;
+use crate::share::request::{Configures, Motion};
 use crate::signal::Motor;
 
 /// Something that has ended in another thread.

@@ -48,6 +48,8 @@ pub enum Happening {
     Stopped,
     /// No drive confirmed a stop: the motor may still be turning.
     StopFailed,
+    /// A program took a motor from another one.
+    Taken,
     /// Motion is refused from now on.
     Latched,
     /// Motion is possible again.
@@ -93,6 +95,8 @@ pub enum Reason {
     Version,
     /// Motion is refused until the latch is released.
     Latched,
+    /// Another program may change the motor now. Nothing was sent.
+    Held,
     /// It could not be sent within its time to live. Nothing was sent.
     Expired,
     /// A stop came first. Nothing was sent.

@@ -1,9 +1,7 @@
 //! The connection of a port to its share.
 
 use std::cell::Cell;
-use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use motorlink::port::{ByteLink, FdLink, Holder, PortError};
@@ -35,16 +33,7 @@ pub(super) struct Connection {
 impl Connection {
     /// Connects to a share, and looks for the line there.
     pub(super) fn open(port: &Place) -> Result<Self, PortError> {
-        let path = port.path.display();
-        let stream = UnixStream::connect(&port.path).map_err(|error| match error.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
-                port.missing(format!("no share is at {path}"))
-            }
-            io::ErrorKind::PermissionDenied => {
-                port.failed("a share is only for the user who runs it")
-            }
-            _ => port.failed(format!("cannot connect to the share at {path}: {error}")),
-        })?;
+        let stream = port.at.connect().map_err(|error| port.unreachable(error))?;
         let mut opened = Connection {
             socket: FdLink::new(stream, port.name())?,
             port: port.clone(),
@@ -152,11 +141,7 @@ impl Connection {
     }
 
     fn gone(&self) -> PortError {
-        self.port.missing(match &self.closing {
-            Some(why) => format!("the share closed the connection: {why}"),
-            None => "the share is gone, and could not stop the motors that were started through it"
-                .to_owned(),
-        })
+        self.port.missing(self.port.at.ended(self.closing.as_deref()))
     }
 }
 

@@ -1,4 +1,4 @@
-//! The port `share:`: a line of a running share.
+//! The port `share:`: a line of a running share. Other schemes have lines of shares elsewhere.
 
 mod bus;
 mod connection;
@@ -6,12 +6,14 @@ mod place;
 mod serial;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use motorlink::port::{
     self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
     NameError, Port, PortError, PortName, Scheme,
 };
 
+use super::address::{Address, Local};
 use super::message::Protocol;
 use bus::ShareBus;
 use place::Place;
@@ -26,6 +28,14 @@ pub fn register() {
 pub fn place_of(name: &str) -> Option<(PathBuf, String)> {
     let (path, line) = name.strip_prefix(Share.name())?.strip_prefix(':')?.rsplit_once('/')?;
     Some((path.into(), line.to_owned()))
+}
+
+/// The port of a line of the share at an address. `None`: this is no name of a line.
+pub fn line_port(at: Arc<dyn Address>, line: &str) -> Option<PortName> {
+    let protocol = [Protocol::St, Protocol::Rmd]
+        .into_iter()
+        .find(|protocol| line.starts_with(protocol.word()))?;
+    Some(PortName::new(SharePort(Place { at, line: line.to_owned(), protocol })))
 }
 
 /// `share:PATH/LINE`.
@@ -53,17 +63,11 @@ impl Scheme for Share {
         const EXAMPLE: &str = "share:./share/st0";
         let (path, line) = rest.rsplit_once('/').unwrap_or((rest, ""));
         given.present(path, "the path of the share's socket", EXAMPLE)?;
-        let protocol = [Protocol::St, Protocol::Rmd]
-            .into_iter()
-            .find(|protocol| line.starts_with(protocol.word()));
-        let lacks_line = || NameError::Incomplete {
+        line_port(Arc::new(Local(path.into())), line).ok_or_else(|| NameError::Incomplete {
             name: given.name.to_owned(),
             what: "the line behind the path: st0, st1, .. or rmd0, rmd1, ..",
             example: EXAMPLE,
-        };
-        let protocol = protocol.ok_or_else(lacks_line)?;
-        let line = line.to_owned();
-        Ok(PortName::new(SharePort(Place { path: path.into(), line, protocol })))
+        })
     }
 }
 

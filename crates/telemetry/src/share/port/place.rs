@@ -1,16 +1,17 @@
 //! The name of a line of a share, and errors about it.
 
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use motorlink::port::{NotDone, PortError};
 
+use crate::share::address::{Address, Unreachable};
 use crate::share::dialogue::Refusal;
 use crate::share::message::{Protocol, Reason};
 
-/// A line of the share at a path.
+/// A line of a share.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
-    pub(super) path: PathBuf,
+    pub(super) at: Arc<dyn Address>,
     pub(super) line: String,
     pub(super) protocol: Protocol,
 }
@@ -18,7 +19,15 @@ pub(super) struct Place {
 impl Place {
     /// The name of the port.
     pub(super) fn name(&self) -> String {
-        format!("share:{}/{}", self.path.display(), self.line)
+        self.at.port(&self.line)
+    }
+
+    /// Why there is no connection.
+    pub(super) fn unreachable(&self, error: Unreachable) -> PortError {
+        match error {
+            Unreachable::Missing(why) => self.missing(why),
+            Unreachable::Failed(why) => self.failed(why),
+        }
     }
 
     /// The share is not there.
@@ -40,6 +49,7 @@ impl Place {
         let kind = match reason {
             Reason::Usage | Reason::Version => NotDone::Usage,
             Reason::Latched => NotDone::Latched,
+            Reason::Held => NotDone::Held,
             Reason::Overtaken | Reason::Refused => NotDone::Refused,
             Reason::Expired | Reason::Busy => NotDone::Unsent,
             Reason::Silent => NotDone::Silent,

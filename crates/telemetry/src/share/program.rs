@@ -6,9 +6,6 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::frame::{self, Frame, Kind, Reader};
-use motorlink_telemetry::share::message::{self, Answer, Ask, Reason, Request, Text};
 use rustix::net::{Shutdown, shutdown};
 use serde::Deserialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -16,20 +13,14 @@ use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, oneshot};
 
+use super::VERSION;
+use super::frame::{self, Frame, Kind, Reader};
+use super::message::{self, Answer, Ask, Reason, Request, Text};
+
+pub use super::dialogue::Refusal;
+
 /// Ids of requests of this side begin here. Those below belong to whoever passes requests on.
 pub const OWN_IDS: u32 = 1 << 31;
-
-/// A share did not carry a request out.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{message}")]
-pub struct Refusal {
-    /// The reason, for programs.
-    pub reason: Reason,
-    /// The reason as a sentence.
-    pub message: String,
-    /// The error code of a drive.
-    pub code: Option<u8>,
-}
 
 /// Asks a share. Copies ask through the same connection. The motors that it turned stop when the
 /// [`Listener`] is dropped.
@@ -49,7 +40,7 @@ struct Shared {
 }
 
 /// A line, and the motor if replies say which motor they are from.
-pub(crate) type Lane = (String, Option<u8>);
+pub type Lane = (String, Option<u8>);
 
 #[derive(Default)]
 struct Pending {
@@ -110,7 +101,7 @@ impl Program {
     ///
     /// # Errors
     /// The share is gone, or refuses.
-    pub(crate) async fn again(&self, what: &str) -> Result<(Self, Listener), Refusal> {
+    pub async fn again(&self, what: &str) -> Result<(Self, Listener), Refusal> {
         let Shared { path, name, .. } = &*self.shared;
         match Self::connect(path, &format!("{name} ({what})")).await {
             Ok((program, listener, _)) => Ok((program, listener)),
@@ -162,7 +153,7 @@ impl Program {
 
     /// Waits until no other exchanges of this lane wait for their confirmation. A confirmation is for all
     /// answers of a program: those of two sequences must not mix.
-    pub(crate) async fn lane(&self, lane: Lane) -> OwnedMutexGuard<()> {
+    pub async fn lane(&self, lane: Lane) -> OwnedMutexGuard<()> {
         let lock = {
             let mut lanes = self.shared.lanes.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(lanes.entry(lane).or_default())

@@ -1,0 +1,102 @@
+//! One program at a time changes a motor of a share that has leases.
+
+mod asking;
+mod drives;
+mod shared;
+
+use std::time::{Duration, Instant};
+
+use asking::{Asker, command};
+use motorlink_telemetry::share::message::*;
+use shared::{PATIENT, Share};
+
+const RAMP: [u8; 7] = [7, 220, 5, 0, 0, 100, 0];
+const START: [u8; 2] = [3, 1];
+const STOP: [u8; 2] = [3, 2];
+const SPEED: [u8; 2] = [2, 30];
+/// SET_REG SPEED_KP 300.
+const GAIN: [u8; 4] = [1, 5, 44, 1];
+
+fn share(name: &str, lease: Duration) -> Share {
+    Share::leasing(&format!("leases-{name}"), PATIENT, Some(lease), |link| link)
+}
+
+fn motor() -> MotorName {
+    MotorName { line: "st0".to_owned(), motor: 1 }
+}
+
+fn held(program: &mut Asker, bytes: &[u8]) -> String {
+    let refusal = program.ask(command("st0", 1, bytes)).unwrap_err();
+    assert_eq!(refusal.reason, Reason::Held, "{}", refusal.message);
+    refusal.message
+}
+
+fn turn(program: &mut Asker) {
+    program.ask(command("st0", 1, &RAMP)).unwrap();
+    program.ask(command("st0", 1, &START)).unwrap();
+}
+
+#[test]
+fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
+    let share = share("one", Duration::from_millis(10));
+    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
+    turn(&mut alice);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    // The lease is over; the motor turns.
+    for bytes in [&RAMP[..], &START, &GAIN] {
+        assert_eq!(
+            held(&mut bob, bytes),
+            "st0: motor 1 turns for alice, who holds it; stop it or take it"
+        );
+    }
+    bob.ask(command("st0", 1, &SPEED)).unwrap();
+    alice.ask(command("st0", 1, &RAMP)).unwrap();
+    bob.ask(command("st0", 1, &STOP)).unwrap();
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+    let end = Instant::now() + PATIENT;
+    while bob.ask(command("st0", 1, &RAMP)).is_err() {
+        assert!(Instant::now() < end, "the lease does not end");
+    }
+}
+
+#[test]
+fn a_lease_ends_by_itself_and_when_its_program_leaves() {
+    let share = share("ends", Duration::from_secs(3600));
+    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
+    // A read needs none, and gives none.
+    alice.ask(command("st0", 1, &SPEED)).unwrap();
+    bob.ask(command("st0", 1, &GAIN)).unwrap();
+    let why = held(&mut alice, &GAIN);
+    assert!(why.starts_with("st0: bob holds motor 1 for another 3"), "{why}");
+    // Another motor is free.
+    alice.ask(command("st0", 2, &RAMP)).unwrap();
+    drop(bob);
+    let end = Instant::now() + PATIENT;
+    while alice.ask(command("st0", 1, &GAIN)).is_err() {
+        assert!(Instant::now() < end, "the lease does not end");
+    }
+}
+
+#[test]
+fn a_motor_is_taken_explicitly_and_the_log_says_so() {
+    let share = share("take", Duration::from_secs(3600));
+    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
+    turn(&mut alice);
+    bob.ask(Ask::Take { motor: motor() }).unwrap();
+    let taken = alice.event(Happening::Taken);
+    assert_eq!(taken.message, "st0, motor 1: bob takes it from alice");
+    assert_eq!((taken.by.as_deref(), taken.motor), (Some("bob"), Some(1)));
+    held(&mut alice, &RAMP);
+    bob.ask(command("st0", 1, &RAMP)).unwrap();
+    // Until bob starts it, it still turns for alice.
+    drop(alice);
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+}
+
+#[test]
+fn a_share_without_leases_refuses_to_take() {
+    let share = Share::new("leases-none");
+    let mut program = Asker::join(&share.path, "alice");
+    let refusal = program.ask(Ask::Take { motor: motor() }).unwrap_err();
+    assert_eq!(refusal.reason, Reason::Usage);
+}
