@@ -62,6 +62,9 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         motorlink_testbench::register();
         motorlink_telemetry::share::port::register();
+        motorlink_fleet::port::register();
+        let finish = wrap_pyfunction!(leave_nodes, module)?;
+        module.py().import("atexit")?.call_method1("register", (finish,))?;
         module.add("ST_SEGMENTS", motorlink_proto::st::SEGMENTS)?;
         module.add("ST_TIMEOUT", seconds(motorlink_proto::st::TIMEOUT))?;
         module.add("ST_BAUD_RATES", PyTuple::new(module.py(), motorlink::st::BAUD_RATES)?)?;
@@ -79,6 +82,12 @@ mod _core {
         let most = motorlink::settings::SettingsFile::MAX_SIZE;
         module.add("SETTINGS_MAX_SIZE", most)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// Waits until the nodes know that the clients of this process have left.
+    #[pyfunction]
+    fn leave_nodes(py: Python<'_>) {
+        py.detach(motorlink_fleet::remote::finish);
     }
 
     fn seconds(span: Micros) -> f64 {

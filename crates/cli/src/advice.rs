@@ -28,11 +28,17 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NotFound { .. } | PortError::NoSuchInterface { .. } => {
             Some("`motorlink ports` lists what is there")
         }
+        PortError::NoHolder { port, .. } if port.starts_with("zenoh:") => {
+            Some("start it with `motorlink node`; `?via=` or MOTORLINK_NETWORK says where it is")
+        }
         PortError::NoHolder { .. } => {
             Some("start it with `motorlink share`, and stop motors that still turn")
         }
         PortError::NotDone { kind: NotDone::Latched, .. } => {
             Some("`motorlink share release --at unix:PATH` releases the latch of this share")
+        }
+        PortError::NotDone { kind: NotDone::Held, .. } => {
+            Some("wait until it is free, or take it: add `?take` to the port")
         }
         PortError::Closed { port } if port.contains(UNIX) => Some(SHARE_SOCKET),
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),

@@ -11,6 +11,8 @@ mod csv;
 mod decode;
 mod demo;
 mod failure;
+#[cfg(any(feature = "monitor", feature = "fleet"))]
+mod folder;
 mod guard;
 mod help;
 mod hint;
@@ -18,6 +20,8 @@ mod interrupt;
 mod json;
 #[cfg(feature = "monitor")]
 mod monitor;
+#[cfg(feature = "fleet")]
+mod node;
 mod output;
 mod outputs;
 mod palette;
@@ -66,6 +70,9 @@ enum Command {
     Guard(guard::Args),
     /// Hold ports, and let several programs use the drives at the same time
     Share(share::Args),
+    /// As share, and programs of other computers use the drives, too
+    #[cfg(feature = "fleet")]
+    Node(node::Args),
     /// Show drives in a browser: values, plots, registers, control, stop
     #[cfg(feature = "monitor")]
     Monitor(monitor::Args),
@@ -121,6 +128,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
     interrupt::install();
     motorlink_testbench::register();
     motorlink_telemetry::share::port::register();
+    #[cfg(feature = "fleet")]
+    motorlink_fleet::port::register();
     let words = own_words(words);
     let is_shown = |word: &OsString| word.to_string_lossy().chars().all(is_printable);
     let has_control_characters = !words.iter().all(is_shown);
@@ -146,6 +155,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Sim(args) => sim::run(args),
         Command::Guard(args) => guard::run(args, program),
         Command::Share(args) => share::run(&args),
+        #[cfg(feature = "fleet")]
+        Command::Node(args) => node::run(&args),
         #[cfg(feature = "monitor")]
         Command::Monitor(args) => monitor::run(args),
         Command::Ports(args) => ports::run(args),
@@ -176,6 +187,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Ok(()) => 0,
         Err(failure) => output::report(&failure),
     };
+    #[cfg(feature = "fleet")]
+    motorlink_fleet::remote::finish();
     output::finish();
     code
 }

@@ -1,6 +1,5 @@
 //! `motorlink monitor`: a share with a page for browsers.
 
-mod folder;
 mod listen;
 
 use std::io;
@@ -11,17 +10,18 @@ use std::time::Duration;
 use motorlink_monitor::message::Role;
 use motorlink_monitor::server::{self, Options, Settings, Tls};
 use motorlink_telemetry::share::message::{Answer, Ask, Line};
+use motorlink_telemetry::share::opening::Limits;
 use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::server::Server;
 use serde_json::json;
 
 use crate::failure::Failure;
+use crate::folder::Folder;
 use crate::interrupt;
 use crate::output;
 use crate::share::{self, Connection, Lines, PROGRAM};
 use crate::span::span_up_to;
 
-use folder::Folder;
 use listen::Listen;
 
 /// Signs of life come each 100 ms.
@@ -163,7 +163,7 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
             folder.socket()
         }
     };
-    let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
+    let server = Server::open(&path, PROGRAM, args.lines.open(Limits::default())?)?;
     let monitor = start(args, path.clone(), false, web)?;
     let ready = ready(args, &monitor, &path, &server.lines(), is_simulated);
     // The motors stop first, then the pages are closed.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{Line, Protocol};
-use motorlink_telemetry::share::opening::{OpenError, Wish};
+use motorlink_telemetry::share::opening::{Limits, OpenError, Wish};
 
 use crate::connection::missing_port;
 use crate::failure::Failure;
@@ -45,14 +45,15 @@ impl Lines {
         }
     }
 
-    /// Opens each port, once for each protocol that it can have.
-    pub fn open(&self) -> Result<Vec<Held>, Failure> {
+    /// Opens each port, once for each protocol that it can have. `limits` hold for all programs.
+    pub fn open(&self, limits: Limits) -> Result<Vec<Held>, Failure> {
         let (mut held, mut st, mut rmd) = (Vec::new(), 0_usize, 0_usize);
         if self.is_empty() {
             return Err(missing_port());
         }
         for text in &self.ports {
-            let wish = Wish { port: text.parse()?, profile: self.profile, timeout: self.timeout };
+            let (profile, timeout) = (self.profile, self.timeout);
+            let wish = Wish { port: text.parse()?, profile, timeout, limits };
             for protocol in wish.protocols() {
                 let number = match protocol {
                     Protocol::St => &mut st,

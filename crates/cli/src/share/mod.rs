@@ -11,6 +11,7 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink_telemetry::line::Stopped;
 use motorlink_telemetry::share::message::{self, ANY_MOTOR, Answer, Ask, Event, StoppedMotor};
+use motorlink_telemetry::share::opening::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
@@ -75,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
-    let server = Server::open(&path, PROGRAM, args.lines.open()?)?;
+    let server = Server::open(&path, PROGRAM, args.lines.open(Limits::default())?)?;
     let ready = ready(&server, args);
     serve(server, args.json, ready)
 }

@@ -18,6 +18,11 @@ pub trait Address: Debug + Send + Sync {
 
     /// What is said when the connection has ended. `why` is what the share said before.
     fn ended(&self, why: Option<&str>) -> String;
+
+    /// Whether the program takes the motors that it changes from other programs.
+    fn takes(&self) -> bool {
+        false
+    }
 }
 
 /// Why a program is not connected to a share.

@@ -21,6 +21,17 @@ pub struct Wish {
     pub profile: Profile,
     /// How long to wait for a reply; that of the protocol without it.
     pub timeout: Option<Duration>,
+    /// What no request may exceed, of whatever program.
+    pub limits: Limits,
+}
+
+/// What the requests of all programs of a share may not exceed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Limits {
+    /// Those of ST drives.
+    pub st: st::Limits,
+    /// Those of RMD motors.
+    pub rmd: rmd::Limits,
 }
 
 /// A port that is open, and its engine.
@@ -64,7 +75,8 @@ impl Wish {
             Protocol::St => {
                 let defaults = st::Options::default();
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
-                let options = st::Options { profile: self.profile, timeout, ..defaults };
+                let (profile, limits) = (self.profile, self.limits.st);
+                let options = st::Options { profile, timeout, limits, ..defaults };
                 let wrap = move |link| around.around_line(link);
                 let client = st::EventClient::open_wrapped(&self.port, wrap, options)?;
                 (Speaks::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
@@ -72,7 +84,8 @@ impl Wish {
             Protocol::Rmd => {
                 let defaults = rmd::Options::default();
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
-                let options = rmd::Options { timeout, ..defaults };
+                let limits = self.limits.rmd;
+                let options = rmd::Options { timeout, limits, ..defaults };
                 let wrap = move |link| around.around_bus(link);
                 let client = rmd::EventClient::open_wrapped(&self.port, wrap, options)?;
                 (Speaks::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))

@@ -30,8 +30,10 @@ pub enum Kind {
     Reads,
     /// It stops a motor.
     Stops,
-    /// It changes something in the drive, or may move a motor.
+    /// It changes something in the drive.
     Changes,
+    /// It may make a motor turn until a stop.
+    Moves,
 }
 
 impl Kind {
@@ -40,7 +42,8 @@ impl Kind {
         match Motion::of(request) {
             Motion::Stops => Kind::Stops,
             Motion::Keeps if request.is_read() => Kind::Reads,
-            Motion::Keeps | Motion::Starts => Kind::Changes,
+            Motion::Keeps => Kind::Changes,
+            Motion::Starts => Kind::Moves,
         }
     }
 

@@ -16,6 +16,7 @@ use rustix::io::Errno;
 use super::frame::{self, LONGEST_REQUEST, Reader};
 use super::hub::{Held, Hub, LineEnded, SessionId};
 use super::message::{Event, Line};
+use super::opening::Limits;
 use crate::line::Stopped;
 
 /// How often samples and events are sent.
@@ -95,6 +96,11 @@ impl Server {
     /// One program at a time changes a motor: [`Hub::lease`].
     pub fn lease(&mut self, length: Duration) {
         self.hub.lease(length);
+    }
+
+    /// Lines that programs open have these limits: [`Hub::limit`].
+    pub fn limit(&mut self, limits: Limits) {
+        self.hub.limit(limits);
     }
 
     /// The lines.

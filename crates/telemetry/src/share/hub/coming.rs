@@ -62,7 +62,8 @@ impl Hub {
             return Err(usage(format!("`timeout` is {SHORTEST_TIMEOUT} to {LONGEST_TIMEOUT} s")));
         }
         let port = self.free_port(port)?;
-        let wish = Wish { port, profile, timeout: timeout.map(Duration::from_secs_f64) };
+        let (timeout, limits) = (timeout.map(Duration::from_secs_f64), self.limits);
+        let wish = Wish { port, profile, timeout, limits };
         if !wish.protocols().contains(&protocol) {
             let port = &wish.port;
             return Err(usage(match protocol {

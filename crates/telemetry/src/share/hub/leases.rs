@@ -33,7 +33,8 @@ impl Hub {
         motor: Option<Motor>,
         kind: Kind,
     ) -> Result<(), Refused> {
-        let (Some(length), Some(motor), Kind::Changes) = (self.lease, motor, kind) else {
+        let (Some(length), Some(motor), Kind::Changes | Kind::Moves) = (self.lease, motor, kind)
+        else {
             return Ok(());
         };
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };

@@ -23,6 +23,7 @@ use std::time::{Duration, Instant};
 
 use super::frame::Frame;
 use super::message::{self, Event, Happening};
+use super::opening::Limits;
 use super::words;
 use crate::event::CommandError;
 use crate::line::Stopped;
@@ -60,6 +61,8 @@ pub struct Hub {
     latch: Option<Arc<str>>,
     /// How long a motor stays with the program that changed it. `None`: others may change it at any time.
     lease: Option<Duration>,
+    /// What no request may exceed on a line that a program opens.
+    limits: Limits,
     log: VecDeque<Event>,
     owed: OwedPorts,
     done: Sender<News>,
@@ -93,6 +96,7 @@ impl Hub {
             last_session: 0,
             latch: None,
             lease: None,
+            limits: Limits::default(),
             log: VecDeque::new(),
             owed: OwedPorts::default(),
             done,
@@ -104,6 +108,11 @@ impl Hub {
     /// The lines.
     pub fn lines(&self) -> Vec<message::Line> {
         self.lines.values().map(Held::info).collect()
+    }
+
+    /// Lines that programs open have these limits. Those of the start were opened with theirs.
+    pub fn limit(&mut self, limits: Limits) {
+        self.limits = limits;
     }
 
     /// A program has connected.

@@ -1,6 +1,7 @@
 //! The connection of a port to its share.
 
 use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,9 @@ use motorlink::st::Profile;
 use super::place::Place;
 use crate::share::VERSION;
 use crate::share::dialogue::{Dialogue, DialogueError, Ended, Heard};
-use crate::share::message::{Answer, Ask, LONGEST_NAME, Line, Text};
+use crate::share::message::{Answer, Ask, LONGEST_NAME, Line, MotorName, Protocol, Text};
+use crate::share::request::Kind;
+use crate::share::words::Speaks;
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
@@ -26,6 +29,8 @@ pub(super) struct Connection {
     holder: Holder,
     /// The time to live of the next request, if it is shorter.
     expires: Cell<Duration>,
+    /// The motors that were taken from other programs.
+    taken: BTreeSet<u8>,
     /// Why the share closes the connection.
     closing: Option<String>,
 }
@@ -40,6 +45,7 @@ impl Connection {
             dialogue: Dialogue::default(),
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
+            taken: BTreeSet::new(),
             closing: None,
         };
         opened.opening(Ask::Hello { protocol: VERSION, name: own_name() })?;
@@ -96,7 +102,18 @@ impl Connection {
     pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
         let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
         let line = self.port.line.clone();
+        if self.port.at.takes() && self.changes(motor, &bytes) && self.taken.insert(motor) {
+            self.ask(Ask::Take { motor: MotorName { line: line.clone(), motor } })?;
+        }
         self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false })
+    }
+
+    fn changes(&self, motor: u8, bytes: &[u8]) -> bool {
+        let speaks = match self.port.protocol {
+            Protocol::St => Speaks::St(self.holder.profile.unwrap_or_default()),
+            Protocol::Rmd => Speaks::Rmd,
+        };
+        matches!(Kind::of_bytes(speaks, motor, bytes), Kind::Changes | Kind::Moves)
     }
 
     /// Sends a request; gives its id.

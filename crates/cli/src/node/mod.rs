@@ -1,0 +1,183 @@
+//! `motorlink node`: a share whose drives are used from other computers, too.
+
+mod config;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use motorlink_fleet::clock::Boot;
+use motorlink_fleet::key::Name;
+use motorlink_fleet::network::{Network, NetworkError};
+use motorlink_fleet::node::{Node, NodeError, Options};
+use motorlink_telemetry::share::message::Line;
+use motorlink_telemetry::share::server::Server;
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::folder::Folder;
+use crate::interrupt::{self, interrupted};
+use crate::output;
+use crate::share::{self, Lines, PROGRAM};
+use crate::span::span_up_to;
+use config::Config;
+
+/// How long a motor stays with the program that changed it.
+const LEASE: Duration = Duration::from_secs(5);
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+A node is a share (`motorlink share --help`) that programs of other computers use through a Zenoh \
+network. Its lines are ports for them: -p zenoh:NAME/st0, -p zenoh:NAME/rmd0. -p and --profile are as \
+for `motorlink share`.
+
+Network: without --listen, --connect and --network the first node of a computer listens at \
+tcp/127.0.0.1:7447, for programs of this computer only, and further nodes connect to it. \
+--listen tcp/0.0.0.0:7447 lets other computers connect. There is no access control then: whoever \
+reaches the address moves motors. A Zenoh configuration with TLS and access control is given with \
+--network.
+
+Safety: a command that comes later than its time to live is not sent. A motor that a program of another \
+computer turned stops when the program ends, when its network is cut, or when it gives no sign of life \
+for the deadline that it has chosen, 1 s without another one. One program at a time changes a motor; \
+all may stop it. Limits of --config hold for all programs. A node cannot stop a motor if the node is \
+killed with SIGKILL or frozen, if the cable to the drive is cut, or if the computer stops. If people can \
+be hurt, use an emergency stop in hardware.
+
+Output: a line when programs can connect, then one line per event. SIGINT, SIGTERM and the other signals \
+that end a program stop the motors first. Exit code 0, or 3 if a motor did not confirm that it stops.")]
+pub struct Args {
+    #[command(flatten)]
+    lines: Lines,
+    /// The name of the node: letters, digits, `-`, `_`, `.` [default: that of this computer]
+    #[arg(long, value_name = "NAME")]
+    name: Option<Name>,
+    /// Where programs of this computer connect: unix:PATH. Only you can connect [default: a new folder]
+    #[arg(long, value_name = "PORT", value_hint = clap::ValueHint::AnyPath)]
+    at: Option<String>,
+    /// An address at which the node listens, such as tcp/0.0.0.0:7447; may be repeated
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Vec<String>,
+    /// An address of a router or of another node; may be repeated
+    #[arg(long, value_name = "ADDRESS")]
+    connect: Vec<String>,
+    /// A Zenoh configuration: mode, addresses, TLS, access control
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["listen", "connect"],
+        value_hint = clap::ValueHint::FilePath)]
+    network: Option<PathBuf>,
+    /// A file with limits of motors, in TOML
+    #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
+    config: Option<PathBuf>,
+    /// How often the main values of each motor are published, 10ms to 60s, or 0s for never
+    #[arg(long, value_name = "TIME", default_value = "100ms",
+        value_parser = span_up_to(Duration::from_secs(60)))]
+    period: Duration,
+    /// Print JSON, one object per line
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
+    let name = args.name.clone().unwrap_or_else(motorlink_fleet::remote::computer);
+    let folder;
+    let path = match &args.at {
+        Some(at) => share::path(at)?,
+        None => {
+            folder = Folder::new()?;
+            folder.socket()
+        }
+    };
+    output::never_wait(if args.json { output::missed } else { output::missed_text });
+    interrupt::hold();
+    let limits = config.limits()?;
+    let mut server = Server::open(&path, PROGRAM, args.lines.open(limits)?)?;
+    server.lease(config.lease()?.unwrap_or(LEASE));
+    server.limit(limits);
+    let options = Options {
+        name: name.clone(),
+        share: path.clone(),
+        program: PROGRAM.to_owned(),
+        network: args.network(),
+        clock: Arc::new(Boot),
+        period: Some(args.period).filter(|period| !period.is_zero()),
+    };
+    let (node, outcome) = match start(&mut server, options) {
+        Ok(Some(node)) => {
+            let ready = ready(args, &node, &name, &path, &server.lines());
+            (Some(node), ready)
+        }
+        Ok(None) => (None, Ok(())),
+        Err(failure) => (None, Err(failure)),
+    };
+    // The motors stop first, then the network is left.
+    let outcome = share::serve(server, args.json, outcome);
+    drop(node);
+    outcome
+}
+
+impl Args {
+    fn network(&self) -> Network {
+        match &self.network {
+            Some(file) => Network::File(file.clone()),
+            None if !self.listen.is_empty() => {
+                Network::Route { listen: self.listen.clone(), connect: self.connect.clone() }
+            }
+            None if !self.connect.is_empty() => Network::Connect(self.connect.clone()),
+            None => Network::usual(),
+        }
+    }
+}
+
+/// Starts the node beside its share. `None`: a signal came.
+fn start(server: &mut Server, options: Options) -> Result<Option<Node>, Failure> {
+    let starting = thread::spawn(move || Node::start(options));
+    while !starting.is_finished() {
+        if interrupted() {
+            return Ok(None);
+        }
+        // That the node itself has joined is no news.
+        server.turn()?;
+    }
+    match starting.join() {
+        Ok(started) => Ok(Some(started?)),
+        Err(_) => Err(Failure::link("the node could not be started")),
+    }
+}
+
+/// Says where programs connect.
+fn ready(
+    args: &Args,
+    node: &Node,
+    name: &Name,
+    path: &std::path::Path,
+    lines: &[Line],
+) -> Result<(), Failure> {
+    let at = format!("unix:{}", path.display());
+    let ports: Vec<_> = lines.iter().map(|line| format!("zenoh:{name}/{}", line.line)).collect();
+    if args.json {
+        return output::print_line(&json!({
+            "event": "ready", "node": name.as_str(), "addresses": node.addresses(), "at": at,
+            "lines": share::lines_in_json(lines), "ports": ports,
+        }));
+    }
+    output::print_line(&format!("node {name} at {}", node.addresses().join(", ")))?;
+    for (line, port) in lines.iter().zip(&ports) {
+        output::print_line(&format!("  -p {port}  is {}", line.port))?;
+    }
+    output::print_line(&share::lines_in_words(&at, lines))
+}
+
+impl From<NodeError> for Failure {
+    fn from(error: NodeError) -> Self {
+        let failure = Failure::link(error.to_string());
+        match error {
+            NodeError::NameTaken(_) => failure.trying("give each node a --name of its own"),
+            NodeError::Network(NetworkError::Nobody(_)) => {
+                failure.trying("is a router or a node with --listen there?")
+            }
+            _ => failure,
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The keys of a node. They begin with `motorlink/v1/NODE`.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The beginning of all keys.
+pub const ROOT: &str = "motorlink/v1";
+/// In the place of a line's name: what is about the whole node.
+const WHOLE: &str = "node";
+/// The longest name of a node or a program, in bytes.
+pub const LONGEST: usize = 40;
+
+/// The name of a node, or of whoever uses one: a part of keys.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Name(String);
+
+/// A text is no name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("a name has 1 to {LONGEST} letters, digits, `-`, `_` and `.`")]
+pub struct BadName;
+
+impl Name {
+    /// The name as text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// The nearest name to a text.
+    pub fn near(text: &str) -> Self {
+        let known: String =
+            text.chars().map(|it| if is_allowed(it) { it } else { '-' }).take(LONGEST).collect();
+        known.parse().unwrap_or_else(|_| Name("unnamed".to_owned()))
+    }
+}
+
+fn is_allowed(character: char) -> bool {
+    character.is_ascii_alphanumeric() || matches!(character, '-' | '_' | '.')
+}
+
+impl FromStr for Name {
+    type Err = BadName;
+
+    fn from_str(text: &str) -> Result<Self, BadName> {
+        let is_name = (1..=LONGEST).contains(&text.len()) && text.chars().all(is_allowed);
+        if is_name { Ok(Name(text.to_owned())) } else { Err(BadName) }
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// What a program may want of a node. Each is a part of keys, so that access control can tell them apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scope {
+    /// To read values and events.
+    See,
+    /// To stop motors and to latch.
+    Stop,
+    /// Everything else.
+    Act,
+}
+
+impl Scope {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Scope::See, Scope::Stop, Scope::Act];
+
+    /// The part of keys.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Scope::See => "see",
+            Scope::Stop => "stop",
+            Scope::Act => "act",
+        }
+    }
+}
+
+/// That a node is there: a liveliness token.
+pub fn alive(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/alive")
+}
+
+/// Those of all nodes.
+pub fn all_alive() -> String {
+    format!("{ROOT}/*/{WHOLE}/alive")
+}
+
+/// What a node says of itself: a query.
+pub fn info(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/info")
+}
+
+/// The requests of a program: queries.
+pub fn ask(node: &Name, scope: Scope, who: &Name, session: &str) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/ask/{}/{who}/{session}", scope.word())
+}
+
+/// The requests of all programs.
+pub fn all_asks(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/ask/**")
+}
+
+/// That a program is there: a liveliness token.
+pub fn here(node: &Name, who: &Name, session: &str) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/here/{who}/{session}")
+}
+
+/// Those of all programs.
+pub fn all_here(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/here/*/*")
+}
+
+/// Events of the node, or of a line.
+pub fn events(node: &Name, line: Option<&str>) -> String {
+    format!("{ROOT}/{node}/{}/events", line.unwrap_or(WHOLE))
+}
+
+/// The lines of a node and their state.
+pub fn state(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/state")
+}
+
+/// The samples of a motor.
+pub fn samples(node: &Name, line: &str, motor: u8) -> String {
+    format!("{ROOT}/{node}/{line}/{motor}/samples")
+}
+
+/// The columns of the samples of a motor: a query.
+pub fn columns(node: &Name, line: &str, motor: u8) -> String {
+    format!("{ROOT}/{node}/{line}/{motor}/columns")
+}
+
+/// Those of all motors of a node.
+pub fn all_columns(node: &Name) -> String {
+    format!("{ROOT}/{node}/*/*/columns")
+}
+
+/// Who asks, in the key of a request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asker {
+    /// What is asked for.
+    pub scope: Scope,
+    /// Who it is.
+    pub who: Name,
+    /// The number of the session.
+    pub session: String,
+}
+
+impl Asker {
+    /// Reads the end of a key that [`ask`] made.
+    pub fn of(key: &str) -> Option<Self> {
+        let mut parts = key.rsplit('/');
+        let (session, who, scope) = (parts.next()?, parts.next()?, parts.next()?);
+        let scope = Scope::ALL.into_iter().find(|it| it.word() == scope)?;
+        Some(Asker { scope, who: who.parse().ok()?, session: session.to_owned() })
+    }
+}
+
+/// The node in a key.
+pub fn node_of(key: &str) -> Option<Name> {
+    key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?.parse().ok()
+}
+
+/// Who is there, and in which session, in a key that [`here`] made.
+pub fn session_of(key: &str) -> Option<&str> {
+    key.rsplit('/').next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_asks_stands_in_the_key() {
+        let (node, who): (Name, Name) = ("arm1".parse().unwrap(), "alice".parse().unwrap());
+        for scope in Scope::ALL {
+            let key = ask(&node, scope, &who, "7f");
+            let asker = Asker { scope, who: who.clone(), session: "7f".to_owned() };
+            assert_eq!(Asker::of(&key), Some(asker), "{key}");
+            assert_eq!(node_of(&key), Some(node.clone()));
+        }
+        assert_eq!(Asker::of("motorlink/v1/arm1/node/ask/own/alice/7f"), None);
+        assert_eq!(Asker::of("alice/7f"), None);
+    }
+
+    #[test]
+    fn names_have_no_character_that_means_something_in_a_key() {
+        for bad in ["", "a/b", "*", "a*", "$*", "a b", "a?", "a#", "@a", &"a".repeat(LONGEST + 1)] {
+            assert_eq!(bad.parse::<Name>(), Err(BadName), "{bad}");
+            let near = Name::near(bad);
+            assert_eq!(near.as_str().parse(), Ok(near.clone()), "{bad}");
+        }
+    }
+}

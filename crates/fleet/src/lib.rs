@@ -1,0 +1,22 @@
+//! Drives at other computers, over [Zenoh](https://zenoh.io).
+//!
+//! A node is a share (`motorlink_telemetry::share`) that programs of other computers use, too. [`node`] is
+//! its side, [`remote`] the side of a program, [`port`] the name `zenoh:NODE/LINE` of a line. Both sides
+//! exchange the messages of a share; [`message`] has what goes around them, [`key`] the keys, [`clock`] the
+//! time that they agree on. docs/FLEET-PROTOCOL.md describes it for other programs.
+//!
+//! Whatever must happen in time is decided at the node by its own clock: a command that is too old is not
+//! sent, and a motor of a program that gives no sign of life is stopped.
+#![forbid(unsafe_code)]
+
+pub mod clock;
+pub mod key;
+pub mod message;
+pub mod network;
+pub mod node;
+pub mod port;
+pub mod remote;
+mod weight;
+
+/// The version of keys and messages.
+pub const VERSION: u32 = 1;

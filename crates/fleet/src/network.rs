@@ -1,0 +1,137 @@
+//! The network of a node or a program: a Zenoh session.
+
+use std::fmt;
+use std::io::ErrorKind;
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use zenoh::config::EndPoint;
+use zenoh::{Config, Session, Wait};
+
+/// The address of a router, of ROS 2 and of the first node of a computer.
+pub const USUAL: &str = "tcp/127.0.0.1:7447";
+/// The same, for the look whether somebody has it.
+const USUAL_SOCKET: &str = "127.0.0.1:7447";
+
+/// How a program or a node gets to the others.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Network {
+    /// It connects to these addresses.
+    Connect(Vec<String>),
+    /// It listens at these addresses, and passes messages on, also between others. It connects to more.
+    Route {
+        /// Where it listens.
+        listen: Vec<String>,
+        /// What it connects to.
+        connect: Vec<String>,
+    },
+    /// As this Zenoh configuration says.
+    File(PathBuf),
+}
+
+/// Why there is no network.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NetworkError {
+    /// Nothing is at the addresses.
+    #[error("nothing answers at {0}")]
+    Nobody(String),
+    /// The configuration.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// A text says nothing about a network.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is no address such as {USUAL} and no file that ends with .json5")]
+pub struct BadNetwork(String);
+
+impl Network {
+    /// What a node does that was told nothing: the first one of a computer listens, the others connect to it.
+    pub fn usual() -> Self {
+        let own = vec![USUAL.to_owned()];
+        match TcpListener::bind(USUAL_SOCKET) {
+            Err(error) if error.kind() == ErrorKind::AddrInUse => Network::Connect(own),
+            _ => Network::Route { listen: own, connect: Vec::new() },
+        }
+    }
+
+    /// Opens it. Gives the addresses at which others reach it.
+    ///
+    /// # Errors
+    /// Nothing is there, or the configuration is not possible.
+    pub fn open(&self) -> Result<(Session, Vec<String>), NetworkError> {
+        let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
+        let mut config = Config::default();
+        let mut set = |key: &str, value: &str| config.insert_json5(key, value).map_err(failed);
+        match self {
+            Network::File(path) => {
+                config = Config::from_file(path).map_err(failed)?;
+            }
+            Network::Connect(addresses) => {
+                set("mode", "\"client\"")?;
+                set("connect/endpoints", &json(addresses))?;
+                usual_rules(&mut config).map_err(failed)?;
+            }
+            Network::Route { listen, connect } => {
+                set("mode", "\"router\"")?;
+                set("listen/endpoints", &json(listen))?;
+                set("connect/endpoints", &json(connect))?;
+                usual_rules(&mut config).map_err(failed)?;
+            }
+        }
+        let session = zenoh::open(config).wait().map_err(|error| match self {
+            Network::Connect(addresses) => NetworkError::Nobody(addresses.join(", ")),
+            _ => failed(error),
+        })?;
+        let addresses = match self {
+            Network::Connect(addresses) => addresses.clone(),
+            Network::Route { listen, .. } => listen.clone(),
+            Network::File(path) => vec![path.display().to_string()],
+        };
+        Ok((session, addresses))
+    }
+}
+
+/// What holds without a file.
+fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
+    // Nobody is found who was not named.
+    config.insert_json5("scouting/multicast/enabled", "false")?;
+    config.insert_json5("scouting/gossip/enabled", "false")?;
+    // A network that was cut is there again soon. What must happen in time does not depend on it.
+    config.insert_json5("transport/link/tx/lease", "3000")?;
+    config.insert_json5("transport/link/tx/keep_alive", "4")?;
+    let retry = "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }";
+    config.insert_json5("connect/retry", retry)?;
+    Ok(())
+}
+
+fn json(addresses: &[String]) -> String {
+    serde_json::to_string(addresses).unwrap_or_default()
+}
+
+impl FromStr for Network {
+    type Err = BadNetwork;
+
+    /// Addresses with commas between them, or the path of a file that ends with .json5.
+    fn from_str(text: &str) -> Result<Self, BadNetwork> {
+        if text.ends_with(".json5") {
+            return Ok(Network::File(text.into()));
+        }
+        let addresses: Vec<_> = text.split(',').map(str::to_owned).collect();
+        match addresses.iter().find(|it| it.parse::<EndPoint>().is_err()) {
+            Some(bad) => Err(BadNetwork(format!("`{bad}`"))),
+            None => Ok(Network::Connect(addresses)),
+        }
+    }
+}
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Network::Connect(addresses) => f.write_str(&addresses.join(",")),
+            Network::Route { listen, .. } => f.write_str(&listen.join(",")),
+            Network::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Queries of programs, and the sessions that they belong to.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, MutexGuard, PoisonError};
+
+use motorlink_telemetry::share::program::Program;
+use tokio::runtime::{Handle, Runtime};
+use tokio::sync::mpsc::error::TrySendError;
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use zenoh::Wait;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::Query;
+use zenoh::sample::SampleKind;
+
+use super::gate::Gate;
+use super::outbox::Outbox;
+use super::session::{Asked, Session};
+use super::{Common, answer};
+use crate::VERSION;
+use crate::key::{self, Asker, Name};
+use crate::message::{Answer, Ask, LONGEST_DEADLINE, SHORTEST_DEADLINE};
+
+/// Sessions at one time: a share has 64 programs.
+const MOST_SESSIONS: usize = 48;
+/// Queries of a session that wait.
+const QUERIES: usize = 256;
+/// Sessions that are over and whose reason is remembered.
+const REASONS: usize = 256;
+/// The longest name of a program in the log, in bytes.
+const LONGEST_PROGRAM: usize = 20;
+/// The longest number of a session, in bytes.
+const LONGEST_SESSION: usize = 32;
+
+/// The sessions of a node.
+#[derive(Default)]
+pub(super) struct Sessions {
+    open: BTreeMap<String, Open>,
+    over: VecDeque<(String, String)>,
+}
+
+struct Open {
+    who: Name,
+    asked: Sender<Asked>,
+}
+
+/// Takes queries from now on.
+pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {
+    let zenoh = &common.zenoh;
+    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
+    let asked = move |query: Query| door.asked(query, &handle);
+    zenoh.declare_queryable(key::all_asks(&common.name)).callback(asked).background().wait()?;
+    let door = Arc::clone(common);
+    let said = move |query: Query| {
+        let info = serde_json::to_vec(&door.info()).unwrap_or_default();
+        // The program asks again if the answer does not come.
+        let _ = query.reply(query.key_expr().clone(), info).wait();
+    };
+    zenoh.declare_queryable(key::info(&common.name)).callback(said).background().wait()?;
+    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
+    let here = move |sample: zenoh::sample::Sample| {
+        if sample.kind() == SampleKind::Delete
+            && let Some(session) = key::session_of(sample.key_expr().as_str())
+        {
+            door.gone(session, &handle);
+        }
+    };
+    let all = key::all_here(&common.name);
+    zenoh.liveliness().declare_subscriber(all).callback(here).background().wait()?;
+    zenoh.liveliness().declare_token(key::alive(&common.name)).wait()
+}
+
+impl Common {
+    fn sessions(&self) -> MutexGuard<'_, Sessions> {
+        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn asked(self: &Arc<Self>, query: Query, handle: &Handle) {
+        let t = self.clock.now();
+        let refuse = |why: String| answer(&query, &Answer::Refused { t, why });
+        let Some(asker) = Asker::of(query.key_expr().as_str()) else {
+            return refuse("the key does not say who asks for what".to_owned());
+        };
+        let bytes = query.payload().map(|payload| payload.to_bytes());
+        let ask: Ask = match serde_json::from_slice(&bytes.unwrap_or_default()) {
+            Ok(ask) => ask,
+            Err(error) => return refuse(format!("the request cannot be read: {error}")),
+        };
+        let Asker { scope, who, session } = asker;
+        let mut sessions = self.sessions();
+        let known = sessions.open.get(&session);
+        if let Some(Open { who: owner, .. }) = known
+            && *owner != who
+        {
+            return refuse("this is the session of somebody else".to_owned());
+        }
+        let sender = match (known, &ask) {
+            (Some(Open { asked, .. }), _) => asked.clone(),
+            (None, Ask::Join { .. }) if sessions.open.len() >= MOST_SESSIONS => {
+                return refuse(format!("the node has {MOST_SESSIONS} programs, its most"));
+            }
+            (None, Ask::Join { protocol, program, deadline, motion }) => {
+                let new = match New::of(&session, *protocol, program, *deadline, *motion) {
+                    Ok(new) => new,
+                    Err(why) => return refuse(why),
+                };
+                let (sender, asked) = channel(QUERIES);
+                let open = Open { who: who.clone(), asked: sender.clone() };
+                sessions.open.insert(session.clone(), open);
+                handle.spawn(Arc::clone(self).serve(session, who, new, asked));
+                sender
+            }
+            (None, _) => {
+                let over = sessions.over.iter().find(|(it, _)| *it == session);
+                let why = over.map_or("no such session at this node", |(_, why)| why);
+                return answer(&query, &Answer::Over { t, why: why.to_owned() });
+            }
+        };
+        drop(sessions);
+        if let Err(TrySendError::Full(Asked::Query(query, ..))) =
+            sender.try_send(Asked::Query(query, ask, scope))
+        {
+            let why = "too many requests of this session wait".to_owned();
+            answer(&query, &Answer::Refused { t, why });
+        }
+    }
+
+    /// A program or its network has gone. What it sees is kept for a moment; its motors stop now.
+    fn gone(self: &Arc<Self>, session: &str, handle: &Handle) {
+        let asked = self.sessions().open.get(session).map(|open| open.asked.clone());
+        if let Some(asked) = asked {
+            handle.spawn(async move { asked.send(Asked::Gone).await });
+        }
+    }
+
+    /// Serves one session.
+    async fn serve(self: Arc<Self>, session: String, who: Name, new: New, asked: Receiver<Asked>) {
+        let New { program, deadline, motion } = new;
+        let name = format!("{who} ({program})");
+        let why = match Program::connect(&self.share, &name).await {
+            Err(error) => format!("the share of the node: {error}"),
+            Ok((program, listener, _)) => {
+                let now = self.clock.now();
+                let served = Session {
+                    common: Arc::clone(&self),
+                    gate: Gate::new(now, deadline, motion),
+                    deadline,
+                    motion,
+                    program,
+                    listener,
+                    outbox: Outbox::default(),
+                    pull: None,
+                    last_pull: 0,
+                };
+                served.serve(asked).await
+            }
+        };
+        let mut sessions = self.sessions();
+        sessions.open.remove(&session);
+        if sessions.over.len() >= REASONS {
+            sessions.over.pop_front();
+        }
+        sessions.over.push_back((session, why));
+    }
+}
+
+/// A session that may begin.
+struct New {
+    program: String,
+    deadline: f64,
+    motion: Option<f64>,
+}
+
+impl New {
+    fn of(
+        session: &str,
+        protocol: u32,
+        program: &str,
+        deadline: f64,
+        motion: Option<f64>,
+    ) -> Result<Self, String> {
+        if protocol != VERSION {
+            return Err(format!("this node speaks version {VERSION}, the program {protocol}"));
+        }
+        if session.len() > LONGEST_SESSION {
+            return Err(format!("the number of a session has up to {LONGEST_SESSION} bytes"));
+        }
+        let is_name = (1..=LONGEST_PROGRAM).contains(&program.len());
+        if !is_name || !program.chars().all(motorlink_link::is_printable) {
+            return Err(format!(
+                "the name of a program has 1 to {LONGEST_PROGRAM} bytes that can be printed"
+            ));
+        }
+        let possible = SHORTEST_DEADLINE..=LONGEST_DEADLINE;
+        if !possible.contains(&deadline) || motion.is_some_and(|it| !possible.contains(&it)) {
+            return Err(format!("a deadline is {SHORTEST_DEADLINE} to {LONGEST_DEADLINE} s"));
+        }
+        Ok(New { program: program.to_owned(), deadline, motion })
+    }
+}

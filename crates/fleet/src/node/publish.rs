@@ -1,0 +1,224 @@
+//! What a node says without being asked: events, the state of its lines, the main values of its motors.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::sync::{Arc, PoisonError};
+use std::time::Duration;
+
+use motorlink_proto::rmd::{Command, ReadStatus};
+use motorlink_proto::st::{FrameCode, RegisterId};
+use motorlink_telemetry::overview::Overview;
+use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::frame::{Frame, Kind};
+use motorlink_telemetry::share::message::{
+    Answer, Ask, DropRule, Event, Group, Line, SignalName, Text, decode,
+};
+use motorlink_telemetry::share::program::{Listener, Program};
+use motorlink_telemetry::signal::Motor;
+use serde::Serialize;
+use tokio::time::{MissedTickBehavior, interval};
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Query;
+
+use super::Common;
+use crate::key;
+use crate::message::Info;
+use crate::weight::{Lines, speaks};
+
+/// How often the state is published.
+const STATE: Duration = Duration::from_secs(1);
+/// The longest time until the share says which lines it has.
+const LINES: Duration = Duration::from_secs(5);
+/// Rows of a motor that wait.
+const QUEUE: u32 = 1000;
+/// The time to live of a question whether a motor is there, in seconds.
+const SEARCH: f64 = 5.0;
+
+/// Follows the share from now on, once its lines are known.
+pub(super) async fn start(common: &Arc<Common>, period: Option<Duration>) -> io::Result<()> {
+    let (program, listener, _) = Program::connect(&common.share, "node").await?;
+    tokio::spawn(Arc::clone(common).follow(listener));
+    tokio::time::timeout(LINES, common.learn(&program))
+        .await
+        .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
+    let columns = Arc::clone(common);
+    let asked = move |query: Query| columns.say_columns(&query);
+    let key = key::all_columns(&common.name);
+    let declared = common.zenoh.declare_queryable(key).callback(asked).background();
+    declared.wait().map_err(io::Error::other)?;
+    tokio::spawn(Arc::clone(common).tell_state(program, period));
+    Ok(())
+}
+
+impl Common {
+    /// Publishes what the share says.
+    async fn follow(self: Arc<Self>, mut listener: Listener) {
+        let mut groups = BTreeMap::new();
+        while let Ok(Frame { kind, payload }) = listener.next().await {
+            match kind {
+                Kind::Text => match decode(&payload) {
+                    Ok(Text::Event(event)) => self.publish_event(&event),
+                    Ok(Text::Group(group)) => {
+                        let key = key::columns(&self.name, &group.line, group.motor);
+                        self.put(&key, &group);
+                        groups.insert(group.group, (group.line.clone(), group.motor));
+                        self.columns_of(group);
+                    }
+                    _ => {}
+                },
+                Kind::Data => {
+                    let of = Data::decode(&payload).ok().and_then(|data| groups.get(&data.group));
+                    let Some((line, motor)) = of else { continue };
+                    let key = key::samples(&self.name, line, *motor);
+                    // A network that is slow loses samples. Nothing waits for it.
+                    let _ = self
+                        .zenoh
+                        .put(key, payload)
+                        .congestion_control(CongestionControl::Drop)
+                        .wait();
+                }
+            }
+        }
+    }
+
+    /// Asks for the lines and the state of the share.
+    async fn learn(&self, program: &Program) -> io::Result<()> {
+        match program.ask(Ask::Lines).await {
+            Ok(Answer::Lines { lines, latched_by }) => {
+                let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+                let known = Lines::of(&lines);
+                if *state.lines != known {
+                    state.lines = Arc::new(known);
+                }
+                (state.known, state.latched_by) = (lines, latched_by);
+                Ok(())
+            }
+            Ok(_) => Err(io::Error::other("it gives another answer")),
+            Err(refusal) => Err(io::Error::other(refusal.message)),
+        }
+    }
+
+    /// Publishes the state again and again, and subscribes to the main values of motors that answer.
+    async fn tell_state(self: Arc<Self>, program: Program, period: Option<Duration>) {
+        let mut ticks = interval(STATE);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut searched, mut subscribed) = (BTreeSet::new(), BTreeSet::new());
+        loop {
+            ticks.tick().await;
+            // The share ends with the node.
+            if self.learn(&program).await.is_err() {
+                return;
+            }
+            self.put(&key::state(&self.name), &self.info());
+            let Some(period) = period else { continue };
+            for line in self.known_lines() {
+                if searched.insert(line.line.clone()) {
+                    search(&program, &line);
+                }
+                for motor in &line.heard {
+                    if subscribed.insert((line.line.clone(), *motor)) {
+                        subscribe(&program, &line, *motor, period).await;
+                    }
+                }
+            }
+        }
+    }
+
+    pub(super) fn known_lines(&self) -> Vec<Line> {
+        self.state.read().unwrap_or_else(PoisonError::into_inner).known.clone()
+    }
+
+    /// What the node says of itself.
+    pub(super) fn info(&self) -> Info {
+        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        Info {
+            node: self.name.to_string(),
+            protocol: crate::VERSION,
+            program: self.program.clone(),
+            boot: self.boot.clone(),
+            t: self.clock.now(),
+            wall: self.clock.wall(),
+            lines: state.known.clone(),
+            latched_by: state.latched_by.clone(),
+        }
+    }
+
+    fn columns_of(&self, group: Group) {
+        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        state.columns.insert(key::columns(&self.name, &group.line, group.motor), group);
+    }
+
+    fn say_columns(&self, query: &Query) {
+        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        for (key, group) in &state.columns {
+            let is_meant = zenoh::key_expr::KeyExpr::try_from(key.as_str())
+                .is_ok_and(|key| query.key_expr().intersects(&key));
+            if is_meant {
+                let text = serde_json::to_vec(group).unwrap_or_default();
+                // The program asks again if the answer does not come.
+                let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
+            }
+        }
+    }
+
+    fn publish_event(&self, event: &Event) {
+        self.put(&key::events(&self.name, event.line.as_deref()), event);
+    }
+
+    /// Publishes a text. If the network does not take it, nothing waits.
+    fn put(&self, key: &str, value: &impl Serialize) {
+        let text = serde_json::to_vec(value).unwrap_or_default();
+        let _ = self
+            .zenoh
+            .put(key, text)
+            .encoding(Encoding::APPLICATION_JSON)
+            .congestion_control(CongestionControl::Drop)
+            .priority(Priority::DataHigh)
+            .wait();
+    }
+}
+
+/// Reads something of each motor that a line can have. The share remembers those that answer.
+fn search(program: &Program, line: &Line) {
+    let Some(speaks) = speaks(line) else { return };
+    let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
+    let (program, name) = (program.clone(), line.line.clone());
+    tokio::spawn(async move {
+        for motor in motors {
+            let bytes = question(motor);
+            let (line, motor) = (name.clone(), motor.number());
+            // Those that are there answer.
+            let _ = program
+                .ask(Ask::Command { line, motor, bytes, time_to_live: SEARCH, continues: false })
+                .await;
+        }
+    });
+}
+
+/// The bytes of a command that only shows that a motor is there.
+fn question(motor: Motor) -> Vec<u8> {
+    match motor {
+        Motor::St(_) => vec![FrameCode::GetReg.number(), RegisterId::STATUS.0],
+        Motor::Rmd(_) => ReadStatus.encode().to_vec(),
+    }
+}
+
+/// Subscribes to the main values of a motor.
+async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) {
+    let Some(motor) = speaks(line).and_then(|speaks| speaks.motor(motor)) else { return };
+    let main = Overview::of(motor);
+    let sources = main.fast().chain(main.slow()).chain(main.angle);
+    let signals = sources
+        .map(|source| SignalName {
+            line: line.line.clone(),
+            motor: motor.number(),
+            name: source.to_string(),
+        })
+        .collect();
+    let period = period.as_secs_f64();
+    let (queue, drop) = (QUEUE, DropRule::Oldest);
+    // The share refuses it if it has none of the signals.
+    let _ = program.ask(Ask::Subscribe { signals, period, queue, drop, rows: true }).await;
+}

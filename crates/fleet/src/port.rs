@@ -1,0 +1,101 @@
+//! The port `zenoh:`: a line of a node.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use motorlink_link::port::{self, Carries, Form, Given, NameError, PortName, Scheme};
+use motorlink_telemetry::share::port::line_port;
+
+use crate::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
+use crate::remote::{self, DEADLINE, Remote};
+
+/// Registers the port `zenoh:` in this process.
+pub fn register() {
+    port::register(&Zenoh);
+}
+
+/// `zenoh:NODE/LINE`.
+struct Zenoh;
+
+const EXAMPLE: &str = "zenoh:arm1/st0";
+
+impl Scheme for Zenoh {
+    fn name(&self) -> &'static str {
+        "zenoh"
+    }
+
+    fn forms(&self) -> &'static [Form] {
+        &[Form {
+            text: "zenoh:NODE/LINE",
+            help: "a line of a `motorlink node`, also of another computer",
+            carries: Carries::Both,
+        }]
+    }
+
+    fn options(&self) -> &'static [&'static str] {
+        &["via", "as", "deadline", "motion", "take", "raw"]
+    }
+
+    fn parse(
+        &self,
+        rest: &str,
+        given: &mut Given<'_>,
+        _: &[&'static dyn Scheme],
+    ) -> Result<PortName, NameError> {
+        let (node, line) = rest.split_once('/').unwrap_or((rest, ""));
+        given.present(node, "the name of the node", EXAMPLE)?;
+        let what = "a name of letters, digits, `-`, `_` and `.`".to_owned();
+        let bad_node = |_| given.bad_option("the node", node, what.clone());
+        let node = node.parse().map_err(bad_node)?;
+        let network = match given.take("via") {
+            Some(text) => text.parse().map_err(|_| {
+                let what = "an address such as tcp/10.0.0.5:7447, or a file that ends with .json5";
+                given.bad_option("via", text, what.to_owned())
+            })?,
+            None => remote::usual(),
+        };
+        let who = match given.take("as") {
+            Some(text) => text.parse().map_err(|_| given.bad_option("as", text, what.clone()))?,
+            None => remote::own_name(),
+        };
+        let deadline = span(given, "deadline")?.unwrap_or(DEADLINE);
+        let motion = span(given, "motion")?;
+        let takes = flag(given, "take")?;
+        if flag(given, "raw")? {
+            let what = "the port without it: there are no raw bytes of a node yet".to_owned();
+            return Err(given.bad_option("raw", "set", what));
+        }
+        let remote = Remote { node, network, who, deadline, motion, takes };
+        line_port(Arc::new(remote), line).ok_or_else(|| NameError::Incomplete {
+            name: given.name.to_owned(),
+            what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",
+            example: EXAMPLE,
+        })
+    }
+}
+
+/// Whether an option without a value was given.
+fn flag(given: &mut Given<'_>, option: &'static str) -> Result<bool, NameError> {
+    match given.take(option) {
+        None => Ok(false),
+        Some("") => Ok(true),
+        Some(text) => Err(given.bad_option(option, text, "it without a value".to_owned())),
+    }
+}
+
+/// A time of an option, such as `200ms`.
+fn span(given: &mut Given<'_>, option: &'static str) -> Result<Option<Duration>, NameError> {
+    let Some(text) = given.take(option) else { return Ok(None) };
+    let seconds = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => number.parse::<f64>().ok().map(|it| it / 1e3),
+        (None, Some(number)) => number.parse().ok(),
+        (None, None) => None,
+    };
+    match seconds.filter(|it| (SHORTEST_DEADLINE..=LONGEST_DEADLINE).contains(it)) {
+        Some(seconds) => Ok(Some(Duration::from_secs_f64(seconds))),
+        None => {
+            let what = format!("{} ms to {LONGEST_DEADLINE} s", SHORTEST_DEADLINE * 1e3);
+            Err(given.bad_option(option, text, what))
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The side of a program: a share at a node, as a socket.
+//!
+//! A tunnel stands between the program's socket and the network. It takes the requests of the program,
+//! says how old they may become, sends them until the node has them, and brings what the share says.
+
+mod outgoing;
+mod tunnel;
+
+use std::collections::BTreeMap;
+use std::io;
+use std::os::unix::net::UnixStream;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use motorlink_telemetry::share::address::{Address, Unreachable};
+use tokio::runtime::Runtime;
+use zenoh::Session as Zenoh;
+
+use crate::key::Name;
+use crate::network::{Network, NetworkError};
+use tunnel::Tunnel;
+
+/// Without another one: how long the motors of a program may turn without a sign of life.
+pub const DEADLINE: Duration = Duration::from_secs(1);
+/// How long a program waits for a node that does not answer.
+pub const PATIENCE: Duration = Duration::from_secs(3);
+/// The longest time until all nodes know that this program has left.
+const LEAVING: Duration = Duration::from_millis(500);
+
+/// The share of a node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remote {
+    /// The node.
+    pub node: Name,
+    /// The way to it.
+    pub network: Network,
+    /// Who uses it: the name that stands in keys and in the log of the node.
+    pub who: Name,
+    /// Its motors stop if the node gets no sign of life for this time.
+    pub deadline: Duration,
+    /// Its motors stop if they get no new command for this time.
+    pub motion: Option<Duration>,
+    /// Whether it takes motors from other programs.
+    pub takes: bool,
+}
+
+impl Remote {
+    /// The options that differ from the default, as in the name of a port.
+    pub fn options(&self) -> Vec<String> {
+        let mut options = Vec::new();
+        if self.network != usual() {
+            options.push(format!("via={}", self.network));
+        }
+        if self.who != own_name() {
+            options.push(format!("as={}", self.who));
+        }
+        if self.deadline != DEADLINE {
+            options.push(format!("deadline={}ms", self.deadline.as_millis()));
+        }
+        if let Some(motion) = self.motion {
+            options.push(format!("motion={}ms", motion.as_millis()));
+        }
+        if self.takes {
+            options.push("take".to_owned());
+        }
+        options
+    }
+}
+
+impl Address for Remote {
+    fn port(&self, line: &str) -> String {
+        let options = self.options();
+        let mark = if options.is_empty() { "" } else { "?" };
+        format!("zenoh:{}/{line}{mark}{}", self.node, options.join("&"))
+    }
+
+    fn connect(&self) -> Result<UnixStream, Unreachable> {
+        let zenoh = zenoh_of(&self.network).map_err(|error| {
+            Unreachable::Missing(format!("no node {} can be reached: {error}", self.node))
+        })?;
+        let failed = |error: io::Error| Unreachable::Failed(error.to_string());
+        let (own, other) = UnixStream::pair().map_err(failed)?;
+        own.set_nonblocking(true).map_err(failed)?;
+        let runtime = runtime().map_err(failed)?;
+        runtime.block_on(Tunnel::open(self.clone(), zenoh, own))?;
+        Ok(other)
+    }
+
+    fn ended(&self, why: Option<&str>) -> String {
+        let node = &self.node;
+        match why {
+            Some(why) => format!("node {node}: {why}"),
+            None => format!("node {node}: the connection has ended"),
+        }
+    }
+
+    fn takes(&self) -> bool {
+        self.takes
+    }
+}
+
+/// The network of programs that are told nothing: that of the environment, or the first node of this
+/// computer.
+pub fn usual() -> Network {
+    let named = std::env::var(VARIABLE).ok().and_then(|text| text.parse().ok());
+    named.unwrap_or_else(|| Network::Connect(vec![crate::network::USUAL.to_owned()]))
+}
+
+/// The variable of the environment with the network: addresses, or a file.
+pub const VARIABLE: &str = "MOTORLINK_NETWORK";
+
+/// Who uses this program: the user and the computer.
+pub fn own_name() -> Name {
+    let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
+    Name::near(&format!("{user}-{}", computer()))
+}
+
+/// The name of this computer.
+pub fn computer() -> Name {
+    Name::near(&rustix::system::uname().nodename().to_string_lossy())
+}
+
+/// Waits for a moment until the nodes know that the programs of this process have left. Call it before
+/// the process ends, or their motors stop some time later.
+pub fn finish() {
+    let end = Instant::now() + LEAVING;
+    while tunnel::open_tunnels() > 0 && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// One for all tunnels.
+fn runtime() -> io::Result<&'static Runtime> {
+    static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
+        tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .thread_name("fleet")
+            .enable_all()
+            .build()
+    });
+    RUNTIME.as_ref().map_err(|error| io::Error::new(error.kind(), error.to_string()))
+}
+
+/// One session for each network of this process.
+fn zenoh_of(network: &Network) -> Result<Arc<Zenoh>, NetworkError> {
+    static OPEN: Mutex<BTreeMap<Network, Weak<Zenoh>>> = Mutex::new(BTreeMap::new());
+    let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(zenoh) = open.get(network).and_then(Weak::upgrade).filter(|it| !it.is_closed()) {
+        return Ok(zenoh);
+    }
+    let (zenoh, _) = network.open()?;
+    let zenoh = Arc::new(zenoh);
+    open.insert(network.clone(), Arc::downgrade(&zenoh));
+    Ok(zenoh)
+}

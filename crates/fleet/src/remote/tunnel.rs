@@ -1,0 +1,476 @@
+//! Between the socket of a program and a node.
+
+use std::io;
+use std::os::unix::net::UnixStream as StdStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use motorlink_telemetry::share::address::Unreachable;
+use motorlink_telemetry::share::frame::{self, Kind as FrameKind, Reader};
+use motorlink_telemetry::share::message::{
+    Answer as ShareAnswer, Ask as ShareAsk, Request, Text, decode, encode,
+};
+use motorlink_telemetry::share::request::Kind;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::UnixStream;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::time::{sleep, timeout};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::{ConsolidationMode, Reply};
+use zenoh::{Session as Zenoh, Wait};
+
+use super::{PATIENCE, Remote};
+use crate::VERSION;
+use crate::clock::{Boot, Clock, NodeClock, span};
+use crate::key::{self, Name, Scope};
+use crate::message::{Answer, Ask};
+use crate::remote::outgoing::Outgoing;
+use crate::weight::{self, Lines};
+
+/// How long a node keeps a pull, in seconds.
+const WAIT: f64 = 0.25;
+/// How long an answer to it may take besides.
+const ANSWER: Duration = Duration::from_millis(1000);
+/// The pause after an answer that did not come.
+const PAUSE: Duration = Duration::from_millis(50);
+/// A program that has ended waits so long for the node to know it.
+const LEAVING: Duration = Duration::from_millis(300);
+/// The longest request of a program.
+const LONGEST: usize = frame::LONGEST_REQUEST;
+
+static OPEN: AtomicUsize = AtomicUsize::new(0);
+
+/// How many programs of this process have not left yet.
+pub(super) fn open_tunnels() -> usize {
+    OPEN.load(Ordering::SeqCst)
+}
+
+/// Counts an open tunnel.
+struct Counted;
+
+impl Counted {
+    fn new() -> Self {
+        OPEN.fetch_add(1, Ordering::SeqCst);
+        Counted
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        OPEN.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Asks a node.
+#[derive(Clone)]
+struct Line {
+    zenoh: Arc<Zenoh>,
+    node: Name,
+    who: Name,
+    session: String,
+}
+
+/// An answer, and when it was asked for.
+struct Answered {
+    of: Of,
+    asked: f64,
+    answer: Option<(Answer, Vec<u8>)>,
+}
+
+/// What was asked.
+enum Of {
+    Pull,
+    Post(u32),
+    Urgent(u32),
+    Sign,
+}
+
+/// What happens next.
+enum Next {
+    Read(io::Result<usize>),
+    Answered(Answered),
+    Written(io::Result<OwnedWriteHalf>),
+    Due,
+}
+
+pub(super) struct Tunnel {
+    line: Line,
+    outgoing: Outgoing,
+    lines: Lines,
+    deadline: f64,
+    reader: OwnedReadHalf,
+    frames: Reader,
+    /// `None` while a task writes.
+    writer: Option<OwnedWriteHalf>,
+    /// What is written next.
+    coming: Vec<u8>,
+    answers: UnboundedSender<Answered>,
+    answered: UnboundedReceiver<Answered>,
+    written: UnboundedSender<io::Result<OwnedWriteHalf>>,
+    done: UnboundedReceiver<io::Result<OwnedWriteHalf>>,
+    is_pulling: bool,
+    pulls: u32,
+    after: u64,
+    /// When the next pull may be sent.
+    pull_from: f64,
+    /// When the node was heard last.
+    heard: f64,
+    /// The next sign of life, once it has commanded something.
+    sign: Option<f64>,
+    _here: LivelinessToken,
+    _counted: Counted,
+}
+
+impl Tunnel {
+    /// Begins a session at the node, and serves the socket from then on.
+    pub(super) async fn open(
+        remote: Remote,
+        zenoh: Arc<Zenoh>,
+        socket: StdStream,
+    ) -> Result<(), Unreachable> {
+        let failed = |error: String| Unreachable::Failed(error);
+        let number = getrandom::u64().map_err(|error| failed(error.to_string()))?;
+        let Remote { node, who, deadline, motion, network, .. } = remote;
+        let line = Line { zenoh, node, who, session: format!("{number:016x}") };
+        let here = key::here(&line.node, &line.who, &line.session);
+        let here = line.zenoh.liveliness().declare_token(here).await;
+        let here = here.map_err(|error| failed(error.to_string()))?;
+        let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
+        let join = Ask::Join { protocol: VERSION, program: own_program(), deadline, motion };
+        let begun = Boot.now();
+        let (asked, answer) = loop {
+            let asked = Boot.now();
+            match line.ask(Scope::See, &join, Priority::InteractiveHigh, ANSWER).await {
+                Some((answer, _)) => break (asked, answer),
+                // The nodes of a network that was just joined may not be known yet.
+                None if Boot.now() > begun + 1.0 => {
+                    return Err(Unreachable::Missing(format!(
+                        "no node {} answers at {network}",
+                        line.node
+                    )));
+                }
+                None => sleep(PAUSE).await,
+            }
+        };
+        let now = Boot.now();
+        let (t, boot, lines) = match answer {
+            Answer::Joined { t, boot, lines, .. } => (t, boot, lines),
+            Answer::Over { why, .. } | Answer::Refused { why, .. } => return Err(failed(why)),
+            _ => return Err(failed("the node gives another answer".to_owned())),
+        };
+        let socket = UnixStream::from_std(socket).map_err(|error| failed(error.to_string()))?;
+        let (reader, writer) = socket.into_split();
+        let (answers, answered) = unbounded_channel();
+        let (written, done) = unbounded_channel();
+        let tunnel = Tunnel {
+            line,
+            outgoing: Outgoing::new(boot, NodeClock::new(asked, now, t)),
+            lines: Lines::of(&lines),
+            deadline,
+            reader,
+            frames: Reader::new(LONGEST),
+            writer: Some(writer),
+            coming: Vec::new(),
+            answers,
+            answered,
+            written,
+            done,
+            is_pulling: false,
+            pulls: 0,
+            after: 0,
+            pull_from: now,
+            heard: now,
+            sign: None,
+            _here: here,
+            _counted: Counted::new(),
+        };
+        tokio::spawn(tunnel.serve());
+        Ok(())
+    }
+
+    async fn serve(mut self) {
+        let mut bytes = vec![0; 1 << 14];
+        let why = loop {
+            let now = Boot.now();
+            self.write();
+            self.send(now);
+            if let Some(why) = self.is_lost(now) {
+                break Some(why);
+            }
+            match self.next(now, &mut bytes).await {
+                Next::Due => {}
+                Next::Read(Ok(0) | Err(_)) => break None,
+                Next::Read(Ok(size)) => {
+                    self.frames.push(&bytes[..size]);
+                    if let Err(why) = self.requests() {
+                        break Some(why);
+                    }
+                }
+                Next::Answered(answered) => {
+                    if let Some(why) = self.answered(answered) {
+                        break Some(why);
+                    }
+                }
+                Next::Written(Ok(writer)) => self.writer = Some(writer),
+                Next::Written(Err(_)) => break None,
+            }
+        };
+        self.end(why).await;
+    }
+
+    async fn next(&mut self, now: f64, bytes: &mut [u8]) -> Next {
+        let pull = self.may_pull().then_some(self.pull_from);
+        let lost = Some(self.heard + PATIENCE.as_secs_f64());
+        let due = [self.outgoing.next_due(), self.sign, pull, lost].into_iter().flatten();
+        let wait = span((due.fold(f64::INFINITY, f64::min) - now).max(0.0));
+        tokio::select! {
+            read = self.reader.read(bytes) => Next::Read(read),
+            Some(answered) = self.answered.recv() => Next::Answered(answered),
+            Some(written) = self.done.recv() => Next::Written(written),
+            () = sleep(wait) => Next::Due,
+        }
+    }
+
+    /// Takes the requests of the program.
+    fn requests(&mut self) -> Result<(), String> {
+        while let Some(frame) = self.frames.take().map_err(|error| error.to_string())? {
+            if frame.kind != FrameKind::Text {
+                return Err("a program sends requests only".to_owned());
+            }
+            let request: Request = decode(&frame.payload).map_err(|error| error.to_string())?;
+            let now = Boot.now();
+            match request.ask {
+                // The node has said hello to its share.
+                ShareAsk::Hello { .. } => self.hello(request.id),
+                _ if self.lines.kind(&request.ask) == Kind::Stops => {
+                    self.outgoing.urgent(now, request);
+                }
+                _ => self.outgoing.post(now, request),
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends what is due.
+    fn send(&mut self, now: f64) {
+        for ask in self.outgoing.due(now) {
+            let (of, scope, priority) = match &ask {
+                Ask::Urgent { post, .. } => {
+                    (Of::Urgent(post.number), Scope::Stop, Priority::RealTime)
+                }
+                Ask::Post(post) => {
+                    let scope = weight::scope(self.lines.kind(&post.request.ask));
+                    let priority = match scope {
+                        Scope::Act => Priority::InteractiveHigh,
+                        Scope::See | Scope::Stop => Priority::DataHigh,
+                    };
+                    (Of::Post(post.number), scope, priority)
+                }
+                _ => continue,
+            };
+            if scope == Scope::Act && self.sign.is_none() {
+                self.sign = Some(now);
+            }
+            self.ask(of, scope, &ask, priority, ANSWER, now);
+        }
+        if self.sign.is_some_and(|sign| sign <= now) {
+            self.sign = Some(now + self.deadline / 5.0);
+            let ask = self.outgoing.sign(now);
+            self.ask(Of::Sign, Scope::Act, &ask, Priority::RealTime, ANSWER, now);
+        }
+        if self.may_pull() && self.pull_from <= now {
+            self.is_pulling = true;
+            self.pulls += 1;
+            let (boot, number, after) = (self.outgoing.boot().to_owned(), self.pulls, self.after);
+            let pull = Ask::Pull { boot, number, after, wait: WAIT };
+            self.ask(Of::Pull, Scope::See, &pull, Priority::Data, span(WAIT) + ANSWER, now);
+        }
+    }
+
+    /// The answer to hello of the program.
+    fn hello(&mut self, id: u32) {
+        let answer = ShareAnswer::Hello {
+            protocol: motorlink_telemetry::share::VERSION,
+            share: format!("node {}", self.line.node),
+            name: self.line.who.to_string(),
+        };
+        let text = encode(&Text::Answer { id, answer });
+        // It is short.
+        let _ = frame::append(FrameKind::Text, &text, &mut self.coming);
+    }
+
+    /// Whether the program takes more, and nothing is asked for yet.
+    fn may_pull(&self) -> bool {
+        self.writer.is_some() && self.coming.is_empty() && !self.is_pulling
+    }
+
+    fn ask(
+        &self,
+        of: Of,
+        scope: Scope,
+        ask: &Ask,
+        priority: Priority,
+        timeout: Duration,
+        asked: f64,
+    ) {
+        // In this order on the network. The answers come in any order.
+        let replies = self.line.send(scope, ask, priority, timeout);
+        let answers = self.answers.clone();
+        tokio::spawn(async move {
+            let answer = match replies {
+                Some(replies) => first_of(replies).await,
+                None => None,
+            };
+            // The tunnel may have ended.
+            let _ = answers.send(Answered { of, asked, answer });
+        });
+    }
+
+    /// Gives the reason if the session is over.
+    fn answered(&mut self, Answered { of, asked, answer }: Answered) -> Option<String> {
+        let now = Boot.now();
+        let is_pull = matches!(of, Of::Pull);
+        if is_pull {
+            self.is_pulling = false;
+            self.pull_from = now;
+        }
+        let Some((answer, stream)) = answer else {
+            self.pull_from = self.pull_from.max(if is_pull { now + 0.05 } else { 0.0 });
+            return None;
+        };
+        self.heard = now;
+        self.outgoing.heard(asked, now, answer.t());
+        match (answer, of) {
+            (Answer::Over { why, .. } | Answer::Refused { why, .. }, _) => return Some(why),
+            (Answer::Taken { .. }, Of::Urgent(number)) => self.outgoing.taken_urgent(number),
+            (Answer::Taken { next, .. }, of) => {
+                self.outgoing.taken(next);
+                if matches!(of, Of::Post(number) if number > next) {
+                    self.outgoing.missed(now);
+                }
+            }
+            (Answer::Pulled { first, count, .. }, Of::Pull) if first == self.after + 1 => {
+                self.after += count;
+                self.coming.extend(stream);
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Writes to the program, which may be slow. Nothing more is pulled meanwhile.
+    fn write(&mut self) {
+        let Some(mut writer) = self.writer.take_if(|_| !self.coming.is_empty()) else { return };
+        let (bytes, written) = (std::mem::take(&mut self.coming), self.written.clone());
+        tokio::spawn(async move {
+            let result = writer.write_all(&bytes).await;
+            let _ = written.send(result.map(|()| writer));
+        });
+    }
+
+    /// Why the node cannot be used any more.
+    fn is_lost(&self, now: f64) -> Option<String> {
+        let patience = PATIENCE.as_secs_f64();
+        if now > self.heard + patience {
+            let why = "it does not answer: it is away, or the network is cut; motors of this program \
+                stop at the node";
+            return Some(format!("{why} (nothing for {:.1} s)", now - self.heard));
+        }
+        let waits = now - self.outgoing.oldest()?;
+        (waits > patience).then(|| {
+            let who = &self.line.who;
+            format!(
+                "it answers, but not this request of {who}: it may not be allowed to ask for it"
+            )
+        })
+    }
+
+    async fn end(mut self, why: Option<String>) {
+        if let Some(message) = why
+            && let Some(mut writer) = self.writer.take()
+        {
+            let mut bytes = Vec::new();
+            let closing = encode(&Text::Closing { message });
+            if frame::append(FrameKind::Text, &closing, &mut bytes).is_ok() {
+                // The program may not read.
+                let _ = timeout(LEAVING, writer.write_all(&bytes)).await;
+            }
+            return;
+        }
+        // The stops that the program has asked for just before.
+        self.send(Boot.now());
+        let leave = Ask::Leave {
+            boot: self.outgoing.boot().to_owned(),
+            why: "the program has ended".to_owned(),
+        };
+        let left = self.line.ask(Scope::See, &leave, Priority::RealTime, LEAVING);
+        // The node notices it otherwise, later.
+        let _ = timeout(LEAVING, left).await;
+    }
+}
+
+impl Line {
+    /// Sends a request. `None`: it cannot be sent now.
+    fn send(
+        &self,
+        scope: Scope,
+        ask: &Ask,
+        priority: Priority,
+        timeout: Duration,
+    ) -> Option<Replies> {
+        let key = key::ask(&self.node, scope, &self.who, &self.session);
+        let payload = serde_json::to_vec(ask).ok()?;
+        let replies = self
+            .zenoh
+            .get(key)
+            .payload(payload)
+            .consolidation(ConsolidationMode::None)
+            .congestion_control(CongestionControl::Drop)
+            .priority(priority)
+            .express(true)
+            .timeout(timeout)
+            .wait();
+        replies.ok()
+    }
+
+    /// Sends a request, and waits for its answer. `None`: there is none.
+    async fn ask(
+        &self,
+        scope: Scope,
+        ask: &Ask,
+        priority: Priority,
+        timeout: Duration,
+    ) -> Option<(Answer, Vec<u8>)> {
+        first_of(self.send(scope, ask, priority, timeout)?).await
+    }
+}
+
+type Replies = zenoh::handlers::FifoChannelHandler<Reply>;
+
+/// The first answer that can be read: the attachment if there is one.
+async fn first_of(replies: Replies) -> Option<(Answer, Vec<u8>)> {
+    while let Ok(reply) = replies.recv_async().await {
+        let Ok(sample) = reply.into_result() else { continue };
+        let payload = sample.payload().to_bytes().into_owned();
+        let head = sample.attachment().map(|it| it.to_bytes().into_owned());
+        let (head, stream) = match head {
+            Some(head) => (head, payload),
+            None => (payload, Vec::new()),
+        };
+        if let Ok(answer) = serde_json::from_slice(&head) {
+            return Some((answer, stream));
+        }
+    }
+    None
+}
+
+/// The name of this program in the log of the node.
+fn own_program() -> String {
+    let program = std::env::current_exe().ok();
+    let name = program.as_ref().and_then(|path| path.file_stem()?.to_str()).unwrap_or("program");
+    let short: String = name.chars().filter(char::is_ascii_alphanumeric).take(12).collect();
+    format!("{short} {}", std::process::id() % 1_000_000)
+}

@@ -1,0 +1,160 @@
+//! Nodes with simulated drives, and a network between them that can be cut.
+#![allow(dead_code, reason = "each test uses a part")]
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use motorlink_fleet::clock::{Boot, Clock};
+use motorlink_fleet::network::Network;
+use motorlink_fleet::node::{Node, NodeError, Options};
+
+use crate::shared::{PATIENT, Share};
+
+/// A node of simulated drives: the lines st0 and rmd0.
+pub struct World {
+    pub share: Share,
+    pub address: String,
+    pub name: String,
+    node: Option<Node>,
+}
+
+impl World {
+    pub fn new(name: &str) -> Self {
+        Self::with(name, Duration::from_secs(5), Arc::new(Boot))
+    }
+
+    pub fn with(name: &str, lease: Duration, clock: Arc<dyn Clock>) -> Self {
+        let share = Share::leasing(&format!("fleet-{name}"), PATIENT, Some(lease), |link| link);
+        let address = format!("127.0.0.1:{}", free_port());
+        let listen = vec![format!("tcp/{address}")];
+        let network = Network::Route { listen, connect: Vec::new() };
+        let node = start(name, &share, network, clock).unwrap();
+        World { share, address, name: name.to_owned(), node: Some(node) }
+    }
+
+    /// Another node at the same network.
+    pub fn beside(&self, name: &str) -> Result<Node, NodeError> {
+        let network = Network::Connect(vec![format!("tcp/{}", self.address)]);
+        start(name, &self.share, network, Arc::new(Boot))
+    }
+
+    /// The name of a line's port, over this address.
+    pub fn port(&self, line: &str, address: &str, options: &str) -> String {
+        motorlink_fleet::port::register();
+        format!("zenoh:{}/{line}?via=tcp/{address}{options}", self.name)
+    }
+
+    pub fn end_node(&mut self) {
+        self.node = None;
+    }
+}
+
+fn start(
+    name: &str,
+    share: &Share,
+    network: Network,
+    clock: Arc<dyn Clock>,
+) -> Result<Node, NodeError> {
+    Node::start(Options {
+        name: name.parse().unwrap(),
+        share: share.path.clone(),
+        program: "test".to_owned(),
+        network,
+        clock,
+        period: Some(Duration::from_millis(50)),
+    })
+}
+
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// TCP connections to an address, which can be cut: nothing passes, and nobody is told.
+pub struct Cable {
+    pub address: String,
+    is_cut: Arc<AtomicBool>,
+    ends: Arc<AtomicBool>,
+    streams: Arc<Mutex<Vec<TcpStream>>>,
+}
+
+impl Cable {
+    pub fn to(target: &str) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let (is_cut, ends) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let streams = Arc::new(Mutex::new(Vec::new()));
+        let cable = Cable { address, is_cut, ends, streams };
+        let (target, is_cut) = (target.to_owned(), Arc::clone(&cable.is_cut));
+        let (ends, streams) = (Arc::clone(&cable.ends), Arc::clone(&cable.streams));
+        std::thread::spawn(move || {
+            while !ends.load(Ordering::SeqCst) {
+                let Ok((near, _)) = listener.accept() else {
+                    std::thread::sleep(Duration::from_millis(2));
+                    continue;
+                };
+                let Ok(far) = TcpStream::connect(&target) else { continue };
+                let pairs = [
+                    (near.try_clone().unwrap(), far.try_clone().unwrap()),
+                    (far.try_clone().unwrap(), near.try_clone().unwrap()),
+                ];
+                streams.lock().unwrap().extend([near, far]);
+                for (from, to) in pairs {
+                    let (is_cut, ends) = (Arc::clone(&is_cut), Arc::clone(&ends));
+                    std::thread::spawn(move || pass(from, to, &is_cut, &ends));
+                }
+            }
+        });
+        cable
+    }
+
+    pub fn cut(&self) {
+        self.is_cut.store(true, Ordering::SeqCst);
+    }
+
+    pub fn mend(&self) {
+        self.is_cut.store(false, Ordering::SeqCst);
+    }
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::SeqCst);
+        for stream in self.streams.lock().unwrap().iter() {
+            let _ = stream.shutdown(Shutdown::Both);
+        }
+    }
+}
+
+fn pass(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool, ends: &AtomicBool) {
+    from.set_nonblocking(false).unwrap();
+    from.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+    let mut bytes = [0; 1 << 16];
+    while !ends.load(Ordering::SeqCst) {
+        match from.read(&mut bytes) {
+            Ok(0) => break,
+            Ok(size) => {
+                while is_cut.load(Ordering::SeqCst) && !ends.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                if to.write_all(&bytes[..size]).is_err() {
+                    break;
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(_) => break,
+        }
+    }
+    let _ = to.shutdown(Shutdown::Both);
+}
+
+pub fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
+    let end = Instant::now() + crate::shared::LIMIT;
+    while !is_so() {
+        assert!(Instant::now() < end, "{what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
