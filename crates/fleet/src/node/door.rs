@@ -1,21 +1,21 @@
 //! Queries of programs, and the sessions that they belong to.
 
-use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, MutexGuard, PoisonError};
 
 use motorlink_telemetry::share::program::Program;
 use tokio::runtime::{Handle, Runtime};
 use tokio::sync::mpsc::error::TrySendError;
-use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::sync::mpsc::{Receiver, channel};
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::query::Query;
 use zenoh::sample::SampleKind;
 
+use super::common::{Common, answer};
 use super::gate::Gate;
 use super::outbox::Outbox;
-use super::session::{Asked, Session};
-use super::{Common, answer};
+use super::session::Session;
+use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
 use crate::key::{self, Asker, Name};
 use crate::message::{Answer, Ask, LONGEST_DEADLINE, SHORTEST_DEADLINE};
@@ -30,18 +30,6 @@ const REASONS: usize = 256;
 const LONGEST_PROGRAM: usize = 20;
 /// The longest number of a session, in bytes.
 const LONGEST_SESSION: usize = 32;
-
-/// The sessions of a node.
-#[derive(Default)]
-pub(super) struct Sessions {
-    open: BTreeMap<String, Open>,
-    over: VecDeque<(String, String)>,
-}
-
-struct Open {
-    who: Name,
-    asked: Sender<Asked>,
-}
 
 /// Takes queries from now on.
 pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {
@@ -116,9 +104,10 @@ impl Common {
             }
         };
         drop(sessions);
-        if let Err(TrySendError::Full(Asked::Query(query, ..))) =
-            sender.try_send(Asked::Query(query, ask, scope))
+        let asking = Box::new(Asking { query, ask, scope });
+        if let Err(TrySendError::Full(Asked::Query(asking))) = sender.try_send(Asked::Query(asking))
         {
+            let query = asking.query;
             let why = "too many requests of this session wait".to_owned();
             answer(&query, &Answer::Refused { t, why });
         }

@@ -1,29 +1,25 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
+mod common;
 mod door;
 mod gate;
 mod outbox;
 mod publish;
 mod session;
+mod sessions;
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
-use motorlink_telemetry::share::message::{Group, Line};
 use tokio::runtime::Runtime;
-use zenoh::bytes::Encoding;
+use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
-use zenoh::query::Query;
-use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
 use crate::key::{self, Name};
-use crate::message::Answer;
 use crate::network::{Network, NetworkError};
-use crate::weight::Lines;
-use door::Sessions;
+use common::Common;
 
 /// What a node is.
 pub struct Options {
@@ -62,28 +58,6 @@ pub enum NodeError {
     /// The share.
     #[error("the share of the node: {0}")]
     Share(#[from] std::io::Error),
-}
-
-/// What all tasks of a node have.
-struct Common {
-    name: Name,
-    share: PathBuf,
-    program: String,
-    boot: String,
-    clock: Arc<dyn Clock>,
-    zenoh: Zenoh,
-    state: RwLock<State>,
-    sessions: Mutex<Sessions>,
-}
-
-/// What the node knows of its share.
-#[derive(Default)]
-struct State {
-    lines: Arc<Lines>,
-    known: Vec<Line>,
-    latched_by: Option<String>,
-    /// The columns of the samples that are published, by key.
-    columns: BTreeMap<String, Group>,
 }
 
 impl Node {
@@ -126,25 +100,6 @@ impl Drop for Node {
     }
 }
 
-impl Common {
-    fn lines(&self) -> Arc<Lines> {
-        Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner).lines)
-    }
-}
-
 fn failed(error: zenoh::Error) -> NetworkError {
     NetworkError::Failed(error.to_string())
-}
-
-/// Answers a query. The program asks again if the answer does not come.
-fn answer(query: &Query, answer: &Answer) {
-    let text = serde_json::to_vec(answer).unwrap_or_default();
-    let json = Encoding::APPLICATION_JSON;
-    let _ = query.reply(query.key_expr().clone(), text).encoding(json).express(true).wait();
-}
-
-/// Answers a query with a part of the share's stream.
-fn answer_with(query: &Query, stream: Vec<u8>, head: &Answer) {
-    let head = serde_json::to_vec(head).unwrap_or_default();
-    let _ = query.reply(query.key_expr().clone(), stream).attachment(head).express(true).wait();
 }

@@ -22,7 +22,7 @@ use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::Common;
+use super::common::Common;
 use crate::key;
 use crate::message::Info;
 use crate::weight::{Lines, speaks};

@@ -11,21 +11,14 @@ use tokio::sync::mpsc::Receiver;
 use tokio::time::sleep;
 use zenoh::query::Query;
 
+use super::common::{Common, answer, answer_with};
 use super::gate::{Gate, Verdict};
 use super::outbox::Outbox;
-use super::{Common, answer, answer_with};
+use super::sessions::{Asked, Asking};
 use crate::clock::span;
 use crate::key::Scope;
 use crate::message::{Answer, Ask, LONGEST_WAIT, Post};
 use crate::weight;
-
-/// What a session is told.
-pub(super) enum Asked {
-    /// A query of the program, and what its key allows.
-    Query(Query, Ask, Scope),
-    /// The program or its network has gone.
-    Gone,
-}
 
 /// What a session task has.
 pub(super) struct Session {
@@ -74,8 +67,8 @@ impl Session {
                     break "its program or its network has gone".to_owned();
                 }
                 Next::Asked(Some(Asked::Gone)) => {}
-                Next::Asked(Some(Asked::Query(query, ask, scope))) => {
-                    if let Some(why) = self.asked(query, ask, scope).await {
+                Next::Asked(Some(Asked::Query(asking))) => {
+                    if let Some(why) = self.asked(*asking).await {
                         break why;
                     }
                 }
@@ -105,7 +98,7 @@ impl Session {
     }
 
     /// Gives the end of the session, if this is it.
-    async fn asked(&mut self, query: Query, ask: Ask, scope: Scope) -> Option<String> {
+    async fn asked(&mut self, Asking { query, ask, scope }: Asking) -> Option<String> {
         let now = self.now();
         self.gate.heard(now);
         let boot = match &ask {

@@ -18,12 +18,10 @@ use zenoh::Session as Zenoh;
 
 use crate::key::Name;
 use crate::network::{Network, NetworkError};
-use tunnel::Tunnel;
+use tunnel::{Tunnel, Whom};
 
 /// Without another one: how long the motors of a program may turn without a sign of life.
 pub const DEADLINE: Duration = Duration::from_secs(1);
-/// How long a program waits for a node that does not answer.
-pub const PATIENCE: Duration = Duration::from_secs(3);
 /// The longest time until all nodes know that this program has left.
 const LEAVING: Duration = Duration::from_millis(500);
 
@@ -82,8 +80,15 @@ impl Address for Remote {
         let (own, other) = UnixStream::pair().map_err(failed)?;
         own.set_nonblocking(true).map_err(failed)?;
         let runtime = runtime().map_err(failed)?;
-        runtime.block_on(Tunnel::open(self.clone(), zenoh, own))?;
-        Ok(other)
+        let Remote { node, who, deadline, motion, network, .. } = self.clone();
+        let whom = Whom { node, who, deadline, motion };
+        match runtime.block_on(Tunnel::open(whom, zenoh, own)) {
+            Ok(()) => Ok(other),
+            Err(Unreachable::Missing(why)) => {
+                Err(Unreachable::Missing(format!("{why} at {network}")))
+            }
+            Err(failed) => Err(failed),
+        }
     }
 
     fn ended(&self, why: Option<&str>) -> String {

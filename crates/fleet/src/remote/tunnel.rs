@@ -22,7 +22,6 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, Reply};
 use zenoh::{Session as Zenoh, Wait};
 
-use super::{PATIENCE, Remote};
 use crate::VERSION;
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
@@ -30,6 +29,8 @@ use crate::message::{Answer, Ask};
 use crate::remote::outgoing::Outgoing;
 use crate::weight::{self, Lines};
 
+/// How long a program waits for a node that does not answer, in seconds.
+const PATIENCE: f64 = 3.0;
 /// How long a node keeps a pull, in seconds.
 const WAIT: f64 = 0.25;
 /// How long an answer to it may take besides.
@@ -62,6 +63,14 @@ impl Drop for Counted {
     fn drop(&mut self) {
         OPEN.fetch_sub(1, Ordering::SeqCst);
     }
+}
+
+/// Which node, and what it is told.
+pub(super) struct Whom {
+    pub(super) node: Name,
+    pub(super) who: Name,
+    pub(super) deadline: Duration,
+    pub(super) motion: Option<Duration>,
 }
 
 /// Asks a node.
@@ -127,13 +136,13 @@ pub(super) struct Tunnel {
 impl Tunnel {
     /// Begins a session at the node, and serves the socket from then on.
     pub(super) async fn open(
-        remote: Remote,
+        whom: Whom,
         zenoh: Arc<Zenoh>,
         socket: StdStream,
     ) -> Result<(), Unreachable> {
         let failed = |error: String| Unreachable::Failed(error);
         let number = getrandom::u64().map_err(|error| failed(error.to_string()))?;
-        let Remote { node, who, deadline, motion, network, .. } = remote;
+        let Whom { node, who, deadline, motion } = whom;
         let line = Line { zenoh, node, who, session: format!("{number:016x}") };
         let here = key::here(&line.node, &line.who, &line.session);
         let here = line.zenoh.liveliness().declare_token(here).await;
@@ -147,10 +156,7 @@ impl Tunnel {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
                 None if Boot.now() > begun + 1.0 => {
-                    return Err(Unreachable::Missing(format!(
-                        "no node {} answers at {network}",
-                        line.node
-                    )));
+                    return Err(Unreachable::Missing(format!("no node {} answers", line.node)));
                 }
                 None => sleep(PAUSE).await,
             }
@@ -223,7 +229,7 @@ impl Tunnel {
 
     async fn next(&mut self, now: f64, bytes: &mut [u8]) -> Next {
         let pull = self.may_pull().then_some(self.pull_from);
-        let lost = Some(self.heard + PATIENCE.as_secs_f64());
+        let lost = Some(self.heard + PATIENCE);
         let due = [self.outgoing.next_due(), self.sign, pull, lost].into_iter().flatten();
         let wait = span((due.fold(f64::INFINITY, f64::min) - now).max(0.0));
         tokio::select! {
@@ -373,14 +379,13 @@ impl Tunnel {
 
     /// Why the node cannot be used any more.
     fn is_lost(&self, now: f64) -> Option<String> {
-        let patience = PATIENCE.as_secs_f64();
-        if now > self.heard + patience {
+        if now > self.heard + PATIENCE {
             let why = "it does not answer: it is away, or the network is cut; motors of this program \
                 stop at the node";
             return Some(format!("{why} (nothing for {:.1} s)", now - self.heard));
         }
         let waits = now - self.outgoing.oldest()?;
-        (waits > patience).then(|| {
+        (waits > PATIENCE).then(|| {
             let who = &self.line.who;
             format!(
                 "it answers, but not this request of {who}: it may not be allowed to ask for it"

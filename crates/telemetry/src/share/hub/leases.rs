@@ -1,96 +1,13 @@
-//! One program at a time changes a motor: it has a lease, which ends by itself.
+//! That one program at a time changes a motor.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::Hub;
-use super::asked::{Refused, usage};
-use super::line::Held;
 use super::place::SessionId;
-use crate::share::message::{Answer, Happening, MotorName, Reason};
-use crate::share::request::Kind;
-use crate::signal::Motor;
 
-/// That a program may change a motor, and nobody else.
+/// A program may change a motor, and nobody else. It ends by itself.
 pub(super) struct Lease {
-    session: SessionId,
-    name: Arc<str>,
-    until: Instant,
-}
-
-impl Hub {
-    /// From now on a motor that a program has changed is not changed by another one for this time, or as
-    /// long as it turns for the program, unless the other takes it.
-    pub fn lease(&mut self, length: Duration) {
-        self.lease = Some(length);
-    }
-
-    /// A program changes a motor.
-    pub(super) fn claim(
-        &mut self,
-        (session, name): (SessionId, &Arc<str>),
-        line: usize,
-        motor: Option<Motor>,
-        kind: Kind,
-    ) -> Result<(), Refused> {
-        let (Some(length), Some(motor), Kind::Changes | Kind::Moves) = (self.lease, motor, kind)
-        else {
-            return Ok(());
-        };
-        let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
-        let now = Instant::now();
-        if let Some(why) = held.lease_of_another(motor, session, now) {
-            return Err((Reason::Held, why));
-        }
-        let lease = Lease { session, name: Arc::clone(name), until: now + length };
-        held.leases.insert(motor, lease);
-        Ok(())
-    }
-
-    /// A program takes a motor from the one that has it.
-    pub(super) fn take(
-        &mut self,
-        session: SessionId,
-        name: &Arc<str>,
-        motor: &MotorName,
-    ) -> Result<Option<Answer>, Refused> {
-        let Some(length) = self.lease else {
-            return Err(usage("motors of this share belong to whoever commands them last"));
-        };
-        let (line, motor) = self.motor(motor)?;
-        let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };
-        let now = Instant::now();
-        let is_held = held.lease_of_another(motor, session, now).is_some();
-        let lease = Lease { session, name: Arc::clone(name), until: now + length };
-        let before = held.leases.insert(motor, lease);
-        let (of, number) = (held.name.clone(), motor.number());
-        if let Some(before) = before.filter(|_| is_held) {
-            let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
-            self.say_of((Some(&of), Some(number)), Happening::Taken, name, message);
-        }
-        Ok(Some(Answer::Take))
-    }
-}
-
-impl Held {
-    /// A program has left.
-    pub(super) fn give_leases_back(&mut self, gone: SessionId) {
-        self.leases.retain(|_, lease| lease.session != gone);
-    }
-
-    /// Who has a motor, if it is another program than this one.
-    fn lease_of_another(&self, motor: Motor, own: SessionId, now: Instant) -> Option<String> {
-        let lease = self.leases.get(&motor).filter(|lease| lease.session != own)?;
-        let (line, number, name) = (&self.name, motor.number(), &lease.name);
-        if self.owners.get(&motor) == Some(&lease.session) {
-            return Some(format!(
-                "{line}: motor {number} turns for {name}, who holds it; stop it or take it"
-            ));
-        }
-        let left = lease.until.checked_duration_since(now).filter(|left| !left.is_zero())?;
-        Some(format!(
-            "{line}: {name} holds motor {number} for another {:.1} s; wait or take it",
-            left.as_secs_f64()
-        ))
-    }
+    pub(super) session: SessionId,
+    pub(super) name: Arc<str>,
+    pub(super) until: Instant,
 }

@@ -3,6 +3,7 @@
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 
 mod asked;
+mod claims;
 mod coming;
 mod ended;
 mod feed;

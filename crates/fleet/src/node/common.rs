@@ -1,0 +1,57 @@
+//! What the tasks of a node share, and how they answer queries.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+
+use motorlink_telemetry::share::message::{Group, Line};
+use zenoh::bytes::Encoding;
+use zenoh::query::Query;
+use zenoh::{Session as Zenoh, Wait};
+
+use super::sessions::Sessions;
+use crate::clock::Clock;
+use crate::key::Name;
+use crate::message::Answer;
+use crate::weight::Lines;
+
+/// What all tasks of a node have.
+pub(super) struct Common {
+    pub(super) name: Name,
+    pub(super) share: PathBuf,
+    pub(super) program: String,
+    pub(super) boot: String,
+    pub(super) clock: Arc<dyn Clock>,
+    pub(super) zenoh: Zenoh,
+    pub(super) state: RwLock<State>,
+    pub(super) sessions: Mutex<Sessions>,
+}
+
+/// What the node knows of its share.
+#[derive(Default)]
+pub(super) struct State {
+    pub(super) lines: Arc<Lines>,
+    pub(super) known: Vec<Line>,
+    pub(super) latched_by: Option<String>,
+    /// The columns of the samples that are published, by key.
+    pub(super) columns: BTreeMap<String, Group>,
+}
+
+impl Common {
+    pub(super) fn lines(&self) -> Arc<Lines> {
+        Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner).lines)
+    }
+}
+
+/// Answers a query. The program asks again if the answer does not come.
+pub(super) fn answer(query: &Query, answer: &Answer) {
+    let text = serde_json::to_vec(answer).unwrap_or_default();
+    let json = Encoding::APPLICATION_JSON;
+    let _ = query.reply(query.key_expr().clone(), text).encoding(json).express(true).wait();
+}
+
+/// Answers a query with a part of the share's stream.
+pub(super) fn answer_with(query: &Query, stream: Vec<u8>, head: &Answer) {
+    let head = serde_json::to_vec(head).unwrap_or_default();
+    let _ = query.reply(query.key_expr().clone(), stream).attachment(head).express(true).wait();
+}
