@@ -28,11 +28,14 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NotFound { .. } | PortError::NoSuchInterface { .. } => {
             Some("`motorlink ports` lists what is there")
         }
-        PortError::NoHolder { port, .. } if port.starts_with("zenoh:") => {
+        PortError::NoHolder { port, .. } if is_of_node(port) => {
             Some("start it with `motorlink node`; `?via=` or MOTORLINK_NETWORK says where it is")
         }
         PortError::NoHolder { .. } => {
             Some("start it with `motorlink share`, and stop motors that still turn")
+        }
+        PortError::NotDone { kind: NotDone::Latched, port, .. } if is_of_node(port) => {
+            Some("`motorlink fleet release --node NAME` releases the latch of this node")
         }
         PortError::NotDone { kind: NotDone::Latched, .. } => {
             Some("`motorlink share release --at unix:PATH` releases the latch of this share")
@@ -44,6 +47,11 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),
         _ => None,
     }
+}
+
+/// Whether a port is a line of a node.
+fn is_of_node(port: &str) -> bool {
+    port.starts_with("zenoh:")
 }
 
 /// What to write instead of a port of the other kind, or besides the port.

@@ -11,6 +11,8 @@ mod csv;
 mod decode;
 mod demo;
 mod failure;
+#[cfg(feature = "fleet")]
+mod fleet;
 #[cfg(any(feature = "monitor", feature = "fleet"))]
 mod folder;
 mod guard;
@@ -73,6 +75,9 @@ enum Command {
     /// As share, and programs of other computers use the drives, too
     #[cfg(feature = "fleet")]
     Node(node::Args),
+    /// List the nodes of a network, and stop all their motors
+    #[cfg(feature = "fleet")]
+    Fleet(fleet::Args),
     /// Show drives in a browser: values, plots, registers, control, stop
     #[cfg(feature = "monitor")]
     Monitor(monitor::Args),
@@ -157,6 +162,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Share(args) => share::run(&args),
         #[cfg(feature = "fleet")]
         Command::Node(args) => node::run(&args),
+        #[cfg(feature = "fleet")]
+        Command::Fleet(args) => fleet::run(args),
         #[cfg(feature = "monitor")]
         Command::Monitor(args) => monitor::run(args),
         Command::Ports(args) => ports::run(args),

@@ -92,6 +92,11 @@ pub fn info(node: &Name) -> String {
     format!("{ROOT}/{node}/{WHOLE}/info")
 }
 
+/// That of all nodes.
+pub fn all_info() -> String {
+    format!("{ROOT}/*/{WHOLE}/info")
+}
+
 /// The requests of a program: queries.
 pub fn ask(node: &Name, scope: Scope, who: &Name, session: &str) -> String {
     format!("{ROOT}/{node}/{WHOLE}/ask/{}/{who}/{session}", scope.word())

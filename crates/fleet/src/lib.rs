@@ -1,7 +1,7 @@
 //! Drives at other computers, over [Zenoh](https://zenoh.io).
 //!
 //! A node is a share (`motorlink_telemetry::share`) that programs of other computers use, too. [`node`] is
-//! its side, [`remote`] the side of a program, [`port`] the name `zenoh:NODE/LINE` of a line. Both sides
+//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE` of a line. Both sides
 //! exchange the messages of a share; [`message`] has what goes around them, [`key`] the keys, [`clock`] the
 //! time that they agree on. docs/FLEET-PROTOCOL.md describes it for other programs.
 //!
@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod clock;
+pub mod directory;
 pub mod key;
 pub mod message;
 pub mod network;

@@ -63,6 +63,11 @@ impl Network {
     pub fn open(&self) -> Result<(Session, Vec<String>), NetworkError> {
         let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
         let mut config = Config::default();
+        let addresses = match self {
+            Network::Connect(addresses) => addresses.clone(),
+            Network::Route { listen, .. } => listen.iter().map(|it| with_port(it)).collect(),
+            Network::File(path) => vec![path.display().to_string()],
+        };
         let mut set = |key: &str, value: &str| config.insert_json5(key, value).map_err(failed);
         match self {
             Network::File(path) => {
@@ -73,9 +78,9 @@ impl Network {
                 set("connect/endpoints", &json(addresses))?;
                 usual_rules(&mut config).map_err(failed)?;
             }
-            Network::Route { listen, connect } => {
+            Network::Route { connect, .. } => {
                 set("mode", "\"router\"")?;
-                set("listen/endpoints", &json(listen))?;
+                set("listen/endpoints", &json(&addresses))?;
                 set("connect/endpoints", &json(connect))?;
                 usual_rules(&mut config).map_err(failed)?;
             }
@@ -84,11 +89,6 @@ impl Network {
             Network::Connect(addresses) => NetworkError::Nobody(addresses.join(", ")),
             _ => failed(error),
         })?;
-        let addresses = match self {
-            Network::Connect(addresses) => addresses.clone(),
-            Network::Route { listen, .. } => listen.clone(),
-            Network::File(path) => vec![path.display().to_string()],
-        };
         Ok((session, addresses))
     }
 }
@@ -104,6 +104,16 @@ fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
     let retry = "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }";
     config.insert_json5("connect/retry", retry)?;
     Ok(())
+}
+
+/// An address to listen at, with a port that is free now in the place of port 0.
+fn with_port(address: &str) -> String {
+    let free = || {
+        let (scheme, host) = address.strip_suffix(":0")?.split_once('/')?;
+        let port = TcpListener::bind(format!("{host}:0")).ok()?.local_addr().ok()?.port();
+        Some(format!("{scheme}/{host}:{port}"))
+    };
+    free().unwrap_or_else(|| address.to_owned())
 }
 
 fn json(addresses: &[String]) -> String {

@@ -1,13 +1,14 @@
 //! Questions to a running share.
 
+use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
 use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::dialogue::{Dialogue, Heard};
-use motorlink_telemetry::share::message::{Answer, Ask, Line};
+use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
+use motorlink_telemetry::share::message::{Answer, Ask, Line, StoppedMotor, Text};
 
 /// The longest time for the answer of a share that does not wait for a drive.
 const ANSWER: Duration = Duration::from_secs(5);
@@ -16,44 +17,82 @@ const ANSWER: Duration = Duration::from_secs(5);
 pub struct Connection {
     socket: UnixStream,
     dialogue: Dialogue,
+    /// The ends of requests that nobody has waited for yet.
+    ended: BTreeMap<u32, Result<Answer, Refusal>>,
+    /// Why the share closes the connection.
+    closing: Option<String>,
 }
 
 impl Connection {
     /// Connects to the share at a path, with this name for its log.
     pub fn open(path: &Path, by: &str) -> io::Result<Self> {
-        let socket = UnixStream::connect(path)?;
+        Self::over(UnixStream::connect(path)?, by)
+    }
+
+    /// As [`open`](Self::open), on a socket that leads to a share.
+    pub fn over(socket: UnixStream, by: &str) -> io::Result<Self> {
         socket.set_read_timeout(Some(ANSWER))?;
         socket.set_write_timeout(Some(ANSWER))?;
-        let mut opened = Connection { socket, dialogue: Dialogue::default() };
+        let (ended, closing) = (BTreeMap::new(), None);
+        let mut opened = Connection { socket, dialogue: Dialogue::default(), ended, closing };
         opened.ask(Ask::Hello { protocol: VERSION, name: by.to_owned() })?;
         Ok(opened)
     }
 
-    /// Asks for a stop of all motors. The share sends its events meanwhile.
-    pub fn stop(&mut self) -> io::Result<Answer> {
-        let patience = match self.ask(Ask::Lines)? {
-            Answer::Lines { lines, .. } => lines.iter().map(Line::patience).max(),
-            _ => None,
-        };
-        self.socket.set_read_timeout(Some(patience.unwrap_or(ANSWER)))?;
-        self.ask(Ask::Stop { motor: None })
+    /// Stops all motors; with `latches` motion is refused from then on. The share sends its events
+    /// meanwhile.
+    pub fn stop(&mut self, latches: bool) -> io::Result<Vec<StoppedMotor>> {
+        // Nothing is waited for before the stop is sent.
+        let latch = latches.then(|| self.send(Ask::Latch)).transpose()?;
+        let stop = self.send(Ask::Stop { motor: None })?;
+        if let Answer::Lines { lines, .. } = self.ask(Ask::Lines)? {
+            let patience = lines.iter().map(Line::patience).max();
+            self.socket.set_read_timeout(Some(patience.unwrap_or(ANSWER)))?;
+        }
+        if let Some(latch) = latch {
+            self.answer(latch)?;
+        }
+        match self.answer(stop)? {
+            Answer::Stop { motors } => Ok(motors),
+            _ => Err(io::Error::other("it gives another answer")),
+        }
     }
 
     /// Sends a request and waits for its answer.
     pub fn ask(&mut self, ask: Ask) -> io::Result<Answer> {
+        let id = self.send(ask)?;
+        self.answer(id)
+    }
+
+    fn send(&mut self, ask: Ask) -> io::Result<u32> {
         let (id, stream) = self.dialogue.request(ask).map_err(io::Error::other)?;
         self.socket.write_all(&stream)?;
+        Ok(id)
+    }
+
+    /// Waits for the answer to a request.
+    fn answer(&mut self, id: u32) -> io::Result<Answer> {
         let mut bytes = [0; 4096];
         loop {
+            if let Some(result) = self.ended.remove(&id) {
+                return result.map_err(|refusal| io::Error::other(refusal.message));
+            }
             while let Some(heard) = self.dialogue.hear().map_err(io::Error::other)? {
-                if let Heard::Ended(ended) = heard
-                    && ended.id == id
-                {
-                    return ended.result.map_err(|refusal| io::Error::other(refusal.message));
+                match heard {
+                    Heard::Ended(Ended { id, result }) => drop(self.ended.insert(id, result)),
+                    Heard::Text(Text::Closing { message }) => self.closing = Some(message),
+                    Heard::Text(_) | Heard::Data(_) => {}
                 }
             }
+            if self.ended.contains_key(&id) {
+                continue;
+            }
             match self.socket.read(&mut bytes)? {
-                0 => return Err(io::Error::other("the share closed the connection")),
+                0 => {
+                    let why = self.closing.take();
+                    let why = why.unwrap_or_else(|| "the share closed the connection".to_owned());
+                    return Err(io::Error::other(why));
+                }
                 count => self.dialogue.push(&bytes[..count]),
             }
         }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink_telemetry::line::Stopped;
-use motorlink_telemetry::share::message::{self, ANY_MOTOR, Answer, Ask, Event, StoppedMotor};
+use motorlink_telemetry::share::message::{self, ANY_MOTOR, Ask, Event, StoppedMotor};
 use motorlink_telemetry::share::opening::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
@@ -119,19 +119,10 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
     };
     match request {
         AskFor::Stop => {
-            let Answer::Stop { motors } = share.stop().map_err(failed)? else {
-                return Err(failed(io::Error::other("it gives another answer")));
-            };
-            for one in motors.iter().filter(|one| !one.absent) {
-                let result = one.failure.as_ref().map_or(Ok(()), Err);
-                tell_stop(&one.motor.line, one.motor.motor, result, args.json)?;
-            }
-            tell_absent(&motors, args.json)?;
-            // Where nothing answers, silence does not show that no motor is there.
-            let is_silent = !motors.is_empty() && motors.iter().all(|one| one.absent);
-            match is_silent || motors.iter().any(may_turn) {
-                true => Err(Failure::link(UNCONFIRMED).trying(advice::STOP_AGAIN)),
-                false => Ok(()),
+            let motors = share.stop(false).map_err(failed)?;
+            match tell_stops(&motors, None, args.json)? {
+                true => Ok(()),
+                false => Err(Failure::link(UNCONFIRMED).trying(advice::STOP_AGAIN)),
             }
         }
         AskFor::Latch => {
@@ -145,6 +136,22 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
     }
 }
 
+/// Says how motors took a stop of all, and at which node they are. Gives whether none may still turn.
+pub fn tell_stops(
+    motors: &[StoppedMotor],
+    node: Option<&str>,
+    json: bool,
+) -> Result<bool, Failure> {
+    for one in motors.iter().filter(|one| !one.absent) {
+        let result = one.failure.as_ref().map_or(Ok(()), Err);
+        tell_stop(node, (&one.motor.line, one.motor.motor), result, json)?;
+    }
+    tell_absent(motors, node, json)?;
+    // Where nothing answers, silence does not show that no motor is there.
+    let is_silent = !motors.is_empty() && motors.iter().all(|one| one.absent);
+    Ok(!is_silent && !motors.iter().any(may_turn))
+}
+
 /// The path in unix:PATH.
 pub fn path(at: &str) -> Result<PathBuf, Failure> {
     match at.strip_prefix("unix:") {
@@ -154,7 +161,8 @@ pub fn path(at: &str) -> Result<PathBuf, Failure> {
     }
 }
 
-const UNCONFIRMED: &str = "motors may still turn: not all confirmed that they stop";
+/// Some motors may still turn.
+pub const UNCONFIRMED: &str = "motors may still turn: not all confirmed that they stop";
 
 fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
     let lines = server.lines();
@@ -198,7 +206,7 @@ fn tell_stopped(
         Motor::St(motor) => motor.number(),
         Motor::Rmd(id) => id.number(),
     };
-    tell_stop(line, motor, result.as_ref().copied(), json)
+    tell_stop(None, (line, motor), result.as_ref().copied(), json)
 }
 
 fn may_turn(one: &StoppedMotor) -> bool {
@@ -206,20 +214,14 @@ fn may_turn(one: &StoppedMotor) -> bool {
 }
 
 /// Says where no motor was found.
-fn tell_absent(motors: &[StoppedMotor], json: bool) -> Result<(), Failure> {
+fn tell_absent(motors: &[StoppedMotor], node: Option<&str>, json: bool) -> Result<(), Failure> {
     let mut lines: BTreeMap<&str, Vec<u8>> = BTreeMap::new();
     for one in motors.iter().filter(|one| one.absent) {
         lines.entry(&one.motor.line).or_default().push(one.motor.motor);
     }
     for (line, numbers) in lines {
-        let message = format!("{line}: no motor was found at {}", ranges(&numbers));
-        match json {
-            true => {
-                let event = json!({"event": "no-motor", "line": line, "message": message});
-                output::print_line(&event)?;
-            }
-            false => output::print_line(&message)?,
-        }
+        let words = format!("no motor was found at {}", ranges(&numbers));
+        tell_of("no-motor", (node, line, None), &words, json)?;
     }
     Ok(())
 }
@@ -236,29 +238,43 @@ fn ranges(numbers: &[u8]) -> String {
 }
 
 fn tell_stop(
-    line: &str,
-    motor: u8,
+    node: Option<&str>,
+    (line, motor): (&str, u8),
     result: Result<(), impl Display>,
     json: bool,
 ) -> Result<(), Failure> {
-    let (event, words) = match result {
-        Ok(()) => ("stopped", "it confirmed the stop".to_owned()),
-        Err(error) => ("stop-failed", format!("it may still be turning: {error}")),
+    let motor = Some(motor).filter(|motor| *motor != ANY_MOTOR);
+    let (event, words) = match (result, motor) {
+        (Ok(()), _) => ("stopped", "it confirmed the stop".to_owned()),
+        (Err(error), Some(_)) => ("stop-failed", format!("it may still be turning: {error}")),
+        (Err(error), None) => ("stop-failed", format!("motors may still be turning: {error}")),
     };
-    let of_line = motor == ANY_MOTOR;
-    let message = match of_line {
-        true => format!("{line}: motors {}", words.trim_start_matches("it ")),
-        false => format!("{line}, motor {motor}: {words}"),
-    };
-    match json {
-        true if of_line => {
-            output::print_line(&json!({"event": event, "line": line, "message": message}))
-        }
-        true => output::print_line(
-            &json!({"event": event, "line": line, "motor": motor, "message": message}),
-        ),
-        false => output::print_line(&message),
+    tell_of(event, (node, line, motor), &words, json)
+}
+
+/// Says something of a line or a motor.
+fn tell_of(
+    event: &str,
+    (node, line, motor): (Option<&str>, &str, Option<u8>),
+    words: &str,
+    json: bool,
+) -> Result<(), Failure> {
+    let node_slash = node.map(|node| format!("{node}/")).unwrap_or_default();
+    let comma_motor = motor.map(|motor| format!(", motor {motor}")).unwrap_or_default();
+    let message = format!("{node_slash}{line}{comma_motor}: {words}");
+    if !json {
+        return output::print_line(&message);
     }
+    let mut object = json!({ "event": event });
+    if let Some(node) = node {
+        object["node"] = json!(node);
+    }
+    object["line"] = json!(line);
+    if let Some(motor) = motor {
+        object["motor"] = json!(motor);
+    }
+    object["message"] = json!(message);
+    output::print_line(&object)
 }
 
 impl From<ServerError> for Failure {

@@ -17,11 +17,13 @@ use super::outbox::Outbox;
 use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
-use crate::key::{self, Asker, Name};
+use crate::key::{self, Asker, Name, Scope};
 use crate::message::{Answer, Ask, LONGEST_DEADLINE, SHORTEST_DEADLINE};
 
 /// Sessions at one time: a share has 64 programs.
 const MOST_SESSIONS: usize = 48;
+/// The same with those that come to stop motors.
+const WITH_STOPS: usize = 60;
 /// Queries of a session that wait.
 const QUERIES: usize = 256;
 /// Sessions that are over and whose reason is remembered.
@@ -41,7 +43,7 @@ pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<Liv
     let said = move |query: Query| {
         let info = serde_json::to_vec(&door.info()).unwrap_or_default();
         // The program asks again if the answer does not come.
-        let _ = query.reply(query.key_expr().clone(), info).wait();
+        let _ = query.reply(key::info(&door.name), info).wait();
     };
     zenoh.declare_queryable(key::info(&common.name)).callback(said).background().wait()?;
     let (door, handle) = (Arc::clone(common), runtime.handle().clone());
@@ -83,7 +85,7 @@ impl Common {
         }
         let sender = match (known, &ask) {
             (Some(Open { asked, .. }), _) => asked.clone(),
-            (None, Ask::Join { .. }) if sessions.open.len() >= MOST_SESSIONS => {
+            (None, Ask::Join { .. }) if sessions.open.len() >= most(scope) => {
                 return refuse(format!("the node has {MOST_SESSIONS} programs, its most"));
             }
             (None, Ask::Join { protocol, program, deadline, motion }) => {
@@ -149,6 +151,14 @@ impl Common {
             sessions.over.pop_front();
         }
         sessions.over.push_back((session, why));
+    }
+}
+
+/// How many sessions there are before one with this key.
+fn most(scope: Scope) -> usize {
+    match scope {
+        Scope::Stop => WITH_STOPS,
+        Scope::See | Scope::Act => MOST_SESSIONS,
     }
 }
 

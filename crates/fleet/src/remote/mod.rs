@@ -40,6 +40,8 @@ pub struct Remote {
     pub motion: Option<Duration>,
     /// Whether it takes motors from other programs.
     pub takes: bool,
+    /// Whether it comes to stop motors. A node that is full takes it nevertheless.
+    pub stops: bool,
 }
 
 impl Remote {
@@ -80,8 +82,8 @@ impl Address for Remote {
         let (own, other) = UnixStream::pair().map_err(failed)?;
         own.set_nonblocking(true).map_err(failed)?;
         let runtime = runtime().map_err(failed)?;
-        let Remote { node, who, deadline, motion, network, .. } = self.clone();
-        let whom = Whom { node, who, deadline, motion };
+        let Remote { node, who, deadline, motion, network, stops, .. } = self.clone();
+        let whom = Whom { node, who, deadline, motion, stops };
         match runtime.block_on(Tunnel::open(whom, zenoh, own)) {
             Ok(()) => Ok(other),
             Err(Unreachable::Missing(why)) => {
@@ -147,7 +149,7 @@ fn runtime() -> io::Result<&'static Runtime> {
 }
 
 /// One session for each network of this process.
-fn zenoh_of(network: &Network) -> Result<Arc<Zenoh>, NetworkError> {
+pub(crate) fn zenoh_of(network: &Network) -> Result<Arc<Zenoh>, NetworkError> {
     static OPEN: Mutex<BTreeMap<Network, Weak<Zenoh>>> = Mutex::new(BTreeMap::new());
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(zenoh) = open.get(network).and_then(Weak::upgrade).filter(|it| !it.is_closed()) {

@@ -71,6 +71,7 @@ pub(super) struct Whom {
     pub(super) who: Name,
     pub(super) deadline: Duration,
     pub(super) motion: Option<Duration>,
+    pub(super) stops: bool,
 }
 
 /// Asks a node.
@@ -142,7 +143,8 @@ impl Tunnel {
     ) -> Result<(), Unreachable> {
         let failed = |error: String| Unreachable::Failed(error);
         let number = getrandom::u64().map_err(|error| failed(error.to_string()))?;
-        let Whom { node, who, deadline, motion } = whom;
+        let Whom { node, who, deadline, motion, stops } = whom;
+        let scope = if stops { Scope::Stop } else { Scope::See };
         let line = Line { zenoh, node, who, session: format!("{number:016x}") };
         let here = key::here(&line.node, &line.who, &line.session);
         let here = line.zenoh.liveliness().declare_token(here).await;
@@ -152,7 +154,7 @@ impl Tunnel {
         let begun = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
-            match line.ask(Scope::See, &join, Priority::InteractiveHigh, ANSWER).await {
+            match line.ask(scope, &join, Priority::RealTime, ANSWER).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
                 None if Boot.now() > begun + 1.0 => {

@@ -1,0 +1,77 @@
+//! `motorlink fleet list`
+
+use motorlink_fleet::directory::nodes;
+use motorlink_fleet::key::Name;
+use motorlink_fleet::message::Info;
+use motorlink_telemetry::share::message::Line;
+use serde_json::{Value, json};
+
+use super::At;
+use crate::failure::Failure;
+use crate::output::{Printer, print_line};
+
+pub fn run(at: &At) -> Result<(), Failure> {
+    let nodes = nodes(&at.network())?;
+    if nodes.is_empty() && !at.json {
+        print_line(&"No node is at this network.")?;
+    }
+    let width = nodes.keys().map(|name| name.as_str().len()).max().unwrap_or(0).max("node".len());
+    if !nodes.is_empty() && !at.json {
+        print_line(&format!(
+            "{:<width$}  {:<6}  {:<8}  {:<10}  port",
+            "node", "line", "motors", "state"
+        ))?;
+    }
+    let printer = Printer { json: at.json };
+    for (name, info) in &nodes {
+        match info {
+            Some(info) => printer.result(text(name, info, width), object(name, info))?,
+            None => printer.result(
+                format!("{name:<width$}  does not answer", name = name.as_str()),
+                json!({"node": name.as_str(), "answers": false}),
+            )?,
+        }
+    }
+    match nodes.iter().find(|(_, info)| info.is_none()) {
+        Some((name, _)) => Err(Failure::link(format!("node {name} does not answer"))),
+        None => Ok(()),
+    }
+}
+
+fn text(name: &Name, info: &Info, width: usize) -> String {
+    let rows = info.lines.iter().enumerate().map(|(row, line)| {
+        let name = if row == 0 { name.as_str() } else { "" };
+        let motors = numbers(&line.heard);
+        let state = state(info, line);
+        format!("{name:<width$}  {:<6}  {motors:<8}  {state:<10}  {}", line.line, line.port)
+    });
+    let rows: Vec<_> = rows.collect();
+    match rows.is_empty() {
+        true => format!("{:<width$}  no line", name.as_str()),
+        false => rows.join("\n"),
+    }
+}
+
+fn numbers(motors: &[u8]) -> String {
+    match motors {
+        [] => "-".to_owned(),
+        motors => motors.iter().map(u8::to_string).collect::<Vec<_>>().join(","),
+    }
+}
+
+/// The state of a line in one word.
+fn state(info: &Info, line: &Line) -> &'static str {
+    match () {
+        () if !line.unstopped.is_empty() => "unstopped",
+        () if info.latched_by.is_some() => "latched",
+        () if line.heard.is_empty() => "silent",
+        () => "ready",
+    }
+}
+
+fn object(name: &Name, info: &Info) -> Value {
+    json!({
+        "node": name.as_str(), "answers": true, "program": info.program, "boot": info.boot,
+        "t": info.t, "wall": info.wall, "latched_by": info.latched_by, "lines": info.lines,
+    })
+}

@@ -1,0 +1,78 @@
+//! `motorlink fleet`: the nodes of a network.
+
+mod list;
+mod order;
+
+use motorlink_fleet::key::Name;
+use motorlink_fleet::network::{Network, NetworkError};
+use motorlink_fleet::remote;
+
+use crate::failure::Failure;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+A node is a computer with drives that runs `motorlink node`. Without --via these commands ask at \
+tcp/127.0.0.1:7447.
+
+stop-all latches each node, then stops its motors. It asks again until each node has it. A latch refuses \
+motion of all programs until `motorlink fleet release`.
+
+Exit code 0, or 3 if a node does not answer or a motor did not confirm its stop. A node whose network \
+was cut before is not in the list: name with --node those that must answer.")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// List the nodes and their lines
+    List(At),
+    /// Latch all nodes and stop all their motors
+    StopAll(OrderArgs),
+    /// Refuse motion at all nodes until it is released; motors keep turning
+    Latch(OrderArgs),
+    /// Release the latches of all nodes: motion is possible again
+    Release(OrderArgs),
+}
+
+/// Where the nodes are.
+#[derive(clap::Args)]
+struct At {
+    /// Addresses with commas between them, or a Zenoh configuration (.json5)
+    #[arg(long, value_name = "NETWORK", env = remote::VARIABLE, global = true)]
+    via: Option<Network>,
+    /// Print JSON, one object per line
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+struct OrderArgs {
+    #[command(flatten)]
+    at: At,
+    /// Only this node, which must answer; may be repeated
+    #[arg(long = "node", value_name = "NAME")]
+    nodes: Vec<Name>,
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    match args.command {
+        Command::List(at) => list::run(&at),
+        Command::StopAll(args) => order::run(&args, order::Order::StopAll),
+        Command::Latch(args) => order::run(&args, order::Order::Latch),
+        Command::Release(args) => order::run(&args, order::Order::Release),
+    }
+}
+
+impl At {
+    fn network(&self) -> Network {
+        self.via.clone().unwrap_or_else(remote::usual)
+    }
+}
+
+impl From<NetworkError> for Failure {
+    fn from(error: NetworkError) -> Self {
+        Failure::link(error.to_string()).trying("is a router or a node there? --via says where")
+    }
+}

@@ -1,0 +1,116 @@
+//! `motorlink fleet stop-all`, `latch` and `release`: one order to all nodes at the same time.
+
+use std::collections::BTreeSet;
+use std::thread;
+
+use motorlink_fleet::directory;
+use motorlink_fleet::key::Name;
+use motorlink_fleet::network::Network;
+use motorlink_fleet::remote::{self, Remote};
+use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::message::{Ask, StoppedMotor};
+use serde_json::json;
+
+use super::OrderArgs;
+use crate::advice;
+use crate::failure::Failure;
+use crate::output::print_line;
+use crate::share::{self, Connection};
+
+/// What all nodes are told.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    StopAll,
+    Latch,
+    Release,
+}
+
+pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
+    let network = args.at.network();
+    let names: BTreeSet<Name> = match args.nodes.is_empty() {
+        true => directory::nodes(&network)?.into_keys().collect(),
+        false => args.nodes.iter().cloned().collect(),
+    };
+    if names.is_empty() {
+        let none = Failure::link("no node is at this network, so nothing was sent");
+        return Err(none.trying("name the nodes that must answer with --node"));
+    }
+    let told: Vec<_> = names
+        .into_iter()
+        .map(|name| {
+            let (node, network) = (name.clone(), network.clone());
+            (name, thread::spawn(move || tell(&node, network, order)))
+        })
+        .collect();
+    let (mut is_done, mut away) = (true, Vec::new());
+    for (name, told) in told {
+        match told.join().unwrap_or_else(|_| Err("it could not be asked".to_owned())) {
+            Ok(motors) => is_done &= say(args, order, &name, motors)?,
+            Err(why) => {
+                let message = format!("node {name}: {why}");
+                match args.at.json {
+                    true => print_line(
+                        &json!({"event": "failed", "node": name.as_str(), "message": message}),
+                    )?,
+                    false => print_line(&message)?,
+                }
+                away.push(name.to_string());
+            }
+        }
+    }
+    match (away.is_empty(), is_done) {
+        (true, true) => Ok(()),
+        (true, false) => Err(Failure::link(share::UNCONFIRMED).trying(advice::STOP_AGAIN)),
+        (false, _) if order == Order::StopAll => {
+            let names = away.join(", ");
+            Err(Failure::link(format!("motors of {names} may still turn: no answer to the stop"))
+                .trying(advice::STOP_AGAIN))
+        }
+        (false, _) => Err(Failure::link(format!("no answer of {}", away.join(", ")))),
+    }
+}
+
+/// Gives the order to a node, and its answer.
+fn tell(node: &Name, network: Network, order: Order) -> Result<Vec<StoppedMotor>, String> {
+    let remote = Remote {
+        node: node.clone(),
+        network,
+        who: remote::own_name(),
+        deadline: remote::DEADLINE,
+        motion: None,
+        takes: false,
+        stops: order != Order::Release,
+    };
+    let socket = remote.connect().map_err(|error| error.to_string())?;
+    let failed = |error: std::io::Error| error.to_string();
+    let mut share = Connection::over(socket, "fleet").map_err(failed)?;
+    match order {
+        Order::Latch => share.ask(Ask::Latch).map(|_| Vec::new()).map_err(failed),
+        Order::Release => share.ask(Ask::Release).map(|_| Vec::new()).map_err(failed),
+        Order::StopAll => share.stop(true).map_err(failed),
+    }
+}
+
+/// Says what a node has done. Gives whether nothing is left to do.
+fn say(
+    args: &OrderArgs,
+    order: Order,
+    node: &Name,
+    motors: Vec<StoppedMotor>,
+) -> Result<bool, Failure> {
+    let (event, words) = match order {
+        Order::StopAll | Order::Latch => ("latched", "motion is refused until it is released"),
+        Order::Release => ("released", "motion is possible"),
+    };
+    let message = format!("{node}: {words}");
+    match args.at.json {
+        true => {
+            print_line(&json!({"event": event, "node": node.as_str(), "message": message}))?;
+        }
+        false => print_line(&message)?,
+    }
+    match order {
+        Order::StopAll => share::tell_stops(&motors, Some(node.as_str()), args.at.json),
+        Order::Latch | Order::Release => Ok(true),
+    }
+}

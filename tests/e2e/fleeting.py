@@ -1,0 +1,135 @@
+"""A program at a node, as docs/FLEET-PROTOCOL.md describes it, written for the tests alone."""
+
+import json
+import os
+import struct
+import threading
+import time
+
+import zenoh
+
+from sharing import samples
+
+
+def network(address):
+    """A Zenoh session that knows nothing but this address."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([address]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+class Member:
+    """A session at a node."""
+
+    def __init__(self, address, node, who="member", deadline=0.5, motion=None, joins=True):
+        self.zenoh = network(address)
+        self.base = f"motorlink/v1/{node}/node/ask"
+        self.who, self.session = who, os.urandom(8).hex()
+        self.last = self.urgent = self.pulls = self.ids = self.after = 0
+        self.deadline, self.alive = deadline, None
+        self.heard = []
+        if joins:
+            ask = {"ask": "join", "protocol": 1, "program": "test", "deadline": deadline}
+            joined = self.ask("see", ask if motion is None else {**ask, "motion": motion})
+            assert joined["kind"] == "joined", joined
+            self.boot, self.ahead = joined["boot"], joined["t"] - time.monotonic()
+
+    def ask(self, scope, ask, within=2.0, session=None):
+        """The first answer to a request; None: there is none."""
+        key = f"{self.base}/{scope}/{self.who}/{session or self.session}"
+        payload = ask if isinstance(ask, bytes) else json.dumps(ask).encode()
+        mode = zenoh.ConsolidationMode.NONE
+        for reply in self.zenoh.get(key, payload=payload, timeout=within, consolidation=mode):
+            if reply.ok is not None:
+                head = reply.ok.attachment
+                if head is None:
+                    return json.loads(reply.ok.payload.to_bytes())
+                self.take(reply.ok.payload.to_bytes())
+                return json.loads(head.to_bytes())
+        return None
+
+    def now(self):
+        """The clock of the node."""
+        return time.monotonic() + self.ahead
+
+    def post(self, scope="act", sent=None, number=None, boot=None, **request):
+        """Sends a request of a share; gives the node's answer, and the id."""
+        self.ids += 1
+        if number is None:
+            self.last += 1
+            number = self.last
+        body = {"boot": boot or self.boot, "number": number}
+        body["time_to_live"] = request.get("time_to_live", 1.0)
+        body["sent"] = self.now() if sent is None else sent
+        body["request"] = {"id": self.ids, **request}
+        return self.ask(scope, {"ask": "post", **body}), self.ids
+
+    def command(self, *code, line="st0", motor=1, within=1.0, **more):
+        """Posts a command; gives the answer of the share."""
+        wanted = {"ask": "command", "line": line, "motor": motor, "time_to_live": within}
+        taken, sent = self.post(**more, **wanted, bytes=list(code))
+        assert taken["kind"] == "taken", taken
+        return self.answer(sent)
+
+    def stop(self, motor=None, after=None):
+        """Sends a stop; gives the answer of the share."""
+        self.urgent += 1
+        self.ids += 1
+        request = {"id": self.ids, "ask": "stop"}
+        if motor:
+            request["motor"] = motor
+        post = {"boot": self.boot, "number": self.urgent, "sent": 0.0, "time_to_live": 1.0}
+        after = self.last if after is None else after
+        ask = {"ask": "urgent", "after": after, **post, "request": request}
+        assert self.ask("stop", ask)["kind"] == "taken"
+        return self.answer(self.ids)
+
+    def pull(self, wait=0.5):
+        """Takes what the share says."""
+        self.pulls += 1
+        ask = {"ask": "pull", "boot": self.boot, "number": self.pulls, "after": self.after}
+        answer = self.ask("see", {**ask, "wait": wait}, within=wait + 2)
+        if answer and answer["kind"] == "pulled":
+            self.after += answer["count"]
+        return answer
+
+    def take(self, stream):
+        while stream:
+            size, kind = struct.unpack_from("<IB3x", stream)
+            payload, stream = stream[8 : 8 + size], stream[8 + size :]
+            self.heard.append(json.loads(payload) if kind == 1 else samples(payload))
+
+    def answer(self, sent):
+        """The share's answer to a request."""
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            for said in self.heard:
+                if isinstance(said, dict) and said.get("id") == sent:
+                    self.heard.remove(said)
+                    return said
+            self.pull()
+        raise AssertionError(f"no answer to {sent}")
+
+    def lives(self):
+        """Gives signs of life from now on, in a thread."""
+        ask = {"ask": "alive", "boot": self.boot}
+
+        def give():
+            while self.alive:
+                self.ask("act", {**ask, "sent": self.now()}, within=0.5)
+                time.sleep(self.deadline / 5)
+
+        self.alive = threading.Thread(target=give, daemon=True)
+        self.alive.start()
+
+    def dies(self):
+        """Gives none any more."""
+        self.alive = None
+
+    def turn(self, rpm=1500):
+        """Turns ST motor 1."""
+        ramp = self.command(7, *struct.pack("<iH", rpm, 100))
+        start = self.command(3, 1)
+        assert {ramp["kind"], start["kind"]} == {"answer"}, (ramp, start)

@@ -1,0 +1,279 @@
+"""`motorlink node`: drives at another computer. The programs of the tests speak the messages themselves.
+
+ROUNDS=30 pytest tests/e2e/test_node.py -s    kills, freezes and delays each program 30 times, with times.
+"""
+
+import json
+import os
+import random
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fleeting import Member, network
+from program import eventually
+from sharing import Client, samples
+from test_json import check
+
+#: Programs that are killed.
+ROUNDS = int(os.environ.get("ROUNDS", "3"))
+RAMP = (7, *struct.pack("<iH", 1500, 100))
+START = (3, 1)
+
+#: A program that turns ST motor 1 of the node, and gives signs of life until it is killed.
+TURNS = """
+import sys, time
+sys.path.insert(0, sys.argv[2])
+from fleeting import Member
+member = Member(sys.argv[1], "arm1", who="turns", deadline=float(sys.argv[3]))
+member.lives()
+member.turn()
+print("turning", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.fixture
+def nodes(start, sim, tmp_path):
+    """`nodes("arm1", ...)`: a node of simulated drives; further ones connect to the first."""
+    started = []
+
+    def nodes(name, *more):
+        drives = sim(st=[f"pty:{tmp_path}/{name}.st"], rmd=[f"slcan-pty:{tmp_path}/{name}.can"])
+        path = tmp_path / f"{name}.share"
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", *more]
+        at = ["--connect", started[0].address] if started else ["--listen", "tcp/127.0.0.1:0"]
+        running = start("node", *words, *at, "--name", name, "--timeout", "5s", "--json")
+        ready = json.loads(running.line(0))
+        check(running.line(0))
+        assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]
+        running.path, running.address = path, ready["addresses"][0]
+        started.append(running)
+        return running
+
+    return nodes
+
+
+@pytest.fixture
+def node(nodes):
+    """A node with the name arm1."""
+    return nodes("arm1")
+
+
+@pytest.fixture
+def direct(node):
+    """A program at the share of the node, which knows how the motors turn."""
+    return Client(node.path, "looks")
+
+
+def stands(direct):
+    eventually(lambda: abs(direct.rpm()) < 30, "motor 1 at rest", within=20)
+
+
+def turns(direct):
+    eventually(lambda: direct.rpm() > 1400, "motor 1 at speed", within=20)
+
+
+def via(node):
+    return {"MOTORLINK_NETWORK": node.address}
+
+
+def program(node, deadline):
+    words = [sys.executable, "-c", TURNS, node.address, str(Path(__file__).parent), str(deadline)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "turning\n"
+    return process
+
+
+def test_the_command_line_uses_a_node_as_a_port(node, run, tmp_path):
+    port = ["-p", "zenoh:arm1/st0"]
+    speed = run("st", *port, "get", "SPEED_MEAS", "--json", **via(node)).ended(0)
+    check(speed.out)
+    assert abs(speed.values["SPEED_MEAS"]) < 30
+    run("st", *port, "set", "SPEED_KP", "123", **via(node)).ended(0)
+    dump = run("st", *port, "dump", **via(node)).ended(0)
+    assert "SPEED_KP" in dump.out and "123" in dump.out
+    named = f"zenoh:arm1/rmd0?via={node.address}"
+    assert "temperature" in run("rmd", "-p", named, "--id", "2", "status").ended(0).out
+    rows = run("st", *port, "get", "SPEED_MEAS", "--every", "20ms", "--count", "20", **via(node))
+    assert len(rows.ended(0).out.splitlines()) >= 20
+    refused = run("st", *port, "set", "SPEED_MEAS", "1", **via(node))
+    assert refused.code != 0
+
+
+def test_errors_say_whether_the_node_the_line_or_the_drive_is_at_fault(nodes, run, sim):
+    node = nodes("arm1")
+    away = run("st", "-p", "zenoh:arm9/st0", "get", "SPEED_MEAS", **via(node)).ended(3)
+    assert "no node arm9 answers" in away.err and "motorlink node" in away.err
+    nobody = run("st", "-p", "zenoh:arm1/st0?via=tcp/127.0.0.1:1", "get", "SPEED_MEAS").ended(3)
+    assert "nothing answers at tcp/127.0.0.1:1" in nobody.err
+    line = run("st", "-p", "zenoh:arm1/st4", "get", "SPEED_MEAS", **via(node)).ended(3)
+    assert "its lines are st0, rmd0" in line.err
+    raw = run("st", "-p", "zenoh:arm1/st0?raw", "get", "SPEED_MEAS", **via(node)).ended(2)
+    assert "no raw bytes" in raw.err
+    node.end()
+    gone = run("st", "-p", "zenoh:arm1/st0", "get", "SPEED_MEAS", **via(node)).ended(3)
+    assert "no node arm1 can be reached" in gone.err
+
+
+def test_a_fleet_is_listed_and_stopped_and_latched_until_it_is_released(nodes, run):
+    first, second = nodes("arm1"), nodes("arm2")
+    looks = [Client(it.path, "looks") for it in (first, second)]
+    members = [Member(first.address, name, deadline=10) for name in ("arm1", "arm2")]
+    for member, look in zip(members, looks):
+        member.turn()
+        turns(look)
+    listed = run("fleet", "list", "--json", **via(first)).ended(0)
+    check(listed.out)
+    assert [it["node"] for it in listed.lines] == ["arm1", "arm2"]
+    assert [it["line"] for it in listed.lines[0]["lines"]] == ["st0", "rmd0"]
+    stopped = run("fleet", "stop-all", "--json", within=60, **via(first)).ended(0)
+    check(stopped.out)
+    for name, look in zip(("arm1", "arm2"), looks):
+        stands(look)
+        confirmed = {"event": "stopped", "node": name, "line": "st0", "motor": 1}
+        assert any(confirmed.items() <= it.items() for it in stopped.lines)
+    port = ["-p", "zenoh:arm2/st0?take"]
+    latched = run("st", *port, "start", **via(first)).ended(1)
+    assert "latched" in latched.err and "fleet release" in latched.err
+    # A node that must answer and is not there.
+    missing = run("fleet", "stop-all", "--node", "arm1", "--node", "arm9", within=60, **via(first))
+    assert "arm9" in missing.ended(3).err
+    run("fleet", "release", **via(first)).ended(0)
+    assert members[1].command(*RAMP)["kind"] == "answer"
+
+
+@pytest.mark.parametrize("deadline", [0.3, 1.0])
+@pytest.mark.parametrize("how", ["killed", "frozen"])
+def test_the_motor_of_a_program_that_is_lost_stops(node, direct, how, deadline):
+    times = []
+    for _ in range(ROUNDS):
+        process = program(node, deadline)
+        try:
+            turns(direct)
+            time.sleep(random.uniform(0, 0.2))
+            began = time.monotonic()
+            process.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+            eventually(lambda: direct.rpm() < 1300, "a motor that stops", within=20)
+            times.append(time.monotonic() - began)
+            stands(direct)
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+    print(f"\n{how}, deadline {deadline} s: {sorted(round(it, 3) for it in times)}")
+
+
+def test_a_frozen_node_carries_out_no_old_motion(node, direct):
+    member = Member(node.address, "arm1", deadline=10)
+    member.command(*RAMP)
+    node.process.send_signal(signal.SIGSTOP)
+    try:
+        # Until the node answers, this asks.
+        wanted = {"ask": "command", "line": "st0", "motor": 1, "bytes": [3, 1], "time_to_live": 0.5}
+        member.last += 1
+        post = {"ask": "post", "boot": member.boot, "number": member.last, "sent": member.now()}
+        post |= {"time_to_live": 0.5, "request": {"id": 999, **wanted}}
+        assert member.ask("act", post, within=1.5) is None
+    finally:
+        node.process.send_signal(signal.SIGCONT)
+    refusal = member.answer(999)
+    assert refusal["reason"] == "expired", refusal
+    stands(direct)
+
+
+def test_requests_that_are_late_doubled_wrong_or_of_others_move_nothing(node, direct):
+    member = Member(node.address, "arm1", who="alice", deadline=10)
+    assert member.command(*RAMP)["kind"] == "answer"
+    start = {"ask": "command", "line": "st0", "motor": 1, "bytes": [3, 1], "time_to_live": 1.0}
+    # Too old; the node's clock decides.
+    _, old = member.post(sent=member.now() - 2, **start)
+    assert member.answer(old)["reason"] == "expired"
+    # A number that has been, one that is too early, another run of the node.
+    assert member.post(number=1, **start)[0]["kind"] == "taken"
+    assert member.post(number=member.last + 5, **start)[0]["next"] == member.last + 1
+    assert member.post(number=member.last + 1, boot="0" * 16, **start)[0]["kind"] == "over"
+    # A key that is for something else.
+    for scope in ("see", "stop"):
+        answer, _ = member.post(scope, number=member.last + 1, **start)
+        assert answer["kind"] == "refused" and "act" in answer["why"], answer
+    # Somebody else's session, and one that is none.
+    other = Member(node.address, "arm1", who="bob", joins=False)
+    other.boot, other.ahead = member.boot, member.ahead
+    body = {"ask": "post", "boot": member.boot, "number": member.last + 1, "sent": member.now()}
+    body |= {"time_to_live": 1.0, "request": {"id": 1, **start}}
+    stolen = other.ask("act", body, session=member.session)
+    assert stolen["kind"] == "refused" and "somebody else" in stolen["why"], stolen
+    assert other.ask("act", body)["kind"] == "over"
+    # What was sent before a stop comes after it.
+    member.stop({"line": "st0", "motor": 1}, after=member.last + 1)
+    _, overtaken = member.post(**start)
+    assert member.answer(overtaken)["reason"] == "overtaken"
+    chance = random.Random(20261127)
+    for _ in range(200):
+        noise = chance.randbytes(chance.randrange(200))
+        answer = member.ask(chance.choice(["see", "stop", "act"]), noise)
+        assert answer["kind"] == "refused", answer
+    stands(direct)
+    assert not any("START" in line for line in node.out)
+    # The session goes on.
+    assert member.command(*START)["kind"] == "answer"
+    turns(direct)
+
+
+def test_a_node_says_what_its_motors_do_to_whoever_listens(node, direct):
+    zenoh = network(node.address)
+    heard = {}
+
+    def listen(sample):
+        heard.setdefault(str(sample.key_expr), []).append(sample.payload.to_bytes())
+
+    zenoh.declare_subscriber("motorlink/v1/**", listen)
+    key = "motorlink/v1/arm1/st0/1/samples"
+    eventually(lambda: len(heard.get(key, [])) > 5, "samples of motor 1", within=20)
+    (reply,) = zenoh.get("motorlink/v1/arm1/st0/1/columns")
+    columns = json.loads(reply.ok.payload.to_bytes())
+    names = [column["name"] for column in columns["columns"]]
+    assert {"SPEED_MEAS", "TORQUE_MEAS", "STATUS", "FLAGS"} <= set(names)
+    *_, values = samples(heard[key][-1])
+    assert len(values) == 2 + len(names)
+    state = "motorlink/v1/arm1/node/state"
+    eventually(lambda: heard.get(state), "the state", within=20)
+    assert json.loads(heard[state][-1])["node"] == "arm1"
+    member = Member(node.address, "arm1")
+    member.turn()
+    events = "motorlink/v1/arm1/st0/events"
+    eventually(lambda: any(b"START_MOTOR" in it for it in heard.get(events, [])), "the event")
+    # It gives no sign of life.
+    stands(direct)
+    eventually(lambda: any(b"no sign of life" in it for it in heard.get(events, [])), "the reason")
+    zenoh.close()
+
+
+def test_limits_of_the_file_hold_for_all_programs(nodes, run, tmp_path):
+    file = tmp_path / "node.toml"
+    file.write_text("[limits.st]\nspeed_rpm = 1000\n\n[limits.rmd]\nspeed_dps = 100.0\n")
+    node = nodes("arm1", "--config", file)
+    st, rmd = ["-p", "zenoh:arm1/st0"], ["-p", "zenoh:arm1/rmd0"]
+    refused = run("st", *st, "ramp", "1500", "1s", **via(node))
+    assert refused.code != 0 and "1000" in refused.err, refused.err
+    run("st", *st, "ramp", "900", "1s", **via(node)).ended(0)
+    refused = run("rmd", *rmd, "--id", "2", "speed", "360", **via(node))
+    assert refused.code != 0 and "100" in refused.err, refused.err
+    file.write_text("[limits.st]\nspeed = 1000\n")
+    bad = run("node", "-p", "sim:", "--config", file, "--listen", "tcp/127.0.0.1:0").ended(2)
+    assert "speed" in bad.err
+
+
+def test_two_nodes_with_one_name_and_a_network_that_is_not_there(nodes, run):
+    first = nodes("arm1")
+    words = ["node", "-p", "sim:", "--name", "arm1", "--connect", first.address]
+    assert "another node" in run(*words).ended(3).err
+    nobody = run("node", "-p", "sim:", "--connect", "tcp/127.0.0.1:1").ended(3)
+    assert "nothing answers at tcp/127.0.0.1:1" in nobody.err
+    assert run("node", "-p", "sim:", "--name", "a/b").code == 2
