@@ -61,10 +61,13 @@ test: toolchain $(if $(SUDO),packages) ## 25 min: all parts below; PARTS="unit e
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
-check: toolchain ## 1 min: format, clippy and the quick tests, while you work
+# Zenoh takes minutes to build.
+WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python --exclude motorlink-bench \
+	--no-default-features --features motorlink-cli/monitor,motorlink-monitor/typescript
+check: toolchain ## 1 min: format, clippy and the quick tests, while you work; not the network of nodes
 	$(CARGO) fmt --all --check
-	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
-	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
+	$(CARGO) clippy $(WITHOUT_NETWORK) --all-targets --locked -- -D warnings
+	$(CARGO) test $(WITHOUT_NETWORK) --locked --quiet --lib --bins --tests -- $(QUICK)
 
 flakes: PARTS = $(TIMED)
 flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs

@@ -6,7 +6,7 @@ A block is fenced and names its language. A word after the language says how it 
 |---|---|
 | `sh` | each line runs and ends with 0, or with N where it ends in `# exit N` |
 | `sh skip=REASON` | not run; `REASON` is one of `SKIPS` |
-| `python` | all blocks of a page run in order in one process, beside the guards and shares that its `sh` blocks start |
+| `python` | all blocks of a page run in order in one process, beside the guards, shares and nodes that its `sh` blocks start |
 | `python pytest` | runs as a test file |
 | `c`, `rust` | a program: it compiles without a warning and runs |
 | `toml scenario`, `toml config` | `motorlink sim run` plays it, `motorlink sim` serves it |

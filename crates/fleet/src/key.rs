@@ -10,11 +10,11 @@ const WHOLE: &str = "node";
 /// The longest name of a node or a program, in bytes.
 pub const LONGEST: usize = 40;
 
-/// The name of a node, or of whoever uses one: a part of keys.
+/// The name of a node, or of the user of one: a part of keys.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Name(String);
 
-/// A text is no name.
+/// A text that cannot be a name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a name has 1 to {LONGEST} letters, digits, `-`, `_` and `.`")]
 pub struct BadName;

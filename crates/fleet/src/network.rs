@@ -30,7 +30,7 @@ pub enum Network {
     File(PathBuf),
 }
 
-/// Why there is no network.
+/// Why the network cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
     /// Nothing is at the addresses.
@@ -43,11 +43,11 @@ pub enum NetworkError {
 
 /// A text says nothing about a network.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is no address such as {USUAL} and no file that ends with .json5")]
+#[error("{0} is neither an address such as {USUAL} nor a file that ends with .json5")]
 pub struct BadNetwork(String);
 
 impl Network {
-    /// What a node does that was told nothing: the first one of a computer listens, the others connect to it.
+    /// The network of a node without options: the first node of a computer listens, the others connect to it.
     pub fn usual() -> Self {
         let own = vec![USUAL.to_owned()];
         match TcpListener::bind(USUAL_SOCKET) {
@@ -95,7 +95,7 @@ impl Network {
 
 /// What holds without a file.
 fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
-    // Nobody is found who was not named.
+    // Only the given addresses are used.
     config.insert_json5("scouting/multicast/enabled", "false")?;
     config.insert_json5("scouting/gossip/enabled", "false")?;
     // A network that was cut is there again soon. What must happen in time does not depend on it.

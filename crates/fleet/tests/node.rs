@@ -105,7 +105,7 @@ fn a_network_that_is_cut_stops_the_motor_at_the_deadline() {
     let why = left(&mut witness);
     assert!(why.starts_with("no sign of life for"), "{why}");
     println!("stands after {:?}: {why}", began.elapsed());
-    // The program is told, and a command that waited in the cable moves nothing.
+    // The program gets an error, and a command that waited in the cable moves nothing.
     let failed = client.motor(1).unwrap().start().unwrap_err();
     assert!(failed.to_string().contains("does not answer"), "{failed}");
     cable.mend();

@@ -34,8 +34,8 @@ for `motorlink share`.
 
 Network: without --listen, --connect and --network the first node of a computer listens at \
 tcp/127.0.0.1:7447, for programs of this computer only, and further nodes connect to it. \
---listen tcp/0.0.0.0:7447 lets other computers connect. There is no access control then: whoever \
-reaches the address moves motors. A Zenoh configuration with TLS and access control is given with \
+--listen tcp/0.0.0.0:7447 lets other computers connect. There is no access control then: \
+everybody who reaches the address can move motors. A Zenoh configuration with TLS and access control is given with \
 --network.
 
 Safety: a command that comes later than its time to live is not sent. A motor that a program of another \
@@ -137,7 +137,7 @@ fn start(server: &mut Server, options: Options) -> Result<Option<Node>, Failure>
         if interrupted() {
             return Ok(None);
         }
-        // That the node itself has joined is no news.
+        // The events of this moment are about the node itself.
         server.turn()?;
     }
     match starting.join() {

@@ -17,7 +17,7 @@ const ANSWER: Duration = Duration::from_secs(5);
 pub struct Connection {
     socket: UnixStream,
     dialogue: Dialogue,
-    /// The ends of requests that nobody has waited for yet.
+    /// Answers that came before they were asked for with `answer`.
     ended: BTreeMap<u32, Result<Answer, Refusal>>,
     /// Why the share closes the connection.
     closing: Option<String>,

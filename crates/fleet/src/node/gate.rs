@@ -180,7 +180,7 @@ impl Gate {
     }
 }
 
-/// Nothing was sent in the future. What is no time was sent long ago.
+/// When a request was sent, at most now. NaN counts as long ago.
 fn past(now: f64, sent: f64) -> f64 {
     if sent.is_nan() { f64::NEG_INFINITY } else { sent.min(now) }
 }

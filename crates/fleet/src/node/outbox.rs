@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use motorlink_telemetry::share::frame::{self, Frame};
 
-/// No more is read from the share while this much waits: its own queues drop samples then, and say so.
+/// While this much waits, the share is not read: its own queues drop samples then, and count them.
 const FULL: usize = 1 << 20;
 /// The most in one answer, unless one message is longer.
 const ANSWER: usize = 1 << 18;

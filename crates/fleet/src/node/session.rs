@@ -148,7 +148,9 @@ impl Session {
             Ask::Urgent { after, post } => {
                 let kind = self.common.lines().kind(&post.request.ask);
                 if kind != Kind::Stops || scope < Scope::Stop {
-                    let why = "this is no stop, or its key is not for stops".to_owned();
+                    let why =
+                        "an urgent request is a stop or a latch, with a key of `stop` or `act`"
+                            .to_owned();
                     answer(&query, &Answer::Refused { t: now, why });
                 } else {
                     let verdict = self.gate.urgent(now, after, post);

@@ -1,4 +1,4 @@
-//! The sessions of a node, and what they are told.
+//! The sessions of a node, and what their tasks receive.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -20,7 +20,7 @@ pub(super) struct Open {
     pub(super) asked: Sender<Asked>,
 }
 
-/// What a session is told.
+/// What the task of a session receives.
 pub(super) enum Asked {
     /// A query of the program.
     Query(Box<Asking>),

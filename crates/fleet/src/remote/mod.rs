@@ -32,7 +32,7 @@ pub struct Remote {
     pub node: Name,
     /// The way to it.
     pub network: Network,
-    /// Who uses it: the name that stands in keys and in the log of the node.
+    /// The name of the user, for keys and the log of the node.
     pub who: Name,
     /// Its motors stop if the node gets no sign of life for this time.
     pub deadline: Duration,

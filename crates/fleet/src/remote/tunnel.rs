@@ -65,7 +65,7 @@ impl Drop for Counted {
     }
 }
 
-/// Which node, and what it is told.
+/// The node, and the values of `join`.
 pub(super) struct Whom {
     pub(super) node: Name,
     pub(super) who: Name,

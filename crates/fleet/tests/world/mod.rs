@@ -72,7 +72,7 @@ pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// TCP connections to an address, which can be cut: nothing passes, and nobody is told.
+/// TCP connections to an address. While they are cut they stay open, and nothing passes.
 pub struct Cable {
     pub address: String,
     is_cut: Arc<AtomicBool>,

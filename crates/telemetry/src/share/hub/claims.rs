@@ -49,7 +49,7 @@ impl Hub {
         motor: &MotorName,
     ) -> Result<Option<Answer>, Refused> {
         let Some(length) = self.lease else {
-            return Err(usage("motors of this share belong to whoever commands them last"));
+            return Err(usage("this share has no leases: each program may command each motor"));
         };
         let (line, motor) = self.motor(motor)?;
         let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };

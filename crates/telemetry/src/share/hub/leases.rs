@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::place::SessionId;
 
-/// A program may change a motor, and nobody else. It ends by itself.
+/// Only this program may change a motor. It ends by itself.
 pub(super) struct Lease {
     pub(super) session: SessionId,
     pub(super) name: Arc<str>,

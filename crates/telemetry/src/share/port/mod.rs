@@ -30,7 +30,7 @@ pub fn place_of(name: &str) -> Option<(PathBuf, String)> {
     Some((path.into(), line.to_owned()))
 }
 
-/// The port of a line of the share at an address. `None`: this is no name of a line.
+/// The port of a line of the share at an address. `None`: no line can have this name.
 pub fn line_port(at: Arc<dyn Address>, line: &str) -> Option<PortName> {
     let protocol = [Protocol::St, Protocol::Rmd]
         .into_iter()

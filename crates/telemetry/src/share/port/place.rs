@@ -22,7 +22,7 @@ impl Place {
         self.at.port(&self.line)
     }
 
-    /// Why there is no connection.
+    /// The error of a connection that failed.
     pub(super) fn unreachable(&self, error: Unreachable) -> PortError {
         match error {
             Unreachable::Missing(why) => self.missing(why),
