@@ -37,6 +37,8 @@ RMD = [
 ]
 #: What a running share is asked for.
 SHARE = ["stop", "latch", "release"]
+#: test_node.py checks their lines.
+FLEET = ["list", "stop-all", "latch", "release"]
 #: Captures, in hexadecimal.
 DECODE = {
     "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 0f", "29 01 02 2c"],
@@ -93,7 +95,8 @@ def test_every_subcommand_is_tested_here(run):
     assert subcommands(run, "rmd") == {word(command) for command in [*RMD, *FILES]}
     others = {"demo", "watch", "spec", "completions", "man", *(word(command) for command in RECORDINGS)}
     assert subcommands(run, "share") == set(SHARE)
-    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "monitor", "record", "replay", "conformance", "decode"} | others
+    assert subcommands(run, "fleet") == set(FLEET)
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "share", "node", "fleet", "monitor", "record", "replay", "conformance", "decode"} | others
 
 
 @pytest.mark.parametrize("protocol", DECODE)

@@ -27,7 +27,7 @@ impl Scheme for Zenoh {
     fn forms(&self) -> &'static [Form] {
         &[Form {
             text: "zenoh:NODE/LINE",
-            help: "a line of a `motorlink node`, also of another computer",
+            help: "a line of a running `motorlink node`",
             carries: Carries::Both,
         }]
     }
