@@ -20,12 +20,25 @@ def network(address):
     return zenoh.open(config)
 
 
+def runs(zenoh, node, within=10):
+    """The runs of the nodes with this name. It is waited for one."""
+    end = time.monotonic() + within
+    while True:
+        tokens = zenoh.liveliness().get(f"motorlink/v1/{node}/node/alive/*")
+        found = [str(it.ok.key_expr).rsplit("/", 1)[1] for it in tokens if it.ok is not None]
+        if found or time.monotonic() > end:
+            return found
+        time.sleep(0.05)
+
+
 class Member:
     """A session at a node."""
 
     def __init__(self, address, node, who="member", deadline=0.5, motion=None, joins=True):
         self.zenoh = network(address)
-        self.base = f"motorlink/v1/{node}/node/ask"
+        (self.boot,) = runs(self.zenoh, node)
+        self.node = node
+        self.base = f"motorlink/v1/{node}/node/ask/{self.boot}"
         self.who, self.session = who, os.urandom(8).hex()
         self.last = self.urgent = self.pulls = self.ids = self.after = 0
         self.deadline, self.alive = deadline, None
@@ -34,7 +47,7 @@ class Member:
             ask = {"ask": "join", "protocol": 1, "program": "test", "deadline": deadline}
             joined = self.ask("see", ask if motion is None else {**ask, "motion": motion})
             assert joined["kind"] == "joined", joined
-            self.boot, self.ahead = joined["boot"], joined["t"] - time.monotonic()
+            self.ahead = joined["t"] - time.monotonic()
 
     def ask(self, scope, ask, within=2.0, session=None):
         """The first answer to a request; None: there is none."""
@@ -54,13 +67,13 @@ class Member:
         """The clock of the node."""
         return time.monotonic() + self.ahead
 
-    def post(self, scope="act", sent=None, number=None, boot=None, **request):
+    def post(self, scope="act", sent=None, number=None, **request):
         """Sends a request of a share; gives the node's answer, and the id."""
         self.ids += 1
         if number is None:
             self.last += 1
             number = self.last
-        body = {"boot": boot or self.boot, "number": number}
+        body = {"number": number}
         body["time_to_live"] = request.get("time_to_live", 1.0)
         body["sent"] = self.now() if sent is None else sent
         body["request"] = {"id": self.ids, **request}
@@ -80,7 +93,7 @@ class Member:
         request = {"id": self.ids, "ask": "stop"}
         if motor:
             request["motor"] = motor
-        post = {"boot": self.boot, "number": self.urgent, "sent": 0.0, "time_to_live": 1.0}
+        post = {"number": self.urgent, "sent": 0.0, "time_to_live": 1.0}
         after = self.last if after is None else after
         ask = {"ask": "urgent", "after": after, **post, "request": request}
         assert self.ask("stop", ask)["kind"] == "taken"
@@ -89,7 +102,7 @@ class Member:
     def pull(self, wait=0.5):
         """Takes what the share says."""
         self.pulls += 1
-        ask = {"ask": "pull", "boot": self.boot, "number": self.pulls, "after": self.after}
+        ask = {"ask": "pull", "number": self.pulls, "after": self.after}
         answer = self.ask("see", {**ask, "wait": wait}, within=wait + 2)
         if answer and answer["kind"] == "pulled":
             self.after += answer["count"]
@@ -114,11 +127,10 @@ class Member:
 
     def lives(self):
         """Gives signs of life from now on, in a thread."""
-        ask = {"ask": "alive", "boot": self.boot}
 
         def give():
             while self.alive:
-                self.ask("act", {**ask, "sent": self.now()}, within=0.5)
+                self.ask("act", {"ask": "alive", "sent": self.now()}, within=0.5)
                 time.sleep(self.deadline / 5)
 
         self.alive = threading.Thread(target=give, daemon=True)

@@ -169,6 +169,30 @@ def test_the_motor_of_a_program_that_is_lost_stops(node, direct, how, deadline):
     print(f"\n{how}, deadline {deadline} s: {sorted(round(it, 3) for it in times)}")
 
 
+@pytest.mark.parametrize("asks", [{"ask": "lines"}, {"ask": "command", "line": "st0", "motor": 1,
+                                   "bytes": list(RAMP), "time_to_live": 1.0}], ids=["reads", "ramps"])
+def test_the_motor_of_a_program_that_takes_no_answers_stops(node, direct, asks):
+    member = Member(node.address, "arm1", who="mute", deadline=1.0)
+    member.lives()
+    member.turn()
+    turns(direct)
+    # It asks on, and pulls nothing.
+    for _ in range(6000 if asks["ask"] == "lines" else 2000):
+        answer, _ = member.post(**asks)
+        if answer is None or answer["kind"] == "over":
+            break
+    member.dies()
+    stands(direct)
+
+
+def test_a_fleet_is_listed_as_it_is_now(node, run):
+    for _ in range(5):
+        run("fleet", "latch", **via(node)).ended(0)
+        assert run("fleet", "list", "--json", **via(node)).ended(0).json["latched_by"]
+        run("fleet", "release", **via(node)).ended(0)
+        assert run("fleet", "list", "--json", **via(node)).ended(0).json["latched_by"] is None
+
+
 def test_a_frozen_node_carries_out_no_old_motion(node, direct):
     member = Member(node.address, "arm1", deadline=10)
     member.command(*RAMP)
@@ -177,7 +201,7 @@ def test_a_frozen_node_carries_out_no_old_motion(node, direct):
         # Until the node answers, this asks.
         wanted = {"ask": "command", "line": "st0", "motor": 1, "bytes": [3, 1], "time_to_live": 0.5}
         member.last += 1
-        post = {"ask": "post", "boot": member.boot, "number": member.last, "sent": member.now()}
+        post = {"ask": "post", "number": member.last, "sent": member.now()}
         post |= {"time_to_live": 0.5, "request": {"id": 999, **wanted}}
         assert member.ask("act", post, within=1.5) is None
     finally:
@@ -194,22 +218,28 @@ def test_requests_that_are_late_doubled_wrong_or_of_others_move_nothing(node, di
     # Too old; the node's clock decides.
     _, old = member.post(sent=member.now() - 2, **start)
     assert member.answer(old)["reason"] == "expired"
-    # A number that has been, one that is too early, another run of the node.
+    # A number that has been, and one that is too early.
     assert member.post(number=1, **start)[0]["kind"] == "taken"
     assert member.post(number=member.last + 5, **start)[0]["next"] == member.last + 1
-    assert member.post(number=member.last + 1, boot="0" * 16, **start)[0]["kind"] == "over"
     # A key that is for something else.
     for scope in ("see", "stop"):
         answer, _ = member.post(scope, number=member.last + 1, **start)
         assert answer["kind"] == "refused" and "act" in answer["why"], answer
     # Somebody else's session, and one that is none.
     other = Member(node.address, "arm1", who="bob", joins=False)
-    other.boot, other.ahead = member.boot, member.ahead
-    body = {"ask": "post", "boot": member.boot, "number": member.last + 1, "sent": member.now()}
+    body = {"ask": "post", "number": member.last + 1, "sent": member.now()}
     body |= {"time_to_live": 1.0, "request": {"id": 1, **start}}
     stolen = other.ask("act", body, session=member.session)
     assert stolen["kind"] == "refused" and "somebody else" in stolen["why"], stolen
     assert other.ask("act", body)["kind"] == "over"
+    # Another right or another name behind those that access control sees.
+    for tail in (f"act/alice/{member.session}", f"x/{member.session}"):
+        assert other.ask("see", body, session=tail) is None
+    # A stranger's word that the program is gone.
+    token = f"motorlink/v1/arm1/node/here/{member.boot}/bob/{member.session}"
+    other.zenoh.liveliness().declare_token(token).undeclare()
+    huge = member.ask("act", b" " * 200_000)
+    assert huge["kind"] == "refused" and "bytes" in huge["why"], huge
     # What was sent before a stop comes after it.
     member.stop({"line": "st0", "motor": 1}, after=member.last + 1)
     _, overtaken = member.post(**start)

@@ -10,9 +10,20 @@ const WHOLE: &str = "node";
 /// The longest name of a node or a program, in bytes.
 pub const LONGEST: usize = 40;
 
-/// The name of a node, or of the user of one: a part of keys.
+/// The name of a node, of its run, of a user or of a session: a part of keys.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Name(String);
+
+impl Name {
+    /// A name that nobody can guess.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn random() -> std::io::Result<Self> {
+        let number = getrandom::u64().map_err(std::io::Error::other)?;
+        Ok(Name(format!("{number:016x}")))
+    }
+}
 
 /// A text that cannot be a name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -77,44 +88,49 @@ impl Scope {
     }
 }
 
-/// That a node is there: a liveliness token.
-pub fn alive(node: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/alive")
+/// That a node is there, and its run: a liveliness token.
+pub fn alive(node: &Name, boot: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/alive/{boot}")
+}
+
+/// Those of all nodes with a name. There should be one.
+pub fn alive_of(node: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/alive/*")
 }
 
 /// Those of all nodes.
 pub fn all_alive() -> String {
-    format!("{ROOT}/*/{WHOLE}/alive")
+    format!("{ROOT}/*/{WHOLE}/alive/*")
 }
 
 /// What a node says of itself: a query.
-pub fn info(node: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/info")
+pub fn info(node: &Name, boot: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/info/{boot}")
 }
 
 /// That of all nodes.
 pub fn all_info() -> String {
-    format!("{ROOT}/*/{WHOLE}/info")
+    format!("{ROOT}/*/{WHOLE}/info/*")
 }
 
 /// The requests of a program: queries.
-pub fn ask(node: &Name, scope: Scope, who: &Name, session: &str) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/ask/{}/{who}/{session}", scope.word())
+pub fn ask(node: &Name, boot: &Name, scope: Scope, who: &Name, session: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/ask/{boot}/{}/{who}/{session}", scope.word())
 }
 
 /// The requests of all programs.
-pub fn all_asks(node: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/ask/**")
+pub fn all_asks(node: &Name, boot: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/ask/{boot}/*/*/*")
 }
 
 /// That a program is there: a liveliness token.
-pub fn here(node: &Name, who: &Name, session: &str) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/here/{who}/{session}")
+pub fn here(node: &Name, boot: &Name, who: &Name, session: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/here/{boot}/{who}/{session}")
 }
 
 /// Those of all programs.
-pub fn all_here(node: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/here/*/*")
+pub fn all_here(node: &Name, boot: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/here/{boot}/*/*")
 }
 
 /// Events of the node, or of a line.
@@ -149,45 +165,73 @@ pub struct Asker {
     pub scope: Scope,
     /// Who it is.
     pub who: Name,
-    /// The number of the session.
-    pub session: String,
+    /// The session.
+    pub session: Name,
 }
 
 impl Asker {
-    /// Reads the end of a key that [`ask`] made.
+    /// Reads a key that [`ask`] made.
     pub fn of(key: &str) -> Option<Self> {
-        let mut parts = key.rsplit('/');
-        let (session, who, scope) = (parts.next()?, parts.next()?, parts.next()?);
+        let [ASK, _, scope, who, session] = behind_node(key)?[..] else { return None };
         let scope = Scope::ALL.into_iter().find(|it| it.word() == scope)?;
-        Some(Asker { scope, who: who.parse().ok()?, session: session.to_owned() })
+        Some(Asker { scope, who: who.parse().ok()?, session: session.parse().ok()? })
     }
 }
 
-/// The node in a key.
-pub fn node_of(key: &str) -> Option<Name> {
-    key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?.parse().ok()
+const ASK: &str = "ask";
+
+/// The node and its run, in a key that [`alive`] or [`info`] made.
+pub fn run_of(key: &str) -> Option<(Name, Name)> {
+    let node = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;
+    let [_, boot] = behind_node(key)?[..] else { return None };
+    Some((node.parse().ok()?, boot.parse().ok()?))
 }
 
 /// Who is there, and in which session, in a key that [`here`] made.
-pub fn session_of(key: &str) -> Option<&str> {
-    key.rsplit('/').next()
+pub fn present_of(key: &str) -> Option<(Name, Name)> {
+    let [_, _, who, session] = behind_node(key)?[..] else { return None };
+    Some((who.parse().ok()?, session.parse().ok()?))
+}
+
+/// The parts of a key that is about a whole node, behind its name.
+fn behind_node(key: &str) -> Option<Vec<&str>> {
+    let mut parts = key.strip_prefix(ROOT)?.split('/').skip(2);
+    (parts.next()? == WHOLE).then(|| parts.collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn name(text: &str) -> Name {
+        text.parse().unwrap()
+    }
+
     #[test]
     fn who_asks_stands_in_the_key() {
-        let (node, who): (Name, Name) = ("arm1".parse().unwrap(), "alice".parse().unwrap());
+        let (node, boot, who) = (name("arm1"), name("5d"), name("alice"));
         for scope in Scope::ALL {
-            let key = ask(&node, scope, &who, "7f");
-            let asker = Asker { scope, who: who.clone(), session: "7f".to_owned() };
+            let key = ask(&node, &boot, scope, &who, &name("7f"));
+            let asker = Asker { scope, who: who.clone(), session: name("7f") };
             assert_eq!(Asker::of(&key), Some(asker), "{key}");
-            assert_eq!(node_of(&key), Some(node.clone()));
         }
-        assert_eq!(Asker::of("motorlink/v1/arm1/node/ask/own/alice/7f"), None);
-        assert_eq!(Asker::of("alice/7f"), None);
+        let (alive, here) = (alive(&node, &boot), here(&node, &boot, &who, &name("7f")));
+        assert_eq!(run_of(&alive), Some((node, boot)));
+        assert_eq!(present_of(&here), Some((who, name("7f"))));
+    }
+
+    #[test]
+    fn nothing_more_stands_in_the_key_of_a_request() {
+        for key in [
+            "motorlink/v1/arm1/node/ask/5d/own/alice/7f",
+            "motorlink/v1/arm1/node/ask/5d/see/mallory/act/alice/7f",
+            "motorlink/v1/arm1/node/ask/5d/act/alice",
+            "motorlink/v1/arm1/node/ask/5d/act/alice/*",
+            "motorlink/v1/arm1/st0/ask/5d/act/alice/7f",
+            "alice/7f",
+        ] {
+            assert_eq!(Asker::of(key), None, "{key}");
+        }
     }
 
     #[test]

@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 pub const LONGEST_DEADLINE: f64 = 10.0;
 /// The shortest one.
 pub const SHORTEST_DEADLINE: f64 = 0.02;
+/// The longest reason of a program that leaves, in bytes.
+pub const LONGEST_WHY: usize = 200;
+/// The longest request, in bytes.
+pub const LONGEST_ASK: usize = 1 << 17;
 /// The longest time that a node keeps a query until it has something to say, in seconds.
 pub const LONGEST_WAIT: f64 = 5.0;
 
@@ -40,15 +44,11 @@ pub enum Ask {
     },
     /// A sign of life.
     Alive {
-        /// The run of the node.
-        boot: String,
         /// When it was sent, at the latest.
         sent: f64,
     },
     /// Asks for what the share says. It is answered when there is something, or after `wait`.
     Pull {
-        /// The run of the node.
-        boot: String,
         /// A later pull has a greater number.
         number: u32,
         /// All messages up to this one have come.
@@ -58,8 +58,6 @@ pub enum Ask {
     },
     /// Ends the session.
     Leave {
-        /// The run of the node.
-        boot: String,
         /// The reason, for the log.
         why: String,
     },
@@ -68,8 +66,6 @@ pub enum Ask {
 /// A request to the share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Post {
-    /// The run of the node.
-    pub boot: String,
     /// From 1 on, without a gap. Urgent ones have numbers of their own.
     pub number: u32,
     /// When the program made it, at the latest.
@@ -88,8 +84,6 @@ pub enum Answer {
     Joined {
         /// The clock.
         t: f64,
-        /// The run of the node: another one after a restart.
-        boot: String,
         /// The deadline that holds, in seconds.
         deadline: f64,
         /// That of motion.

@@ -98,6 +98,10 @@ fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
     // Only the given addresses are used.
     config.insert_json5("scouting/multicast/enabled", "false")?;
     config.insert_json5("scouting/gossip/enabled", "false")?;
+    // Whoever does not read delays nobody: what it does not take is dropped, also if it asks for more.
+    let drop =
+        "[{ messages: ['put', 'delete', 'query'], overwrite: { congestion_control: 'drop' } }]";
+    config.insert_json5("qos/network", drop)?;
     // A network that was cut is there again soon. What must happen in time does not depend on it.
     config.insert_json5("transport/link/tx/lease", "3000")?;
     config.insert_json5("transport/link/tx/keep_alive", "4")?;

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use asking::Asker;
 use motorlink::port::{NotDone, PortError, PortName};
 use motorlink::{rmd, st};
+use motorlink_fleet::directory;
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_telemetry::share::message::{Ask, Event, Happening};
@@ -221,4 +222,20 @@ fn a_name_belongs_to_one_node() {
     open(&port).unwrap().motor(1).unwrap().get_raw(RegisterId::SPEED_MEAS).unwrap();
     drop(other);
     eventually("the node is still there", || open(&port).is_err());
+}
+
+#[test]
+fn two_nodes_with_one_name_are_told_apart() {
+    let world = World::new("twins");
+    let bridge = format!("127.0.0.1:{}", world::free_port());
+    // They do not see each other yet.
+    let twin = world.namesake(&bridge);
+    turn(&st(&world, ""));
+    let _bridge = Cable::at(&bridge, &world.address);
+    let network = format!("tcp/{}", world.address).parse().unwrap();
+    eventually("the nodes do not meet", || directory::nodes(&network).unwrap().len() == 2);
+    for world in [&world, &twin] {
+        let error = open(&world.port("st0", &world.address, "")).err().unwrap().to_string();
+        assert!(error.contains("2 nodes have the name twins"), "{error}");
+    }
 }

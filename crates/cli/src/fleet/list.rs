@@ -15,7 +15,8 @@ pub fn run(at: &At) -> Result<(), Failure> {
     if nodes.is_empty() && !at.json {
         print_line(&"No node is at this network.")?;
     }
-    let width = nodes.keys().map(|name| name.as_str().len()).max().unwrap_or(0).max("node".len());
+    let width =
+        nodes.keys().map(|(name, _)| name.as_str().len()).max().unwrap_or(0).max("node".len());
     if !nodes.is_empty() && !at.json {
         print_line(&format!(
             "{:<width$}  {:<6}  {:<8}  {:<10}  port",
@@ -23,7 +24,7 @@ pub fn run(at: &At) -> Result<(), Failure> {
         ))?;
     }
     let printer = Printer { json: at.json };
-    for (name, info) in &nodes {
+    for ((name, _), info) in &nodes {
         match info {
             Some(info) => printer.result(text(name, info, width), object(name, info))?,
             None => printer.result(
@@ -33,7 +34,7 @@ pub fn run(at: &At) -> Result<(), Failure> {
         }
     }
     match nodes.iter().find(|(_, info)| info.is_none()) {
-        Some((name, _)) => Err(Failure::link(format!("node {name} does not answer"))),
+        Some(((name, _), _)) => Err(Failure::link(format!("node {name} does not answer"))),
         None => Ok(()),
     }
 }

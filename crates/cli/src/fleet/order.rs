@@ -1,6 +1,5 @@
 //! `motorlink fleet stop-all`, `latch` and `release`: one order to all nodes at the same time.
 
-use std::collections::BTreeSet;
 use std::thread;
 
 use motorlink_fleet::directory;
@@ -14,7 +13,7 @@ use serde_json::json;
 use super::OrderArgs;
 use crate::advice;
 use crate::failure::Failure;
-use crate::output::print_line;
+use crate::output::{self, print_line};
 use crate::share::{self, Connection};
 
 /// What all nodes are told.
@@ -27,21 +26,33 @@ pub enum Order {
 
 pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
     let network = args.at.network();
-    let names: BTreeSet<Name> = match args.nodes.is_empty() {
-        true => directory::nodes(&network)?.into_keys().collect(),
-        false => args.nodes.iter().cloned().collect(),
-    };
-    if names.is_empty() {
+    let found = directory::nodes(&network)?.into_keys();
+    let is_meant = |(name, _): &(Name, Name)| args.nodes.is_empty() || args.nodes.contains(name);
+    let mut nodes: Vec<(Name, Option<Name>)> =
+        found.filter(is_meant).map(|(name, boot)| (name, Some(boot))).collect();
+    for name in &args.nodes {
+        if nodes.iter().all(|(found, _)| found != name) {
+            nodes.push((name.clone(), None));
+        }
+    }
+    if nodes.is_empty() {
         let none = Failure::link("no node is at this network, so nothing was sent");
         return Err(none.trying("name the nodes that must answer with --node"));
     }
-    let told: Vec<_> = names
+    let told: Vec<_> = nodes
         .into_iter()
-        .map(|name| {
+        .map(|(name, boot)| {
             let (node, network) = (name.clone(), network.clone());
-            (name, thread::spawn(move || tell(&node, network, order)))
+            (name, thread::spawn(move || tell(&node, boot, network, order)))
         })
         .collect();
+    if args.nodes.is_empty() {
+        let names: Vec<_> = told.iter().map(|(name, _)| name.as_str()).collect();
+        output::note(format!(
+            "a node that is away is not found; those that are there: {}",
+            names.join(", ")
+        ));
+    }
     let (mut is_done, mut away) = (true, Vec::new());
     for (name, told) in told {
         match told.join().unwrap_or_else(|_| Err("it could not be asked".to_owned())) {
@@ -71,9 +82,15 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
 }
 
 /// Gives the order to a node, and its answer.
-fn tell(node: &Name, network: Network, order: Order) -> Result<Vec<StoppedMotor>, String> {
+fn tell(
+    node: &Name,
+    boot: Option<Name>,
+    network: Network,
+    order: Order,
+) -> Result<Vec<StoppedMotor>, String> {
     let remote = Remote {
         node: node.clone(),
+        boot,
         network,
         who: remote::own_name(),
         deadline: remote::DEADLINE,

@@ -25,6 +25,8 @@ use config::Config;
 
 /// How long a motor stays with the program that changed it.
 const LEASE: Duration = Duration::from_secs(5);
+/// The shortest period of published values.
+const SHORTEST_PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -69,7 +71,7 @@ pub struct Args {
     /// A file with limits of motors, in TOML
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     config: Option<PathBuf>,
-    /// How often the main values of each motor are published, 10ms to 60s, or 0s for never
+    /// How often the main values of each motor are published, 10ms to 60s
     #[arg(long, value_name = "TIME", default_value = "100ms",
         value_parser = span_up_to(Duration::from_secs(60)))]
     period: Duration,
@@ -79,6 +81,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
+    if args.period < SHORTEST_PERIOD {
+        return Err(Failure::usage("--period is 10ms to 60s"));
+    }
     let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(motorlink_fleet::remote::computer);
     let folder;
@@ -101,7 +106,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         program: PROGRAM.to_owned(),
         network: args.network(),
         clock: Arc::new(Boot),
-        period: Some(args.period).filter(|period| !period.is_zero()),
+        period: args.period,
     };
     let (node, outcome) = match start(&mut server, options) {
         Ok(Some(node)) => {

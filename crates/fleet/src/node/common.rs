@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 use motorlink_telemetry::share::message::{Group, Line};
+use motorlink_telemetry::share::program::Program;
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
@@ -20,7 +21,9 @@ pub(super) struct Common {
     pub(super) name: Name,
     pub(super) share: PathBuf,
     pub(super) program: String,
-    pub(super) boot: String,
+    pub(super) boot: Name,
+    /// The node itself, at its share.
+    pub(super) own: OnceLock<Program>,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) zenoh: Zenoh,
     pub(super) state: RwLock<State>,
@@ -33,6 +36,8 @@ pub(super) struct State {
     pub(super) lines: Arc<Lines>,
     pub(super) known: Vec<Line>,
     pub(super) latched_by: Option<String>,
+    /// When the share said so.
+    pub(super) t: f64,
     /// The columns of the samples that are published, by key.
     pub(super) columns: BTreeMap<String, Group>,
 }

@@ -1,5 +1,6 @@
 //! Queries of programs, and the sessions that they belong to.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
 use motorlink_telemetry::share::program::Program;
@@ -18,7 +19,7 @@ use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
 use crate::key::{self, Asker, Name, Scope};
-use crate::message::{Answer, Ask, LONGEST_DEADLINE, SHORTEST_DEADLINE};
+use crate::message::{Answer, Ask, LONGEST_ASK, LONGEST_DEADLINE, SHORTEST_DEADLINE};
 
 /// Sessions at one time: a share has 64 programs.
 const MOST_SESSIONS: usize = 48;
@@ -30,33 +31,35 @@ const QUERIES: usize = 256;
 const REASONS: usize = 256;
 /// The longest name of a program in the log, in bytes.
 const LONGEST_PROGRAM: usize = 20;
-/// The longest number of a session, in bytes.
-const LONGEST_SESSION: usize = 32;
 
 /// Takes queries from now on.
 pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {
     let zenoh = &common.zenoh;
     let (door, handle) = (Arc::clone(common), runtime.handle().clone());
     let asked = move |query: Query| door.asked(query, &handle);
-    zenoh.declare_queryable(key::all_asks(&common.name)).callback(asked).background().wait()?;
-    let door = Arc::clone(common);
+    zenoh
+        .declare_queryable(key::all_asks(&common.name, &common.boot))
+        .callback(asked)
+        .background()
+        .wait()?;
+    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
     let said = move |query: Query| {
-        let info = serde_json::to_vec(&door.info()).unwrap_or_default();
-        // The program asks again if the answer does not come.
-        let _ = query.reply(key::info(&door.name), info).wait();
+        let door = Arc::clone(&door);
+        handle.spawn(async move { door.say_info(&query).await });
     };
-    zenoh.declare_queryable(key::info(&common.name)).callback(said).background().wait()?;
+    let info = key::info(&common.name, &common.boot);
+    zenoh.declare_queryable(info).callback(said).background().wait()?;
     let (door, handle) = (Arc::clone(common), runtime.handle().clone());
     let here = move |sample: zenoh::sample::Sample| {
         if sample.kind() == SampleKind::Delete
-            && let Some(session) = key::session_of(sample.key_expr().as_str())
+            && let Some((who, session)) = key::present_of(sample.key_expr().as_str())
         {
-            door.gone(session, &handle);
+            door.gone(&who, &session, &handle);
         }
     };
-    let all = key::all_here(&common.name);
+    let all = key::all_here(&common.name, &common.boot);
     zenoh.liveliness().declare_subscriber(all).callback(here).background().wait()?;
-    zenoh.liveliness().declare_token(key::alive(&common.name)).wait()
+    zenoh.liveliness().declare_token(key::alive(&common.name, &common.boot)).wait()
 }
 
 impl Common {
@@ -71,12 +74,19 @@ impl Common {
             return refuse("the key does not say who asks for what".to_owned());
         };
         let bytes = query.payload().map(|payload| payload.to_bytes());
+        if bytes.as_ref().is_some_and(|bytes| bytes.len() > LONGEST_ASK) {
+            return refuse(format!("a request has up to {LONGEST_ASK} bytes"));
+        }
         let ask: Ask = match serde_json::from_slice(&bytes.unwrap_or_default()) {
             Ok(ask) => ask,
             Err(error) => return refuse(format!("the request cannot be read: {error}")),
         };
         let Asker { scope, who, session } = asker;
         let mut sessions = self.sessions();
+        sessions.heard(&session, t);
+        if matches!(ask, Ask::Join { .. }) && sessions.open.len() >= most(scope) {
+            sessions.forget_silent(t);
+        }
         let known = sessions.open.get(&session);
         if let Some(Open { who: owner, .. }) = known
             && *owner != who
@@ -89,12 +99,12 @@ impl Common {
                 return refuse(format!("the node has {MOST_SESSIONS} programs, its most"));
             }
             (None, Ask::Join { protocol, program, deadline, motion }) => {
-                let new = match New::of(&session, *protocol, program, *deadline, *motion) {
+                let new = match New::of(*protocol, program, *deadline, *motion) {
                     Ok(new) => new,
                     Err(why) => return refuse(why),
                 };
                 let (sender, asked) = channel(QUERIES);
-                let open = Open { who: who.clone(), asked: sender.clone() };
+                let open = Open { who: who.clone(), asked: sender.clone(), heard: t };
                 sessions.open.insert(session.clone(), open);
                 handle.spawn(Arc::clone(self).serve(session, who, new, asked));
                 sender
@@ -116,15 +126,18 @@ impl Common {
     }
 
     /// A program or its network has gone. What it sees is kept for a moment; its motors stop now.
-    fn gone(self: &Arc<Self>, session: &str, handle: &Handle) {
-        let asked = self.sessions().open.get(session).map(|open| open.asked.clone());
+    fn gone(self: &Arc<Self>, who: &Name, session: &Name, handle: &Handle) {
+        let sessions = self.sessions();
+        let open = sessions.open.get(session).filter(|open| open.who == *who);
+        let asked = open.map(|open| open.asked.clone());
+        drop(sessions);
         if let Some(asked) = asked {
             handle.spawn(async move { asked.send(Asked::Gone).await });
         }
     }
 
     /// Serves one session.
-    async fn serve(self: Arc<Self>, session: String, who: Name, new: New, asked: Receiver<Asked>) {
+    async fn serve(self: Arc<Self>, session: Name, who: Name, new: New, asked: Receiver<Asked>) {
         let New { program, deadline, motion } = new;
         let name = format!("{who} ({program})");
         let why = match Program::connect(&self.share, &name).await {
@@ -139,6 +152,7 @@ impl Common {
                     program,
                     listener,
                     outbox: Outbox::default(),
+                    waiting: BTreeSet::new(),
                     pull: None,
                     last_pull: 0,
                 };
@@ -171,7 +185,6 @@ struct New {
 
 impl New {
     fn of(
-        session: &str,
         protocol: u32,
         program: &str,
         deadline: f64,
@@ -179,9 +192,6 @@ impl New {
     ) -> Result<Self, String> {
         if protocol != VERSION {
             return Err(format!("this node speaks version {VERSION}, the program {protocol}"));
-        }
-        if session.len() > LONGEST_SESSION {
-            return Err(format!("the number of a session has up to {LONGEST_SESSION} bytes"));
         }
         let is_name = (1..=LONGEST_PROGRAM).contains(&program.len());
         if !is_name || !program.chars().all(motorlink_link::is_printable) {

@@ -2,7 +2,7 @@
 //!
 //! It reads no clock: all times are those of the node, in seconds, and come from the caller.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_telemetry::share::message::{Ask, LONGEST_TIME, Reason, Request};
 use motorlink_telemetry::share::request::Kind;
@@ -12,6 +12,9 @@ use crate::message::Post;
 /// How long a session that commands nothing may be silent.
 const PATIENCE: f64 = 60.0;
 
+/// How many urgent requests are remembered.
+const URGENT: usize = 1024;
+
 /// The rules of one session.
 #[derive(Debug)]
 pub struct Gate {
@@ -19,8 +22,8 @@ pub struct Gate {
     motion: Option<f64>,
     /// The next post in the order.
     next: u32,
-    /// The last urgent request.
-    urgent: u32,
+    /// The urgent requests that the node has. They may come in any order.
+    urgent: BTreeSet<u32>,
     /// Posts up to this number came before a stop.
     overtaken: u32,
     /// The youngest sign of life.
@@ -53,7 +56,7 @@ impl Gate {
             deadline,
             motion,
             next: 1,
-            urgent: 0,
+            urgent: BTreeSet::new(),
             overtaken: 0,
             sign: now,
             heard: now,
@@ -93,10 +96,13 @@ impl Gate {
 
     /// A stop or a latch. Posts up to `after` that come later change nothing.
     pub fn urgent(&mut self, now: f64, after: u32, post: Post) -> Verdict {
-        if post.number <= self.urgent {
+        if !self.urgent.insert(post.number) {
             return Verdict::Again;
         }
-        self.urgent = post.number;
+        // Those long ago are not sent again.
+        if self.urgent.len() > URGENT {
+            self.urgent.pop_first();
+        }
         self.overtaken = self.overtaken.max(after);
         self.take(now, post, Kind::Stops)
     }

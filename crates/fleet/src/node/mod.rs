@@ -9,7 +9,7 @@ mod session;
 mod sessions;
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, RwLock};
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
@@ -33,8 +33,8 @@ pub struct Options {
     pub network: Network,
     /// Its clock.
     pub clock: Arc<dyn Clock>,
-    /// How often the main values of each motor are published; `None`: not at all.
-    pub period: Option<Duration>,
+    /// How often the main values of each motor are published.
+    pub period: Duration,
 }
 
 /// A node that runs. When it is dropped, all its sessions end.
@@ -73,12 +73,14 @@ impl Node {
             .enable_all()
             .build()?;
         let (zenoh, addresses) = network.open()?;
-        if zenoh.liveliness().get(key::alive(&name)).wait().map_err(failed)?.recv().is_ok() {
+        if zenoh.liveliness().get(key::alive_of(&name)).wait().map_err(failed)?.recv().is_ok() {
             return Err(NodeError::NameTaken(name));
         }
-        let boot = format!("{:016x}", getrandom::u64().map_err(std::io::Error::other)?);
+        let boot = Name::random()?;
         let (state, sessions) = (RwLock::default(), Mutex::default());
-        let common = Arc::new(Common { name, share, program, boot, clock, zenoh, state, sessions });
+        let own = OnceLock::new();
+        let common =
+            Arc::new(Common { name, share, program, boot, own, clock, zenoh, state, sessions });
         runtime.block_on(publish::start(&common, period))?;
         let alive = door::open(&common, &runtime).map_err(failed)?;
         Ok(Node { common, addresses, _alive: alive, runtime: Some(runtime) })

@@ -24,6 +24,11 @@ impl Outbox {
         self.bytes < FULL
     }
 
+    /// Whether far too much waits: refusals of a program that asks and does not pull.
+    pub fn is_over(&self) -> bool {
+        self.bytes > 2 * FULL
+    }
+
     /// A message of the share.
     pub fn push(&mut self, frame: &Frame) {
         let mut bytes = Vec::with_capacity(frame.payload.len() + 8);

@@ -16,7 +16,7 @@ use motorlink_telemetry::share::message::{
 use motorlink_telemetry::share::program::{Listener, Program};
 use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
-use tokio::time::{MissedTickBehavior, interval};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
@@ -29,6 +29,8 @@ use crate::weight::{Lines, speaks};
 
 /// How often the state is published.
 const STATE: Duration = Duration::from_secs(1);
+/// A state that is younger than this, in seconds, is as good as a new one.
+const FRESH: f64 = 0.02;
 /// The longest time until the share says which lines it has.
 const LINES: Duration = Duration::from_secs(5);
 /// Rows of a motor that wait.
@@ -37,10 +39,10 @@ const QUEUE: u32 = 1000;
 const SEARCH: f64 = 5.0;
 
 /// Follows the share from now on, once its lines are known.
-pub(super) async fn start(common: &Arc<Common>, period: Option<Duration>) -> io::Result<()> {
+pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<()> {
     let (program, listener, _) = Program::connect(&common.share, "node").await?;
     tokio::spawn(Arc::clone(common).follow(listener));
-    tokio::time::timeout(LINES, common.learn(&program))
+    timeout(LINES, common.learn(&program))
         .await
         .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
     let columns = Arc::clone(common);
@@ -48,7 +50,8 @@ pub(super) async fn start(common: &Arc<Common>, period: Option<Duration>) -> io:
     let key = key::all_columns(&common.name);
     let declared = common.zenoh.declare_queryable(key).callback(asked).background();
     declared.wait().map_err(io::Error::other)?;
-    tokio::spawn(Arc::clone(common).tell_state(program, period));
+    let own = common.own.get_or_init(|| program);
+    tokio::spawn(Arc::clone(common).tell_state(own.clone(), period));
     Ok(())
 }
 
@@ -93,6 +96,7 @@ impl Common {
                     state.lines = Arc::new(known);
                 }
                 (state.known, state.latched_by) = (lines, latched_by);
+                state.t = self.clock.now();
                 Ok(())
             }
             Ok(_) => Err(io::Error::other("it gives another answer")),
@@ -101,7 +105,7 @@ impl Common {
     }
 
     /// Publishes the state again and again, and subscribes to the main values of motors that answer.
-    async fn tell_state(self: Arc<Self>, program: Program, period: Option<Duration>) {
+    async fn tell_state(self: Arc<Self>, program: Program, period: Duration) {
         let mut ticks = interval(STATE);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut searched, mut subscribed) = (BTreeSet::new(), BTreeSet::new());
@@ -112,7 +116,6 @@ impl Common {
                 return;
             }
             self.put(&key::state(&self.name), &self.info());
-            let Some(period) = period else { continue };
             for line in self.known_lines() {
                 if searched.insert(line.line.clone()) {
                     search(&program, &line);
@@ -137,12 +140,27 @@ impl Common {
             node: self.name.to_string(),
             protocol: crate::VERSION,
             program: self.program.clone(),
-            boot: self.boot.clone(),
+            boot: self.boot.to_string(),
             t: self.clock.now(),
             wall: self.clock.wall(),
             lines: state.known.clone(),
             latched_by: state.latched_by.clone(),
         }
+    }
+
+    /// Answers what the node is, as it is now.
+    pub(super) async fn say_info(&self, query: &Query) {
+        // Without an answer of the share the last state is given.
+        let age = self.clock.now() - self.state.read().unwrap_or_else(PoisonError::into_inner).t;
+        if age > FRESH
+            && let Some(own) = self.own.get()
+        {
+            let _ = timeout(STATE, self.learn(own)).await;
+        }
+        let text = serde_json::to_vec(&self.info()).unwrap_or_default();
+        let key = key::info(&self.name, &self.boot);
+        // The program asks again if the answer does not come.
+        let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
     }
 
     fn columns_of(&self, group: Group) {

@@ -1,14 +1,16 @@
 //! A program of another computer, at this node.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_telemetry::share::frame::Frame;
-use motorlink_telemetry::share::message::{Ask as ShareAsk, Reason, Text, encode};
+use motorlink_link::is_printable;
+use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
+use motorlink_telemetry::share::message::{Ask as ShareAsk, Reason, Text, decode, encode};
 use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal};
 use motorlink_telemetry::share::request::Kind;
 use tokio::sync::mpsc::Receiver;
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
 use super::common::{Common, answer, answer_with};
@@ -17,8 +19,15 @@ use super::outbox::Outbox;
 use super::sessions::{Asked, Asking};
 use crate::clock::span;
 use crate::key::Scope;
-use crate::message::{Answer, Ask, LONGEST_WAIT, Post};
+use crate::message::{Answer, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
 use crate::weight;
+
+/// Requests without an answer. A share that has 256 answers for a program takes no more of its requests.
+const REQUESTS: usize = 128;
+/// The same with stops.
+const WITH_STOPS: usize = 192;
+/// The longest time for a request into the socket of the share.
+const TAKEN: Duration = Duration::from_millis(500);
 
 /// What a session task has.
 pub(super) struct Session {
@@ -29,6 +38,8 @@ pub(super) struct Session {
     pub(super) deadline: f64,
     pub(super) motion: Option<f64>,
     pub(super) outbox: Outbox,
+    /// The requests that the share has not answered.
+    pub(super) waiting: BTreeSet<u32>,
     pub(super) pull: Option<Pull>,
     pub(super) last_pull: u32,
 }
@@ -54,15 +65,20 @@ impl Session {
             if let Some(why) = self.gate.lapse(now) {
                 break why;
             }
+            if self.outbox.is_over() {
+                break "it does not take what the share says".to_owned();
+            }
             if self.gate.is_forgotten(now) {
                 break "nothing was heard of it for a minute".to_owned();
             }
             self.answer_pull(now);
             match self.next(now, &mut asked).await {
                 Next::Due => {}
-                Next::Said(Ok(frame)) => self.outbox.push(&frame),
+                Next::Said(Ok(frame)) => self.said(&frame),
                 Next::Said(Err(_)) => break "the share has closed the connection".to_owned(),
-                Next::Asked(None) => break "the node ends".to_owned(),
+                Next::Asked(None) => {
+                    break "the node ends, or other programs need its place".to_owned();
+                }
                 Next::Asked(Some(Asked::Gone)) if self.gate.has_commanded() => {
                     break "its program or its network has gone".to_owned();
                 }
@@ -101,24 +117,12 @@ impl Session {
     async fn asked(&mut self, Asking { query, ask, scope }: Asking) -> Option<String> {
         let now = self.now();
         self.gate.heard(now);
-        let boot = match &ask {
-            Ask::Join { .. } => {
-                let (boot, deadline, motion) =
-                    (self.common.boot.clone(), self.deadline, self.motion);
-                let lines = self.common.known_lines();
-                answer(&query, &Answer::Joined { t: now, boot, deadline, motion, lines });
-                return None;
-            }
-            Ask::Post(post) | Ask::Urgent { post, .. } => &post.boot,
-            Ask::Alive { boot, .. } | Ask::Pull { boot, .. } | Ask::Leave { boot, .. } => boot,
-        };
-        if *boot != self.common.boot {
-            let why = "the node was started again".to_owned();
-            answer(&query, &Answer::Over { t: now, why });
-            return None;
-        }
         match ask {
-            Ask::Join { .. } => {}
+            Ask::Join { .. } => {
+                let (deadline, motion) = (self.deadline, self.motion);
+                let lines = self.common.known_lines();
+                answer(&query, &Answer::Joined { t: now, deadline, motion, lines });
+            }
             Ask::Alive { sent, .. } => {
                 self.gate.sign(now, sent);
                 self.taken(&query, now);
@@ -133,7 +137,9 @@ impl Session {
             }
             Ask::Leave { why, .. } => {
                 self.taken(&query, now);
-                return Some(why);
+                return Some(
+                    why.chars().filter(|it| is_printable(*it)).take(LONGEST_WHY).collect(),
+                );
             }
             Ask::Post(post) => {
                 let kind = self.common.lines().kind(&post.request.ask);
@@ -166,19 +172,48 @@ impl Session {
         answer(query, &Answer::Taken { t: now, next: self.gate.next() });
     }
 
+    /// Gives the end of the session, if this is it.
     async fn carry_out(&mut self, verdict: Verdict) -> Option<String> {
         match verdict {
             Verdict::Again | Verdict::Early => None,
             Verdict::Refuse(id, reason, message) => {
-                let text = Text::Refusal { id, reason, message, code: None };
-                self.outbox.push(&Frame::text(encode(&text)));
+                self.refuse(id, reason, message);
                 None
             }
-            Verdict::Pass(request) => match self.program.pass(&request).await {
-                Ok(()) => None,
-                Err(error) => Some(format!("the share is lost: {error}")),
-            },
+            Verdict::Pass(request) => {
+                // The share takes requests only as long as few of its answers wait.
+                let most = match self.common.lines().kind(&request.ask) {
+                    Kind::Stops => WITH_STOPS,
+                    _ => REQUESTS,
+                };
+                if self.waiting.len() >= most {
+                    let why = "too many requests wait for their answers".to_owned();
+                    self.refuse(request.id, Reason::Busy, why);
+                    return None;
+                }
+                self.waiting.insert(request.id);
+                match timeout(TAKEN, self.program.pass(&request)).await {
+                    Ok(Ok(())) => None,
+                    Ok(Err(error)) => Some(format!("the share is lost: {error}")),
+                    Err(_) => Some("the share takes no requests".to_owned()),
+                }
+            }
         }
+    }
+
+    fn refuse(&mut self, id: u32, reason: Reason, message: String) {
+        let text = Text::Refusal { id, reason, message, code: None };
+        self.outbox.push(&Frame::text(encode(&text)));
+    }
+
+    /// The share has said something.
+    fn said(&mut self, frame: &Frame) {
+        if frame.kind == FrameKind::Text
+            && let Ok(Text::Answer { id, .. } | Text::Refusal { id, .. }) = decode(&frame.payload)
+        {
+            self.waiting.remove(&id);
+        }
+        self.outbox.push(frame);
     }
 
     fn answer_pull(&mut self, now: f64) {

@@ -30,6 +30,8 @@ const LEAVING: Duration = Duration::from_millis(500);
 pub struct Remote {
     /// The node.
     pub node: Name,
+    /// Its run; `None`: the only one that is there.
+    pub boot: Option<Name>,
     /// The way to it.
     pub network: Network,
     /// The name of the user, for keys and the log of the node.
@@ -82,8 +84,8 @@ impl Address for Remote {
         let (own, other) = UnixStream::pair().map_err(failed)?;
         own.set_nonblocking(true).map_err(failed)?;
         let runtime = runtime().map_err(failed)?;
-        let Remote { node, who, deadline, motion, network, stops, .. } = self.clone();
-        let whom = Whom { node, who, deadline, motion, stops };
+        let Remote { node, boot, who, deadline, motion, network, stops, .. } = self.clone();
+        let whom = Whom { node, boot, who, deadline, motion, stops };
         match runtime.block_on(Tunnel::open(whom, zenoh, own)) {
             Ok(()) => Ok(other),
             Err(Unreachable::Missing(why)) => {

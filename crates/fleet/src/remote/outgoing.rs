@@ -21,7 +21,6 @@ const AGAIN_STOP: f64 = 0.05;
 /// The requests that the node does not have yet.
 #[derive(Debug)]
 pub struct Outgoing {
-    boot: String,
     clock: NodeClock,
     last: u32,
     last_urgent: u32,
@@ -40,15 +39,10 @@ struct Sent {
 }
 
 impl Outgoing {
-    /// To this run of a node.
-    pub fn new(boot: String, clock: NodeClock) -> Self {
+    /// To a node with this clock.
+    pub fn new(clock: NodeClock) -> Self {
         let (posts, urgent) = (VecDeque::new(), VecDeque::new());
-        Outgoing { boot, clock, last: 0, last_urgent: 0, posts, urgent }
-    }
-
-    /// The run of the node.
-    pub fn boot(&self) -> &str {
-        &self.boot
+        Outgoing { clock, last: 0, last_urgent: 0, posts, urgent }
     }
 
     /// The node answered what was asked at a time.
@@ -78,18 +72,12 @@ impl Outgoing {
             ShareAsk::Release => RELEASE,
             _ => TIME_TO_LIVE,
         };
-        Post {
-            boot: self.boot.clone(),
-            number,
-            sent: self.clock.at_least(now),
-            time_to_live,
-            request,
-        }
+        Post { number, sent: self.clock.at_least(now), time_to_live, request }
     }
 
     /// A sign of life.
     pub fn sign(&self, now: f64) -> Ask {
-        Ask::Alive { boot: self.boot.clone(), sent: self.clock.at_least(now) }
+        Ask::Alive { sent: self.clock.at_least(now) }
     }
 
     /// The node has all posts before this one.
@@ -139,7 +127,7 @@ mod tests {
     use super::*;
 
     fn outgoing() -> Outgoing {
-        Outgoing::new("7f".to_owned(), NodeClock::new(0.0, 0.0, 1000.0))
+        Outgoing::new(NodeClock::new(0.0, 0.0, 1000.0))
     }
 
     fn request(id: u32, ask: ShareAsk) -> Request {

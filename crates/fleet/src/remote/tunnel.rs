@@ -1,5 +1,6 @@
 //! Between the socket of a program and a node.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
 use std::sync::Arc;
@@ -35,6 +36,8 @@ const PATIENCE: f64 = 3.0;
 const WAIT: f64 = 0.25;
 /// How long an answer to it may take besides.
 const ANSWER: Duration = Duration::from_millis(1000);
+/// How long a node is looked for, in seconds.
+const FOUND: f64 = 1.0;
 /// The pause after an answer that did not come.
 const PAUSE: Duration = Duration::from_millis(50);
 /// A program that has ended waits so long for the node to know it.
@@ -68,6 +71,8 @@ impl Drop for Counted {
 /// The node, and the values of `join`.
 pub(super) struct Whom {
     pub(super) node: Name,
+    /// Its run; `None`: the only one that is there.
+    pub(super) boot: Option<Name>,
     pub(super) who: Name,
     pub(super) deadline: Duration,
     pub(super) motion: Option<Duration>,
@@ -80,7 +85,8 @@ struct Line {
     zenoh: Arc<Zenoh>,
     node: Name,
     who: Name,
-    session: String,
+    session: Name,
+    boot: Name,
 }
 
 /// An answer, and when it was asked for.
@@ -142,11 +148,15 @@ impl Tunnel {
         socket: StdStream,
     ) -> Result<(), Unreachable> {
         let failed = |error: String| Unreachable::Failed(error);
-        let number = getrandom::u64().map_err(|error| failed(error.to_string()))?;
-        let Whom { node, who, deadline, motion, stops } = whom;
+        let Whom { node, boot, who, deadline, motion, stops } = whom;
         let scope = if stops { Scope::Stop } else { Scope::See };
-        let line = Line { zenoh, node, who, session: format!("{number:016x}") };
-        let here = key::here(&line.node, &line.who, &line.session);
+        let boot = match boot {
+            Some(boot) => boot,
+            None => run_of(&zenoh, &node).await?,
+        };
+        let session = Name::random().map_err(|error| failed(error.to_string()))?;
+        let line = Line { zenoh, node, who, session, boot };
+        let here = key::here(&line.node, &line.boot, &line.who, &line.session);
         let here = line.zenoh.liveliness().declare_token(here).await;
         let here = here.map_err(|error| failed(error.to_string()))?;
         let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
@@ -157,15 +167,15 @@ impl Tunnel {
             match line.ask(scope, &join, Priority::RealTime, ANSWER).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
-                None if Boot.now() > begun + 1.0 => {
+                None if Boot.now() > begun + FOUND => {
                     return Err(Unreachable::Missing(format!("no node {} answers", line.node)));
                 }
                 None => sleep(PAUSE).await,
             }
         };
         let now = Boot.now();
-        let (t, boot, lines) = match answer {
-            Answer::Joined { t, boot, lines, .. } => (t, boot, lines),
+        let (t, lines) = match answer {
+            Answer::Joined { t, lines, .. } => (t, lines),
             Answer::Over { why, .. } | Answer::Refused { why, .. } => return Err(failed(why)),
             _ => return Err(failed("the node gives another answer".to_owned())),
         };
@@ -175,7 +185,7 @@ impl Tunnel {
         let (written, done) = unbounded_channel();
         let tunnel = Tunnel {
             line,
-            outgoing: Outgoing::new(boot, NodeClock::new(asked, now, t)),
+            outgoing: Outgoing::new(NodeClock::new(asked, now, t)),
             lines: Lines::of(&lines),
             deadline,
             reader,
@@ -292,8 +302,8 @@ impl Tunnel {
         if self.may_pull() && self.pull_from <= now {
             self.is_pulling = true;
             self.pulls += 1;
-            let (boot, number, after) = (self.outgoing.boot().to_owned(), self.pulls, self.after);
-            let pull = Ask::Pull { boot, number, after, wait: WAIT };
+            let (number, after) = (self.pulls, self.after);
+            let pull = Ask::Pull { number, after, wait: WAIT };
             self.ask(Of::Pull, Scope::See, &pull, Priority::Data, span(WAIT) + ANSWER, now);
         }
     }
@@ -409,13 +419,36 @@ impl Tunnel {
         }
         // The stops that the program has asked for just before.
         self.send(Boot.now());
-        let leave = Ask::Leave {
-            boot: self.outgoing.boot().to_owned(),
-            why: "the program has ended".to_owned(),
-        };
+        let leave = Ask::Leave { why: "the program has ended".to_owned() };
         let left = self.line.ask(Scope::See, &leave, Priority::RealTime, LEAVING);
         // The node notices it otherwise, later.
         let _ = timeout(LEAVING, left).await;
+    }
+}
+
+/// The run of a node. Two nodes with one name would answer for each other, so that is refused.
+async fn run_of(zenoh: &Zenoh, node: &Name) -> Result<Name, Unreachable> {
+    let end = Boot.now() + FOUND;
+    loop {
+        let tokens = zenoh.liveliness().get(key::alive_of(node)).timeout(ANSWER).await;
+        let tokens = tokens.map_err(|error| Unreachable::Failed(error.to_string()))?;
+        let mut runs = BTreeSet::new();
+        while let Ok(reply) = tokens.recv_async().await {
+            let Ok(sample) = reply.into_result() else { continue };
+            runs.extend(key::run_of(sample.key_expr().as_str()).map(|(_, boot)| boot));
+        }
+        let count = runs.len();
+        match runs.pop_first() {
+            Some(boot) if count == 1 => return Ok(boot),
+            Some(_) => {
+                let why =
+                    format!("{count} nodes have the name {node}: give each a --name of its own");
+                return Err(Unreachable::Failed(why));
+            }
+            // The nodes of a network that was just joined may not be known yet.
+            None if Boot.now() < end => sleep(PAUSE).await,
+            None => return Err(Unreachable::Missing(format!("no node {node} answers"))),
+        }
     }
 }
 
@@ -428,7 +461,7 @@ impl Line {
         priority: Priority,
         timeout: Duration,
     ) -> Option<Replies> {
-        let key = key::ask(&self.node, scope, &self.who, &self.session);
+        let key = key::ask(&self.node, &self.boot, scope, &self.who, &self.session);
         let payload = serde_json::to_vec(ask).ok()?;
         let replies = self
             .zenoh

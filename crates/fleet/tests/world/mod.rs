@@ -41,6 +41,16 @@ impl World {
         start(name, &self.share, network, Arc::new(Boot))
     }
 
+    /// A node of its own drives with the same name, which gets to this one only through an address.
+    pub fn namesake(&self, address: &str) -> Self {
+        let share = Share::leasing(&format!("fleet-{}-2", self.name), PATIENT, None, |link| link);
+        let own = format!("127.0.0.1:{}", free_port());
+        let listen = vec![format!("tcp/{own}")];
+        let network = Network::Route { listen, connect: vec![format!("tcp/{address}")] };
+        let node = start(&self.name, &share, network, Arc::new(Boot)).unwrap();
+        World { share, address: own, name: self.name.clone(), node: Some(node) }
+    }
+
     /// The name of a line's port, over this address.
     pub fn port(&self, line: &str, address: &str, options: &str) -> String {
         motorlink_fleet::port::register();
@@ -64,7 +74,7 @@ fn start(
         program: "test".to_owned(),
         network,
         clock,
-        period: Some(Duration::from_millis(50)),
+        period: Duration::from_millis(50),
     })
 }
 
@@ -82,7 +92,12 @@ pub struct Cable {
 
 impl Cable {
     pub fn to(target: &str) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        Self::at("127.0.0.1:0", target)
+    }
+
+    /// As [`to`](Self::to), at an address.
+    pub fn at(address: &str, target: &str) -> Self {
+        let listener = TcpListener::bind(address).unwrap();
         listener.set_nonblocking(true).unwrap();
         let address = listener.local_addr().unwrap().to_string();
         let (is_cut, ends) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));

@@ -24,7 +24,7 @@ fn command(number: u32, sent: f64, time_to_live: f64) -> Post {
 
 fn post(number: u32, sent: f64, time_to_live: f64, ask: Ask) -> Post {
     let request = Request { id: number, ask };
-    Post { boot: "7f".to_owned(), number, sent, time_to_live, request }
+    Post { number, sent, time_to_live, request }
 }
 
 /// What is left of the time to live of a command that passes.
@@ -154,4 +154,16 @@ fn a_stream_of_references_that_ends_stops_its_motor_though_the_program_lives() {
     let stop = post(1, NOW + 0.3, 1.0, Ask::Stop { motor });
     assert!(matches!(gate.urgent(NOW + 0.3, 2, stop), Verdict::Pass(_)));
     assert_eq!(gate.lapse(NOW + 0.31), None);
+}
+
+#[test]
+fn stops_that_come_in_another_order_are_all_carried_out_once() {
+    let mut gate = gate();
+    let stop = |number| post(number, NOW, 1.0, Ask::Stop { motor: None });
+    for number in [2, 1, 3] {
+        assert!(matches!(gate.urgent(NOW, 0, stop(number)), Verdict::Pass(_)), "{number}");
+    }
+    for number in 1..=3 {
+        assert_eq!(gate.urgent(NOW, 0, stop(number)), Verdict::Again);
+    }
 }
