@@ -15,7 +15,7 @@ pub const LONGEST: usize = 40;
 pub struct Name(String);
 
 impl Name {
-    /// A name that nobody can guess.
+    /// 16 random hexadecimal digits.
     ///
     /// # Errors
     /// The system has no random numbers.

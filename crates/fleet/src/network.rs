@@ -98,7 +98,7 @@ fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
     // Only the given addresses are used.
     config.insert_json5("scouting/multicast/enabled", "false")?;
     config.insert_json5("scouting/gossip/enabled", "false")?;
-    // Whoever does not read delays nobody: what it does not take is dropped, also if it asks for more.
+    // What a slow program does not take is dropped, so that it delays no other program.
     let drop =
         "[{ messages: ['put', 'delete', 'query'], overwrite: { congestion_control: 'drop' } }]";
     config.insert_json5("qos/network", drop)?;

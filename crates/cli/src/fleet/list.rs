@@ -6,7 +6,7 @@ use motorlink_fleet::message::Info;
 use motorlink_telemetry::share::message::Line;
 use serde_json::{Value, json};
 
-use super::At;
+use super::args::At;
 use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 

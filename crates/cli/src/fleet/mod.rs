@@ -1,13 +1,13 @@
 //! `motorlink fleet`: the nodes of a network.
 
+mod args;
 mod list;
 mod order;
 
-use motorlink_fleet::key::Name;
-use motorlink_fleet::network::{Network, NetworkError};
-use motorlink_fleet::remote;
+use motorlink_fleet::network::NetworkError;
 
 use crate::failure::Failure;
+use args::{At, OrderArgs};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -36,38 +36,12 @@ enum Command {
     Release(OrderArgs),
 }
 
-/// Where the nodes are.
-#[derive(clap::Args)]
-struct At {
-    /// Addresses with commas between them, or a Zenoh configuration (.json5)
-    #[arg(long, value_name = "NETWORK", env = remote::VARIABLE, global = true)]
-    via: Option<Network>,
-    /// Print JSON, one object per line
-    #[arg(long, global = true)]
-    json: bool,
-}
-
-#[derive(clap::Args)]
-struct OrderArgs {
-    #[command(flatten)]
-    at: At,
-    /// Only this node, which must answer; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    nodes: Vec<Name>,
-}
-
 pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::List(at) => list::run(&at),
         Command::StopAll(args) => order::run(&args, order::Order::StopAll),
         Command::Latch(args) => order::run(&args, order::Order::Latch),
         Command::Release(args) => order::run(&args, order::Order::Release),
-    }
-}
-
-impl At {
-    fn network(&self) -> Network {
-        self.via.clone().unwrap_or_else(remote::usual)
     }
 }
 

@@ -10,7 +10,7 @@ use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Ask, StoppedMotor};
 use serde_json::json;
 
-use super::OrderArgs;
+use super::args::OrderArgs;
 use crate::advice;
 use crate::failure::Failure;
 use crate::output::{self, print_line};
