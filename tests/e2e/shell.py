@@ -42,7 +42,7 @@ def serves(words):
         return "--prove" not in words
     if words[:2] == ["motorlink", "share"]:
         return not asks_a_share(words)
-    if words[:2] in (["motorlink", "replay"], ["motorlink", "monitor"]):
+    if words[:2] in (["motorlink", "replay"], ["motorlink", "monitor"], ["motorlink", "node"]):
         return True
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
 

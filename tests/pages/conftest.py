@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import socket
 import sys
 from pathlib import Path
 
@@ -19,12 +20,21 @@ FOLDERS = ["bindings", "contrib", "crates", "docs", "scenarios", "tests", "vecto
 SERVE = "motorlink sim --st pty:./st0 --rmd slcan-pty:./can0"
 
 
+def free_port():
+    """A TCP port that is free now."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
 #: What a reader's commands have: `motorlink` and `python3` are those of the package. A busy machine may
 #: be late with a reply of a simulated motor.
 VARIABLES = {
     "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
     "MPLBACKEND": "Agg",
     "MOTORLINK_RMD_TIMEOUT": "1s",
+    # Pages that are tested at the same time have networks of their own.
+    "MOTORLINK_NETWORK": f"tcp/127.0.0.1:{free_port()}",
 }
 
 

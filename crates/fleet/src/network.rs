@@ -1,8 +1,7 @@
 //! The network of a node or a program: a Zenoh session.
 
 use std::fmt;
-use std::io::ErrorKind;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -11,8 +10,8 @@ use zenoh::{Config, Session, Wait};
 
 /// The address of a router, of ROS 2 and of the first node of a computer.
 pub const USUAL: &str = "tcp/127.0.0.1:7447";
-/// The same, for the look whether somebody has it.
-const USUAL_SOCKET: &str = "127.0.0.1:7447";
+/// The variable of the environment with the network: addresses, or a file.
+pub const VARIABLE: &str = "MOTORLINK_NETWORK";
 
 /// How a program or a node gets to the others.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,12 +46,25 @@ pub enum NetworkError {
 pub struct BadNetwork(String);
 
 impl Network {
-    /// The network of a node without options: the first node of a computer listens, the others connect to it.
-    pub fn usual() -> Self {
-        let own = vec![USUAL.to_owned()];
-        match TcpListener::bind(USUAL_SOCKET) {
-            Err(error) if error.kind() == ErrorKind::AddrInUse => Network::Connect(own),
-            _ => Network::Route { listen: own, connect: Vec::new() },
+    /// The network of a program without options: that of the environment, or the usual address.
+    pub fn of_programs() -> Self {
+        let named = std::env::var(VARIABLE).ok().and_then(|text| text.parse().ok());
+        named.unwrap_or_else(|| Network::Connect(vec![USUAL.to_owned()]))
+    }
+
+    /// The network of a node without options: the same. The first node of a computer listens there, if only
+    /// programs of this computer can connect.
+    pub fn of_nodes() -> Self {
+        let network = Self::of_programs();
+        let is_free = |address: &str| {
+            let socket = address.strip_prefix("tcp/").and_then(|it| it.parse::<SocketAddr>().ok());
+            socket.is_some_and(|it| it.ip().is_loopback() && TcpListener::bind(it).is_ok())
+        };
+        match &network {
+            Network::Connect(addresses) if addresses.len() == 1 && is_free(&addresses[0]) => {
+                Network::Route { listen: addresses.clone(), connect: Vec::new() }
+            }
+            _ => network,
         }
     }
 

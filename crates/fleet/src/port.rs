@@ -7,6 +7,7 @@ use motorlink_link::port::{self, Carries, Form, Given, NameError, PortName, Sche
 use motorlink_telemetry::share::port::line_port;
 
 use crate::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
+use crate::network::Network;
 use crate::remote::{self, DEADLINE, Remote};
 
 /// Registers the port `zenoh:` in this process.
@@ -52,7 +53,7 @@ impl Scheme for Zenoh {
                 let what = "an address such as tcp/10.0.0.5:7447, or a file that ends with .json5";
                 given.bad_option("via", text, what.to_owned())
             })?,
-            None => remote::usual(),
+            None => Network::of_programs(),
         };
         let who = match given.take("as") {
             Some(text) => text.parse().map_err(|_| given.bad_option("as", text, what.clone()))?,

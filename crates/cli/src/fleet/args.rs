@@ -1,14 +1,13 @@
 //! The arguments of `motorlink fleet`.
 
 use motorlink_fleet::key::Name;
-use motorlink_fleet::network::Network;
-use motorlink_fleet::remote;
+use motorlink_fleet::network::{Network, VARIABLE};
 
 /// Where the nodes are.
 #[derive(clap::Args)]
 pub struct At {
     /// Addresses with commas between them, or a Zenoh configuration (.json5)
-    #[arg(long, value_name = "NETWORK", env = remote::VARIABLE, global = true)]
+    #[arg(long, value_name = "NETWORK", env = VARIABLE, global = true)]
     pub via: Option<Network>,
     /// Print JSON, one object per line
     #[arg(long, global = true)]
@@ -26,6 +25,6 @@ pub struct OrderArgs {
 
 impl At {
     pub fn network(&self) -> Network {
-        self.via.clone().unwrap_or_else(remote::usual)
+        self.via.clone().unwrap_or_else(Network::of_programs)
     }
 }

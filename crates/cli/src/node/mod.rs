@@ -36,6 +36,7 @@ for `motorlink share`.
 
 Network: without --listen, --connect and --network the first node of a computer listens at \
 tcp/127.0.0.1:7447, for programs of this computer only, and further nodes connect to it. \
+MOTORLINK_NETWORK names another address. \
 --listen tcp/0.0.0.0:7447 lets other computers connect. There is no access control then: \
 everybody who reaches the address can move motors. A Zenoh configuration with TLS and access control is given with \
 --network.
@@ -130,7 +131,7 @@ impl Args {
                 Network::Route { listen: self.listen.clone(), connect: self.connect.clone() }
             }
             None if !self.connect.is_empty() => Network::Connect(self.connect.clone()),
-            None => Network::usual(),
+            None => Network::of_nodes(),
         }
     }
 }

@@ -50,7 +50,7 @@ impl Remote {
     /// The options that differ from the default, as in the name of a port.
     pub fn options(&self) -> Vec<String> {
         let mut options = Vec::new();
-        if self.network != usual() {
+        if self.network != Network::of_programs() {
             options.push(format!("via={}", self.network));
         }
         if self.who != own_name() {
@@ -107,16 +107,6 @@ impl Address for Remote {
         self.takes
     }
 }
-
-/// The network of programs that are told nothing: that of the environment, or the first node of this
-/// computer.
-pub fn usual() -> Network {
-    let named = std::env::var(VARIABLE).ok().and_then(|text| text.parse().ok());
-    named.unwrap_or_else(|| Network::Connect(vec![crate::network::USUAL.to_owned()]))
-}
-
-/// The variable of the environment with the network: addresses, or a file.
-pub const VARIABLE: &str = "MOTORLINK_NETWORK";
 
 /// Who uses this program: the user and the computer.
 pub fn own_name() -> Name {
