@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import socket
 import subprocess
 import time
 from pathlib import Path
@@ -54,6 +55,18 @@ def asks_a_share(words):
     return words[:2] == ["motorlink", "share"] and bool({"stop", "latch", "release"} & set(words))
 
 
+def asks_a_node(words):
+    """Whether a command needs a node that runs."""
+    return words[:2] == ["motorlink", "fleet"]
+
+
+def free_port():
+    """A TCP port that is free now."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
 def is_view(words):
     """Whether a command shows a view in a terminal, which `q` ends."""
     return words[:2] == ["motorlink", "watch"]
@@ -70,7 +83,10 @@ class Shell:
 
     def __init__(self, folder, **variables):
         # Simulated motors answer late on a loaded machine.
-        self.folder, self.variables = folder, {"MOTORLINK_RMD_TIMEOUT": "200ms", **variables}
+        own = {"MOTORLINK_RMD_TIMEOUT": "200ms"}
+        # Shells that run at the same time have networks of their own.
+        own["MOTORLINK_NETWORK"] = f"tcp/127.0.0.1:{free_port()}"
+        self.folder, self.variables = folder, {**own, **variables}
         self.background = []
 
     def __enter__(self):

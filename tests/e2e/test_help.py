@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from recordings import short
-from shell import Shell, asks_a_share, lines as commands
+from shell import Shell, asks_a_node, asks_a_share, lines as commands
 
 ROOT = Path(__file__).parents[2]
 #: What a bare `motorlink` needs: position control and the other features of a servo.
@@ -69,6 +69,8 @@ def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command
             command = next(commands(line))
             if asks_a_share(command[1]):
                 shell.run(*next(commands("motorlink share -p ./st0 -p slcan:./can0 --at unix:./share &")))
+            if asks_a_node(command[1]):
+                shell.run(*next(commands("motorlink node -p sim: --name arm1 &")))
             if command[1][1] in RECORDINGS:
                 short(tmp_path / "run.mcap")
             if command[1][1] == "replay":

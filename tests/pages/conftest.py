@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import socket
 import sys
 from pathlib import Path
 
@@ -13,18 +12,11 @@ from blocks import REPOSITORY
 sys.path.insert(0, str(REPOSITORY / "tests/e2e"))
 
 from program import environment as without_settings  # noqa: E402
-from shell import Shell  # noqa: E402
+from shell import Shell, free_port  # noqa: E402
 
 #: What a page's lines find in the current folder, as in a clone.
 FOLDERS = ["bindings", "contrib", "crates", "docs", "scenarios", "tests", "vectors"]
 SERVE = "motorlink sim --st pty:./st0 --rmd slcan-pty:./can0"
-
-
-def free_port():
-    """A TCP port that is free now."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 #: What a reader's commands have: `motorlink` and `python3` are those of the package. A busy machine may
@@ -33,7 +25,7 @@ VARIABLES = {
     "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
     "MPLBACKEND": "Agg",
     "MOTORLINK_RMD_TIMEOUT": "1s",
-    # Pages that are tested at the same time have networks of their own.
+    # That of the shell lines of a page is also that of its Python.
     "MOTORLINK_NETWORK": f"tcp/127.0.0.1:{free_port()}",
 }
 

@@ -54,6 +54,7 @@ __all__ = [
     "StVerifiedWrite",
     "__version__",
     "cli",
+    "leave_nodes",
     "open_descriptors",
     "recorded_directions",
     "recorded_results",
@@ -106,6 +107,7 @@ ST_SEGMENTS: int
 ST_TIMEOUT: float
 
 def cli(program: Sequence[str], words: Sequence[str]) -> int: ...
+def leave_nodes() -> None: ...
 def open_descriptors() -> list[int]: ...
 def st_register(
     name: str | int, profile: str = "spec", full_scale_amps: float | None = None
