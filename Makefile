@@ -57,7 +57,7 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --release --locked -p motorlink-cli -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 25 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 37 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
