@@ -50,7 +50,7 @@ help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
 
 demo: toolchain ## 1 min: simulated drives, driven through real ports
-	$(CARGO) run --release --locked -p motorlink-cli -- demo
+	$(CARGO) run --release --locked -p motorlink-cli --no-default-features --features monitor -- demo
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
