@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 use motorlink_telemetry::share::message::{Group, Line};
 use motorlink_telemetry::share::program::Program;
+use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
@@ -48,11 +49,15 @@ impl Common {
     }
 }
 
-/// Answers a query. The program asks again if the answer does not come.
+/// Answers a query of a program.
 pub(super) fn answer(query: &Query, answer: &Answer) {
-    let text = serde_json::to_vec(answer).unwrap_or_default();
-    let json = Encoding::APPLICATION_JSON;
-    let _ = query.reply(query.key_expr().clone(), text).encoding(json).express(true).wait();
+    reply(query, query.key_expr().as_str(), answer);
+}
+
+/// Answers a query with a text for this key. The program asks again if the answer does not come.
+pub(super) fn reply(query: &Query, key: &str, value: &impl Serialize) {
+    let text = serde_json::to_vec(value).unwrap_or_default();
+    let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).express(true).wait();
 }
 
 /// Answers a query with a part of the share's stream.

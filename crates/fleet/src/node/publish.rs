@@ -22,7 +22,7 @@ use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::common::Common;
+use super::common::{Common, reply};
 use crate::key;
 use crate::message::Info;
 use crate::weight::{Lines, speaks};
@@ -157,10 +157,7 @@ impl Common {
         {
             let _ = timeout(STATE, self.learn(own)).await;
         }
-        let text = serde_json::to_vec(&self.info()).unwrap_or_default();
-        let key = key::info(&self.name, &self.boot);
-        // The program asks again if the answer does not come.
-        let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
+        reply(query, &key::info(&self.name, &self.boot), &self.info());
     }
 
     fn columns_of(&self, group: Group) {
@@ -174,9 +171,7 @@ impl Common {
             let is_meant = zenoh::key_expr::KeyExpr::try_from(key.as_str())
                 .is_ok_and(|key| query.key_expr().intersects(&key));
             if is_meant {
-                let text = serde_json::to_vec(group).unwrap_or_default();
-                // The program asks again if the answer does not come.
-                let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
+                reply(query, key, group);
             }
         }
     }
