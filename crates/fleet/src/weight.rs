@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use motorlink::st::Profile;
-use motorlink_telemetry::share::message::{Ask, Line, Protocol};
+use motorlink_telemetry::share::message::{Ask, Line};
 use motorlink_telemetry::share::request::Kind;
 use motorlink_telemetry::share::words::Speaks;
 
@@ -16,7 +15,7 @@ pub struct Lines(BTreeMap<String, Speaks>);
 impl Lines {
     /// What the node says of its lines. A line in a profile that is not known here is left out.
     pub fn of(lines: &[Line]) -> Self {
-        Lines(lines.iter().filter_map(|it| Some((it.line.clone(), speaks(it)?))).collect())
+        Lines(lines.iter().filter_map(|it| Some((it.line.clone(), Speaks::of(it)?))).collect())
     }
 
     /// What a request does. Of a line that is not known, every command may move a motor.
@@ -42,17 +41,6 @@ impl Lines {
             | Ask::Ports
             | Ask::Frames { .. }
             | Ask::Leave { .. } => Kind::Reads,
-        }
-    }
-}
-
-/// What the drives of a line speak.
-pub fn speaks(line: &Line) -> Option<Speaks> {
-    match line.protocol {
-        Protocol::Rmd => Some(Speaks::Rmd),
-        Protocol::St => {
-            let name = line.profile.as_deref()?;
-            Profile::ALL.into_iter().find(|it| it.name() == name).map(Speaks::St)
         }
     }
 }

@@ -14,6 +14,7 @@ use motorlink_telemetry::share::message::{
     Answer, Ask, DropRule, Event, Group, Line, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program};
+use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
 use tokio::time::{MissedTickBehavior, interval, timeout};
@@ -25,7 +26,7 @@ use zenoh::query::Query;
 use super::common::{Common, reply};
 use crate::key;
 use crate::message::Info;
-use crate::weight::{Lines, speaks};
+use crate::weight::Lines;
 
 /// How often the state is published.
 const STATE: Duration = Duration::from_secs(1);
@@ -195,7 +196,7 @@ impl Common {
 
 /// Reads something of each motor that a line can have. The share remembers those that answer.
 fn search(program: &Program, line: &Line) {
-    let Some(speaks) = speaks(line) else { return };
+    let Some(speaks) = Speaks::of(line) else { return };
     let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
     let (program, name) = (program.clone(), line.line.clone());
     tokio::spawn(async move {
@@ -220,7 +221,7 @@ fn question(motor: Motor) -> Vec<u8> {
 
 /// Subscribes to the main values of a motor.
 async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) {
-    let Some(motor) = speaks(line).and_then(|speaks| speaks.motor(motor)) else { return };
+    let Some(motor) = Speaks::of(line).and_then(|speaks| speaks.motor(motor)) else { return };
     let main = Overview::of(motor);
     let sources = main.fast().chain(main.slow()).chain(main.angle);
     let signals = sources

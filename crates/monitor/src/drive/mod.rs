@@ -22,7 +22,7 @@ mod write;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use motorlink_telemetry::share::message::{Line, MotorName, Protocol};
+use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 
@@ -53,11 +53,7 @@ impl Drives {
 
     /// The drives of these lines.
     pub fn new(lines: Vec<Line>) -> Self {
-        let speaks = |line: &Line| match line.protocol {
-            Protocol::Rmd => Some(Speaks::Rmd),
-            Protocol::St => Some(Speaks::St(line.profile.as_ref()?.parse().ok()?)),
-        };
-        let lines = lines.iter().filter_map(|line| Some((line.line.clone(), speaks(line)?)));
+        let lines = lines.iter().filter_map(|line| Some((line.line.clone(), Speaks::of(line)?)));
         Drives { lines: Arc::new(lines.collect()), control: Arc::default() }
     }
 

@@ -9,7 +9,7 @@ use motorlink_proto::rmd::{Direction, MotorId, describe};
 use motorlink_proto::st::{Frame, MAX_FRAME, MotorNumber, Profile};
 use motorlink_proto::time::Instant;
 
-use super::message::{Happening, Protocol};
+use super::message::{Happening, Line, Protocol};
 use crate::event::What;
 use crate::line::Request;
 use crate::schedule::CommandId;
@@ -25,6 +25,14 @@ pub enum Speaks {
 }
 
 impl Speaks {
+    /// What the drives of a line speak. `None`: in a profile that is not known here.
+    pub fn of(line: &Line) -> Option<Self> {
+        match line.protocol {
+            Protocol::Rmd => Some(Speaks::Rmd),
+            Protocol::St => Some(Speaks::St(line.profile.as_ref()?.parse().ok()?)),
+        }
+    }
+
     /// The protocol, without a profile.
     pub fn protocol(self) -> Protocol {
         match self {
