@@ -6,6 +6,7 @@ $ pip install -r tests/e2e/requirements.txt
 $ MOTORLINK_BIN=target/debug/motorlink pytest tests/e2e
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -127,3 +128,25 @@ def drives(motorlink, tmp_path_factory):
     for sim in serving(motorlink, folder):
         yield sim(st=("pty", "tcp"), rmd=("slcan-pty", "tcp"))
     shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def nodes(start, sim, tmp_path):
+    """`nodes("arm1", ...)`: a node of simulated drives, again and again; further ones connect to the first."""
+    started, simulated = [], {}
+
+    def nodes(name, *more):
+        if name not in simulated:
+            simulated[name] = sim(st=[f"pty:{tmp_path}/{name}.st"], rmd=[f"slcan-pty:{tmp_path}/{name}.can"])
+        drives = simulated[name]
+        path = tmp_path / f"{name}.share"
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", *more]
+        at = ["--connect", started[0].address] if started else ["--listen", "tcp/127.0.0.1:0"]
+        running = start("node", *words, *at, "--name", name, "--timeout", "5s", "--json")
+        running.ready = ready = json.loads(running.line(0))
+        assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]
+        running.path, running.address = path, ready["addresses"][0]
+        started.append(running)
+        return running
+
+    return nodes

@@ -152,18 +152,18 @@ class Page:
         """The answer to a command of the protocol."""
         return self.ask("act", line=line, motor=motor, command=command, values=values, hold=hold)
 
-    def turn(self, hold=False):
-        """Turns ST motor 1 and RMD motor 2."""
-        self.act_soon("st0", 1, "SET_RAMP", hold, speed_rpm=1500, duration_ms=100)
-        self.act_soon("st0", 1, "START_MOTOR", hold)
-        self.act_soon("rmd0", 2, "set_speed", hold, speed_dps=360)
+    def turn(self, hold=False, node=""):
+        """Turns ST motor 1 and RMD motor 2; `node` is `arm1/` in a fleet."""
+        self.act_soon(f"{node}st0", 1, "SET_RAMP", hold, speed_rpm=1500, duration_ms=100)
+        self.act_soon(f"{node}st0", 1, "START_MOTOR", hold)
+        self.act_soon(f"{node}rmd0", 2, "set_speed", hold, speed_dps=360)
 
     def act_soon(self, *words, **values):
         """A command that is carried out, as soon as the motor has stopped and the line is not busy."""
 
         def done():
             answer = self.act(*words, **values)
-            assert answer["kind"] == "answer" or answer["reason"] in ("refused", "expired"), answer
+            assert answer["kind"] == "answer" or answer["reason"] in ("refused", "expired", "overtaken"), answer
             return answer["kind"] == "answer"
 
         eventually(done, f"{words}")

@@ -49,7 +49,7 @@ RECORDINGS = ("info", "recover", "convert", "plot")
 OF_THEIR_OWN = [(), *((name,) for name in ("ports", "completions", "man", "watch", "record", "replay", *RECORDINGS))]
 
 
-@pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", ""])
+@pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", "node", "fleet", ""])
 def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
     pages = helps(run, command) if command else [
         page for page in helps(run) if page[0][:1] in OF_THEIR_OWN

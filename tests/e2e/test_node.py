@@ -39,27 +39,6 @@ time.sleep(600)
 
 
 @pytest.fixture
-def nodes(start, sim, tmp_path):
-    """`nodes("arm1", ...)`: a node of simulated drives; further ones connect to the first."""
-    started = []
-
-    def nodes(name, *more):
-        drives = sim(st=[f"pty:{tmp_path}/{name}.st"], rmd=[f"slcan-pty:{tmp_path}/{name}.can"])
-        path = tmp_path / f"{name}.share"
-        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", *more]
-        at = ["--connect", started[0].address] if started else ["--listen", "tcp/127.0.0.1:0"]
-        running = start("node", *words, *at, "--name", name, "--timeout", "5s", "--json")
-        ready = json.loads(running.line(0))
-        check(running.line(0))
-        assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]
-        running.path, running.address = path, ready["addresses"][0]
-        started.append(running)
-        return running
-
-    return nodes
-
-
-@pytest.fixture
 def node(nodes):
     """A node with the name arm1."""
     return nodes("arm1")

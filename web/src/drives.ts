@@ -1,6 +1,6 @@
 // What the page knows of lines and motors: descriptions, events about them, and rates.
 import { computed, effect, signal } from '@preact/signals';
-import { nameOf } from './format';
+import { nameOf, nodeOf } from './format';
 import { ask, entries, found, lines, motors, searchFailed, searching, welcome } from './link';
 import type { Description, Event as DriveEvent, Mode, SignalRate } from './wire';
 
@@ -12,6 +12,29 @@ export interface MotorId {
 /** All motors that were found, in the order of the lines. */
 export const allMotors = computed<MotorId[]>(() =>
   lines.value.flatMap(({ line }) => (motors.value.get(line) ?? []).map((motor) => ({ line, motor }))),
+);
+
+/** The nodes of a fleet. None without one. */
+export const nodes = computed<string[]>(() => [
+  ...new Set(lines.value.map(({ line }) => nodeOf(line)).filter((node) => node !== null)),
+]);
+
+/** With more motors only those of one node are shown. */
+const MANY = 24;
+
+/** The node that was chosen, `null` for all. `undefined`: none was chosen. */
+export const chosenNode = signal<string | null | undefined>(undefined);
+
+/** The node whose motors are shown, `null` for all. */
+export const shownNode = computed<string | null>(() => {
+  const chosen = chosenNode.value;
+  if (chosen === null || (chosen !== undefined && nodes.value.includes(chosen))) return chosen;
+  return allMotors.value.length > MANY ? (nodes.value[0] ?? null) : null;
+});
+
+/** The motors that have a card. */
+export const shownMotors = computed<MotorId[]>(() =>
+  allMotors.value.filter(({ line }) => shownNode.value === null || nodeOf(line) === shownNode.value),
 );
 
 /** What the drives of a line have, by line. */

@@ -1,9 +1,10 @@
 // The faults of all motors, for the header of every view.
-import { effect, signal } from '@preact/signals';
-import { allMotors, descriptions } from './drives';
+import { signal } from '@preact/signals';
+import { type MotorId, allMotors, descriptions } from './drives';
 import { nameOf } from './format';
-import { type Rows, age, subscribe, wallAt } from './link';
+import { type Rows, age, wallAt } from './link';
 import { named } from './stop';
+import { follow } from './subscriptions';
 import type { Fault, SignalName } from './wire';
 
 /** How often the faults of all motors are read while no other view reads them, in seconds. */
@@ -39,6 +40,16 @@ export const faultsText = (count: number) => `${count || 'no'} ${count === 1 ? '
 /** The last value of the faults of each motor, by name. */
 const last = new Map<string, { value: number; wall: number }>();
 
+/** How many faults a motor had last. 0 if that is not known. */
+function faultsAt(line: string, motor: number): number {
+  const known = last.get(nameOf(line, motor));
+  return known ? countOf(known.value, descriptions.peek().get(line)?.faults ?? []) : 0;
+}
+
+/** How many of these motors have a fault. */
+export const faulty = (motors: readonly MotorId[]) =>
+  motors.filter(({ line, motor }) => faultsAt(line, motor) > 0).length;
+
 /** The faults of all motors in words. Empty if there is none. */
 export const faultSummary = signal('');
 
@@ -47,12 +58,11 @@ function summary(): string {
   const names: string[] = [];
   for (const { line, motor } of allMotors.peek()) {
     const name = nameOf(line, motor);
-    const known = last.get(name);
-    const faults = known && countOf(known.value, descriptions.peek().get(line)?.faults ?? []);
+    const faults = faultsAt(line, motor);
     if (!faults) continue;
     count += faults;
     // NaN: the age is unknown.
-    names.push(age(known.wall) <= OLD ? name : `${name} (old)`);
+    names.push(age(last.get(name)?.wall ?? NaN) <= OLD ? name : `${name} (old)`);
   }
   return count ? `${faultsText(count)}: ${named(names)}` : '';
 }
@@ -70,14 +80,13 @@ export function watchFaults(): () => void {
   const isHidden = signal(document.hidden);
   const look = () => void (isHidden.value = document.hidden);
   document.addEventListener('visibilitychange', look);
-  const stopReading = effect(() => {
+  const stopReading = follow(() => {
     const signals = allMotors.value.flatMap(({ line, motor }): SignalName[] => {
       const name = descriptions.value.get(line)?.overview.faults;
       return name === undefined ? [] : [{ line, motor, name }];
     });
-    if (isHidden.value || signals.length === 0) return;
-    return subscribe(signals, PERIOD, take, { rows: true });
-  });
+    return isHidden.value ? [] : [{ signals, period: PERIOD }];
+  }, take);
   const timer = setInterval(() => (faultSummary.value = summary()), LOOK);
   return () => {
     stopReading();

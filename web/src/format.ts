@@ -54,6 +54,12 @@ export function timeOfDay(wall: number): string {
   return Number.isFinite(wall) ? TIME.format(wall * 1000) : '–';
 }
 
+/** The node of a line of a fleet: `arm1` of `arm1/st0`. Lines of one share have none. */
+export function nodeOf(line: string): string | null {
+  const end = line.indexOf('/');
+  return end < 0 ? null : line.slice(0, end);
+}
+
 /** The name of a motor. Number 0 stands for any motor of a line on which nothing has answered. */
 export const nameOf = (line: string, motor: number) => (motor === 0 ? line : `${line}/${motor}`);
 

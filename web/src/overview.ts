@@ -1,8 +1,9 @@
 // The values on the cards: the last of each signal, and a short history of the speed.
-import { type Signal, effect, signal } from '@preact/signals';
-import { allMotors, descriptions } from './drives';
+import { type Signal, signal } from '@preact/signals';
+import { descriptions, shownMotors } from './drives';
 import { nameOf, tooOld } from './format';
-import { type Refused, type Rows, age, state, subscribe, wallAt } from './link';
+import { type Rows, age, state, wallAt } from './link';
+import { follow } from './subscriptions';
 import type { Overview, SignalName } from './wire';
 
 /** How often the values of the cards are read, in seconds. */
@@ -91,30 +92,28 @@ const slowOf = ({ temperature, voltage }: Overview) => [temperature, voltage];
 
 /** Reads what the cards show. Returns what ends it. */
 export function watchOverview(): () => void {
-  const stopReading = effect(() => {
-    const all = allMotors.value;
-    const known = descriptions.value;
-    const names = (pick: (overview: Overview) => (string | null)[]): SignalName[] =>
-      all.flatMap(({ line, motor }) => {
-        const overview = known.get(line)?.overview;
-        const wanted = overview ? pick(overview).filter((name) => name !== null) : [];
-        return wanted.map((name) => ({ line, motor, name }));
-      });
-    overviewRefused.value = null;
-    const onRefused = (why: Refused) => void (overviewRefused.value = why.message);
-    const ends = [
-      [names(fastOf), FAST] as const,
-      [names(slowOf), SLOW] as const,
-    ].map(([signals, period]) =>
-      signals.length ? subscribe(signals, period, take, { rows: true, onRefused }) : () => {},
-    );
-    return () => ends.forEach((end) => end());
-  });
+  const stopReading = follow(
+    () => {
+      const known = descriptions.value;
+      const names = (pick: (overview: Overview) => (string | null)[]): SignalName[] =>
+        shownMotors.value.flatMap(({ line, motor }) => {
+          const overview = known.get(line)?.overview;
+          const wanted = overview ? pick(overview).filter((name) => name !== null) : [];
+          return wanted.map((name) => ({ line, motor, name }));
+        });
+      return [
+        { signals: names(fastOf), period: FAST },
+        { signals: names(slowOf), period: SLOW },
+      ];
+    },
+    take,
+    (why) => void (overviewRefused.value = why && why.message),
+  );
 
   let turn = 0;
   const timer = setInterval(() => {
     turn += 1;
-    for (const { line, motor } of allMotors.peek()) {
+    for (const { line, motor } of shownMotors.peek()) {
       const live = liveOf(line, motor);
       const speed = descriptions.peek().get(line)?.overview.speed;
       const last = speed === undefined ? undefined : live.values.get(speed);

@@ -294,7 +294,7 @@ motor: number,
  */
 columns: Array<Column>, };
 
-export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "taken" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "opened" | "closed" | "scanned" | "later";
+export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "taken" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "late" | "clock" | "opened" | "closed" | "scanned" | "later";
 
 export type Limit = { 
 /**

@@ -153,9 +153,33 @@ pub fn columns(node: &Name, line: &str, motor: u8) -> String {
     format!("{ROOT}/{node}/{line}/{motor}/columns")
 }
 
-/// Those of all motors of a node.
-pub fn all_columns(node: &Name) -> String {
-    format!("{ROOT}/{node}/*/*/columns")
+/// Those of all motors of a node, or of all nodes.
+pub fn all_columns(node: Option<&Name>) -> String {
+    format!("{ROOT}/{}/*/*/columns", node.map_or("*", Name::as_str))
+}
+
+/// The samples of all motors of all nodes.
+pub fn all_samples() -> String {
+    format!("{ROOT}/*/*/*/samples")
+}
+
+/// The state of all nodes.
+pub fn all_states() -> String {
+    format!("{ROOT}/*/{WHOLE}/state")
+}
+
+/// The node of any key.
+pub fn node_of(key: &str) -> Option<Name> {
+    key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?.parse().ok()
+}
+
+/// The node, the line and the motor in a key that [`samples`] or [`columns`] made.
+pub fn motor_of(key: &str) -> Option<(Name, &str, u8)> {
+    let [line, motor, _] = key.strip_prefix(ROOT)?.split('/').skip(2).collect::<Vec<_>>()[..]
+    else {
+        return None;
+    };
+    Some((node_of(key)?, line, motor.parse().ok()?))
 }
 
 /// Who asks, in the key of a request.
@@ -182,9 +206,8 @@ const ASK: &str = "ask";
 
 /// The node and its run, in a key that [`alive`] or [`info`] made.
 pub fn run_of(key: &str) -> Option<(Name, Name)> {
-    let node = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;
     let [_, boot] = behind_node(key)?[..] else { return None };
-    Some((node.parse().ok()?, boot.parse().ok()?))
+    Some((node_of(key)?, boot.parse().ok()?))
 }
 
 /// Who is there, and in which session, in a key that [`here`] made.

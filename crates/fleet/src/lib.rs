@@ -1,7 +1,8 @@
 //! Drives at other computers, over [Zenoh](https://zenoh.io).
 //!
 //! A node is a share (`motorlink_telemetry::share`) that programs of other computers use, too. [`node`] is
-//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE` of a line. Both sides
+//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE` of a line,
+//! [`whole`] makes one share of all nodes, [`view`] sees what they publish. Both sides
 //! exchange the messages of a share; [`message`] has what goes around them, [`key`] the keys, [`clock`] the
 //! time that they agree on. docs/FLEET-PROTOCOL.md describes it for other programs.
 //!
@@ -17,7 +18,9 @@ pub mod network;
 pub mod node;
 pub mod port;
 pub mod remote;
+pub mod view;
 mod weight;
+pub mod whole;
 
 /// The version of keys and messages.
 pub const VERSION: u32 = 1;

@@ -154,6 +154,9 @@ pub struct Info {
     pub wall: f64,
     /// Its lines.
     pub lines: Vec<Line>,
+    /// The lines on which it still looks for motors for the first time: more may be found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub searching: Vec<String>,
     /// Who stopped the motors, if motion is refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latched_by: Option<String>,

@@ -66,8 +66,7 @@ impl Scheme for Zenoh {
             let what = "the port without it: there are no raw bytes of a node yet".to_owned();
             return Err(given.bad_option("raw", "set", what));
         }
-        let (boot, stops) = (None, false);
-        let remote = Remote { node, boot, network, who, deadline, motion, takes, stops };
+        let remote = Remote { who, deadline, motion, takes, ..Remote::new(node, network) };
         line_port(Arc::new(remote), line).ok_or_else(|| NameError::Incomplete {
             name: given.name.to_owned(),
             what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",

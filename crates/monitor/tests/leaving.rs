@@ -13,7 +13,7 @@ const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
 
 /// A program that turned motor 1 of the bus, and one that sees the log.
 async fn turning(world: &World) -> (Program, Listener) {
-    let (_, watcher, _) = Program::connect(&world.path, "watcher").await.unwrap();
+    let (_, watcher, _) = Program::connect(&world.share(), "watcher").await.unwrap();
     let (drive, _) = connect(&world.path, "page 4 (control)").await;
     let command = Ask::Command {
         line: "rmd0".to_owned(),

@@ -23,7 +23,7 @@ fn turn() -> Ask {
 /// A link whose share has ended.
 async fn lost(name: &str) -> Arc<Link> {
     let world = World::new(name, Profile::Spec);
-    let link = Arc::new(Link::new(world.path.clone()));
+    let link = Arc::new(Link::new(world.share()));
     let kept = Arc::clone(&link);
     tokio::spawn(async move { kept.keep().await });
     joins(&link, true).await;
@@ -128,7 +128,7 @@ async fn a_stop_that_is_too_old_is_not_sent() {
 #[tokio::test]
 async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() {
     let world = World::new("link-latch", Profile::Spec);
-    let link = Arc::new(Link::new(world.path.clone()));
+    let link = Arc::new(Link::new(world.share()));
     let kept = Arc::clone(&link);
     tokio::spawn(async move { kept.keep().await });
     joins(&link, true).await;

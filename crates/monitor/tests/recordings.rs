@@ -46,7 +46,7 @@ impl Desk {
 
     async fn of(world: World, folder: PathBuf) -> Self {
         motorlink_telemetry::share::port::register();
-        let recordings = Arc::new(Recordings::new(folder.clone(), world.path.clone()));
+        let recordings = Arc::new(Recordings::new(folder.clone(), world.share()));
         let (view, _) = connect(&world.path, PAGE).await;
         Desk { world, folder, recordings, view }
     }

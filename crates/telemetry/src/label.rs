@@ -3,7 +3,11 @@
 /// The last part of a port's name: `can0` of `slcan:/dev/can0?x=1`.
 pub fn last_part(port: &str) -> &str {
     let body = port.split('?').next().unwrap_or(port).trim_end_matches(['/', ':']);
-    body.rsplit(['/', ':']).next().unwrap_or(body)
+    match body.strip_prefix("zenoh:") {
+        // The line of a node.
+        Some(line) => line,
+        None => body.rsplit(['/', ':']).next().unwrap_or(body),
+    }
 }
 
 /// The same names, each of them once: `numbered` adds a number to one that is there already.

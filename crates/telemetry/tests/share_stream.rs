@@ -6,10 +6,12 @@ mod shared;
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{Kind, Reader, append};
 use motorlink_telemetry::share::message::*;
@@ -37,7 +39,7 @@ fn follow_at(path: &Path, line: &str) -> Result<Stream, String> {
         period,
     };
     let followed = Followed {
-        path: path.to_owned(),
+        share: Arc::new(Local(path.to_owned())),
         line: line.to_owned(),
         speaks: Speaks::Rmd,
         name: "follower".to_owned(),

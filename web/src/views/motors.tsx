@@ -1,12 +1,13 @@
 // A card a motor: what it does, and the controls that move it.
 import { useEffect, useRef } from 'preact/hooks';
-import { allMotors, describeFailed, descriptions, isSearched, isSilent, motorEvents, watchDescriptions, watchLimits, watchRates } from '../drives';
+import { allMotors, describeFailed, descriptions, isSearched, isSilent, motorEvents, shownMotors, watchDescriptions, watchLimits, watchRates } from '../drives';
 import { nameOf } from '../format';
 import { found, lines, refreshMotors, searchFailed, searching, welcome } from '../link';
 import { liveOf, overviewRefused, watchOverview, watchView } from '../overview';
 import { Said } from '../parts';
 import { Control } from './control';
 import './motors.css';
+import { Nodes } from './nodes';
 import { Values } from './values';
 import { Words } from '../words';
 
@@ -101,8 +102,9 @@ export default function Motors() {
           {isSearched.value ? 'No motor was found. Check power and cables, then search again.' : searchText()}
         </p>
       )}
+      <Nodes />
       <ul class="cards">
-        {all.map(({ line, motor }) => (
+        {shownMotors.value.map(({ line, motor }) => (
           <Card key={nameOf(line, motor)} line={line} motor={motor} />
         ))}
       </ul>

@@ -5,12 +5,19 @@ use motorlink_fleet::network::{Network, VARIABLE};
 
 /// Where the nodes are.
 #[derive(clap::Args)]
-pub struct At {
+pub struct Via {
     /// Addresses with commas between them, or a Zenoh configuration (.json5)
-    #[arg(long, value_name = "NETWORK", env = VARIABLE, global = true)]
+    #[arg(long, value_name = "NETWORK", env = VARIABLE)]
     pub via: Option<Network>,
+}
+
+/// Where the nodes are, and how they are shown.
+#[derive(clap::Args)]
+pub struct At {
+    #[command(flatten)]
+    pub via: Via,
     /// Print JSON, one object per line
-    #[arg(long, global = true)]
+    #[arg(long)]
     pub json: bool,
 }
 
@@ -23,7 +30,7 @@ pub struct OrderArgs {
     pub nodes: Vec<Name>,
 }
 
-impl At {
+impl Via {
     pub fn network(&self) -> Network {
         self.via.clone().unwrap_or_else(Network::of_programs)
     }

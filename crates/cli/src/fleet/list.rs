@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 
 pub fn run(at: &At) -> Result<(), Failure> {
-    let nodes = nodes(&at.network())?;
+    let nodes = nodes(&at.via.network())?;
     if nodes.is_empty() && !at.json {
         print_line(&"No node is at this network.")?;
     }

@@ -1,8 +1,13 @@
 //! `motorlink fleet`: the nodes of a network.
 
 mod args;
+mod command;
+mod found;
 mod list;
 mod order;
+mod record;
+mod settings;
+mod watch;
 
 use motorlink_fleet::network::NetworkError;
 
@@ -21,13 +26,21 @@ Exit code 0, or 3 if a node does not answer or a motor did not confirm its stop.
 was cut before is not in the list: name with --node those that must answer.")]
 pub struct Args {
     #[command(subcommand)]
-    command: Command,
+    task: Task,
 }
 
 #[derive(clap::Subcommand)]
-enum Command {
+enum Task {
     /// List the nodes and their lines
     List(At),
+    /// Show what the drives of all nodes do
+    Watch(watch::Args),
+    /// Record the motors of all nodes in one MCAP file, with the time of this computer
+    Record(record::Args),
+    /// Carry out a command of st or rmd for the motors of all nodes, if it moves none
+    Command(command::Args),
+    /// Compare the settings of the motors of all nodes
+    Settings(settings::Args),
     /// Latch all nodes and stop all their motors
     StopAll(OrderArgs),
     /// Refuse motion at all nodes until it is released; motors keep turning
@@ -37,11 +50,15 @@ enum Command {
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
-    match args.command {
-        Command::List(at) => list::run(&at),
-        Command::StopAll(args) => order::run(&args, order::Order::StopAll),
-        Command::Latch(args) => order::run(&args, order::Order::Latch),
-        Command::Release(args) => order::run(&args, order::Order::Release),
+    match args.task {
+        Task::List(at) => list::run(&at),
+        Task::Watch(args) => watch::run(&args),
+        Task::Record(args) => record::run(&args),
+        Task::Command(args) => command::run(&args),
+        Task::Settings(args) => settings::run(&args),
+        Task::StopAll(args) => order::run(&args, order::Order::StopAll),
+        Task::Latch(args) => order::run(&args, order::Order::Latch),
+        Task::Release(args) => order::run(&args, order::Order::Release),
     }
 }
 

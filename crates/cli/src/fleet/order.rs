@@ -5,8 +5,7 @@ use std::thread;
 use motorlink_fleet::directory;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
-use motorlink_fleet::remote::{self, Remote};
-use motorlink_telemetry::share::address::Address;
+use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::message::{Ask, StoppedMotor};
 use serde_json::json;
 
@@ -25,7 +24,7 @@ pub enum Order {
 }
 
 pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
-    let network = args.at.network();
+    let network = args.at.via.network();
     let found = directory::nodes(&network)?.into_keys();
     let is_meant = |(name, _): &(Name, Name)| args.nodes.is_empty() || args.nodes.contains(name);
     let mut nodes: Vec<(Name, Option<Name>)> =
@@ -88,19 +87,10 @@ fn tell(
     network: Network,
     order: Order,
 ) -> Result<Vec<StoppedMotor>, String> {
-    let remote = Remote {
-        node: node.clone(),
-        boot,
-        network,
-        who: remote::own_name(),
-        deadline: remote::DEADLINE,
-        motion: None,
-        takes: false,
-        stops: order != Order::Release,
-    };
-    let socket = remote.connect().map_err(|error| error.to_string())?;
+    let stops = order != Order::Release;
+    let remote = Remote { boot, stops, ..Remote::new(node.clone(), network) };
     let failed = |error: std::io::Error| error.to_string();
-    let mut share = Connection::over(socket, "fleet").map_err(failed)?;
+    let mut share = Connection::open(&remote, "fleet").map_err(failed)?;
     match order {
         Order::Latch => share.ask(Ask::Latch).map(|_| Vec::new()).map_err(failed),
         Order::Release => share.ask(Ask::Release).map(|_| Vec::new()).map_err(failed),

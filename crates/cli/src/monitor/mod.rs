@@ -1,17 +1,19 @@
 //! `motorlink monitor`: a share with a page for browsers.
 
 mod listen;
+mod shown;
 
 use std::io;
 use std::net::TcpListener;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_monitor::message::Role;
 use motorlink_monitor::server::{self, Options, Settings, Tls};
+use motorlink_telemetry::share::address::{Address, Local};
 use motorlink_telemetry::share::message::{Answer, Ask, Line};
 use motorlink_telemetry::share::opening::Limits;
-use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::share::server::Server;
 use serde_json::json;
 
@@ -23,6 +25,7 @@ use crate::share::{self, Connection, Lines, PROGRAM};
 use crate::span::span_up_to;
 
 use listen::Listen;
+use shown::{Running, Shown};
 
 /// Signs of life come each 100 ms.
 const SHORTEST_DEADLINE: Duration = Duration::from_millis(200);
@@ -35,7 +38,8 @@ const SIMULATED_TIMEOUT: Duration = Duration::from_millis(500);
 #[command(after_help = "\
 Without -p the drives are simulated. -p and --profile are as for `motorlink share`, and the monitor is \
 a share: other programs use the drives at the same time at --at. With --share, or with -p \
-share:PATH/LINE, it shows all lines of a share that runs already.
+share:PATH/LINE, it shows all lines of a share that runs already. With --fleet it shows all nodes of a \
+network, also those that come later.
 
 Who may do what: the first address is for operators. The second one is for viewers, who see everything \
 and can stop, nothing else. The third one is for programs that speak Foxglove's protocol, and read \
@@ -57,10 +61,8 @@ pub struct Args {
     /// Where other programs connect: unix:PATH. Only you can connect [default: a new folder]
     #[arg(long, value_name = "PORT", value_hint = clap::ValueHint::AnyPath)]
     at: Option<String>,
-    /// Show a share that runs: unix:PATH. Its drives are not opened again
-    #[arg(long, value_name = "PORT", conflicts_with_all = ["at", "timeout"],
-        value_hint = clap::ValueHint::AnyPath)]
-    share: Option<String>,
+    #[command(flatten)]
+    running: Running,
     #[command(flatten)]
     listen: Listen,
     /// How long a page may give no sign of life until its motors stop, 200ms to 2s
@@ -90,7 +92,7 @@ pub fn run(mut args: Args) -> Result<(), Failure> {
     if args.deadline < SHORTEST_DEADLINE {
         return Err(Failure::usage("--deadline is 200ms to 2s: signs of life come each 100 ms"));
     }
-    let running = running_share(&args)?;
+    let running = args.running.shown(&args.lines, args.at.is_some())?;
     // Before the ports: if no browser can connect, no drive is touched.
     let web = Web {
         tls: args.listen.tls()?,
@@ -100,50 +102,30 @@ pub fn run(mut args: Args) -> Result<(), Failure> {
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     match running {
-        Some(path) => show(&args, path, web),
+        Some(share) => show(&args, share, web),
         None => hold(&mut args, web),
     }
 }
 
-/// The share that is shown, if it runs in another program.
-fn running_share(args: &Args) -> Result<Option<PathBuf>, Failure> {
-    if let Some(share) = &args.share {
-        return match args.lines.is_empty() {
-            true => Ok(Some(share::path(share)?)),
-            false => Err(Failure::usage("--share shows a share that has its ports")
-                .trying("leave -p out, and unset MOTORLINK_PORT")),
-        };
-    }
-    let places: Vec<_> = args.lines.ports.iter().map(|port| place_of(port)).collect();
-    match places.iter().flatten().next() {
-        None => Ok(None),
-        Some((path, _)) => {
-            let is_same = |place: &Option<(PathBuf, String)>| {
-                place.as_ref().is_some_and(|(other, _)| other == path)
-            };
-            match places.iter().all(is_same) && args.at.is_none() {
-                true => Ok(Some(path.clone())),
-                false => Err(Failure::usage("a running share is shown alone")
-                    .trying("give --share unix:PATH without -p and --at")),
-            }
-        }
-    }
-}
-
 /// Shows a share that runs in another program.
-fn show(args: &Args, path: PathBuf, web: Web) -> Result<(), Failure> {
+fn show(args: &Args, Shown { share, at, is_fleet }: Shown, web: Web) -> Result<(), Failure> {
+    let what = if is_fleet { "fleet" } else { "share" };
     let failed = |error: io::Error| {
-        Failure::link(format!("the share at unix:{}: {error}", path.display()))
-            .trying("is it that of a running `motorlink share`?")
+        Failure::link(format!("the {what} at {at}: {error}")).trying(match is_fleet {
+            true => "is a router or a node there? --via says where",
+            false => "is it that of a running `motorlink share`?",
+        })
     };
-    let mut share = Connection::open(&path, PROGRAM).map_err(failed)?;
-    let Answer::Lines { lines, .. } = share.ask(Ask::Lines).map_err(failed)? else {
+    let mut asked = Connection::open(&*share, PROGRAM).map_err(failed)?;
+    let Answer::Lines { lines, .. } = asked.ask(Ask::Lines).map_err(failed)? else {
         return Err(failed(io::Error::other("it gives another answer")));
     };
-    drop(share);
-    args.lines.check(&lines)?;
-    let monitor = start(args, path.clone(), true, web)?;
-    ready(args, &monitor, &path, &lines, false)?;
+    drop(asked);
+    if !is_fleet {
+        args.lines.check(&lines)?;
+    }
+    let monitor = start(args, share, true, web)?;
+    ready(args, &monitor, (what, &at), &lines, false)?;
     while interrupt::wait(Duration::from_secs(3600)) {}
     Ok(())
 }
@@ -164,8 +146,9 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
         }
     };
     let server = Server::open(&path, PROGRAM, args.lines.open(Limits::default())?)?;
-    let monitor = start(args, path.clone(), false, web)?;
-    let ready = ready(args, &monitor, &path, &server.lines(), is_simulated);
+    let at = format!("unix:{}", path.display());
+    let monitor = start(args, Arc::new(Local(path)), false, web)?;
+    let ready = ready(args, &monitor, ("share", &at), &server.lines(), is_simulated);
     // The motors stop first, then the pages are closed.
     let outcome = share::serve(server, args.json, ready);
     drop(monitor);
@@ -174,7 +157,7 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
 
 fn start(
     args: &Args,
-    share: PathBuf,
+    share: Arc<dyn Address>,
     separate_share: bool,
     web: Web,
 ) -> Result<server::Server, Failure> {
@@ -194,7 +177,7 @@ fn start(
 fn ready(
     args: &Args,
     monitor: &server::Server,
-    path: &Path,
+    (what, at): (&str, &str),
     lines: &[Line],
     is_simulated: bool,
 ) -> Result<(), Failure> {
@@ -202,7 +185,6 @@ fn ready(
     let url = monitor.url(&host, Role::Operator);
     let viewer_url = monitor.url(&host, Role::Viewer);
     let foxglove_url = monitor.foxglove_url(&host);
-    let at = format!("unix:{}", path.display());
     if args.open
         && let Err(error) = open::that_detached(&url)
     {
@@ -224,7 +206,7 @@ fn ready(
     if let Some(url) = monitor.bare_url() {
         output::print_line(&format!("for PlotJuggler: {url}"))?;
     }
-    output::print_line(&share::lines_in_words(&at, lines))?;
+    output::print_line(&share::lines_in_words(&format!("{what} at {at}"), lines))?;
     match is_simulated {
         true => output::print_line(&"all drives are simulated; -p PORT shows real ones"),
         false => Ok(()),

@@ -172,7 +172,7 @@ fn ready(
     for (line, port) in lines.iter().zip(&ports) {
         output::print_line(&format!("  -p {port}  is {}", line.port))?;
     }
-    output::print_line(&share::lines_in_words(&at, lines))
+    output::print_line(&share::lines_in_words(&format!("share at {at}"), lines))
 }
 
 impl From<NodeError> for Failure {

@@ -14,7 +14,14 @@ pub struct Args {
     /// A port; repeat it for each port. A serial line has an ST drive, a CAN bus has RMD motors
     #[arg(short, long, env = "MOTORLINK_PORT", value_name = "PORT",
           value_hint = clap::ValueHint::AnyPath)]
-    pub port: Vec<String>,
+    pub ports: Vec<String>,
+    #[command(flatten)]
+    pub what: What,
+}
+
+/// What is recorded, and where it goes.
+#[derive(clap::Args)]
+pub struct What {
     /// The file, such as run.mcap; with --rotate its name before the number: run_000.mcap
     #[arg(short, long, value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
     pub output: PathBuf,

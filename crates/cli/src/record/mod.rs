@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use motorlink::rmd::MotorSet;
 use motorlink::st::MotorNumber;
 use motorlink_link::printable;
 use motorlink_recording::record::{Abort, Config, Line, Port, Progress, Recorder};
@@ -21,7 +22,7 @@ use crate::connection::missing_port;
 use crate::failure::Failure;
 use crate::output::{self, note};
 use crate::{interrupt, pasteable};
-pub use args::Args;
+pub use args::{Args, What};
 
 /// How often the progress is shown.
 const SHOWN: Duration = Duration::from_secs(1);
@@ -34,9 +35,24 @@ const ENOUGH: f64 = 0.99;
 const OTHERS: [&str; 6] = ["csv", "log", "asc", "pcapng", "svg", "png"];
 
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let of = |port: &String| Place { port: port.clone(), ..Place::default() };
+    let ports: Vec<Place> = args.ports.iter().filter(|port| !port.is_empty()).map(of).collect();
+    run_on(&ports, &args.what)
+}
+
+/// A port, and the motors that it is known to have.
+#[derive(Default)]
+pub struct Place {
+    pub port: String,
+    pub motors: Vec<MotorNumber>,
+    pub ids: MotorSet,
+}
+
+/// Records these ports.
+pub fn run_on(ports: &[Place], args: &What) -> Result<(), Failure> {
     // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
-    let config = config(args)?;
+    let config = config(ports, args)?;
     let recorder = start(&config)?;
     begun(&recorder, args)?;
     let bar = bar(args);
@@ -74,8 +90,8 @@ fn start(config: &Config) -> Result<Recorder, Failure> {
     started
 }
 
-fn config(args: &Args) -> Result<Config, Failure> {
-    if args.port.iter().all(String::is_empty) {
+fn config(ports: &[Place], args: &What) -> Result<Config, Failure> {
+    if ports.is_empty() {
         return Err(missing_port());
     }
     if args.output == Path::new("-") {
@@ -89,19 +105,21 @@ fn config(args: &Args) -> Result<Config, Failure> {
     }
     let numbers = args.motor.iter().copied().filter_map(MotorNumber::new);
     let motors: Vec<MotorNumber> = numbers.collect();
-    let ids = args
-        .id
-        .iter()
-        .fold(Default::default(), |ids: motorlink::rmd::MotorSet, more| ids.union(*more));
-    let port = |text: &String| -> Result<Port, Failure> {
-        let (name, motors) = (text.parse()?, motors.clone());
+    let ids = args.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
+    let is_given = !motors.is_empty() || !ids.is_empty();
+    let port = |place: &Place| -> Result<Port, Failure> {
+        let name = place.port.parse()?;
+        let (motors, ids) = match is_given {
+            true => (motors.clone(), ids),
+            false => (place.motors.clone(), place.ids),
+        };
         let (profile, timeout, full_scale) = (args.profile, args.timeout, args.full_scale);
         Ok(Port { name, profile, timeout, motors, ids, full_scale })
     };
     let words: Vec<String> =
         std::env::args().map(|word| pasteable::quoted(&word).to_string()).collect();
     Ok(Config {
-        ports: args.port.iter().map(port).collect::<Result<_, _>>()?,
+        ports: ports.iter().map(port).collect::<Result<_, _>>()?,
         clients: Vec::new(),
         signals: args.signals.clone(),
         period: args.rate.into(),
@@ -175,7 +193,7 @@ fn broken(error: &WriteError) -> Failure {
     Failure::unwritten(printable(&error.to_string())).trying(what)
 }
 
-fn begun(recorder: &Recorder, args: &Args) -> Result<(), Failure> {
+fn begun(recorder: &Recorder, args: &What) -> Result<(), Failure> {
     let file = args.output.display().to_string();
     if args.json {
         let lines: Vec<Value> = recorder.lines().iter().map(line_object).collect();
@@ -198,7 +216,7 @@ fn line_object(line: &Line) -> Value {
 }
 
 /// A line on stderr, if that is a terminal.
-fn bar(args: &Args) -> ProgressBar {
+fn bar(args: &What) -> ProgressBar {
     let is_shown = !args.json && std::io::stderr().is_terminal();
     let bar = if is_shown { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
     bar.set_style(
@@ -207,7 +225,7 @@ fn bar(args: &Args) -> ProgressBar {
     bar
 }
 
-fn show(progress: &Progress, bar: &ProgressBar, args: &Args) -> Result<(), Failure> {
+fn show(progress: &Progress, bar: &ProgressBar, args: &What) -> Result<(), Failure> {
     if args.json {
         return output::print_line(&object("progress", progress));
     }
@@ -215,7 +233,7 @@ fn show(progress: &Progress, bar: &ProgressBar, args: &Args) -> Result<(), Failu
     Ok(())
 }
 
-fn over(progress: &Progress, args: &Args) -> Result<(), Failure> {
+fn over(progress: &Progress, args: &What) -> Result<(), Failure> {
     if args.json {
         return output::print_line(&object("recorded", progress));
     }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::Path;
 use std::time::Duration;
 
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
 use motorlink_telemetry::share::message::{Answer, Ask, Line, StoppedMotor, Text};
 
@@ -24,13 +24,9 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Connects to the share at a path, with this name for its log.
-    pub fn open(path: &Path, by: &str) -> io::Result<Self> {
-        Self::over(UnixStream::connect(path)?, by)
-    }
-
-    /// As [`open`](Self::open), on a socket that leads to a share.
-    pub fn over(socket: UnixStream, by: &str) -> io::Result<Self> {
+    /// Connects to a share, with this name for its log.
+    pub fn open(share: &dyn Address, by: &str) -> io::Result<Self> {
+        let socket = share.connect().map_err(io::Error::other)?;
         socket.set_read_timeout(Some(ANSWER))?;
         socket.set_write_timeout(Some(ANSWER))?;
         let (ended, closing) = (BTreeMap::new(), None);

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use motorlink_telemetry::line::Stopped;
+use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::message::{self, ANY_MOTOR, Ask, Event, StoppedMotor};
 use motorlink_telemetry::share::opening::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
@@ -112,7 +113,7 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
             .trying("is --at that of a running `motorlink share`?")
     };
     let name = format!("motorlink {}", std::process::id());
-    let mut share = Connection::open(path, &name).map_err(failed)?;
+    let mut share = Connection::open(&Local(path.to_owned()), &name).map_err(failed)?;
     let done = |event: &str, message: &str| match args.json {
         true => output::print_line(&json!({ "event": event, "message": message })),
         false => output::print_line(&message),
@@ -170,7 +171,7 @@ fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
         let lines = lines_in_json(&lines);
         return output::print_line(&json!({"event": "ready", "at": args.at, "lines": lines}));
     }
-    output::print_line(&lines_in_words(&args.at, &lines))
+    output::print_line(&lines_in_words(&format!("share at {}", args.at), &lines))
 }
 
 /// The lines of a share, for programs.
@@ -180,10 +181,10 @@ pub fn lines_in_json(lines: &[message::Line]) -> Value {
     lines.iter().map(line).collect()
 }
 
-/// The lines of a share, and where other programs connect.
-pub fn lines_in_words(at: &str, lines: &[message::Line]) -> String {
+/// The lines of a share or a fleet, and where it is.
+pub fn lines_in_words(what: &str, lines: &[message::Line]) -> String {
     let lines: Vec<_> = lines.iter().map(|it| format!("{} ({})", it.line, it.port)).collect();
-    format!("share at {at}: {}", lines.join(", "))
+    format!("{what}: {}", lines.join(", "))
 }
 
 fn tell(event: &Event, json: bool) -> Result<(), Failure> {

@@ -5,11 +5,11 @@ mod keys;
 mod model;
 mod ports;
 mod row;
-mod screen;
+pub mod screen;
 mod settings;
 mod share;
 mod values;
-mod view;
+pub mod view;
 mod work;
 
 #[cfg(test)]
@@ -57,7 +57,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
              lists what is connected",
         ));
     }
-    screen::require_terminal()?;
+    screen::require_terminal_of(
+        "watch",
+        "for values as lines use --every: `motorlink st get SPEED_MEAS --every 100ms` or `motorlink \
+         rmd status --every 100ms`",
+    )?;
     let mut watch = Watch::open(&args)?;
     interrupt::take_over();
     interrupt::hold_on(true);

@@ -28,18 +28,16 @@ pub struct Screen {
     go_on: Arc<AtomicBool>,
 }
 
-/// Returns an error if stdin or stdout is no terminal, or if it cannot show a view.
-pub fn require_terminal() -> Result<(), Failure> {
+/// Returns an error if stdin or stdout is no terminal, or if it cannot show a view of this command. `tip` is
+/// what to do without one.
+pub fn require_terminal_of(command: &str, tip: &str) -> Result<(), Failure> {
     let is_dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let why = match stdin().is_terminal() && stdout().is_terminal() {
         true if is_dumb => "TERM names a terminal that cannot place text",
         true => return Ok(()),
         false => "stdin or stdout is none",
     };
-    Err(Failure::usage(format!("watch needs a terminal, and {why}")).trying(
-        "for values as lines use --every: `motorlink st get SPEED_MEAS --every 100ms` or `motorlink \
-         rmd status --every 100ms`",
-    ))
+    Err(Failure::usage(format!("{command} needs a terminal, and {why}")).trying(tip.to_owned()))
 }
 
 impl Screen {

@@ -1,11 +1,12 @@
 //! The latch of a share. It holds for all programs of the share, that of an engine here does not.
 
 use std::io;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
+use motorlink::port::PortName;
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Answer, Ask};
 use motorlink_telemetry::share::port::place_of;
 
@@ -18,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(500);
 
 /// A share that has some of the ports.
 pub struct Share {
-    path: PathBuf,
+    at: Arc<dyn Address>,
     pub ports: Vec<usize>,
     commands: Sender<bool>,
 }
@@ -28,14 +29,16 @@ impl Share {
     pub fn of(names: &[String], work: &Work) -> Vec<Share> {
         let mut shares: Vec<Share> = Vec::new();
         for (port, name) in names.iter().enumerate() {
-            let Some((path, _)) = place_of(name) else { continue };
-            match shares.iter_mut().find(|share| share.path == path) {
+            let name: Option<PortName> = name.parse().ok();
+            let Some((at, _)) = name.and_then(|name| place_of(&name)) else { continue };
+            // Shares differ in the names of their ports.
+            match shares.iter_mut().find(|share| share.at.port("") == at.port("")) {
                 Some(share) => share.ports.push(port),
                 None => {
                     let (commands, received) = channel();
                     let number = shares.len();
                     let watcher = Watcher {
-                        path: path.clone(),
+                        at: Arc::clone(&at),
                         by: Arc::clone(&work.by),
                         connection: None,
                         holds: false,
@@ -45,7 +48,7 @@ impl Share {
                             sender.send(Done::Latch(number, latch)).is_ok()
                         });
                     });
-                    shares.push(Share { path, ports: vec![port], commands });
+                    shares.push(Share { at, ports: vec![port], commands });
                 }
             }
         }
@@ -61,7 +64,7 @@ impl Share {
 
 /// The thread of a share.
 struct Watcher {
-    path: PathBuf,
+    at: Arc<dyn Address>,
     by: Arc<str>,
     connection: Option<Connection>,
     /// Whether this program set the latch and has not released it. A new share gets it again.
@@ -98,7 +101,7 @@ impl Watcher {
                 if self.holds {
                     *pending = Some(true);
                 }
-                none.insert(Connection::open(&self.path, &self.by)?)
+                none.insert(Connection::open(&*self.at, &self.by)?)
             }
         };
         match *pending {

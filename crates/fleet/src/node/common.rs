@@ -1,9 +1,9 @@
 //! What the tasks of a node share, and how they answer queries.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Group, Line};
 use motorlink_telemetry::share::program::Program;
 use serde::Serialize;
@@ -20,7 +20,7 @@ use crate::weight::Lines;
 /// What all tasks of a node have.
 pub(super) struct Common {
     pub(super) name: Name,
-    pub(super) share: PathBuf,
+    pub(super) share: Arc<dyn Address>,
     pub(super) program: String,
     pub(super) boot: Name,
     /// The node itself, at its share.
@@ -37,6 +37,8 @@ pub(super) struct State {
     pub(super) lines: Arc<Lines>,
     pub(super) known: Vec<Line>,
     pub(super) latched_by: Option<String>,
+    /// The lines on which motors are looked for.
+    pub(super) searching: BTreeSet<String>,
     /// When the share said so.
     pub(super) t: f64,
     /// The columns of the samples that are published, by key.

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, RwLock};
 use std::time::Duration;
 
+use motorlink_telemetry::share::address::Local;
 use tokio::runtime::Runtime;
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
@@ -79,8 +80,17 @@ impl Node {
         let boot = Name::random()?;
         let (state, sessions) = (RwLock::default(), Mutex::default());
         let own = OnceLock::new();
-        let common =
-            Arc::new(Common { name, share, program, boot, own, clock, zenoh, state, sessions });
+        let common = Arc::new(Common {
+            name,
+            share: Arc::new(Local(share)),
+            program,
+            boot,
+            own,
+            clock,
+            zenoh,
+            state,
+            sessions,
+        });
         runtime.block_on(publish::start(&common, period))?;
         let alive = door::open(&common, &runtime).map_err(failed)?;
         Ok(Node { common, addresses, _alive: alive, runtime: Some(runtime) })

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, PoisonError, RwLockWriteGuard};
 use std::time::Duration;
 
 use motorlink_proto::rmd::{Command, ReadStatus};
@@ -23,7 +23,7 @@ use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::common::{Common, reply};
+use super::common::{Common, State, reply};
 use crate::key;
 use crate::message::Info;
 use crate::weight::Lines;
@@ -46,9 +46,12 @@ pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<
     timeout(LINES, common.learn(&program))
         .await
         .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
+    // Before anybody can ask.
+    let names = common.known_lines().into_iter().map(|line| line.line);
+    common.state_mut().searching.extend(names);
     let columns = Arc::clone(common);
     let asked = move |query: Query| columns.say_columns(&query);
-    let key = key::all_columns(&common.name);
+    let key = key::all_columns(Some(&common.name));
     let declared = common.zenoh.declare_queryable(key).callback(asked).background();
     declared.wait().map_err(io::Error::other)?;
     let own = common.own.get_or_init(|| program);
@@ -91,7 +94,7 @@ impl Common {
     async fn learn(&self, program: &Program) -> io::Result<()> {
         match program.ask(Ask::Lines).await {
             Ok(Answer::Lines { lines, latched_by }) => {
-                let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+                let mut state = self.state_mut();
                 let known = Lines::of(&lines);
                 if *state.lines != known {
                     state.lines = Arc::new(known);
@@ -119,7 +122,7 @@ impl Common {
             self.put(&key::state(&self.name), &self.info());
             for line in self.known_lines() {
                 if searched.insert(line.line.clone()) {
-                    search(&program, &line);
+                    Arc::clone(&self).search(&program, &line);
                 }
                 for motor in &line.heard {
                     if subscribed.insert((line.line.clone(), *motor)) {
@@ -128,6 +131,35 @@ impl Common {
                 }
             }
         }
+    }
+
+    /// Reads something of each motor that a line can have. The share remembers those that answer.
+    fn search(self: Arc<Self>, program: &Program, line: &Line) {
+        let Some(speaks) = Speaks::of(line) else { return };
+        let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
+        let (program, name) = (program.clone(), line.line.clone());
+        self.state_mut().searching.insert(name.clone());
+        tokio::spawn(async move {
+            for motor in motors {
+                let bytes = question(motor);
+                let (line, motor) = (name.clone(), motor.number());
+                // Those that are there answer.
+                let _ = program
+                    .ask(Ask::Command {
+                        line,
+                        motor,
+                        bytes,
+                        time_to_live: SEARCH,
+                        continues: false,
+                    })
+                    .await;
+            }
+            self.state_mut().searching.remove(&name);
+        });
+    }
+
+    fn state_mut(&self) -> RwLockWriteGuard<'_, State> {
+        self.state.write().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn known_lines(&self) -> Vec<Line> {
@@ -145,6 +177,7 @@ impl Common {
             t: self.clock.now(),
             wall: self.clock.wall(),
             lines: state.known.clone(),
+            searching: state.searching.iter().cloned().collect(),
             latched_by: state.latched_by.clone(),
         }
     }
@@ -162,7 +195,7 @@ impl Common {
     }
 
     fn columns_of(&self, group: Group) {
-        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state_mut();
         state.columns.insert(key::columns(&self.name, &group.line, group.motor), group);
     }
 
@@ -192,23 +225,6 @@ impl Common {
             .priority(Priority::DataHigh)
             .wait();
     }
-}
-
-/// Reads something of each motor that a line can have. The share remembers those that answer.
-fn search(program: &Program, line: &Line) {
-    let Some(speaks) = Speaks::of(line) else { return };
-    let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
-    let (program, name) = (program.clone(), line.line.clone());
-    tokio::spawn(async move {
-        for motor in motors {
-            let bytes = question(motor);
-            let (line, motor) = (name.clone(), motor.number());
-            // Those that are there answer.
-            let _ = program
-                .ask(Ask::Command { line, motor, bytes, time_to_live: SEARCH, continues: false })
-                .await;
-        }
-    });
 }
 
 /// The bytes of a command that only shows that a motor is there.

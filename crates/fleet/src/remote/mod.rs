@@ -22,6 +22,10 @@ use tunnel::{Tunnel, Whom};
 
 /// Without another one: how long the motors of a program may turn without a sign of life.
 pub const DEADLINE: Duration = Duration::from_secs(1);
+/// How long a program waits for a node that does not answer.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(3);
+/// The same of a program that only reads, and wants what waits at the node. The node waits a little longer.
+const LONG_PATIENCE: Duration = Duration::from_secs(55);
 /// The longest time until all nodes know that this program has left.
 const LEAVING: Duration = Duration::from_millis(500);
 
@@ -47,6 +51,46 @@ pub struct Remote {
 }
 
 impl Remote {
+    /// A node of a network, with what is usual.
+    pub fn new(node: Name, network: Network) -> Self {
+        Remote {
+            node,
+            boot: None,
+            network,
+            who: own_name(),
+            deadline: DEADLINE,
+            motion: None,
+            takes: false,
+            stops: false,
+        }
+    }
+
+    fn begin(&self, patience: Duration) -> Result<UnixStream, Unreachable> {
+        let zenoh = zenoh_of(&self.network).map_err(|error| {
+            Unreachable::Missing(format!("no node {} can be reached: {error}", self.node))
+        })?;
+        runtime()?.block_on(self.open(zenoh, patience))
+    }
+
+    /// Connects to the node, in the runtime of this process. It is given up when it is silent for
+    /// `patience`.
+    pub(crate) async fn open(
+        &self,
+        zenoh: Arc<Zenoh>,
+        patience: Duration,
+    ) -> Result<UnixStream, Unreachable> {
+        let (own, other) = pair()?;
+        let Remote { node, boot, who, deadline, motion, network, stops, .. } = self.clone();
+        let whom = Whom { node, boot, who, deadline, motion, stops, patience };
+        match Tunnel::open(whom, zenoh, own).await {
+            Ok(()) => Ok(other),
+            Err(Unreachable::Missing(why)) => {
+                Err(Unreachable::Missing(format!("{why} at {network}")))
+            }
+            Err(failed) => Err(failed),
+        }
+    }
+
     /// The options that differ from the default, as in the name of a port.
     pub fn options(&self) -> Vec<String> {
         let mut options = Vec::new();
@@ -77,22 +121,11 @@ impl Address for Remote {
     }
 
     fn connect(&self) -> Result<UnixStream, Unreachable> {
-        let zenoh = zenoh_of(&self.network).map_err(|error| {
-            Unreachable::Missing(format!("no node {} can be reached: {error}", self.node))
-        })?;
-        let failed = |error: io::Error| Unreachable::Failed(error.to_string());
-        let (own, other) = UnixStream::pair().map_err(failed)?;
-        own.set_nonblocking(true).map_err(failed)?;
-        let runtime = runtime().map_err(failed)?;
-        let Remote { node, boot, who, deadline, motion, network, stops, .. } = self.clone();
-        let whom = Whom { node, boot, who, deadline, motion, stops };
-        match runtime.block_on(Tunnel::open(whom, zenoh, own)) {
-            Ok(()) => Ok(other),
-            Err(Unreachable::Missing(why)) => {
-                Err(Unreachable::Missing(format!("{why} at {network}")))
-            }
-            Err(failed) => Err(failed),
-        }
+        self.begin(PATIENCE)
+    }
+
+    fn follow(&self) -> Result<UnixStream, Unreachable> {
+        self.begin(LONG_PATIENCE)
     }
 
     fn ended(&self, why: Option<&str>) -> String {
@@ -128,8 +161,17 @@ pub fn finish() {
     }
 }
 
+/// Two ends of a socket. The first one does not wait.
+pub(crate) fn pair() -> Result<(UnixStream, UnixStream), Unreachable> {
+    let pair = UnixStream::pair().and_then(|(own, other)| {
+        own.set_nonblocking(true)?;
+        Ok((own, other))
+    });
+    pair.map_err(|error| Unreachable::Failed(error.to_string()))
+}
+
 /// One for all tunnels.
-fn runtime() -> io::Result<&'static Runtime> {
+pub(crate) fn runtime() -> Result<&'static Runtime, Unreachable> {
     static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
         tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -137,7 +179,7 @@ fn runtime() -> io::Result<&'static Runtime> {
             .enable_all()
             .build()
     });
-    RUNTIME.as_ref().map_err(|error| io::Error::new(error.kind(), error.to_string()))
+    RUNTIME.as_ref().map_err(|error| Unreachable::Failed(error.to_string()))
 }
 
 /// One session for each network of this process.

@@ -30,8 +30,6 @@ use crate::message::{Answer, Ask};
 use crate::remote::outgoing::Outgoing;
 use crate::weight::{self, Lines};
 
-/// How long a program waits for a node that does not answer, in seconds.
-const PATIENCE: f64 = 3.0;
 /// How long a node keeps a pull, in seconds.
 const WAIT: f64 = 0.25;
 /// How long an answer to it may take besides.
@@ -77,6 +75,8 @@ pub(super) struct Whom {
     pub(super) deadline: Duration,
     pub(super) motion: Option<Duration>,
     pub(super) stops: bool,
+    /// How long it may be silent.
+    pub(super) patience: Duration,
 }
 
 /// Asks a node.
@@ -117,6 +117,8 @@ pub(super) struct Tunnel {
     outgoing: Outgoing,
     lines: Lines,
     deadline: f64,
+    /// How long the node may be silent.
+    patience: f64,
     reader: OwnedReadHalf,
     frames: Reader,
     /// `None` while a task writes.
@@ -148,7 +150,7 @@ impl Tunnel {
         socket: StdStream,
     ) -> Result<(), Unreachable> {
         let failed = |error: String| Unreachable::Failed(error);
-        let Whom { node, boot, who, deadline, motion, stops } = whom;
+        let Whom { node, boot, who, deadline, motion, stops, patience } = whom;
         let scope = if stops { Scope::Stop } else { Scope::See };
         let boot = match boot {
             Some(boot) => boot,
@@ -188,6 +190,7 @@ impl Tunnel {
             outgoing: Outgoing::new(NodeClock::new(asked, now, t)),
             lines: Lines::of(&lines),
             deadline,
+            patience: patience.as_secs_f64(),
             reader,
             frames: Reader::new(LONGEST),
             writer: Some(writer),
@@ -241,7 +244,7 @@ impl Tunnel {
 
     async fn next(&mut self, now: f64, bytes: &mut [u8]) -> Next {
         let pull = self.may_pull().then_some(self.pull_from);
-        let lost = Some(self.heard + PATIENCE);
+        let lost = Some(self.heard + self.patience);
         let due = [self.outgoing.next_due(), self.sign, pull, lost].into_iter().flatten();
         let wait = span((due.fold(f64::INFINITY, f64::min) - now).max(0.0));
         tokio::select! {
@@ -391,13 +394,13 @@ impl Tunnel {
 
     /// Why the node cannot be used any more.
     fn is_lost(&self, now: f64) -> Option<String> {
-        if now > self.heard + PATIENCE {
+        if now > self.heard + self.patience {
             let why = "it does not answer: it is away, or the network is cut; motors of this program \
                 stop at the node";
             return Some(format!("{why} (nothing for {:.1} s)", now - self.heard));
         }
         let waits = now - self.outgoing.oldest()?;
-        (waits > PATIENCE).then(|| {
+        (waits > self.patience).then(|| {
             let who = &self.line.who;
             format!(
                 "it answers, but not this request of {who}: it may not be allowed to ask for it"

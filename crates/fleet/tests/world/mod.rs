@@ -35,6 +35,15 @@ impl World {
         World { share, address, name: name.to_owned(), node: Some(node) }
     }
 
+    /// A node of its own drives, at the network of this address.
+    pub fn joined(name: &str, address: &str) -> Self {
+        let lease = Some(Duration::from_secs(5));
+        let share = Share::leasing(&format!("fleet-{name}"), PATIENT, lease, |link| link);
+        let network = Network::Connect(vec![format!("tcp/{address}")]);
+        let node = start(name, &share, network, Arc::new(Boot)).unwrap();
+        World { share, address: address.to_owned(), name: name.to_owned(), node: Some(node) }
+    }
+
     /// Another node at the same network.
     pub fn beside(&self, name: &str) -> Result<Node, NodeError> {
         let network = Network::Connect(vec![format!("tcp/{}", self.address)]);

@@ -1,5 +1,6 @@
 //! A kind of port, and the name of a port.
 
+use std::any::Any;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -112,9 +113,9 @@ pub trait Port: fmt::Debug + Send + Sync {
         false
     }
 
-    /// Whether another program holds the port, and stops the motors of its clients.
-    fn is_held(&self) -> bool {
-        false
+    /// The program that holds the port, and stops the motors of its clients: what the scheme knows of it.
+    fn holder(&self) -> Option<&dyn Any> {
+        None
     }
 
     /// Whether it is a device that this computer lists now, a drive that this program serves, or an
@@ -219,9 +220,14 @@ impl PortName {
         self.0.is_in_process()
     }
 
-    /// As [`Port::is_held`].
+    /// As [`Port::holder`].
+    pub fn holder(&self) -> Option<&dyn Any> {
+        self.0.holder()
+    }
+
+    /// Whether another program holds the port, and stops the motors of its clients.
     pub fn is_held(&self) -> bool {
-        self.0.is_held()
+        self.holder().is_some()
     }
 
     /// As [`Port::is_device`].

@@ -192,7 +192,7 @@ fn follow(link: &Link, viewers: &Weak<Viewers>, drives: &Drives) -> Option<Live>
         }
     };
     let config = Config { period: PERIOD, by: NAME.into() };
-    match Live::start(&config, link.path(), drives.lines(), put) {
+    match Live::start(&config, link.share(), drives.lines(), put) {
         Ok(live) => Some(live),
         Err(error) => {
             if let Some(viewers) = viewers.upgrade() {

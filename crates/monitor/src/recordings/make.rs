@@ -12,6 +12,7 @@ use motorlink_recording::record::{Abort, Config, Port, Progress, Recorder};
 use motorlink_recording::schema::name;
 use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Line, Reason};
 use motorlink_telemetry::share::program::Refusal;
 use tokio::sync::{oneshot, watch};
@@ -27,8 +28,7 @@ const NUMBERS: u32 = 100;
 /// What to record.
 pub struct Order {
     pub folder: PathBuf,
-    /// The socket of the share.
-    pub share: PathBuf,
+    pub share: Arc<dyn Address>,
     pub lines: Vec<Line>,
     pub period: Micros,
     /// The page that asked for it.
@@ -173,8 +173,8 @@ fn start(order: &Order, telling: &Telling, abort: &Abort) -> Result<Recorder, Re
             Err(RecordError::File(WriteError::Exists { .. })) => name = None,
             Err(RecordError::NoMotor { port, .. }) if config.ports.len() > 1 => {
                 config.ports.retain(|it| it.name.to_string() != port);
-                let line = port.rsplit('/').next().unwrap_or_default().to_owned();
-                telling.change(|told| told.left_out.push(line));
+                let line = order.lines.iter().find(|it| order.share.port(&it.line) == port);
+                telling.change(|told| told.left_out.extend(line.map(|it| it.line.clone())));
             }
             Err(error) => return Err(refused(&error)),
         }
@@ -193,7 +193,7 @@ fn make(folder: &Path) -> Result<(), Refusal> {
 impl Order {
     fn config(&self) -> Result<Config, Refusal> {
         let port = |line: &Line| {
-            let name = format!("share:{}/{}", self.share.display(), line.line);
+            let name = self.share.port(&line.line);
             let profile = Profile::ALL.into_iter();
             let profile = profile.into_iter().find(|it| Some(it.name()) == line.profile.as_deref());
             Ok(Port {

@@ -17,6 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Micros;
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{self as share, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
@@ -41,7 +42,7 @@ const LOOKED: Duration = Duration::from_millis(10);
 /// The recordings of a server.
 pub struct Recordings {
     path: PathBuf,
-    share: PathBuf,
+    share: Arc<dyn Address>,
     told: watch::Sender<Option<Recorded>>,
     making: Mutex<Option<Making>>,
     /// One file is read at a time, so that reading never takes all of the machine.
@@ -49,8 +50,8 @@ pub struct Recordings {
 }
 
 impl Recordings {
-    /// Recordings of the share at this socket, in this folder. The first recording makes the folder.
-    pub fn new(path: PathBuf, share: PathBuf) -> Self {
+    /// Recordings of the share, in this folder. The first recording makes the folder.
+    pub fn new(path: PathBuf, share: Arc<dyn Address>) -> Self {
         // Pages show it, and the folder of this program says nothing to them.
         let path = std::path::absolute(&path).unwrap_or(path);
         let folder = Arc::new(AsyncMutex::new(Folder::new(path.clone())));
@@ -114,7 +115,7 @@ impl Recordings {
                 let message = format!("{} records already, for {}", told.name, told.by);
                 return Err(Refusal { reason: Reason::Busy, message, code: None });
             }
-            let (folder, share) = (self.path.clone(), self.share.clone());
+            let (folder, share) = (self.path.clone(), Arc::clone(&self.share));
             let order = Order { folder, share, lines, period, by: by.to_owned() };
             *making = Some(Making::start(order, self.told.clone(), begun)?);
         }

@@ -1,11 +1,11 @@
 //! The connection of the server itself to the share: it stops all motors when no page can.
 
 use std::io;
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::frame::Kind;
 use motorlink_telemetry::share::message::{
     Answer, Ask, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
@@ -30,7 +30,7 @@ const PENDING: Duration = Duration::from_secs(10);
 
 /// A share that may end and be started again.
 pub struct Link {
-    path: PathBuf,
+    share: Arc<dyn Address>,
     /// The stops of all pages.
     stops: Arc<Mutex<Stops>>,
     /// What the next share gets first.
@@ -60,10 +60,10 @@ struct Joined {
 }
 
 impl Link {
-    /// The share at a path. [`keep`](Self::keep) connects to it.
-    pub fn new(path: PathBuf) -> Self {
+    /// To a share. [`keep`](Self::keep) connects to it.
+    pub fn new(share: Arc<dyn Address>) -> Self {
         Link {
-            path,
+            share,
             stops: Arc::default(),
             pending: Mutex::default(),
             is_latched: AtomicBool::new(false),
@@ -78,8 +78,8 @@ impl Link {
     }
 
     /// Where the share is.
-    pub fn path(&self) -> &Path {
-        &self.path
+    pub fn share(&self) -> &Arc<dyn Address> {
+        &self.share
     }
 
     /// A page latches the share: a share that is started later is latched, too.
@@ -98,7 +98,7 @@ impl Link {
     }
 
     async fn open(&self, name: &str) -> io::Result<(Program, Listener, String)> {
-        let connected = timeout(HELLO, Program::connect(&self.path, name)).await;
+        let connected = timeout(HELLO, Program::connect(&self.share, name)).await;
         connected.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
     }
 

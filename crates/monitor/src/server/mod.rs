@@ -18,6 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use motorlink_telemetry::share::address::Address;
 use tokio::runtime::{Builder, Runtime};
 
 pub use door::random_word;
@@ -45,8 +46,8 @@ pub struct Options {
     pub names: Vec<String>,
     /// Where programs connect that speak Foxglove's protocol without a token.
     pub foxglove: Option<TcpListener>,
-    /// The socket of the share.
-    pub share: PathBuf,
+    /// The share.
+    pub share: Arc<dyn Address>,
     /// The folder of recordings. The first recording makes it.
     pub recordings: PathBuf,
     /// What pages may do, and what they are told.
@@ -71,7 +72,7 @@ impl Server {
         let address = listener.local_addr()?;
         let bare_address = foxglove.as_ref().map(TcpListener::local_addr).transpose()?;
         let door = Door::new(address.port(), tls.is_some(), names)?;
-        let recordings = Recordings::new(recordings, share.clone());
+        let recordings = Recordings::new(recordings, Arc::clone(&share));
         let state = Arc::new(State::new(door, Link::new(share), recordings, settings)?);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)

@@ -13,6 +13,7 @@ use motorlink_monitor::message::{Answer, Ask, Ran};
 use motorlink_proto::st::{Frame, Parse, Profile};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
+use motorlink_telemetry::share::address::{Address, Local};
 use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
 use motorlink_telemetry::share::opening::Opened;
@@ -206,6 +207,11 @@ impl World {
             .collect()
     }
 
+    /// The share, for programs.
+    pub fn share(&self) -> Arc<dyn Address> {
+        Arc::new(Local(self.path.clone()))
+    }
+
     /// Ends the share.
     pub fn end(&self) {
         self.ends.store(true, Ordering::SeqCst);
@@ -228,7 +234,8 @@ impl Drop for World {
 }
 
 pub async fn connect(path: &Path, name: &str) -> (Program, tokio::task::JoinHandle<()>) {
-    let (program, mut listener, _) = Program::connect(path, name).await.unwrap();
+    let share: Arc<dyn Address> = Arc::new(Local(path.to_owned()));
+    let (program, mut listener, _) = Program::connect(&share, name).await.unwrap();
     let listening = tokio::spawn(async move { while listener.next().await.is_ok() {} });
     (program, listening)
 }

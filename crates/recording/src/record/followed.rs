@@ -1,9 +1,10 @@
 //! A line of a share: from the rows and events of the share to messages. The share reads the drives, and
 //! another program may command them.
 
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use motorlink_telemetry::sample::Sample;
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Event, Happening, SignalRate};
 use motorlink_telemetry::share::stream::{Followed as Target, Item, Stream, Wanted};
 use motorlink_telemetry::share::words::Told;
@@ -16,6 +17,9 @@ use crate::error::RecordError;
 use crate::schema::Time;
 use crate::write::Entry;
 
+/// A share, and the name of a line there.
+pub(super) type Place = (Arc<dyn Address>, String);
+
 /// The recording of a line of a share.
 #[derive(Debug)]
 pub(super) struct Followed {
@@ -25,9 +29,9 @@ pub(super) struct Followed {
     has_events_of_share: bool,
 }
 
-/// Asks the share at a path to read these signals of a line. It has its own name for the line.
+/// Asks a share to read these signals of a line. It has its own name for the line.
 pub(super) fn stream(
-    (path, name): (PathBuf, String),
+    (share, name): Place,
     line: &Line,
     groups: &[Group],
     by: &str,
@@ -37,7 +41,7 @@ pub(super) fn stream(
         period: group.period.0 as f64 / 1e6,
     });
     let wanted = wanted.filter(|wanted| !wanted.signals.is_empty()).collect();
-    let target = Target { path, line: name, speaks: line.speaks, name: by.to_owned(), wanted };
+    let target = Target { share, line: name, speaks: line.speaks, name: by.to_owned(), wanted };
     let failed = |why| RecordError::Share { port: line.port.clone(), why };
     Stream::open(target, || wall_now().0).map_err(failed)
 }
@@ -86,6 +90,20 @@ impl Followed {
             Item::Up => {
                 let back = "the share is there again".to_owned();
                 self.content.told(now, of_line(Happening::Back, back), put);
+            }
+            Item::Late(since) => {
+                let waited = now.0.saturating_sub(since) as f64 / 1e9;
+                let message =
+                    format!("values of the last {waited:.1} s come late: they waited at the share");
+                self.content.told(now, of_line(Happening::Late, message), put);
+            }
+            Item::Clock { ahead, within } => {
+                let (by, way) = (ahead.abs(), if ahead < 0.0 { "behind" } else { "ahead" });
+                let message = format!(
+                    "the wall clock of the share is {by:.3} s {way} (within {within:.3} s); times here \
+                     are by the clock of this computer"
+                );
+                self.content.told(now, of_line(Happening::Clock, message), put);
             }
         }
     }

@@ -1,7 +1,6 @@
 //! What a recording of a share would have, for viewers, while it is made.
 
 use std::io;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -11,6 +10,7 @@ use std::time::{Duration, Instant};
 use motorlink::rmd::MotorSet;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::search;
+use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::stream::Stream;
 use motorlink_telemetry::share::words::Speaks;
 
@@ -65,14 +65,13 @@ struct Found {
 }
 
 impl Live {
-    /// Searches the motors of these lines of the share at `path`, and makes messages of what the share
-    /// reads. `put` gets them in a thread. A line whose motors do not answer does not hold up others.
+    /// Searches the motors of these lines of a share, and makes messages of what the share reads. `put` gets them in a thread. A line whose motors do not answer does not hold up others.
     ///
     /// # Errors
     /// The system gives no thread.
     pub fn start(
         config: &Config,
-        path: &Path,
+        share: &Arc<dyn Address>,
         lines: impl IntoIterator<Item = (String, Speaks)>,
         put: impl FnMut(Item) + Send + 'static,
     ) -> io::Result<Self> {
@@ -80,7 +79,7 @@ impl Live {
         let mut live = Live { ends: Arc::clone(&ends), threads: Vec::new() };
         let (sender, found) = channel();
         for (name, speaks) in lines {
-            let port = format!("share:{}/{name}", path.display());
+            let port = share.port(&name);
             let seeker = Seeker {
                 name: name.clone(),
                 port,
@@ -157,8 +156,8 @@ impl Seeker {
             search::motors(runner.remote(), &self.config.by, protocol).map_err(missing)?;
         runner.end();
         let groups = choice::choose(&line.motors, &[], self.config.period);
-        let stream =
-            followed::stream(opened.share.unwrap_or_default(), &line, &groups, &self.config.by);
+        let share = opened.share.ok_or("this is no line of a share")?;
+        let stream = followed::stream(share, &line, &groups, &self.config.by);
         Ok(Found { stream: stream.map_err(|error| error.to_string())?, line, groups })
     }
 }

@@ -1,6 +1,5 @@
 //! Opens ports with taps around them, and finds their motors.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -19,6 +18,7 @@ use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
 use super::client::{Client, Lent};
+use super::followed::Place;
 use super::frames::Taps;
 use super::track::Line;
 use super::wall::Anchor;
@@ -51,7 +51,7 @@ pub(super) struct Opened {
     /// The client, if it is not the recording's own.
     pub(super) lent: Option<Lent>,
     /// The path of the share that holds the port, and its name of the line.
-    pub(super) share: Option<(PathBuf, String)>,
+    pub(super) share: Option<Place>,
 }
 
 /// Opens all ports, and takes the clients. A port of both kinds gives a serial line and a CAN bus.
@@ -139,8 +139,7 @@ pub(super) fn unsearched(
     };
     let anchor = Anchor::now(acquisition.clock());
     let full_scale = port.full_scale.filter(|_| protocol == Protocol::St);
-    let port = port.name.to_string();
-    let share = place_of(&port);
+    let (share, port) = (place_of(&port.name), port.name.to_string());
     let runner = Runner::start(&label, acquisition).map_err(RecordError::Thread)?;
     let line = Line { label, port, speaks, motors: Vec::new(), full_scale };
     Ok(Opened { runner, line, anchor, taps, lent: None, share })

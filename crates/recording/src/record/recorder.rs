@@ -15,7 +15,7 @@ use super::abort::Abort;
 use super::choice::{self, Group};
 use super::client::{Client, Lent};
 use super::content::{Content, Counts, Line};
-use super::followed::{self, Followed};
+use super::followed::{self, Followed, Place};
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
@@ -144,10 +144,11 @@ impl Recorder {
         let mut shares = BTreeSet::new();
         for it in opened {
             let groups = choice::choose(&it.line.motors, &config.signals, config.period);
-            recorded.push(match &it.share {
-                Some((path, _)) => {
-                    let is_first = shares.insert(path.clone());
-                    Recorded::follow(it, groups, &config.by, is_first, &mut topics)?
+            recorded.push(match it.share.clone() {
+                Some((share, name)) => {
+                    // Shares differ in the names of their ports.
+                    let is_first = shares.insert(share.port(""));
+                    Recorded::follow(it, (share, name), groups, &config.by, is_first, &mut topics)?
                 }
                 None => Recorded::read(it, groups, &mut topics)?,
             });
@@ -332,7 +333,8 @@ impl Recorded {
 
     /// Follows a line of a share. Its first line has the events of the share itself.
     fn follow(
-        Opened { runner, line, share, .. }: Opened,
+        Opened { runner, line, .. }: Opened,
+        share: Place,
         groups: Vec<Group>,
         by: &str,
         is_first: bool,
@@ -340,7 +342,7 @@ impl Recorded {
     ) -> Result<Self, RecordError> {
         // The share reads the signals from now on.
         runner.end();
-        let stream = followed::stream(share.unwrap_or_default(), &line, &groups, by)?;
+        let stream = followed::stream(share, &line, &groups, by)?;
         let content = Content::new(line, groups, topics);
         Ok(Recorded::Share(Followed::new(content, stream, is_first)))
     }

@@ -16,6 +16,15 @@ pub trait Address: Debug + Send + Sync {
     /// It is not there, or does not take this program.
     fn connect(&self) -> Result<UnixStream, Unreachable>;
 
+    /// As [`connect`](Self::connect), for a program that reads only, and wants nothing to be lost while a
+    /// network is cut for a moment.
+    ///
+    /// # Errors
+    /// As for `connect`.
+    fn follow(&self) -> Result<UnixStream, Unreachable> {
+        self.connect()
+    }
+
     /// What is said when the connection has ended. `why` is what the share said before.
     fn ended(&self, why: Option<&str>) -> String;
 

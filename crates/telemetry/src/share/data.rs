@@ -7,6 +7,21 @@ pub const HEADER: usize = 32;
 /// The columns that every group has before those of its signals: `t` and `span`.
 pub const TIMES: usize = 2;
 
+/// Where the group is in a payload.
+const GROUP: std::ops::Range<usize> = 4..8;
+
+/// The group of samples, without reading them.
+pub fn group_of(payload: &[u8]) -> Option<u32> {
+    Some(u32::from_le_bytes(payload.get(GROUP)?.try_into().ok()?))
+}
+
+/// Gives samples to another group.
+pub fn regroup(payload: &mut [u8], group: u32) {
+    if let Some(bytes) = payload.get_mut(GROUP) {
+        bytes.copy_from_slice(&group.to_le_bytes());
+    }
+}
+
 /// Rows of one group of signals. All values of a row were read in one exchange.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {

@@ -10,6 +10,7 @@
 //! of the events of an engine. [`wire`] keeps the frames of a line.
 
 pub mod address;
+pub mod clock;
 pub mod data;
 pub mod dialogue;
 pub mod frame;

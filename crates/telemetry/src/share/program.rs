@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rustix::net::{Shutdown, shutdown};
@@ -14,6 +13,7 @@ use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, oneshot};
 
 use super::VERSION;
+use super::address::Address;
 use super::frame::{self, Frame, Kind, Reader};
 use super::message::{self, Answer, Ask, Reason, Request, Text};
 
@@ -35,7 +35,7 @@ struct Shared {
     socket: OwnedFd,
     pending: Mutex<Pending>,
     lanes: Mutex<BTreeMap<Lane, Arc<AsyncMutex<()>>>>,
-    path: PathBuf,
+    share: Arc<dyn Address>,
     name: String,
 }
 
@@ -65,12 +65,19 @@ struct Ending {
 }
 
 impl Program {
-    /// Connects to the share at `path`, and says who this is. Gives the name that events have.
+    /// Connects to a share, and says who this is. Gives the name that events have.
     ///
     /// # Errors
     /// No share is there, or it refuses.
-    pub async fn connect(path: &Path, name: &str) -> io::Result<(Self, Listener, String)> {
-        let stream = UnixStream::connect(path).await?;
+    pub async fn connect(
+        share: &Arc<dyn Address>,
+        name: &str,
+    ) -> io::Result<(Self, Listener, String)> {
+        let address = Arc::clone(share);
+        let connected = tokio::task::spawn_blocking(move || address.connect()).await?;
+        let stream = connected.map_err(io::Error::other)?;
+        stream.set_nonblocking(true)?;
+        let stream = UnixStream::from_std(stream)?;
         let socket = stream.as_fd().try_clone_to_owned()?;
         let (reader, writer) = stream.into_split();
         let shared = Arc::new(Shared {
@@ -78,7 +85,7 @@ impl Program {
             socket,
             pending: Mutex::new(Pending { last: OWN_IDS, ..Pending::default() }),
             lanes: Mutex::default(),
-            path: path.to_owned(),
+            share: Arc::clone(share),
             name: name.to_owned(),
         });
         let program = Program { shared: Arc::clone(&shared) };
@@ -102,8 +109,8 @@ impl Program {
     /// # Errors
     /// The share is gone, or refuses.
     pub async fn again(&self, what: &str) -> Result<(Self, Listener), Refusal> {
-        let Shared { path, name, .. } = &*self.shared;
-        match Self::connect(path, &format!("{name} ({what})")).await {
+        let Shared { share, name, .. } = &*self.shared;
+        match Self::connect(share, &format!("{name} ({what})")).await {
             Ok((program, listener, _)) => Ok((program, listener)),
             Err(error) => {
                 let message = format!("the share is lost: {error}; nothing was sent");

@@ -22,7 +22,10 @@ pub struct Asker {
 
 impl Asker {
     pub fn join(path: &Path, name: &str) -> Self {
-        let stream = UnixStream::connect(path).unwrap();
+        Self::over(UnixStream::connect(path).unwrap(), name)
+    }
+
+    pub fn over(stream: UnixStream, name: &str) -> Self {
         stream.set_read_timeout(Some(LIMIT)).unwrap();
         let dialogue = Dialogue::default();
         let (events, ended) = (VecDeque::new(), VecDeque::new());

@@ -66,6 +66,10 @@ pub enum Happening {
     Refused,
     /// Values of a motor may be those of other signals since the given time.
     Doubtful,
+    /// Only in recordings: values since the given time came late, and waited at the share.
+    Late,
+    /// Only in recordings: the wall clock of the share differs from that of the recorder.
+    Clock,
     /// A line was opened.
     Opened,
     /// A line was closed.

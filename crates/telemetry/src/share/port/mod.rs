@@ -5,7 +5,7 @@ mod connection;
 mod place;
 mod serial;
 
-use std::path::PathBuf;
+use std::any::Any;
 use std::sync::Arc;
 
 use motorlink::port::{
@@ -24,10 +24,10 @@ pub fn register() {
     port::register(&Share);
 }
 
-/// The path of the share and the name of the line, if this is the name of a line of a share.
-pub fn place_of(name: &str) -> Option<(PathBuf, String)> {
-    let (path, line) = name.strip_prefix(Share.name())?.strip_prefix(':')?.rsplit_once('/')?;
-    Some((path.into(), line.to_owned()))
+/// Where the share is and the name of the line there, if the port is a line of a share.
+pub fn place_of(port: &PortName) -> Option<(Arc<dyn Address>, String)> {
+    let place: &Place = port.holder()?.downcast_ref()?;
+    Some((Arc::clone(&place.at), place.line.clone()))
 }
 
 /// The port of a line of the share at an address. `None`: no line can have this name.
@@ -88,8 +88,8 @@ impl Port for SharePort {
         (self.0.protocol == Protocol::Rmd).then_some(self)
     }
 
-    fn is_held(&self) -> bool {
-        true
+    fn holder(&self) -> Option<&dyn Any> {
+        Some(&self.0)
     }
 }
 

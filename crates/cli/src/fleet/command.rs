@@ -1,0 +1,231 @@
+//! `motorlink fleet command`: a command of `motorlink st` or `motorlink rmd` for the motors of many nodes.
+
+use std::process::{Command, Output, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use motorlink_fleet::key::Name;
+use motorlink_fleet::remote::Remote;
+use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::message::Protocol;
+use serde_json::Value;
+
+use super::args::At;
+use super::found::found;
+use crate::failure::Failure;
+use crate::output::{note, print_line};
+
+/// Commands that move no motor and end by themselves.
+const ST: [&str; 17] = [
+    "info",
+    "status",
+    "registers",
+    "get",
+    "segment",
+    "dump",
+    "diff",
+    "set",
+    "stop",
+    "stop-ramp",
+    "revup-data",
+    "revup",
+    "fault-ack",
+    "iqdref-clear",
+    "pfc",
+    "restore",
+    "help",
+];
+const RMD: [&str; 15] = [
+    "scan",
+    "status",
+    "dump",
+    "diff",
+    "angle",
+    "pid",
+    "acceleration",
+    "accel",
+    "encoder",
+    "off",
+    "stop",
+    "clear-errors",
+    "restore",
+    "encoder-offset",
+    "help",
+];
+/// Commands that run at the same time.
+const AT_ONCE: usize = 8;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+The words behind -- are those behind `motorlink`, without port and motor: st or rmd, then a command. It \
+is carried out for each motor of this kind that has answered its node. Commands that move motors are \
+refused: a motor turns as long as the program that turned it, so command it through its own port, such \
+as -p zenoh:arm1/st0.
+
+Exit code: the greatest of all commands, at most 3.")]
+pub struct Args {
+    #[command(flatten)]
+    at: At,
+    /// Only this node, which must be there; may be repeated
+    #[arg(long = "node", value_name = "NAME")]
+    nodes: Vec<Name>,
+    /// Motors with this in their name, such as /st0/ or /1
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    name: String,
+    /// st or rmd, and a command: -- st get SPEED_MEAS
+    #[arg(last = true, required = true, value_name = "WORD")]
+    words: Vec<String>,
+}
+
+/// A command for a motor.
+struct Job {
+    /// The name of the motor.
+    name: String,
+    command: Command,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let protocol = protocol(&args.words)?;
+    let network = args.at.via.network();
+    let program = std::env::current_exe()?;
+    let mut jobs = Vec::new();
+    for (node, info) in found(&network, &args.nodes)? {
+        let remote = Remote::new(node.clone(), network.clone());
+        for line in info.lines.iter().filter(|line| line.protocol == protocol) {
+            for motor in &line.heard {
+                let name = format!("{node}/{}/{motor}", line.line);
+                if !name.contains(&args.name) {
+                    continue;
+                }
+                let motor = motor.to_string();
+                let of_motor = match protocol {
+                    Protocol::St => ["-m", &motor],
+                    Protocol::Rmd => ["-i", &motor],
+                };
+                let mut command = Command::new(&program);
+                command.arg(&args.words[0]).args(["-p", &remote.port(&line.line)]).args(of_motor);
+                if let Some(profile) = &line.profile {
+                    command.args(["--profile", profile]);
+                }
+                command.args(args.at.json.then_some("--json")).args(&args.words[1..]);
+                command.stdin(Stdio::null());
+                jobs.push(Job { name, command });
+            }
+        }
+    }
+    if jobs.is_empty() {
+        return Err(Failure::link(format!("no {} motor has answered", args.words[0]))
+            .trying("`motorlink fleet list` shows nodes and motors"));
+    }
+    carry_out(jobs, args.at.json)
+}
+
+/// What the words are for.
+fn protocol(words: &[String]) -> Result<Protocol, Failure> {
+    let (protocol, commands): (_, &[&str]) = match words.first().map(String::as_str) {
+        Some("st") => (Protocol::St, &ST),
+        Some("rmd") => (Protocol::Rmd, &RMD),
+        _ => {
+            return Err(Failure::usage("the words behind -- begin with st or rmd")
+                .trying("for example: motorlink fleet command -- st get SPEED_MEAS"));
+        }
+    };
+    // Options of the command come behind it: their values could be taken for it.
+    match words.get(1) {
+        Some(command) if commands.contains(&command.as_str()) => Ok(protocol),
+        Some(command) => Err(Failure::usage(format!(
+            "`{command}` is not for a fleet; these are: {}",
+            commands.join(", ")
+        ))),
+        None => Err(Failure::usage("the command is missing behind st or rmd")),
+    }
+}
+
+/// Runs all commands, some at the same time, and prints what they say in the order of the motors.
+fn carry_out(jobs: Vec<Job>, json: bool) -> Result<(), Failure> {
+    let (next, count) = (AtomicUsize::new(0), jobs.len());
+    let slots: Vec<Mutex<(Job, Option<std::io::Result<Output>>)>> =
+        jobs.into_iter().map(|job| Mutex::new((job, None))).collect();
+    thread::scope(|scope| {
+        for _ in 0..AT_ONCE.min(count) {
+            scope.spawn(|| {
+                while let Some(slot) = slots.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let Ok(mut slot) = slot.lock() else { continue };
+                    slot.1 = Some(slot.0.command.output());
+                }
+            });
+        }
+    });
+    let (mut failed, mut worst) = (Vec::new(), 0);
+    for slot in slots {
+        let Ok((Job { name, .. }, Some(output))) = slot.into_inner() else { continue };
+        let output = output?;
+        for line in String::from_utf8_lossy(&output.stdout).lines() {
+            match json {
+                true => print_line(&named(&name, line))?,
+                false => print_line(&format!("{name}: {line}"))?,
+            }
+        }
+        for line in String::from_utf8_lossy(&output.stderr).lines() {
+            note(format!("{name}: {line}"));
+        }
+        // Without a code it was ended by a signal.
+        let code = output.status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(u8::MAX);
+        if code != 0 {
+            failed.push(name);
+            worst = worst.max(code);
+        }
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    let why =
+        format!("the command failed at {} of {count} motors: {}", failed.len(), failed.join(", "));
+    Err(match worst {
+        1 => Failure::refused(why),
+        2 => Failure::usage(why),
+        _ => Failure::link(why),
+    })
+}
+
+/// An object of a command, with the name of the motor in front.
+fn named(name: &str, line: &str) -> Value {
+    let mut object = serde_json::Map::new();
+    object.insert("drive".to_owned(), name.into());
+    match serde_json::from_str(line) {
+        Ok(Value::Object(members)) => object.extend(members),
+        other => drop(object.insert("text".to_owned(), other.unwrap_or_else(|_| line.into()))),
+    }
+    Value::Object(object)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_commands_for_fleets_are_there() {
+        let program = crate::Cli::command();
+        for (protocol, commands) in [("st", &ST[..]), ("rmd", &RMD)] {
+            let of = program.find_subcommand(protocol).unwrap();
+            for command in commands.iter().filter(|it| **it != "help") {
+                assert!(of.find_subcommand(command).is_some(), "{protocol} {command}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_moves_a_motor_is_refused() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        for text in
+            ["st start", "st ramp 100 1000", "rmd speed 90", "rmd run", "st -m start", "st raw 1"]
+        {
+            assert!(protocol(&words(text)).is_err(), "{text}");
+        }
+        assert_eq!(protocol(&words("st get SPEED_MEAS")).ok(), Some(Protocol::St));
+        assert_eq!(protocol(&words("rmd clear-errors")).ok(), Some(Protocol::Rmd));
+    }
+}

@@ -1,0 +1,54 @@
+//! `motorlink fleet record`: lines of many nodes in one recording.
+
+use motorlink::rmd::MotorId;
+use motorlink::st::MotorNumber;
+use motorlink_fleet::key::Name;
+use motorlink_fleet::remote::Remote;
+use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::message::Protocol;
+
+use super::args::Via;
+use super::found::found;
+use crate::failure::Failure;
+use crate::output::note;
+use crate::record::{Place, What, run_on};
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    via: Via,
+    /// Only this node, which must be there; may be repeated
+    #[arg(long = "node", value_name = "NAME")]
+    nodes: Vec<Name>,
+    #[command(flatten)]
+    what: What,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let network = args.via.network();
+    let mut ports = Vec::new();
+    for (node, info) in found(&network, &args.nodes)? {
+        let remote = Remote::new(node.clone(), network.clone());
+        for line in info.lines {
+            if line.heard.is_empty() {
+                note(format!("{node}/{}: no motor has answered, left out", line.line));
+                continue;
+            }
+            let mut place = Place { port: remote.port(&line.line), ..Place::default() };
+            let numbers = line.heard.iter();
+            match line.protocol {
+                Protocol::St => {
+                    place.motors = numbers.filter_map(|it| MotorNumber::new(*it)).collect()
+                }
+                Protocol::Rmd => place.ids = numbers.filter_map(|it| MotorId::new(*it)).collect(),
+            }
+            ports.push(place);
+        }
+    }
+    if ports.is_empty() {
+        return Err(Failure::link(
+            "no motor of a node has answered, so there is nothing to record",
+        ));
+    }
+    run_on(&ports, &args.what)
+}

@@ -1,0 +1,142 @@
+//! What nodes publish: the last values of all motors, without a session at any node.
+
+mod picture;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::message::Group;
+use zenoh::pubsub::Subscriber;
+use zenoh::query::{ConsolidationMode, QueryTarget};
+use zenoh::sample::Sample;
+use zenoh::{Session as Zenoh, Wait};
+
+use crate::clock::{Boot, Clock};
+use crate::directory;
+use crate::key::{self, Name};
+use crate::network::{Network, NetworkError};
+use crate::remote;
+use picture::Picture;
+pub use picture::{Drive, Node};
+
+/// How long nodes may take to say their columns.
+const ANSWER: Duration = Duration::from_secs(2);
+/// The least time between two questions for columns, in seconds.
+const AGAIN: f64 = 1.0;
+
+/// Takes what a node has published.
+type Hear = fn(&Arc<Shared>, &Sample);
+
+/// The nodes of a network, until this is dropped.
+pub struct View {
+    shared: Arc<Shared>,
+    _subscribers: Vec<Subscriber<()>>,
+}
+
+struct Shared {
+    zenoh: Arc<Zenoh>,
+    picture: Mutex<Picture>,
+    /// When columns were asked for last.
+    asked: Mutex<f64>,
+}
+
+impl View {
+    /// Looks at a network. The nodes that are there are known then, their values soon.
+    ///
+    /// # Errors
+    /// The network.
+    pub fn open(network: &Network) -> Result<Self, NetworkError> {
+        let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
+        let zenoh = remote::zenoh_of(network)?;
+        let (picture, asked) = (Mutex::default(), Mutex::new(f64::NEG_INFINITY));
+        let shared = Arc::new(Shared { zenoh: Arc::clone(&zenoh), picture, asked });
+        let mut subscribers = Vec::new();
+        let heard: [(String, Hear); 3] = [
+            (key::all_states(), Shared::state),
+            (key::all_columns(None), Shared::columns),
+            (key::all_samples(), Shared::samples),
+        ];
+        for (key, hear) in heard {
+            let shared = Arc::clone(&shared);
+            let heard = move |sample: Sample| hear(&shared, &sample);
+            let subscriber = zenoh.declare_subscriber(key).callback(heard).wait();
+            subscribers.push(subscriber.map_err(failed)?);
+        }
+        let now = Boot.now();
+        for ((node, _), info) in directory::nodes(network)? {
+            if let Some(info) = info {
+                shared.picture().state(node, info, now);
+            }
+        }
+        shared.ask_columns();
+        Ok(View { shared, _subscribers: subscribers })
+    }
+
+    /// The nodes that have said something.
+    pub fn nodes(&self) -> std::collections::BTreeMap<Name, Node> {
+        self.shared.picture().nodes()
+    }
+
+    /// The motors that have answered.
+    pub fn drives(&self) -> Vec<Drive> {
+        self.shared.picture().drives()
+    }
+
+    /// The clock of [`Drive::at`] and [`Node::at`].
+    pub fn now() -> f64 {
+        Boot.now()
+    }
+}
+
+impl Shared {
+    fn picture(&self) -> MutexGuard<'_, Picture> {
+        self.picture.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn state(self: &Arc<Self>, sample: &Sample) {
+        let info = serde_json::from_slice(&sample.payload().to_bytes()).ok();
+        if let (Some(node), Some(info)) = (key::node_of(sample.key_expr().as_str()), info) {
+            self.picture().state(node, info, Boot.now());
+        }
+    }
+
+    fn columns(self: &Arc<Self>, sample: &Sample) {
+        let group: Option<Group> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
+        if let (Some(node), Some(group)) = (key::node_of(sample.key_expr().as_str()), group) {
+            self.picture().columns(node, group);
+        }
+    }
+
+    fn samples(self: &Arc<Self>, sample: &Sample) {
+        let Some((node, line, motor)) = key::motor_of(sample.key_expr().as_str()) else { return };
+        let Ok(data) = Data::decode(&sample.payload().to_bytes()) else { return };
+        if !self.picture().samples(node, line, motor, &data, Boot.now()) {
+            self.ask_columns();
+        }
+    }
+
+    /// Asks all nodes for the columns of their samples, unless that was done just before.
+    fn ask_columns(self: &Arc<Self>) {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Boot.now();
+        if now < *asked + AGAIN {
+            return;
+        }
+        *asked = now;
+        let shared = Arc::clone(self);
+        let question = self
+            .zenoh
+            .get(key::all_columns(None))
+            .target(QueryTarget::All)
+            .consolidation(ConsolidationMode::None)
+            .timeout(ANSWER)
+            .callback(move |reply| {
+                if let Ok(sample) = reply.into_result() {
+                    shared.columns(&sample);
+                }
+            });
+        // Samples that come later ask again.
+        let _ = question.wait();
+    }
+}

@@ -1,0 +1,582 @@
+//! From the requests of one program to those of all nodes, and back.
+//!
+//! It has no socket and reads no clock. Times come from the caller, in seconds.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::data;
+use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
+use motorlink_telemetry::share::message::{
+    Answer, Ask, Event, Happening, Line, Reason, Request, SignalName, Text, decode, encode,
+};
+
+use super::member::{Member, State};
+use super::names;
+use super::round::{Kind, Round};
+use crate::key::Name;
+
+/// How long a stop waits for a node that is away, in seconds.
+const PENDING: f64 = 10.0;
+
+/// What is sent next.
+#[derive(Debug, PartialEq)]
+pub(super) enum Out {
+    Program(Frame),
+    Node(Name, Request),
+}
+
+/// A request to a node.
+#[derive(Debug)]
+struct Asked {
+    node: Name,
+    of: Of,
+    /// When, by the wall clock.
+    wall: f64,
+}
+
+/// Why a node was asked.
+#[derive(Debug)]
+enum Of {
+    /// For the request of the program with this id, about this line of the node.
+    One(u32, Option<String>),
+    Round(u64),
+    /// The lines of a node that came.
+    Lines,
+    /// A subscription of the program, at a node that is back.
+    Again(u32),
+    /// The answer does not matter.
+    Nothing,
+}
+
+/// A request to a node that is being connected for the first time.
+#[derive(Debug)]
+struct Waiting {
+    node: Name,
+    id: u32,
+    ask: Ask,
+    line: String,
+    since: f64,
+}
+
+/// A subscription of the program.
+#[derive(Debug)]
+struct Subscription {
+    /// What each node is asked for.
+    parts: BTreeMap<Name, Ask>,
+}
+
+#[derive(Debug)]
+pub(super) struct Merge {
+    /// The name of the program in the log of each node.
+    who: String,
+    members: BTreeMap<Name, Member>,
+    last_id: u32,
+    asked: BTreeMap<u32, Asked>,
+    last_round: u64,
+    rounds: BTreeMap<u64, Round>,
+    waiting: Vec<Waiting>,
+    last_subscription: u32,
+    subscriptions: BTreeMap<u32, Subscription>,
+    last_group: u32,
+    /// Whether a node that comes is latched first.
+    latches: bool,
+    /// Until when a node that comes is stopped first.
+    stops_until: f64,
+    /// Now, by the clock of stops and by the wall clock.
+    now: f64,
+    wall: f64,
+    out: Vec<Out>,
+}
+
+impl Merge {
+    pub(super) fn new(who: String) -> Self {
+        Merge {
+            who,
+            members: BTreeMap::new(),
+            last_id: 0,
+            asked: BTreeMap::new(),
+            last_round: 0,
+            rounds: BTreeMap::new(),
+            waiting: Vec::new(),
+            last_subscription: 0,
+            subscriptions: BTreeMap::new(),
+            last_group: 0,
+            latches: false,
+            stops_until: f64::NEG_INFINITY,
+            now: 0.0,
+            wall: 0.0,
+            out: Vec::new(),
+        }
+    }
+
+    /// It is this time, by a clock that only goes forward and by the wall clock.
+    pub(super) fn at(&mut self, now: f64, wall: f64) {
+        (self.now, self.wall) = (now, wall);
+    }
+
+    /// What is to be sent, in this order.
+    pub(super) fn take(&mut self) -> Vec<Out> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// A node is there, and is being connected. It may be known.
+    pub(super) fn coming(&mut self, node: Name) {
+        self.members.entry(node).or_insert_with(Member::new);
+    }
+
+    /// A node is connected.
+    pub(super) fn came(&mut self, node: &Name) {
+        let Some(member) = self.members.get_mut(node) else { return };
+        member.state = State::Here;
+        member.closing = None;
+        // Before anything else can move its motors.
+        if self.latches {
+            self.ask(node, Ask::Latch, Of::Nothing);
+        }
+        if self.now < self.stops_until {
+            self.ask(node, Ask::Stop { motor: None }, Of::Nothing);
+        }
+        self.ask(node, Ask::Lines, Of::Lines);
+        let waiting = self.rounds.iter().filter(|(_, round)| round.waits.contains(node));
+        let waiting: Vec<_> = waiting.map(|(number, round)| (*number, round.kind)).collect();
+        for (number, kind) in waiting {
+            if let Some(ask) = self.ask_of(kind, node) {
+                self.ask(node, ask, Of::Round(number));
+            }
+        }
+        let pending =
+            |number: &u32| self.rounds.values().any(|round| round.kind == Kind::Subscribe(*number));
+        let again = self.subscriptions.iter().filter(|(number, _)| !pending(number));
+        let again = again.filter_map(|(number, it)| Some((*number, it.parts.get(node)?.clone())));
+        for (number, ask) in again.collect::<Vec<_>>() {
+            self.ask(node, ask, Of::Again(number));
+        }
+        self.end_waiting(node);
+    }
+
+    /// Asks, or refuses, what waited for a node.
+    fn end_waiting(&mut self, node: &Name) {
+        let (ended, waiting): (Vec<_>, _) =
+            std::mem::take(&mut self.waiting).into_iter().partition(|it| it.node == *node);
+        self.waiting = waiting;
+        for Waiting { id, mut ask, line, since, .. } in ended {
+            if let Ask::Command { time_to_live, .. } = &mut ask {
+                *time_to_live -= self.now - since;
+                if *time_to_live <= 0.0 {
+                    self.refuse(id, expired(node));
+                    continue;
+                }
+            }
+            self.one(id, ask, &names::in_fleet(node, &line));
+        }
+    }
+
+    /// A node cannot be reached any more, or could not be reached.
+    pub(super) fn gone(&mut self, node: &Name, why: &str) {
+        let Some(member) = self.members.get_mut(node) else { return };
+        let why = member.closing.take().unwrap_or_else(|| why.to_owned());
+        member.subscriptions.clear();
+        member.groups.clear();
+        let before = std::mem::replace(&mut member.state, State::Away(why.clone()));
+        let lines: Vec<_> = member.lines.iter().map(|line| line.line.clone()).collect();
+        let (asked, others): (BTreeMap<_, _>, _) =
+            std::mem::take(&mut self.asked).into_iter().partition(|(_, it)| it.node == *node);
+        self.asked = others;
+        for asked in asked.into_values() {
+            self.ended(node, asked.of, Err(away(node, &why)));
+        }
+        if before == State::Coming {
+            self.fail_rounds(node, &why);
+            self.end_waiting(node);
+        }
+        if before == State::Here {
+            for line in lines {
+                let message = format!("node {node} is away: {why}");
+                self.tell(node, Happening::Lost, &line, message);
+            }
+        }
+    }
+
+    /// A request of the program. `false`: it leaves.
+    pub(super) fn asked(&mut self, Request { id, mut ask }: Request) -> bool {
+        match &ask {
+            Ask::Hello { protocol, .. } if *protocol != VERSION => {
+                let message = format!("the fleet speaks version {VERSION}");
+                self.refuse(id, usage(message));
+            }
+            Ask::Hello { .. } => {
+                let share = "fleet".to_owned();
+                let name = self.who.clone();
+                self.answer(id, Answer::Hello { protocol: VERSION, share, name });
+            }
+            Ask::Lines => self.all(id, Kind::Lines),
+            Ask::Rates => self.all(id, Kind::Rates),
+            Ask::Stop { motor: None } => {
+                self.stops_until = self.now + PENDING;
+                self.all(id, Kind::Stop);
+            }
+            Ask::Latch => {
+                self.latches = true;
+                self.all(id, Kind::Latch);
+            }
+            Ask::Release => {
+                self.latches = false;
+                self.all(id, Kind::Release);
+            }
+            Ask::Subscribe { .. } => self.subscribe(id, ask),
+            Ask::Unsubscribe { subscription } => {
+                let answer = match self.unsubscribe(*subscription) {
+                    true => Ok(Answer::Unsubscribe),
+                    false => Err(usage(format!("there is no subscription {subscription}"))),
+                };
+                self.end(id, answer);
+            }
+            Ask::Leave { .. } => return false,
+            Ask::Ports | Ask::Scan { .. } | Ask::Open { .. } => {
+                let why = "ports of a node are opened at the node: `motorlink node -p PORT`";
+                self.refuse(id, usage(why.to_owned()));
+            }
+            _ => match names::line_of(&mut ask).map(std::mem::take) {
+                Some(line) => self.one(id, ask, &line),
+                None => self.refuse(id, usage("the fleet does not know this request".to_owned())),
+            },
+        }
+        true
+    }
+
+    /// A message of a node.
+    pub(super) fn heard(&mut self, node: &Name, Frame { kind, payload }: Frame) {
+        if kind == FrameKind::Data {
+            return self.rows(node, payload);
+        }
+        // What a later version says besides.
+        let Ok(text) = decode(&payload) else { return };
+        match text {
+            Text::Answer { id, answer } => self.answered(node, id, Ok(answer)),
+            Text::Refusal { id, reason, message, code } => {
+                self.answered(node, id, Err(Refusal { reason, message, code }));
+            }
+            Text::Event(event) => {
+                if event.event == Happening::Released {
+                    self.latches = false;
+                }
+                let ahead = self.members.get(node).map_or(0.0, Member::ahead);
+                self.say(&Text::Event(names::event(node, event, ahead)));
+            }
+            Text::Group(mut group) => {
+                let Some(member) = self.members.get_mut(node) else { return };
+                let Some(subscription) = member.subscriptions.get(&group.subscription) else {
+                    return;
+                };
+                self.last_group += 1;
+                member.groups.insert(group.group, self.last_group);
+                group.group = self.last_group;
+                group.subscription = *subscription;
+                group.line = names::in_fleet(node, &group.line);
+                self.say(&Text::Group(group));
+            }
+            Text::Unconfirmed { subscription, line, motor, rows } => {
+                let member = self.members.get(node);
+                let ours = member.and_then(|it| it.subscriptions.get(&subscription));
+                if let Some(&subscription) = ours {
+                    let line = names::in_fleet(node, &line);
+                    self.say(&Text::Unconfirmed { subscription, line, motor, rows });
+                }
+            }
+            Text::Missed { .. } => self.say(&text),
+            Text::Closing { message } => {
+                if let Some(member) = self.members.get_mut(node) {
+                    member.closing = Some(message);
+                }
+            }
+            Text::Later => {}
+        }
+    }
+
+    fn rows(&mut self, node: &Name, mut payload: Vec<u8>) {
+        let member = self.members.get(node);
+        let group = data::group_of(&payload);
+        let ours = group.and_then(|group| member?.groups.get(&group));
+        if let Some(&group) = ours {
+            data::regroup(&mut payload, group);
+            self.out.push(Out::Program(Frame::data(payload)));
+        }
+    }
+
+    fn answered(&mut self, node: &Name, id: u32, result: Result<Answer, Refusal>) {
+        let Some(Asked { of, wall, .. }) = self.asked.remove(&id) else { return };
+        if let Ok(Answer::Lines { lines, latched_by }) = &result {
+            let before = self.learn(node, lines, latched_by.clone(), wall);
+            if matches!(of, Of::Lines) {
+                self.tell_lines(node, &before, lines);
+            }
+        }
+        let new = match (&of, &result) {
+            (Of::Again(number), Ok(Answer::Subscribe { subscription })) => {
+                Some((*number, *subscription))
+            }
+            (Of::Round(round), Ok(Answer::Subscribe { subscription })) => {
+                match self.rounds.get(round).map(|it| it.kind) {
+                    Some(Kind::Subscribe(number)) => Some((number, *subscription)),
+                    _ => None,
+                }
+            }
+            _ => None,
+        };
+        if let Some((ours, theirs)) = new {
+            match self.members.get_mut(node) {
+                Some(member) if self.subscriptions.contains_key(&ours) => {
+                    member.subscriptions.insert(theirs, ours);
+                }
+                // It was ended meanwhile.
+                _ => self.ask(node, Ask::Unsubscribe { subscription: theirs }, Of::Nothing),
+            }
+        }
+        self.ended(node, of, result);
+    }
+
+    /// Ends what a node was asked for.
+    fn ended(&mut self, node: &Name, of: Of, result: Result<Answer, Refusal>) {
+        match of {
+            Of::One(id, line) => {
+                let result = result.map(|answer| names::answer(node, answer));
+                let named = |why| names::refusal(node, line.as_deref(), why);
+                self.end(id, result.map_err(named));
+            }
+            Of::Round(number) => {
+                let Some(round) = self.rounds.get_mut(&number) else { return };
+                round.waits.remove(node);
+                round.done.insert(node.clone(), result);
+                self.finish(number);
+            }
+            Of::Lines | Of::Again(_) | Of::Nothing => {}
+        }
+    }
+
+    /// Remembers the lines of a node, which was asked for them at this time of the wall clock. Gives those
+    /// before.
+    fn learn(
+        &mut self,
+        node: &Name,
+        lines: &[Line],
+        latched_by: Option<String>,
+        asked: f64,
+    ) -> Vec<Line> {
+        let Some(member) = self.members.get_mut(node) else { return Vec::new() };
+        member.latched_by = latched_by;
+        member.learn(lines, asked, self.wall)
+    }
+
+    /// Tells the program what is new at a node that was just connected.
+    fn tell_lines(&mut self, node: &Name, before: &[Line], lines: &[Line]) {
+        let is_in = |lines: &[Line], line: &Line| {
+            lines.iter().any(|it| it.line == line.line && it.protocol == line.protocol)
+        };
+        for line in before.iter().filter(|line| !is_in(lines, line)) {
+            let message = format!("node {node} has no such line any more");
+            self.tell(node, Happening::Closed, &line.line, message);
+        }
+        for line in lines {
+            let (event, words) = match is_in(before, line) {
+                true => (Happening::Back, "is there again"),
+                false => (Happening::Opened, "is there"),
+            };
+            self.tell(node, event, &line.line, format!("node {node} {words}"));
+        }
+    }
+
+    /// Asks all nodes.
+    fn all(&mut self, id: u32, kind: Kind) {
+        let nodes: BTreeSet<_> = self.members.keys().cloned().collect();
+        self.round(id, kind, nodes);
+    }
+
+    fn round(&mut self, id: u32, kind: Kind, nodes: BTreeSet<Name>) {
+        self.last_round += 1;
+        let number = self.last_round;
+        let round = Round { id, kind, waits: nodes.clone(), done: BTreeMap::new() };
+        self.rounds.insert(number, round);
+        for node in &nodes {
+            match self.members.get(node).map(|it| &it.state) {
+                Some(State::Here) => {
+                    if let Some(ask) = self.ask_of(kind, node) {
+                        self.ask(node, ask, Of::Round(number));
+                    }
+                }
+                Some(State::Away(why)) => {
+                    let why = away(node, why);
+                    self.ended(node, Of::Round(number), Err(why));
+                }
+                Some(State::Coming) | None => {}
+            }
+        }
+        self.finish(number);
+    }
+
+    /// What a node is asked in a round.
+    fn ask_of(&self, kind: Kind, node: &Name) -> Option<Ask> {
+        Some(match kind {
+            Kind::Lines => Ask::Lines,
+            Kind::Rates => Ask::Rates,
+            Kind::Stop => Ask::Stop { motor: None },
+            Kind::Latch => Ask::Latch,
+            Kind::Release => Ask::Release,
+            Kind::Subscribe(number) => self.subscriptions.get(&number)?.parts.get(node)?.clone(),
+        })
+    }
+
+    /// Answers the program if all nodes have answered.
+    fn finish(&mut self, number: u64) {
+        if self.rounds.get(&number).is_none_or(|round| !round.waits.is_empty()) {
+            return;
+        }
+        let Some(round) = self.rounds.remove(&number) else { return };
+        let answer = round.answer(&self.members);
+        if let (Kind::Subscribe(subscription), Err(_)) = (round.kind, &answer) {
+            self.unsubscribe(subscription);
+        }
+        self.end(round.id, answer);
+    }
+
+    /// No round waits for a node that did not come.
+    fn fail_rounds(&mut self, node: &Name, why: &str) {
+        let waiting = self.rounds.iter().filter(|(_, round)| round.waits.contains(node));
+        for number in waiting.map(|(number, _)| *number).collect::<Vec<_>>() {
+            self.ended(node, Of::Round(number), Err(away(node, why)));
+        }
+    }
+
+    fn subscribe(&mut self, id: u32, ask: Ask) {
+        let Ask::Subscribe { signals, period, queue, drop, rows } = ask else { return };
+        let mut of_nodes: BTreeMap<Name, Vec<SignalName>> = BTreeMap::new();
+        for mut signal in signals {
+            match self.known(&signal.line) {
+                Ok((node, line)) => {
+                    signal.line = line;
+                    of_nodes.entry(node).or_default().push(signal);
+                }
+                Err(why) => return self.refuse(id, why),
+            }
+        }
+        self.last_subscription += 1;
+        let number = self.last_subscription;
+        let nodes = of_nodes.keys().cloned().collect();
+        let part = |signals| Ask::Subscribe { signals, period, queue, drop, rows };
+        let parts = of_nodes.into_iter().map(|(node, signals)| (node, part(signals)));
+        self.subscriptions.insert(number, Subscription { parts: parts.collect() });
+        self.round(id, Kind::Subscribe(number), nodes);
+    }
+
+    /// Whether there was such a subscription.
+    fn unsubscribe(&mut self, number: u32) -> bool {
+        if self.subscriptions.remove(&number).is_none() {
+            return false;
+        }
+        let mut theirs = Vec::new();
+        for (node, member) in &mut self.members {
+            let ended = member.subscriptions.iter().filter(|(_, ours)| **ours == number);
+            theirs.extend(ended.map(|(subscription, _)| (node.clone(), *subscription)));
+            member.subscriptions.retain(|_, ours| *ours != number);
+        }
+        for (node, subscription) in theirs {
+            self.ask(&node, Ask::Unsubscribe { subscription }, Of::Nothing);
+        }
+        true
+    }
+
+    /// Asks the node of a line.
+    fn one(&mut self, id: u32, mut ask: Ask, line: &str) {
+        let (node, there) = match self.known(line) {
+            Ok(place) => place,
+            Err(why) => return self.refuse(id, why),
+        };
+        match self.members.get(&node).map(|it| &it.state) {
+            Some(State::Away(why)) => {
+                let why = away(&node, why);
+                self.refuse(id, why);
+            }
+            Some(State::Here) => {
+                if let Some(line) = names::line_of(&mut ask) {
+                    line.clone_from(&there);
+                }
+                self.ask(&node, ask, Of::One(id, Some(there)));
+            }
+            // It does not take long until it is known whether the node is there.
+            Some(State::Coming) | None => {
+                self.waiting.push(Waiting { node, id, ask, line: there, since: self.now });
+            }
+        }
+    }
+
+    /// The node of a line, and the name of the line there.
+    fn known(&self, line: &str) -> Result<(Name, String), Refusal> {
+        match names::at_node(line) {
+            Some((node, line)) if self.members.contains_key(&node) => Ok((node, line.to_owned())),
+            Some((node, _)) => Err(usage(format!("the fleet has no node {node}"))),
+            None => Err(usage(format!("a line of the fleet is NODE/LINE, not `{line}`"))),
+        }
+    }
+
+    fn ask(&mut self, node: &Name, ask: Ask, of: Of) {
+        self.last_id += 1;
+        let asked = Asked { node: node.clone(), of, wall: self.wall };
+        self.asked.insert(self.last_id, asked);
+        self.out.push(Out::Node(node.clone(), Request { id: self.last_id, ask }));
+    }
+
+    fn end(&mut self, id: u32, result: Result<Answer, Refusal>) {
+        match result {
+            Ok(answer) => self.answer(id, answer),
+            Err(why) => self.refuse(id, why),
+        }
+    }
+
+    fn answer(&mut self, id: u32, answer: Answer) {
+        self.say(&Text::Answer { id, answer });
+    }
+
+    fn refuse(&mut self, id: u32, Refusal { reason, message, code }: Refusal) {
+        self.say(&Text::Refusal { id, reason, message, code });
+    }
+
+    /// Something happened to a line of a node.
+    fn tell(&mut self, node: &Name, event: Happening, line: &str, message: String) {
+        let line = names::in_fleet(node, line);
+        let message = format!("{line}: {message}");
+        self.say(&Text::Event(Event {
+            wall: self.wall,
+            line: Some(line),
+            t: None,
+            since: None,
+            motor: None,
+            by: None,
+            event,
+            message,
+        }));
+    }
+
+    fn say(&mut self, text: &Text) {
+        self.out.push(Out::Program(Frame::text(encode(text))));
+    }
+}
+
+fn usage(message: String) -> Refusal {
+    Refusal { reason: Reason::Usage, message, code: None }
+}
+
+/// A node came too late for a command.
+fn expired(node: &Name) -> Refusal {
+    let message =
+        format!("node {node} was not connected within the time to live; nothing was sent");
+    Refusal { reason: Reason::Expired, message, code: None }
+}
+
+/// A node did not get a request, or did not answer it.
+fn away(node: &Name, why: &str) -> Refusal {
+    Refusal { reason: Reason::Line, message: format!("node {node} is away: {why}"), code: None }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,278 @@
+//! The sockets of one program and of all nodes.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::os::unix::net::UnixStream as StdStream;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use motorlink_telemetry::share::address::Unreachable;
+use motorlink_telemetry::share::frame::{self, Frame, Reader};
+use motorlink_telemetry::share::message::{Request, decode, encode};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::UnixStream;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::mpsc::{Receiver, Sender, UnboundedSender, channel, unbounded_channel};
+use tokio::time::{Instant, sleep_until};
+use zenoh::Session as Zenoh;
+use zenoh::handlers::FifoChannelHandler;
+use zenoh::sample::{Sample, SampleKind};
+
+use super::merge::{Merge, Out};
+use crate::clock::{Boot, Clock};
+use crate::key::{self, Name};
+use crate::remote::{PATIENCE, Remote};
+
+/// The pause between two attempts to connect to a node.
+const AGAIN: Duration = Duration::from_millis(500);
+/// Bytes that wait for the program. Nothing more is read from nodes meanwhile: their shares drop samples.
+const WAITING: usize = 1 << 20;
+/// The longest request of a program: one may have the signals of all drives.
+const LONGEST: usize = frame::LONGEST;
+/// Messages of nodes that wait.
+const QUEUE: usize = 64;
+
+/// What a node has said.
+struct News {
+    node: Name,
+    /// Which connection of it.
+    run: u64,
+    what: What,
+}
+
+enum What {
+    Connected(Result<StdStream, Unreachable>),
+    Said(Frame),
+    Ended,
+}
+
+/// A node that was seen.
+struct Link {
+    run: u64,
+    /// Its requests, while it is connected.
+    requests: Option<UnboundedSender<Vec<u8>>>,
+    /// When it is tried to connect next. `None`: it is connected, or is being connected.
+    next: Option<Instant>,
+}
+
+/// A program that sees all nodes.
+pub(super) struct Serving {
+    merge: Merge,
+    /// What a node is, besides its name.
+    pattern: Remote,
+    is_meant: Box<dyn Fn(&Name) -> bool + Send + Sync>,
+    links: BTreeMap<Name, Link>,
+    reader: OwnedReadHalf,
+    frames: Reader,
+    writer: OwnedWriteHalf,
+    out: Vec<u8>,
+    news: Receiver<News>,
+    told: Sender<News>,
+    /// Its liveliness subscriber ends with the handler.
+    seen: zenoh::pubsub::Subscriber<FifoChannelHandler<Sample>>,
+    zenoh: Arc<Zenoh>,
+}
+
+impl Serving {
+    /// Looks for nodes, and serves the socket from then on.
+    pub(super) async fn open(
+        pattern: Remote,
+        is_meant: impl Fn(&Name) -> bool + Send + Sync + 'static,
+        zenoh: Arc<Zenoh>,
+        socket: StdStream,
+    ) -> io::Result<()> {
+        let seen = zenoh.liveliness().declare_subscriber(key::all_alive()).history(true).await;
+        let seen = seen.map_err(io::Error::other)?;
+        let (reader, writer) = UnixStream::from_std(socket)?.into_split();
+        let (told, news) = channel(QUEUE);
+        let mut serving = Serving {
+            merge: Merge::new(pattern.who.to_string()),
+            pattern,
+            is_meant: Box::new(is_meant),
+            links: BTreeMap::new(),
+            reader,
+            frames: Reader::new(LONGEST),
+            writer,
+            out: Vec::new(),
+            news,
+            told,
+            seen,
+            zenoh: Arc::clone(&zenoh),
+        };
+        // Those that are there already, so that the first answer has their lines.
+        let tokens = zenoh.liveliness().get(key::all_alive()).await.map_err(io::Error::other)?;
+        while let Ok(reply) = tokens.recv_async().await {
+            if let Ok(sample) = reply.into_result() {
+                serving.saw(&sample);
+            }
+        }
+        tokio::spawn(async move {
+            // The program has ended. So do the sessions at the nodes, with their sockets.
+            let _ = serving.serve().await;
+        });
+        Ok(())
+    }
+
+    async fn serve(&mut self) -> io::Result<()> {
+        let mut bytes = vec![0; 1 << 14];
+        loop {
+            self.connect();
+            self.pass();
+            let next = self.links.values().filter_map(|link| link.next).min();
+            let next = next.unwrap_or_else(|| Instant::now() + AGAIN);
+            tokio::select! {
+                biased;
+                read = self.reader.read(&mut bytes) => match read? {
+                    0 => return Ok(()),
+                    size => {
+                        self.frames.push(&bytes[..size]);
+                        if !self.requests()? {
+                            return Ok(());
+                        }
+                    }
+                },
+                ready = self.writer.writable(), if !self.out.is_empty() => {
+                    ready?;
+                    self.write()?;
+                }
+                Some(news) = self.news.recv(), if self.out.len() < WAITING => self.heard(news),
+                Ok(sample) = self.seen.recv_async() => self.saw(&sample),
+                () = sleep_until(next) => {}
+            }
+        }
+    }
+
+    /// Takes the requests of the program. `false`: it leaves.
+    fn requests(&mut self) -> io::Result<bool> {
+        self.merge.at(Boot.now(), wall());
+        while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
+            let request: Request = decode(&frame.payload).map_err(io::Error::other)?;
+            if !self.merge.asked(request) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Passes on what the merge says.
+    fn pass(&mut self) {
+        for out in self.merge.take() {
+            match out {
+                Out::Program(Frame { kind, payload }) => {
+                    // It was made from messages that were not too long.
+                    let _ = frame::append(kind, &payload, &mut self.out);
+                }
+                Out::Node(node, request) => {
+                    let requests = self.links.get(&node).and_then(|link| link.requests.as_ref());
+                    let mut bytes = Vec::new();
+                    let _ = frame::append(frame::Kind::Text, &encode(&request), &mut bytes);
+                    // If it has ended, that is heard soon.
+                    let _ = requests.map(|it| it.send(bytes));
+                }
+            }
+        }
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        match self.writer.try_write(&self.out) {
+            Ok(size) => drop(self.out.drain(..size)),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// A node came or went. One that went ends its connection itself, sooner or later.
+    fn saw(&mut self, sample: &Sample) {
+        if sample.kind() != SampleKind::Put {
+            return;
+        }
+        let Some((node, _)) = key::run_of(sample.key_expr().as_str()) else { return };
+        if !(self.is_meant)(&node) {
+            return;
+        }
+        self.merge.coming(node.clone());
+        let now = Instant::now();
+        let link = self.links.entry(node);
+        let link = link.or_insert(Link { run: 0, requests: None, next: Some(now) });
+        link.next = link.next.map(|_| now);
+    }
+
+    /// Connects to nodes, if it is time.
+    fn connect(&mut self) {
+        let now = Instant::now();
+        for (node, link) in &mut self.links {
+            if link.next.is_none_or(|next| next > now) {
+                continue;
+            }
+            link.next = None;
+            link.run += 1;
+            let remote = Remote { node: node.clone(), ..self.pattern.clone() };
+            let (zenoh, told) = (Arc::clone(&self.zenoh), self.told.clone());
+            let (node, run) = (node.clone(), link.run);
+            tokio::spawn(async move {
+                let connected = remote.open(zenoh, PATIENCE).await;
+                // The program may have ended.
+                let _ = told.send(News { node, run, what: What::Connected(connected) }).await;
+            });
+        }
+    }
+
+    fn heard(&mut self, News { node, run, what }: News) {
+        self.merge.at(Boot.now(), wall());
+        if self.links.get(&node).is_none_or(|link| link.run != run) {
+            return;
+        }
+        let lost = match what {
+            What::Said(frame) => return self.merge.heard(&node, frame),
+            What::Connected(Ok(socket)) => match self.begin(&node, run, socket) {
+                Ok(()) => return self.merge.came(&node),
+                Err(error) => error.to_string(),
+            },
+            What::Connected(Err(error)) => error.to_string(),
+            What::Ended => "the connection has ended".to_owned(),
+        };
+        if let Some(link) = self.links.get_mut(&node) {
+            link.requests = None;
+            link.next = Some(Instant::now() + AGAIN);
+        }
+        self.merge.gone(&node, &lost);
+    }
+
+    /// Passes on what a node says, and what it is asked.
+    fn begin(&mut self, node: &Name, run: u64, socket: StdStream) -> io::Result<()> {
+        socket.set_nonblocking(true)?;
+        let (mut reader, mut writer) = UnixStream::from_std(socket)?.into_split();
+        let (requests, mut asked) = unbounded_channel::<Vec<u8>>();
+        tokio::spawn(async move {
+            while let Some(bytes) = asked.recv().await {
+                if writer.write_all(&bytes).await.is_err() {
+                    return;
+                }
+            }
+        });
+        let (told, name) = (self.told.clone(), node.clone());
+        tokio::spawn(async move {
+            let (mut frames, mut bytes) = (Reader::default(), vec![0; 1 << 14]);
+            let said = |what| told.send(News { node: name.clone(), run, what });
+            while let Ok(size @ 1..) = reader.read(&mut bytes).await {
+                frames.push(&bytes[..size]);
+                while let Ok(Some(frame)) = frames.take() {
+                    if said(What::Said(frame)).await.is_err() {
+                        return;
+                    }
+                }
+            }
+            let _ = said(What::Ended).await;
+        });
+        if let Some(link) = self.links.get_mut(node) {
+            link.requests = Some(requests);
+        }
+        Ok(())
+    }
+}
+
+/// The wall clock, in seconds since 1970.
+fn wall() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
+}

@@ -1,0 +1,221 @@
+"""`motorlink fleet` and `motorlink monitor --fleet`: the drives of several nodes from one place."""
+
+import json
+import os
+import signal
+import struct
+import time
+
+import pytest
+
+from monitoring import Site, is_kind, kind
+from program import eventually
+from sharing import Client, are_still, speeds
+from terminal import Terminal
+from test_json import check
+
+#: Programs that are killed. ROUNDS=30 for more.
+ROUNDS = int(os.environ.get("ROUNDS", "2"))
+
+
+@pytest.fixture
+def arms(nodes, run):
+    """Two nodes at one network, which have found their motors."""
+    arms = [nodes("arm1"), nodes("arm2")]
+
+    def found():
+        listed = check(run("fleet", "list", "--via", arms[0].address, "--json").ended(0).out)
+        return [[len(line.get("heard", [])) for line in it["lines"]] for it in listed] == [[2, 4], [2, 4]]
+
+    eventually(found, "all motors")
+    return arms
+
+
+@pytest.fixture
+def via(arms):
+    return ("--via", arms[0].address)
+
+
+@pytest.fixture
+def watchers(arms):
+    """A program at the share of each node, which knows how the motors turn."""
+    return [Client(arm.path, "watcher") for arm in arms]
+
+
+@pytest.fixture
+def show(start, via):
+    """`show()`: a monitor of the fleet, and its site."""
+
+    def show(*words):
+        words = ["--listen", "127.0.0.1:0", "--json", "--deadline", "2s", *via, *words]
+        monitor = start("monitor", "--fleet", *words)
+        ready = json.loads(monitor.line(0))
+        check(monitor.line(0))
+        return monitor, ready, Site(ready)
+
+    return show
+
+
+def turn(watcher):
+    rpm, dps = speeds(watcher)
+    return rpm > 1200 and dps > 300
+
+
+def turn_both(page, watchers):
+    for node, watcher in zip(("arm1/", "arm2/"), watchers):
+        page.turn(node=node)
+        eventually(lambda watcher=watcher: turn(watcher), "motors that turn")
+
+
+def rest(watchers):
+    for watcher in watchers:
+        eventually(lambda watcher=watcher: are_still(watcher), "motors that rest")
+
+
+def test_a_monitor_shows_all_nodes_and_stops_all_their_motors(show, watchers):
+    _, ready, site = show()
+    names = [line["line"] for line in ready["lines"]]
+    assert names == ["arm1/st0", "arm1/rmd0", "arm2/st0", "arm2/rmd0"]
+    with site.page() as page:
+        page.alive()
+        assert [line["line"] for line in page.ask("lines")["lines"]] == names
+        turn_both(page, watchers)
+        stopped = page.ask("stop-all")["motors"]
+        confirmed = {(it["line"], it["motor"]) for it in stopped if not it.get("failure")}
+        assert {("arm1/st0", 1), ("arm2/st0", 1), ("arm1/rmd0", 2), ("arm2/rmd0", 2)} <= confirmed
+        rest(watchers)
+        assert page.act("arm2/st0", 1, "START_MOTOR")["reason"] == "latched"
+        assert page.ask("release")["kind"] == "answer"
+        turn_both(page, watchers)
+        # The end of the page is that of its motors.
+    rest(watchers)
+
+
+@pytest.mark.parametrize("ends", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_monitor_that_fails_leaves_no_motor_of_any_node_turning(show, watchers, ends):
+    for _ in range(ROUNDS):
+        monitor, _, site = show()
+        with site.page() as page:
+            page.alive()
+            turn_both(page, watchers)
+            os.kill(monitor.process.pid, ends)
+            began = time.monotonic()
+            rest(watchers)
+            # 1 s without a sign of life, and the time in which the motors come to rest.
+            assert time.monotonic() - began < 8
+            if ends == signal.SIGSTOP:
+                os.kill(monitor.process.pid, signal.SIGCONT)
+
+
+def test_a_node_that_is_killed_is_away_and_comes_back(show, arms, nodes, watchers):
+    _, _, site = show()
+    with site.page() as page:
+        page.alive()
+        turn_both(page, watchers)
+        page.forget()
+        arms[1].kill()
+        page.until(lambda it: is_kind(it, "event") and it["event"] == "lost" and it["line"] == "arm2/st0")
+        refusal = page.act("arm2/st0", 1, "START_MOTOR")
+        assert refusal["reason"] == "line" and "node arm2 is away" in refusal["message"], refusal
+        assert turn(watchers[0]), "the motors of the other node turn on"
+        failed = [it for it in page.ask("stop-all")["motors"] if it.get("failure") and not it.get("absent")]
+        assert {it["line"] for it in failed} == {"arm2/st0", "arm2/rmd0"}, failed
+        rest(watchers[:1])
+        page.forget()
+        nodes("arm2")
+        page.until(lambda it: is_kind(it, "event") and it["event"] == "back" and it["line"] == "arm2/st0")
+        # The latch of the stop holds at the node that came later, too.
+        # A line that looks for motors may be busy.
+        eventually(lambda: page.act("arm2/st0", 1, "START_MOTOR")["reason"] == "latched", "the latch")
+
+
+def test_a_port_of_a_node_is_shown_with_its_fleet(run):
+    refused = run("monitor", "-p", "zenoh:arm1/st0").ended(2)
+    assert "--fleet" in refused.err
+
+
+def test_the_table_has_all_drives_and_sums_of_nodes(run, via, arms, watchers):
+    watchers[0].command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+
+    def rows(*words):
+        return check(run("fleet", "watch", *via, "--once", "--json", *words).ended(0).out)
+
+    eventually(lambda: len(rows()) == 12 and all(it["age_seconds"] < 2 for it in rows()), "all drives")
+    eventually(lambda: rows("--only", "turning"), "a motor that turns")
+    [row] = rows("--only", "turning")
+    assert (row["node"], row["line"], row["motor"]) == ("arm1", "rmd0", 2)
+    assert row["speed"] > 300 and row["speed_unit"] == "°/s"
+    assert (rows("--sort", "speed")[0]["node"], rows("--sort", "speed")[0]["motor"]) == ("arm1", 2)
+    sums = {it["node"]: it for it in rows("--by-node")}
+    assert (sums["arm1"]["drives"], sums["arm1"]["turning"]) == (6, 1)
+    assert (sums["arm2"]["drives"], sums["arm2"]["turning"]) == (6, 0)
+    text = run("fleet", "watch", *via, "--once").ended(0).out
+    assert text.startswith("2 nodes, 12 drives: 1 turning, 0 faulty, 0 old\n")
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_table_on_the_screen_has_keys(motorlink, via, arms):
+    terminal = Terminal([motorlink, "fleet", "watch", *via], 80, 24)
+    try:
+        terminal.shows("2 nodes, 12 drives", "arm2/rmd0/4", "1 to 12 of 12, sorted by name, all")
+        terminal.press("s")
+        terminal.shows("sorted by speed")
+        terminal.press("n")
+        terminal.shows("hottest", "here")
+        arms[1].kill()
+        terminal.shows("away for")
+        terminal.press("n", "f")
+        terminal.shows("sorted by speed, turning")
+        terminal.press("q")
+        assert terminal.wait() == 0
+    finally:
+        terminal.end()
+
+
+def test_a_table_needs_a_terminal_or_a_word(run, via, arms):
+    assert "--once" in run("fleet", "watch", *via).ended(2).err
+    assert "--once" in run("fleet", "watch", *via, "--json").ended(2).err
+
+
+def test_a_command_is_for_all_motors_of_its_kind(run, via, arms):
+    said = check(run("fleet", "command", *via, "--json", "--", "st", "get", "SPEED_MEAS").ended(0).out)
+    drives = [f"{node}/st0/{motor}" for node in ("arm1", "arm2") for motor in (1, 2)]
+    assert [it["drive"] for it in said] == drives
+    assert all(it["values"]["SPEED_MEAS"]["unit"] == "rpm" for it in said)
+    text = run("fleet", "command", *via, "--node", "arm2", "--name", "/2", "--", "rmd", "clear-errors")
+    assert all(line.startswith("arm2/rmd0/2: ") for line in text.ended(0).out.splitlines())
+    refused = run("fleet", "command", *via, "--", "st", "start").ended(2)
+    assert "`start` is not for a fleet" in refused.err
+    missing = run("fleet", "command", *via, "--node", "arm9", "--", "st", "info").ended(3)
+    assert "no node arm9" in missing.err
+    failed = run("fleet", "command", *via, "--", "st", "get", "PFC_I_KP").ended(1)
+    assert "at 2 of 4 motors: arm1/st0/2, arm2/st0/2" in failed.err
+
+
+def test_settings_of_siblings_are_compared(run, via, arms):
+    words = ("fleet", "settings", "diff", *via, "--name", "/st0/1")
+    assert "2 motors of st: no difference" in run(*words).ended(0).err
+    port = f"zenoh:arm2/st0?via={arms[0].address}"
+    run("st", "-p", port, "set", "SPEED_KP", "300").ended(0)
+    [one] = check(run(*words, "--json").ended(1).out)
+    assert (one["protocol"], one["setting"]) == ("st", "SPEED_KP")
+    assert [it["drives"] for it in one["values"] if it["value"].startswith("300")] == [["arm2/st0/1"]]
+
+
+def test_one_recording_has_all_nodes_and_says_when_one_was_silent(start, run, via, arms, tmp_path):
+    file = tmp_path / "run.mcap"
+    recording = start("fleet", "record", *via, "-o", file, "--rate", "50", "--no-settings", "--json")
+    recording.line(0)
+    time.sleep(1)
+    os.kill(arms[1].process.pid, signal.SIGSTOP)
+    time.sleep(4)
+    os.kill(arms[1].process.pid, signal.SIGCONT)
+    time.sleep(2)
+    recording.interrupt()
+    assert recording.wait(20) == 0
+    events = check(run("info", file, "--events", "--json").ended(0).out)
+    of = {(it["event"], it["of"]) for it in events}
+    assert {("lost", "arm2_rmd0"), ("back", "arm2_rmd0")} <= of, of
+    assert not any(of.startswith("arm1") for event, of in of if event == "lost")
+    about = check(run("info", file, "--json").ended(0).out)[0]
+    assert about["messages"] > 1000
