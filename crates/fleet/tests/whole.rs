@@ -47,12 +47,15 @@ impl Site {
     }
 
     fn whole(&self) -> Asker {
-        let whole = Whole::new(self.network(), Default::default());
-        let mut program = Asker::over(whole.connect().unwrap(), "whole");
-        // The answer waits for the nodes.
-        assert_eq!(program.lines().len(), 4);
-        program
+        join(&Whole::new(self.network(), Default::default()))
     }
+}
+
+fn join(whole: &Whole) -> Asker {
+    let mut program = Asker::over(whole.connect().unwrap(), "whole");
+    // The answer waits for the nodes.
+    assert_eq!(program.lines().len(), 4);
+    program
 }
 
 fn turn(program: &mut Asker, node: &str) {
@@ -110,12 +113,17 @@ fn a_stop_reaches_all_nodes_and_the_latch_holds_at_each() {
 #[test]
 fn a_node_that_ends_keeps_its_lines_and_those_of_others_go_on() {
     let mut site = Site::new("ends");
-    let mut program = site.whole();
+    let whole = Whole::new(site.network(), Default::default());
+    let mut program = join(&whole);
     turn(&mut program, "ends1");
     site.two.end_node();
     let lost = program.event(Happening::Lost);
     assert!(lost.message.contains("node ends2 is away"), "{}", lost.message);
     assert_eq!(program.names().len(), 4);
+    // Programs that come later know them, too.
+    let mut later = join(&whole);
+    assert_eq!(later.names(), program.names());
+    assert!(later.event(Happening::Lost).message.contains("node ends2 is away"));
     let refusal = program.ask(command("ends2/st0", 1, &START)).unwrap_err();
     assert_eq!(refusal.reason, Reason::Line);
     turns(&site.one);

@@ -126,6 +126,18 @@ impl Merge {
         self.members.entry(node).or_insert_with(Member::new);
     }
 
+    /// A node that other programs of this process knew is away.
+    pub(super) fn remember(&mut self, node: Name, lines: Vec<Line>) {
+        let member = self.members.entry(node).or_insert_with(Member::new);
+        member.state = State::Away("it was there before".to_owned());
+        member.lines = lines;
+    }
+
+    /// The lines of a node, as it told them last.
+    pub(super) fn lines_of(&self, node: &Name) -> Option<&[Line]> {
+        self.members.get(node).map(|member| &member.lines[..])
+    }
+
     /// A node is connected.
     pub(super) fn came(&mut self, node: &Name) {
         let Some(member) = self.members.get_mut(node) else { return };
@@ -180,7 +192,6 @@ impl Merge {
         member.subscriptions.clear();
         member.groups.clear();
         let before = std::mem::replace(&mut member.state, State::Away(why.clone()));
-        let lines: Vec<_> = member.lines.iter().map(|line| line.line.clone()).collect();
         let (asked, others): (BTreeMap<_, _>, _) =
             std::mem::take(&mut self.asked).into_iter().partition(|(_, it)| it.node == *node);
         self.asked = others;
@@ -192,10 +203,26 @@ impl Merge {
             self.end_waiting(node);
         }
         if before == State::Here {
-            for line in lines {
-                let message = format!("node {node} is away: {why}");
-                self.tell(node, Happening::Lost, &line, message);
-            }
+            self.tell_lost(node, &why);
+        }
+    }
+
+    /// Tells a program that comes which lines are lost.
+    fn tell_away(&mut self) {
+        let away = |(node, member): (&Name, &Member)| match &member.state {
+            State::Away(why) => Some((node.clone(), why.clone())),
+            State::Coming | State::Here => None,
+        };
+        for (node, why) in self.members.iter().filter_map(away).collect::<Vec<_>>() {
+            self.tell_lost(&node, &why);
+        }
+    }
+
+    fn tell_lost(&mut self, node: &Name, why: &str) {
+        let lines = self.lines_of(node).unwrap_or_default();
+        for line in lines.iter().map(|line| line.line.clone()).collect::<Vec<_>>() {
+            let message = format!("node {node} is away: {why}");
+            self.tell(node, Happening::Lost, &line, message);
         }
     }
 
@@ -210,6 +237,7 @@ impl Merge {
                 let share = "fleet".to_owned();
                 let name = self.who.clone();
                 self.answer(id, Answer::Hello { protocol: VERSION, share, name });
+                self.tell_away();
             }
             Ask::Lines => self.all(id, Kind::Lines),
             Ask::Rates => self.all(id, Kind::Rates),

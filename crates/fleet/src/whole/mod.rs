@@ -17,15 +17,17 @@ use motorlink_telemetry::share::address::{Address, Unreachable};
 use crate::key::Name;
 use crate::network::Network;
 use crate::remote::{self, Remote};
-use serve::Serving;
+use serve::{Known, Serving};
 
 /// The nodes of a network.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Whole {
     /// How each of them is reached. The name of the node does not matter.
     pub pattern: Remote,
     /// Only these; all of them if it is empty.
     pub nodes: BTreeSet<Name>,
+    /// Nodes that went away. They stay in the list, also for programs that come later.
+    known: Known,
 }
 
 impl Whole {
@@ -33,7 +35,7 @@ impl Whole {
     pub fn new(network: Network, nodes: BTreeSet<Name>) -> Self {
         // No node has this name: each takes its place.
         let pattern = Remote::new(Name::near("node"), network);
-        Whole { pattern, nodes }
+        Whole { pattern, nodes, known: Known::default() }
     }
 }
 
@@ -47,12 +49,12 @@ impl Address for Whole {
     }
 
     fn connect(&self) -> Result<UnixStream, Unreachable> {
-        let Whole { pattern, nodes } = self.clone();
+        let Whole { pattern, nodes, known } = self.clone();
         let is_meant = move |node: &Name| nodes.is_empty() || nodes.contains(node);
         let zenoh = remote::zenoh_of(&pattern.network)
             .map_err(|error| Unreachable::Missing(format!("no node can be reached: {error}")))?;
         let (own, other) = remote::pair()?;
-        let serving = Serving::open(pattern, is_meant, zenoh, own);
+        let serving = Serving::open(pattern, is_meant, known, zenoh, own);
         let opened = remote::runtime()?.block_on(serving);
         opened.map_err(|error| Unreachable::Failed(error.to_string()))?;
         Ok(other)

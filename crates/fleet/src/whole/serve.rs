@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use motorlink_telemetry::share::address::Unreachable;
 use motorlink_telemetry::share::frame::{self, Frame, Reader};
-use motorlink_telemetry::share::message::{Request, decode, encode};
+use motorlink_telemetry::share::message::{Line, Request, decode, encode};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
@@ -70,14 +70,19 @@ pub(super) struct Serving {
     told: Sender<News>,
     /// Its liveliness subscriber ends with the handler.
     seen: zenoh::pubsub::Subscriber<FifoChannelHandler<Sample>>,
+    known: Known,
     zenoh: Arc<Zenoh>,
 }
 
+/// The lines of nodes that went away, for programs that come later.
+pub(super) type Known = Arc<Mutex<BTreeMap<Name, Vec<Line>>>>;
+
 impl Serving {
-    /// Looks for nodes, and serves the socket from then on.
+    /// Looks for nodes, and serves the socket from then on. `known` has nodes that were there before.
     pub(super) async fn open(
         pattern: Remote,
         is_meant: impl Fn(&Name) -> bool + Send + Sync + 'static,
+        known: Known,
         zenoh: Arc<Zenoh>,
         socket: StdStream,
     ) -> io::Result<()> {
@@ -97,6 +102,7 @@ impl Serving {
             news,
             told,
             seen,
+            known,
             zenoh: Arc::clone(&zenoh),
         };
         // Those that are there already, so that the first answer has their lines.
@@ -106,6 +112,7 @@ impl Serving {
                 serving.saw(&sample);
             }
         }
+        serving.remember();
         tokio::spawn(async move {
             // The program has ended. So do the sessions at the nodes, with their sockets.
             let _ = serving.serve().await;
@@ -198,6 +205,18 @@ impl Serving {
         link.next = link.next.map(|_| now);
     }
 
+    /// Nodes that were there before keep their lines.
+    fn remember(&mut self) {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        for (node, lines) in known {
+            if !self.links.contains_key(&node) {
+                let next = Some(Instant::now() + AGAIN);
+                self.links.insert(node.clone(), Link { run: 0, requests: None, next });
+                self.merge.remember(node, lines);
+            }
+        }
+    }
+
     /// Connects to nodes, if it is time.
     fn connect(&mut self) {
         let now = Instant::now();
@@ -237,6 +256,10 @@ impl Serving {
             link.next = Some(Instant::now() + AGAIN);
         }
         self.merge.gone(&node, &lost);
+        if let Some(lines) = self.merge.lines_of(&node).filter(|lines| !lines.is_empty()) {
+            let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+            known.insert(node, lines.to_vec());
+        }
     }
 
     /// Passes on what a node says, and what it is asked.

@@ -243,6 +243,25 @@ fn a_node_that_is_away_gets_no_command() {
 }
 
 #[test]
+fn a_node_that_was_there_before_is_away_for_a_program_that_comes() {
+    let mut fleet = Fleet::new();
+    fleet.0.remember(name("arm1"), vec![line("rmd0", &[1])]);
+    // The answer to hello is the first message.
+    assert_eq!(fleet.0.take(), []);
+    fleet.asked(1, Ask::Hello { protocol: VERSION, name: "late".to_owned() });
+    let texts = fleet.texts();
+    let [Text::Answer { id: 1, answer: Answer::Hello { .. } }, Text::Event(event)] = &texts[..]
+    else {
+        panic!("{texts:?}")
+    };
+    assert_eq!((event.event, event.line.as_deref()), (Happening::Lost, Some("arm1/rmd0")));
+    fleet.0.came(&name("arm1"));
+    fleet.lines("arm1");
+    let texts = fleet.texts();
+    assert!(matches!(&texts[..], [Text::Event(it)] if it.event == Happening::Back), "{texts:?}");
+}
+
+#[test]
 fn what_a_node_says_before_it_closes_is_the_reason() {
     let mut fleet = Fleet::of(&["arm1"]);
     fleet.says("arm1", &Text::Closing { message: "no sign of life for 1002 ms".to_owned() });
