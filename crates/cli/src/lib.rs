@@ -23,6 +23,8 @@ mod json;
 #[cfg(feature = "monitor")]
 mod monitor;
 #[cfg(feature = "fleet")]
+mod network;
+#[cfg(feature = "fleet")]
 mod node;
 mod output;
 mod outputs;

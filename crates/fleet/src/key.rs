@@ -23,6 +23,11 @@ impl Name {
         let number = getrandom::u64().map_err(std::io::Error::other)?;
         Ok(Name(format!("{number:016x}")))
     }
+
+    /// In the place of a name: all of them.
+    pub(crate) fn any() -> Self {
+        Name("*".to_owned())
+    }
 }
 
 /// A text that cannot be a name.
@@ -88,6 +93,11 @@ impl Scope {
     }
 }
 
+/// All that a node says.
+pub(crate) fn all_of(node: &Name) -> String {
+    format!("{ROOT}/{node}/**")
+}
+
 /// That a node is there, and its run: a liveliness token.
 pub fn alive(node: &Name, boot: &Name) -> String {
     format!("{ROOT}/{node}/{WHOLE}/alive/{boot}")
@@ -148,24 +158,19 @@ pub fn samples(node: &Name, line: &str, motor: u8) -> String {
     format!("{ROOT}/{node}/{line}/{motor}/samples")
 }
 
+/// Those of all motors of a node.
+pub(crate) fn all_samples(node: &Name) -> String {
+    format!("{ROOT}/{node}/*/*/samples")
+}
+
 /// The columns of the samples of a motor: a query.
 pub fn columns(node: &Name, line: &str, motor: u8) -> String {
     format!("{ROOT}/{node}/{line}/{motor}/columns")
 }
 
-/// Those of all motors of a node, or of all nodes.
-pub fn all_columns(node: Option<&Name>) -> String {
-    format!("{ROOT}/{}/*/*/columns", node.map_or("*", Name::as_str))
-}
-
-/// The samples of all motors of all nodes.
-pub fn all_samples() -> String {
-    format!("{ROOT}/*/*/*/samples")
-}
-
-/// The state of all nodes.
-pub fn all_states() -> String {
-    format!("{ROOT}/*/{WHOLE}/state")
+/// Those of all motors of a node.
+pub(crate) fn all_columns(node: &Name) -> String {
+    format!("{ROOT}/{node}/*/*/columns")
 }
 
 /// The node of any key.

@@ -1,8 +1,9 @@
 //! Drives at other computers, over [Zenoh](https://zenoh.io).
 //!
 //! A node is a share (`motorlink_telemetry::share`) that programs of other computers use, too. [`node`] is
-//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE` of a line,
-//! [`whole`] makes one share of all nodes, [`view`] sees what they publish. Both sides
+//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE`
+//! of a line, [`whole`] makes one share of all nodes, [`view`] sees what they publish, [`site`] writes the
+//! certificates and rights of a network with a router. Both sides
 //! exchange the messages of a share; [`message`] has what goes around them, [`key`] the keys, [`clock`] the
 //! time that they agree on. docs/FLEET-PROTOCOL.md describes it for other programs.
 //!
@@ -10,7 +11,9 @@
 //! sent, and a motor of a program that gives no sign of life is stopped.
 #![forbid(unsafe_code)]
 
+mod certificate;
 pub mod clock;
+mod config;
 pub mod directory;
 pub mod key;
 pub mod message;
@@ -18,6 +21,7 @@ pub mod network;
 pub mod node;
 pub mod port;
 pub mod remote;
+pub mod site;
 pub mod view;
 mod weight;
 pub mod whole;

@@ -2,11 +2,17 @@
 
 use std::fmt;
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use serde_json::json;
 use zenoh::config::EndPoint;
 use zenoh::{Config, Session, Wait};
+
+use crate::certificate::Certificate;
+use crate::config::ConfigFile;
+use crate::key::Name;
+use crate::site::{self, Role};
 
 /// The address of a router, of ROS 2 and of the first node of a computer.
 pub const USUAL: &str = "tcp/127.0.0.1:7447";
@@ -68,58 +74,81 @@ impl Network {
         }
     }
 
+    /// The name in the certificate of its file: access control knows this program by it.
+    pub fn name(&self) -> Option<Name> {
+        let Network::File(path) = self else { return None };
+        ConfigFile::read(path).ok()?.certificate()?.name.parse().ok()
+    }
+
+    /// The role of its file in a site, if it says one.
+    pub fn role(&self) -> Option<Role> {
+        let Network::File(path) = self else { return None };
+        let role = ConfigFile::read(path).ok()?.text(site::ROLE)?;
+        Role::ALL.into_iter().find(|it| it.word() == role)
+    }
+
+    /// Whether others can connect to it.
+    pub fn listens(&self) -> bool {
+        match self {
+            Network::Connect(_) => false,
+            Network::Route { listen, .. } => !listen.is_empty(),
+            // A file that cannot be read is reported when it is opened.
+            Network::File(path) => !ConfigFile::read(path).is_ok_and(|it| it.is_of_client()),
+        }
+    }
+
     /// Opens it. Gives the addresses at which others reach it.
     ///
     /// # Errors
     /// Nothing is there, or the configuration is not possible.
     pub fn open(&self) -> Result<(Session, Vec<String>), NetworkError> {
-        let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
-        let mut config = Config::default();
-        let addresses = match self {
-            Network::Connect(addresses) => addresses.clone(),
-            Network::Route { listen, .. } => listen.iter().map(|it| with_port(it)).collect(),
-            Network::File(path) => vec![path.display().to_string()],
-        };
-        let mut set = |key: &str, value: &str| config.insert_json5(key, value).map_err(failed);
         match self {
-            Network::File(path) => {
-                config = Config::from_file(path).map_err(failed)?;
-            }
             Network::Connect(addresses) => {
-                set("mode", "\"client\"")?;
-                set("connect/endpoints", &json(addresses))?;
-                usual_rules(&mut config).map_err(failed)?;
+                let nobody = || NetworkError::Nobody(addresses.join(", "));
+                let config = configured("client", &[], addresses).map_err(failed)?;
+                let session = zenoh::open(config).wait().map_err(|_| nobody())?;
+                Ok((session, addresses.clone()))
             }
-            Network::Route { connect, .. } => {
-                set("mode", "\"router\"")?;
-                set("listen/endpoints", &json(&addresses))?;
-                set("connect/endpoints", &json(connect))?;
-                usual_rules(&mut config).map_err(failed)?;
+            Network::Route { listen, connect } => {
+                let addresses: Vec<_> = listen.iter().map(|it| with_port(it)).collect();
+                let config = configured("router", &addresses, connect).map_err(failed)?;
+                Ok((zenoh::open(config).wait().map_err(failed)?, addresses))
             }
+            Network::File(path) => open_file(path),
         }
-        let session = zenoh::open(config).wait().map_err(|error| match self {
-            Network::Connect(addresses) => NetworkError::Nobody(addresses.join(", ")),
-            _ => failed(error),
-        })?;
-        Ok((session, addresses))
     }
 }
 
+/// Opens the network of a file.
+fn open_file(path: &Path) -> Result<(Session, Vec<String>), NetworkError> {
+    let file = ConfigFile::read(path).map_err(NetworkError::Failed)?;
+    let of_file = |why: String| NetworkError::Failed(format!("{}: {why}", path.display()));
+    let certificate = file.certificate();
+    if let Some(fault) = certificate.as_ref().and_then(Certificate::fault) {
+        return Err(of_file(fault));
+    }
+    let config = Config::from_file(path).map_err(|error| of_file(error.to_string()))?;
+    let addresses = file.addresses();
+    let session = zenoh::open(config).wait().map_err(|error| match certificate {
+        Some(Certificate { name, .. }) if file.is_of_client() => {
+            let places = addresses.join(", ");
+            NetworkError::Nobody(format!("{places}, or it refuses the certificate of {name}"))
+        }
+        _ if file.is_of_client() => NetworkError::Nobody(addresses.join(", ")),
+        _ => of_file(error.to_string()),
+    })?;
+    Ok((session, addresses))
+}
+
 /// What holds without a file.
-fn usual_rules(config: &mut Config) -> zenoh::Result<()> {
-    // Only the given addresses are used.
-    config.insert_json5("scouting/multicast/enabled", "false")?;
-    config.insert_json5("scouting/gossip/enabled", "false")?;
-    // What a slow program does not take is dropped, so that it delays no other program.
-    let drop =
-        "[{ messages: ['put', 'delete', 'query'], overwrite: { congestion_control: 'drop' } }]";
-    config.insert_json5("qos/network", drop)?;
-    // A network that was cut is there again soon. What must happen in time does not depend on it.
-    config.insert_json5("transport/link/tx/lease", "3000")?;
-    config.insert_json5("transport/link/tx/keep_alive", "4")?;
-    let retry = "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }";
-    config.insert_json5("connect/retry", retry)?;
-    Ok(())
+fn configured(mode: &str, listen: &[String], connect: &[String]) -> zenoh::Result<Config> {
+    let mut config = ConfigFile::new(mode, "connect", connect);
+    config.set("listen/endpoints", json!(listen));
+    Config::from_json5(&config.to_string())
+}
+
+fn failed(error: zenoh::Error) -> NetworkError {
+    NetworkError::Failed(error.to_string())
 }
 
 /// An address to listen at, with a port that is free now in the place of port 0.
@@ -130,10 +159,6 @@ fn with_port(address: &str) -> String {
         Some(format!("{scheme}/{host}:{port}"))
     };
     free().unwrap_or_else(|| address.to_owned())
-}
-
-fn json(addresses: &[String]) -> String {
-    serde_json::to_string(addresses).unwrap_or_default()
 }
 
 impl FromStr for Network {

@@ -57,7 +57,7 @@ impl Scheme for Zenoh {
         };
         let who = match given.take("as") {
             Some(text) => text.parse().map_err(|_| given.bad_option("as", text, what.clone()))?,
-            None => remote::own_name(),
+            None => remote::own_name(&network),
         };
         let deadline = span(given, "deadline")?.unwrap_or(DEADLINE);
         let motion = span(given, "motion")?;

@@ -3,9 +3,11 @@
 mod args;
 mod command;
 mod found;
+mod init;
 mod list;
 mod order;
 mod record;
+mod router;
 mod settings;
 mod watch;
 
@@ -47,6 +49,10 @@ enum Task {
     Latch(OrderArgs),
     /// Release the latches of all nodes: motion is possible again
     Release(OrderArgs),
+    /// Write certificates and rights for a network with a router
+    Init(init::Args),
+    /// Run the router of a network
+    Router(router::Args),
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -59,6 +65,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
         Task::StopAll(args) => order::run(&args, order::Order::StopAll),
         Task::Latch(args) => order::run(&args, order::Order::Latch),
         Task::Release(args) => order::run(&args, order::Order::Release),
+        Task::Init(args) => init::run(args),
+        Task::Router(args) => router::run(&args),
     }
 }
 

@@ -11,6 +11,7 @@ use motorlink_fleet::clock::Boot;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::{Network, NetworkError};
 use motorlink_fleet::node::{Node, NodeError, Options};
+use motorlink_fleet::site::Role;
 use motorlink_telemetry::share::message::Line;
 use motorlink_telemetry::share::server::Server;
 use serde_json::json;
@@ -18,6 +19,7 @@ use serde_json::json;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::interrupt::{self, interrupted};
+use crate::network::NetworkArgs;
 use crate::output;
 use crate::share::{self, Lines, PROGRAM};
 use crate::span::span_up_to;
@@ -53,22 +55,14 @@ that end a program stop the motors first. Exit code 0, or 3 if a motor did not c
 pub struct Args {
     #[command(flatten)]
     lines: Lines,
-    /// The name of the node: letters, digits, `-`, `_`, `.` [default: that of this computer]
+    /// The name of the node: letters, digits, `-`, `_`, `.` [default: that in the certificate of --network, or that of this computer]
     #[arg(long, value_name = "NAME")]
     name: Option<Name>,
     /// Where programs of this computer connect: unix:PATH. Only you can connect [default: a new folder]
     #[arg(long, value_name = "PORT", value_hint = clap::ValueHint::AnyPath)]
     at: Option<String>,
-    /// An address at which the node listens, such as tcp/0.0.0.0:7447; may be repeated
-    #[arg(long, value_name = "ADDRESS")]
-    listen: Vec<String>,
-    /// An address of a router or of another node; may be repeated
-    #[arg(long, value_name = "ADDRESS")]
-    connect: Vec<String>,
-    /// A Zenoh configuration: mode, addresses, TLS, access control
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["listen", "connect"],
-        value_hint = clap::ValueHint::FilePath)]
-    network: Option<PathBuf>,
+    #[command(flatten)]
+    network: NetworkArgs,
     /// A file with limits of motors, in TOML
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     config: Option<PathBuf>,
@@ -86,7 +80,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::usage("--period is 10ms to 60s"));
     }
     let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
-    let name = args.name.clone().unwrap_or_else(motorlink_fleet::remote::computer);
+    let network = args.network.given().unwrap_or_else(Network::of_nodes);
+    let name = name(args.name.as_ref(), &network)?;
     let folder;
     let path = match &args.at {
         Some(at) => share::path(at)?,
@@ -105,7 +100,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         name: name.clone(),
         share: path.clone(),
         program: PROGRAM.to_owned(),
-        network: args.network(),
+        network,
         clock: Arc::new(Boot),
         period: args.period,
     };
@@ -123,16 +118,22 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     outcome
 }
 
-impl Args {
-    fn network(&self) -> Network {
-        match &self.network {
-            Some(file) => Network::File(file.clone()),
-            None if !self.listen.is_empty() => {
-                Network::Route { listen: self.listen.clone(), connect: self.connect.clone() }
-            }
-            None if !self.connect.is_empty() => Network::Connect(self.connect.clone()),
-            None => Network::of_nodes(),
-        }
+/// The name of the node: that in the certificate of its network, if there is one.
+fn name(given: Option<&Name>, network: &Network) -> Result<Name, Failure> {
+    if let Some(role @ (Role::Operator | Role::Viewer)) = network.role() {
+        let message = format!("{network} is the file of a {}, which cannot be a node", role.word());
+        return Err(
+            Failure::usage(message).trying("`motorlink fleet init DIR --node NAME` makes one")
+        );
+    }
+    match (given, network.name()) {
+        (Some(given), Some(own)) if *given != own => Err(Failure::usage(format!(
+            "the certificate of {network} is that of {own}, not of {given}"
+        ))
+        .trying("leave --name out")),
+        (Some(name), _) => Ok(name.clone()),
+        (None, Some(name)) => Ok(name),
+        (None, None) => Ok(motorlink_fleet::remote::computer()),
     }
 }
 

@@ -51,7 +51,7 @@ pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<
     common.state_mut().searching.extend(names);
     let columns = Arc::clone(common);
     let asked = move |query: Query| columns.say_columns(&query);
-    let key = key::all_columns(Some(&common.name));
+    let key = key::all_columns(&common.name);
     let declared = common.zenoh.declare_queryable(key).callback(asked).background();
     declared.wait().map_err(io::Error::other)?;
     let own = common.own.get_or_init(|| program);

@@ -56,8 +56,8 @@ impl Remote {
         Remote {
             node,
             boot: None,
+            who: own_name(&network),
             network,
-            who: own_name(),
             deadline: DEADLINE,
             motion: None,
             takes: false,
@@ -97,7 +97,7 @@ impl Remote {
         if self.network != Network::of_programs() {
             options.push(format!("via={}", self.network));
         }
-        if self.who != own_name() {
+        if self.who != own_name(&self.network) {
             options.push(format!("as={}", self.who));
         }
         if self.deadline != DEADLINE {
@@ -141,8 +141,11 @@ impl Address for Remote {
     }
 }
 
-/// Who uses this program: the user and the computer.
-pub fn own_name() -> Name {
+/// Who uses this program: the name in the certificate of the network, or the user and the computer.
+pub fn own_name(network: &Network) -> Name {
+    if let Some(name) = network.name() {
+        return name;
+    }
     let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
     Name::near(&format!("{user}-{}", computer()))
 }

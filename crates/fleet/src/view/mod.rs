@@ -53,9 +53,9 @@ impl View {
         let shared = Arc::new(Shared { zenoh: Arc::clone(&zenoh), picture, asked });
         let mut subscribers = Vec::new();
         let heard: [(String, Hear); 3] = [
-            (key::all_states(), Shared::state),
-            (key::all_columns(None), Shared::columns),
-            (key::all_samples(), Shared::samples),
+            (key::state(&Name::any()), Shared::state),
+            (key::all_columns(&Name::any()), Shared::columns),
+            (key::all_samples(&Name::any()), Shared::samples),
         ];
         for (key, hear) in heard {
             let shared = Arc::clone(&shared);
@@ -127,7 +127,7 @@ impl Shared {
         let shared = Arc::clone(self);
         let question = self
             .zenoh
-            .get(key::all_columns(None))
+            .get(key::all_columns(&Name::any()))
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
             .timeout(ANSWER)

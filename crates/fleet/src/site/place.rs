@@ -1,0 +1,80 @@
+//! Where a router is reached.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::str::FromStr;
+
+/// The usual port of Zenoh.
+const PORT: u16 = 7447;
+
+/// A name or an IP address of a computer, and a port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The name or the IP address.
+    pub host: String,
+    /// The port.
+    pub port: u16,
+}
+
+/// A text says nothing about a place.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the address of a router is a name or an IP address, such as 10.0.0.5 or plant.local:{PORT}"
+)]
+pub struct BadPlace;
+
+impl Place {
+    /// The addresses at which a router listens: these IP addresses. With a name, all of its computer.
+    pub(super) fn listened(places: &[Self]) -> Vec<String> {
+        let known = |it: &Self| match &*it.host {
+            "localhost" => Some(IpAddr::V4(Ipv4Addr::LOCALHOST)),
+            host => host.parse().ok(),
+        };
+        let is_any = places.iter().any(|it| known(it).is_none());
+        let of = |it: &Self| {
+            let ip = known(it).filter(|_| !is_any).unwrap_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
+            format!("tls/{}", SocketAddr::new(ip, it.port))
+        };
+        places.iter().map(of).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// The address to which others connect.
+    pub(super) fn connected(&self) -> String {
+        format!("tls/{self}")
+    }
+}
+
+impl FromStr for Place {
+    type Err = BadPlace;
+
+    fn from_str(text: &str) -> Result<Self, BadPlace> {
+        if let Ok(socket) = text.parse::<SocketAddr>() {
+            return Ok(Place { host: socket.ip().to_string(), port: socket.port() });
+        }
+        if let Ok(ip) = text.parse::<IpAddr>() {
+            return Ok(Place { host: ip.to_string(), port: PORT });
+        }
+        let (host, port) = match text.split_once(':') {
+            Some((host, port)) => (host, port.parse().map_err(|_| BadPlace)?),
+            None => (text, PORT),
+        };
+        let is_name = |part: &str| {
+            (1..=63).contains(&part.len())
+                && part.chars().all(|it| it.is_ascii_alphanumeric() || it == '-')
+        };
+        match host.split('.').all(is_name) && host.len() <= 253 {
+            true => Ok(Place { host: host.to_owned(), port }),
+            false => Err(BadPlace),
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.host.parse() {
+            Ok(ip) => SocketAddr::new(ip, self.port).fmt(f),
+            Err(_) => write!(f, "{}:{}", self.host, self.port),
+        }
+    }
+}
