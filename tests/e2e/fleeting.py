@@ -12,7 +12,9 @@ from sharing import samples
 
 
 def network(address):
-    """A Zenoh session that knows nothing but this address."""
+    """A Zenoh session that knows nothing but this address, or a configuration in a file."""
+    if str(address).endswith(".json5"):
+        return zenoh.open(zenoh.Config.from_file(str(address)))
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([address]))

@@ -29,7 +29,7 @@ pub fn port(error: &PortError) -> Option<&'static str> {
             Some("`motorlink ports` lists what is there")
         }
         PortError::NoHolder { port, .. } if is_of_node(port) => {
-            Some("start it with `motorlink node`; `?via=` or MOTORLINK_NETWORK says where it is")
+            Some("is `motorlink node` running there? `?via=` or MOTORLINK_NETWORK says where it is")
         }
         PortError::NoHolder { .. } => {
             Some("start it with `motorlink share`, and stop motors that still turn")

@@ -127,7 +127,7 @@ fn open_file(path: &Path) -> Result<(Session, Vec<String>), NetworkError> {
     if let Some(fault) = certificate.as_ref().and_then(Certificate::fault) {
         return Err(of_file(fault));
     }
-    let config = Config::from_file(path).map_err(|error| of_file(error.to_string()))?;
+    let config = Config::from_file(path).map_err(|error| of_file(without_source(&error)))?;
     let addresses = file.addresses();
     let session = zenoh::open(config).wait().map_err(|error| match certificate {
         Some(Certificate { name, .. }) if file.is_of_client() => {
@@ -135,7 +135,7 @@ fn open_file(path: &Path) -> Result<(Session, Vec<String>), NetworkError> {
             NetworkError::Nobody(format!("{places}, or it refuses the certificate of {name}"))
         }
         _ if file.is_of_client() => NetworkError::Nobody(addresses.join(", ")),
-        _ => of_file(error.to_string()),
+        _ => of_file(without_source(&error)),
     })?;
     Ok((session, addresses))
 }
@@ -147,8 +147,15 @@ fn configured(mode: &str, listen: &[String], connect: &[String]) -> zenoh::Resul
     Config::from_json5(&config.to_string())
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
 fn failed(error: zenoh::Error) -> NetworkError {
-    NetworkError::Failed(error.to_string())
+    NetworkError::Failed(without_source(&error))
+}
+
+/// What Zenoh says, without the lines of its source.
+fn without_source(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    text.split_once(" at /").map_or(text.clone(), |(what, _)| what.to_owned())
 }
 
 /// An address to listen at, with a port that is free now in the place of port 0.

@@ -101,9 +101,8 @@ impl From<SiteError> for Failure {
     fn from(error: SiteError) -> Self {
         let failure = Failure::usage(error.to_string());
         match error {
-            SiteError::NoRouter(_) => failure.trying("--router HOST"),
+            SiteError::NoRouter(_) => failure.trying("give --router HOST[:PORT]"),
             SiteError::OtherRouter(_) => failure.trying("leave --router out, or name a new folder"),
-            SiteError::Strange(_) => failure.trying("remove the file: a new one is written"),
             _ => failure,
         }
     }

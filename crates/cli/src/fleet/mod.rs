@@ -72,6 +72,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 impl From<NetworkError> for Failure {
     fn from(error: NetworkError) -> Self {
-        Failure::link(error.to_string()).trying("is a router or a node there? --via says where")
+        Failure::link(error.to_string()).trying(
+            "is a router or a node there? --via says where: an address, or your file of `fleet init`",
+        )
     }
 }

@@ -170,7 +170,7 @@ impl Tunnel {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
                 None if Boot.now() > begun + FOUND => {
-                    return Err(Unreachable::Missing(format!("no node {} answers", line.node)));
+                    return Err(failed(line.unanswered(scope)));
                 }
                 None => sleep(PAUSE).await,
             }
@@ -402,9 +402,7 @@ impl Tunnel {
         let waits = now - self.outgoing.oldest()?;
         (waits > self.patience).then(|| {
             let who = &self.line.who;
-            format!(
-                "it answers, but not this request of {who}: it may not be allowed to ask for it"
-            )
+            format!("it answers, but not to this request: {who} may be allowed to see only")
         })
     }
 
@@ -456,6 +454,15 @@ async fn run_of(zenoh: &Zenoh, node: &Name) -> Result<Name, Unreachable> {
 }
 
 impl Line {
+    /// What is said if the node is there, and does not answer `join`.
+    fn unanswered(&self, scope: Scope) -> String {
+        let Line { node, who, .. } = self;
+        let right = scope.word();
+        format!(
+            "node {node} is there, but does not answer: it hangs, or {who} may not be allowed to {right}"
+        )
+    }
+
     /// Sends a request. `None`: it cannot be sent now.
     fn send(
         &self,

@@ -121,12 +121,10 @@ pub enum SiteError {
     #[error("`{ROUTER}` is the name of the router: choose another one")]
     NameOfRouter,
     /// The first time, somebody must say where the router is.
-    #[error("{0} has no router yet: say where it is reached")]
+    #[error("{0} has no router yet: say where nodes and programs reach it")]
     NoRouter(PathBuf),
     /// The router was made for other addresses.
-    #[error(
-        "the router of this site is reached at {0}: a router at other addresses needs a new site"
-    )]
+    #[error("the router of this site is reached at {0}: other addresses need a new site")]
     OtherRouter(String),
     /// A file of the site is not what it should be.
     #[error("{0}")]
