@@ -2,6 +2,8 @@
 the programs of the tests speak the messages themselves.
 """
 
+import base64
+import contextlib
 import json
 import os
 import re
@@ -11,15 +13,16 @@ import socket
 import ssl
 import struct
 import subprocess
+import sys
 import threading
 import time
-from types import SimpleNamespace
+from pathlib import Path
 
 import pytest
 import zenoh
 
 from fleeting import Member, network
-from program import Running, eventually
+from program import Running, children, eventually
 from sharing import Client
 from shell import free_port
 from test_json import check
@@ -28,7 +31,7 @@ ROOT = "motorlink/v1"
 RAMP = (7, *struct.pack("<iH", 1500, 100))
 START = (3, 1)
 #: What is not there after this time does not come, s.
-PAUSE = 0.7
+PAUSE = 0.5
 
 
 class Site:
@@ -166,6 +169,13 @@ def turn(site):
     eventually(lambda: site.direct.rpm() > 1400, "motor 1 at speed", within=20)
 
 
+def leaves(site, it):
+    """Its motor stops, and is free."""
+    site.direct.ask("stop", motor={"line": "st0", "motor": 2})
+    it.ask("see", {"ask": "leave", "why": "end"}, PAUSE)
+    eventually(lambda: abs(site.direct.rpm(2)) < 30, "motor 2 at rest", within=20)
+
+
 # What somebody may try. Each gives whether it had an effect.
 
 
@@ -198,7 +208,7 @@ def hears_events(site, session, who):
 
 
 def hears_all(site, session, who):
-    return hears(session, f"{ROOT}/**", within=1.2)
+    return hears(session, f"{ROOT}/**", within=PAUSE)
 
 
 def joins_to_see(site, session, who):
@@ -239,8 +249,7 @@ def moves(site, session, who, name=None):
                 number += 1
     time.sleep(PAUSE)
     turned = site.direct.rpm(2) > 200
-    site.direct.ask("stop", motor={"line": "st0", "motor": 2})
-    eventually(lambda: abs(site.direct.rpm(2)) < 30, "motor 2 at rest", within=20)
+    leaves(site, it)
     return turned
 
 
@@ -318,16 +327,14 @@ def says_that_alice_is_gone(site, session, who):
     """The motors of a program that is gone stop."""
     alice = member(site, site.alice, "alice")
     assert joins(alice)
-    alice.command(*RAMP, motor=2)
-    alice.command(*START, motor=2)
+    for code in (RAMP, START):
+        assert alice.command(*code, motor=2)["kind"] == "answer"
     eventually(lambda: site.direct.rpm(2) > 1400, "motor 2 at speed", within=20)
     token = f"{ROOT}/arm1/node/here/{site.boot}/alice/{alice.session}"
     session.liveliness().declare_token(token).undeclare()
     time.sleep(PAUSE)
     stopped = site.direct.rpm(2) < 1300
-    site.direct.ask("stop", motor={"line": "st0", "motor": 2})
-    eventually(lambda: abs(site.direct.rpm(2)) < 30, "motor 2 at rest", within=20)
-    alice.ask("see", {"ask": "leave", "why": "end"})
+    leaves(site, alice)
     return stopped
 
 
@@ -358,3 +365,210 @@ def test_each_may_do_what_its_role_allows_and_nothing_else(site, sessions, who, 
     assert (session is None) == (who in ("nobody", "plain", "stranger"))
     had_effect = session is not None and what(site, session, who)
     assert had_effect == (what in MAY[who])
+
+
+def test_wildcards_and_foreign_queries_reach_a_node_without_access_control(start):
+    """The control of `asks_with_wildcards`: without a router that denies it, there are answers."""
+    open_node = start("node", "-p", "sim:", "--name", "arm1", "--listen", "tcp/127.0.0.1:0", "--json")
+    session = network(json.loads(open_node.line(0))["addresses"][0])
+    assert eventually(lambda: asks_with_wildcards(None, session, "alice"), "an answer")
+    session.close()
+
+
+def st(site, who, *words):
+    return ["st", "-p", f"zenoh:arm1/st0?via={site.file(who)}", *words]
+
+
+def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
+    via = ["--via", site.file("bob")]
+    listed = run("fleet", "list", *via, "--json").ended(0)
+    assert [it["node"] for it in listed.lines] == ["arm1", "arm2"]
+    run(*st(site, "bob", "get", "SPEED_MEAS")).ended(0)
+    began = time.monotonic()
+    denied = run(*st(site, "bob", "start")).ended(3)
+    assert "bob may be allowed to see only" in denied.err
+    assert time.monotonic() - began < 8
+    turn(site)
+    began = time.monotonic()
+    stopped = run("fleet", "stop-all", *via).ended(3)
+    for node in ("arm1", "arm2"):
+        assert f"node {node} is there, but does not answer" in stopped.out
+    assert "may still turn" in stopped.err and "confirmed" not in stopped.out
+    for order in ("latch", "release"):
+        assert "no answer of arm1, arm2" in run("fleet", order, *via).ended(3).err
+    assert time.monotonic() - began < 8
+    assert site.direct.rpm() > 1400
+    confirmed = run("fleet", "stop-all", "--via", site.file("alice"), within=60).ended(0)
+    assert "arm1/st0, motor 1: it confirmed the stop" in confirmed.out
+    run("fleet", "release", "--via", site.file("alice")).ended(0)
+
+
+def test_a_program_has_the_name_of_its_certificate(site, run):
+    run(*st(site, "alice", "ramp", "500", "1s")).ended(0)
+    arm1 = site.running[1]
+    arm1.until(lambda: any('"alice (motorlink' in line for line in arm1.out), "the name alice")
+    other = f"zenoh:arm1/st0?via={site.file('alice')}&as=bob"
+    denied = run("st", "-p", other, "get", "SPEED_MEAS").ended(3)
+    assert "bob may not be allowed to see" in denied.err
+    name = run("node", "-p", "sim:", "--name", "arm7", "--network", site.file("arm1")).ended(2)
+    assert "is that of arm1, not of arm7" in name.err
+    role = run("node", "-p", "sim:", "--network", site.file("bob")).ended(2)
+    assert "the file of a viewer" in role.err
+    again = run("node", "-p", "sim:", "--network", site.file("arm1")).ended(3)
+    assert "another node of this network has the name arm1" in again.err
+
+
+def changed(site, who, tmp_path, **replaced):
+    """The file of a member with other texts in it."""
+    text = site.file(who).read_text()
+    for old, new in replaced.values():
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / f"{who}.json5"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("fault", ["nobody", "plain", "stranger", "host", "port"])
+def test_a_network_that_refuses_a_program_is_named_at_once(site, run, fault, tmp_path):
+    way = {
+        "host": lambda: changed(site, "alice", tmp_path, host=("tls/127.0.0.1", "tls/localhost")),
+        "port": lambda: changed(site, "alice", tmp_path, port=(site.address, "tls/127.0.0.1:1")),
+    }.get(fault, lambda: site.file(fault))()
+    began = time.monotonic()
+    for words in (["fleet", "list", "--via", way], ["fleet", "stop-all", "--via", way],
+                  ["st", "-p", f"zenoh:arm1/st0?via={way}", "status"]):
+        refused = run(*words).ended(3)
+        assert "nothing answers at t" in refused.err, refused.err
+        if fault in ("stranger", "host", "port"):
+            assert "or it refuses the certificate of alice" in refused.err
+    if fault == "stranger":
+        file = site.folder / "other/nodes/arm2.json5"
+        node = run("node", "-p", "sim:", "--network", file).ended(3)
+        assert "or it refuses the certificate of arm2" in node.err
+    assert time.monotonic() - began < 10
+
+
+def openssl(*words, cwd):
+    done = subprocess.run(["openssl", *map(str, words)], cwd=cwd, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def pem(path, what):
+    """A certificate or a key of a file, in PEM."""
+    (text,) = re.findall(f'"{what}_base64": "([^"]+)"', path.read_text())
+    return base64.b64decode(text).decode()
+
+
+def test_an_expired_certificate_is_named_and_refused(site, run, tmp_path):
+    ca = site.folder / "plant/ca"
+    (tmp_path / "key.pem").write_text(pem(site.file("alice"), "connect_private_key"))
+    openssl("req", "-new", "-key", "key.pem", "-subj", "/CN=alice", "-out", "it.csr", cwd=tmp_path)
+    (tmp_path / "index.txt").touch()
+    (tmp_path / "ca.cnf").write_text("[ca]\ndefault_ca=own\n[own]\ndatabase=index.txt\nserial=serial\n"
+                                     "new_certs_dir=.\npolicy=any\nx509_extensions=client\n"
+                                     "[any]\ncommonName=supplied\n[client]\nextendedKeyUsage=clientAuth\n")
+    dates = ["-startdate", "20250101000000Z", "-enddate", "20250201000000Z"]
+    openssl("ca", "-batch", "-config", "ca.cnf", "-cert", ca / "ca.pem", "-keyfile", ca / "ca.key",
+            "-in", "it.csr", "-out", "it.pem", "-md", "sha256", "-rand_serial", *dates, "-notext", cwd=tmp_path)
+    text = base64.b64encode((tmp_path / "it.pem").read_bytes()).decode()
+    old = base64.b64encode(pem(site.file("alice"), "connect_certificate").encode()).decode()
+    path = changed(site, "alice", tmp_path, certificate=(old, text))
+    refused = run("fleet", "list", "--via", path).ended(3)
+    assert "the certificate of alice has expired on 2025-02-01" in refused.err
+    # The router looks, too.
+    with pytest.raises(zenoh.ZError):
+        network(path)
+
+
+def test_another_program_reads_the_certificates(site):
+    ca = site.folder / "plant/ca/ca.pem"
+    for who, side, purpose in (("alice", "connect", "sslclient"), ("arm1", "connect", "sslclient")):
+        path = site.folder / f"{who}.pem"
+        path.write_text(pem(site.file(who), f"{side}_certificate"))
+        openssl("verify", "-x509_strict", "-CAfile", ca, "-purpose", purpose, path, cwd=site.folder)
+        text = openssl("x509", "-in", path, "-noout", "-subject", cwd=site.folder)
+        assert text.strip().replace(" ", "") == f"subject=CN={who}"
+    path = site.folder / "router.pem"
+    path.write_text(pem(site.folder / "plant/router.json5", "listen_certificate"))
+    openssl("verify", "-x509_strict", "-CAfile", ca, "-purpose", "sslserver",
+            "-verify_ip", "127.0.0.1", path, cwd=site.folder)
+
+
+#: A program that turns ST motor 1 until it is killed. It promises a sign of life each 10 s.
+TURNS = """
+import sys, time
+sys.path.insert(0, sys.argv[2])
+from fleeting import Member
+member = Member(sys.argv[1], "arm1", who="alice", deadline=10)
+key = f"motorlink/v1/arm1/node/here/{member.boot}/alice/{member.session}"
+token = member.zenoh.liveliness().declare_token(key)
+member.turn()
+print("turning", flush=True)
+time.sleep(600)
+"""
+
+
+def test_the_router_tells_a_node_at_once_that_a_program_was_killed(site):
+    words = [sys.executable, "-c", TURNS, site.file("alice"), Path(__file__).parent]
+    with children() as start:
+        process = start(words, "turning")
+        eventually(lambda: site.direct.rpm() > 1400, "motor 1 at speed", within=20)
+        process.kill()
+        eventually(lambda: site.direct.rpm() < 1300, "a motor that stops", within=3)
+    eventually(lambda: abs(site.direct.rpm()) < 30, "motor 1 at rest", within=20)
+
+
+@pytest.mark.parametrize("how", ["silent", "without a certificate"])
+def test_a_flood_of_strangers_does_not_delay_a_stop(site, sessions, how):
+    """A stop of somebody who is connected. The router takes nobody new for some seconds: each connection
+    that fails takes it 0.1 s. So these tests come late."""
+    host, port = site.address.removeprefix("tls/").split(":")
+    context = ssl._create_unverified_context()
+    strangers = []
+
+    def attack():
+        with socket.create_connection((host, int(port)), timeout=20) as stranger:
+            strangers.append(stranger)
+            try:
+                if how != "silent":
+                    context.wrap_socket(stranger, suppress_ragged_eofs=False).recv(1)
+                stranger.recv(1)
+            except OSError:
+                pass
+
+    turn(site)
+    alice = member(site, sessions("alice"), "alice")
+    assert joins(alice)
+    for _ in range(200):
+        threading.Thread(target=attack, daemon=True).start()
+    try:
+        eventually(lambda: len(strangers) == 200, "200 connections")
+        began = time.monotonic()
+        assert alice.stop({"line": "st0", "motor": 1})["kind"] == "answer"
+        assert time.monotonic() - began < 1
+        eventually(lambda: abs(site.direct.rpm()) < 30, "motor 1 at rest", within=20)
+    finally:
+        for stranger in strangers:
+            with contextlib.suppress(OSError):
+                stranger.shutdown(socket.SHUT_RDWR)
+
+
+def test_access_is_withdrawn_when_the_router_starts_again(site, sessions, run):
+    """Last: the sessions of other tests lose their router."""
+    bob = site.file("bob")
+    copy = site.folder / "bob.json5"
+    shutil.move(bob, copy)
+    site.init("plant", "--viewer", "carol")
+    router = site.running[0]
+    router.process.send_signal(signal.SIGTERM)
+    assert router.wait(10) == 0
+    site.running[0] = site.route()
+    site.running.pop()
+    alice = ["fleet", "list", "--via", site.file("alice"), "--json"]
+    eventually(lambda: len(run(*alice).lines) == 2, "both nodes, by themselves", within=20)
+    assert len(run("fleet", "list", "--via", site.file("carol"), "--json").ended(0).lines) == 2
+    hidden = run("fleet", "list", "--via", copy).ended(0).out
+    assert "No node is at this network that bob may see" in hidden
+    assert run("st", "-p", f"zenoh:arm1/st0?via={copy}", "status").code == 3

@@ -11,9 +11,11 @@ use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 
 pub fn run(at: &At) -> Result<(), Failure> {
-    let nodes = nodes(&at.via.network())?;
+    let network = at.via.network();
+    let nodes = nodes(&network)?;
     if nodes.is_empty() && !at.json {
-        print_line(&"No node is at this network.")?;
+        let limit = network.name().map_or_else(String::new, |name| format!(" that {name} may see"));
+        print_line(&format!("No node is at this network{limit}."))?;
     }
     let width =
         nodes.keys().map(|(name, _)| name.as_str().len()).max().unwrap_or(0).max("node".len());
