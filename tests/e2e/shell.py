@@ -45,6 +45,8 @@ def serves(words):
         return not asks_a_share(words)
     if words[:2] in (["motorlink", "replay"], ["motorlink", "monitor"], ["motorlink", "node"]):
         return True
+    if words[:3] == ["motorlink", "fleet", "router"]:
+        return True
     return words[:2] == ["motorlink", "sim"] and not {"run", "presets"} & set(words)
 
 
@@ -57,7 +59,7 @@ def asks_a_share(words):
 
 def asks_a_node(words):
     """Whether a command needs a node that runs."""
-    return words[:2] == ["motorlink", "fleet"]
+    return words[:2] == ["motorlink", "fleet"] and words[2] not in ("init", "router")
 
 
 def free_port():

@@ -37,8 +37,8 @@ RMD = [
 ]
 #: What a running share is asked for.
 SHARE = ["stop", "latch", "release"]
-#: test_node.py checks their lines.
-FLEET = ["list", "watch", "record", "command", "settings", "stop-all", "latch", "release"]
+#: test_node.py, test_fleet.py and test_site.py check their lines.
+FLEET = ["list", "watch", "record", "command", "settings", "stop-all", "latch", "release", "init", "router"]
 #: Captures, in hexadecimal.
 DECODE = {
     "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 0f", "29 01 02 2c"],

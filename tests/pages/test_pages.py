@@ -56,10 +56,11 @@ def test_shell_lines(found, shell, request):
 
 @each_page(blocks.by_page("python", ""))
 def test_python_blocks(found, folder, shell, drives, environment):
-    # The guards, shares and nodes that the page starts.
+    # The guards, shares and nodes that the page starts, except those of a network with a router.
     for block in blocks.by_page("sh", "").get(found[0].page, ()):
         for line, words, code in lines(block.text):
-            if words[0] == "motorlink" and words[1] in ("guard", "share", "node") and words[-1] == "&":
+            serves = words[0] == "motorlink" and words[1] in ("guard", "share", "node")
+            if serves and words[-1] == "&" and "--network" not in words:
                 shell.run(line, words, code)
     # With the line numbers of the page.
     program = ""

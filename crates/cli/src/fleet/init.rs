@@ -55,7 +55,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
     if json {
         return print_line(&object(&site));
     }
-    print_line(&format!("{}  router at {}", shown(&site.router), site.addresses.join(", ")))?;
+    let addresses = site.addresses.join(", ");
+    print_line(&format!("{}  router at {addresses}, until {}", shown(&site.router), site.until))?;
     for (name, Member { role, file, is_new, until }) in &site.members {
         let new = if *is_new { "new, " } else { "" };
         print_line(&format!("{}  {} {name}, {new}until {until}", shown(file), role.word()))?;
@@ -89,7 +90,7 @@ fn object(site: &Site) -> serde_json::Value {
     });
     json!({
         "site": site.router.parent(), "router": site.router, "addresses": site.addresses,
-        "members": members.collect::<Vec<_>>(),
+        "until": site.until, "members": members.collect::<Vec<_>>(),
     })
 }
 

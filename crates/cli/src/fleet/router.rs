@@ -12,8 +12,7 @@ use crate::output::Printer;
 #[derive(clap::Args)]
 #[command(after_help = "\
 A router passes messages between nodes and programs. `motorlink fleet init` writes the file for \
---network. With --listen instead there is no access control: everybody who reaches the address can move \
-motors.
+--network. With --listen instead there is no access control: all who reach the address can move motors.
 
 Output: a line when others can connect. Ctrl-C or SIGTERM ends it with exit code 0. While it is away, \
 nodes cannot be reached, and motors of programs stop.")]

@@ -40,8 +40,8 @@ Network: without --listen, --connect and --network the first node of a computer 
 tcp/127.0.0.1:7447, for programs of this computer only, and further nodes connect to it. \
 MOTORLINK_NETWORK names another address. \
 --listen tcp/0.0.0.0:7447 lets other computers connect. There is no access control then: \
-everybody who reaches the address can move motors. A Zenoh configuration with TLS and access control is given with \
---network.
+everybody who reaches the address can move motors. `motorlink fleet init` writes a file for --network with a \
+certificate, for a network with access control.
 
 Safety: a command that comes later than its time to live is not sent. A motor that a program of another \
 computer turned stops when the program ends, when its network is cut, or when it gives no sign of life \

@@ -87,6 +87,8 @@ pub struct Site {
     pub router: PathBuf,
     /// Where it is reached.
     pub addresses: Vec<String>,
+    /// The last day of its certificate.
+    pub until: String,
     /// All members, by name.
     pub members: BTreeMap<Name, Member>,
 }
@@ -146,7 +148,7 @@ pub enum SiteError {
 /// there stay.
 ///
 /// # Errors
-/// A name has two roles, nobody says where the router is, a file cannot be read or written.
+/// A name has two roles, the router has no address, a file cannot be read or written.
 pub fn init(plan: &Plan) -> Result<Site, SiteError> {
     let site = &plan.folder;
     let mut known = BTreeMap::new();
@@ -187,7 +189,7 @@ pub fn init(plan: &Plan) -> Result<Site, SiteError> {
                 let config = signer.member(role, &name, &addresses)?;
                 let comment = format!("// The key of {name} is in this file: keep its mode, 0600.");
                 folder::write(&file, &format!("{comment}\n{config}\n"))?;
-                config.certificate().map(|it| it.last_day()).unwrap_or_default()
+                last_day(&config)
             }
         };
         members.insert(name, Member { role, file, is_new, until });
@@ -197,7 +199,11 @@ pub fn init(plan: &Plan) -> Result<Site, SiteError> {
     let comment = "// The key of the router is in this file: keep its mode, 0600. `motorlink fleet init` \
         writes access_control anew.";
     folder::write(&file, &format!("{comment}\n{router}\n"))?;
-    Ok(Site { router: file, addresses, members })
+    Ok(Site { router: file, addresses, until: last_day(&router), members })
+}
+
+fn last_day(config: &ConfigFile) -> String {
+    config.certificate().map(|it| it.last_day()).unwrap_or_default()
 }
 
 /// Members by name. Without a certificate they are new.

@@ -186,7 +186,7 @@ fn what_cannot_be_is_refused_before_anything_is_written() {
     assert!(matches!(refused(&folder.plan(&twice[1..])), SiteError::TwoRoles { .. }));
     let elsewhere = Plan { router: vec!["10.0.0.9".parse().unwrap()], ..folder.plan(&[]) };
     assert!(matches!(refused(&elsewhere), SiteError::OtherRouter(_)));
-    // The name of a file gives rights to nobody else.
+    // A certificate has no rights under the name of another file.
     fs::copy(folder.0.join("viewers/bob.json5"), folder.0.join("operators/eve.json5")).unwrap();
     assert!(
         refused(&folder.plan(&[])).to_string().contains("the certificate in it is that of bob")
