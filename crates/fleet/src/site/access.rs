@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::Role;
+use super::role::Role;
 use crate::key::{self, Name, Scope};
 
 /// The rules for these members. All else is denied.

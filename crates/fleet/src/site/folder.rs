@@ -5,8 +5,8 @@ use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::Path;
 
-use super::SiteError;
 use super::authority::{Authority, Pair};
+use super::error::SiteError;
 use crate::certificate::Certificate;
 use crate::config::ConfigFile;
 use crate::key::Name;

@@ -13,8 +13,10 @@
 
 mod access;
 mod authority;
+mod error;
 mod folder;
 mod place;
+mod role;
 #[cfg(test)]
 mod tests;
 
@@ -29,7 +31,9 @@ use crate::certificate::Certificate;
 use crate::config::ConfigFile;
 use crate::key::Name;
 use authority::{Authority, Pair};
+pub use error::SiteError;
 pub use place::{BadPlace, Place};
+pub use role::Role;
 
 /// The name of the router in its certificate.
 const ROUTER: &str = "router";
@@ -37,35 +41,6 @@ const ROUTER: &str = "router";
 const REACHED_AT: &str = "metadata/reached_at";
 /// Where the file of a member says its role.
 pub(crate) const ROLE: &str = "metadata/role";
-
-/// What a member may do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
-    /// It holds drives.
-    Node,
-    /// A person or a program that commands motors.
-    Operator,
-    /// A person or a program that sees values and events.
-    Viewer,
-}
-
-impl Role {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Role::Node, Role::Operator, Role::Viewer];
-
-    /// The role in one word.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Role::Node => "node",
-            Role::Operator => "operator",
-            Role::Viewer => "viewer",
-        }
-    }
-
-    fn folder(self, site: &Path) -> PathBuf {
-        site.join(format!("{}s", self.word()))
-    }
-}
 
 /// What a site shall have.
 #[derive(Debug, Clone)]
@@ -104,44 +79,6 @@ pub struct Member {
     pub is_new: bool,
     /// The last day of its certificate, such as 2027-11-27.
     pub until: String,
-}
-
-/// Why a site cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum SiteError {
-    /// A name has two roles.
-    #[error("{name} is a {} already, so it cannot be a {}, too: each name has one role", has.word(), wanted.word())]
-    TwoRoles {
-        /// The name.
-        name: Name,
-        /// The role that it has.
-        has: Role,
-        /// The other one.
-        wanted: Role,
-    },
-    /// The name of the router.
-    #[error("`{ROUTER}` is the name of the router: choose another one")]
-    NameOfRouter,
-    /// The first time, somebody must say where the router is.
-    #[error("{0} has no router yet: say where nodes and programs reach it")]
-    NoRouter(PathBuf),
-    /// The router was made for other addresses.
-    #[error("the router of this site is reached at {0}: other addresses need a new site")]
-    OtherRouter(String),
-    /// A file of the site is not what it should be.
-    #[error("{0}")]
-    Strange(String),
-    /// The file system.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A certificate cannot be made.
-    #[error("a certificate cannot be made: {0}")]
-    Certificate(#[from] rcgen::Error),
 }
 
 /// Writes what a site does not have yet, and the rights of all members. Certificates and keys that are
