@@ -180,6 +180,9 @@ impl From<NodeError> for Failure {
     fn from(error: NodeError) -> Self {
         let failure = Failure::link(error.to_string());
         match error {
+            NodeError::Unknown(_) => failure.trying(
+                "copy router.json5 of `fleet init` to the router, and start the router again",
+            ),
             NodeError::NameTaken(_) => failure.trying("give each node a --name of its own"),
             NodeError::Network(NetworkError::Nobody(_)) => {
                 failure.trying("is a router or a node with --listen there?")

@@ -10,7 +10,8 @@ mod sessions;
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, RwLock};
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use motorlink_telemetry::share::address::Local;
 use tokio::runtime::Runtime;
@@ -21,6 +22,11 @@ use crate::clock::Clock;
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use common::Common;
+
+/// The longest time until others see a node.
+const SEEN: Duration = Duration::from_secs(2);
+/// The pause until it is asked again.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// What a node is.
 pub struct Options {
@@ -56,6 +62,9 @@ pub enum NodeError {
     /// Two nodes with one name would answer for each other.
     #[error("another node of this network has the name {0}")]
     NameTaken(Name),
+    /// Its certificate is good, and its name has no rights.
+    #[error("the router does not know the node {0}, so no program sees it")]
+    Unknown(Name),
     /// The share.
     #[error("the share of the node: {0}")]
     Share(#[from] std::io::Error),
@@ -93,6 +102,10 @@ impl Node {
         });
         runtime.block_on(publish::start(&common, period))?;
         let alive = door::open(&common, &runtime).map_err(failed)?;
+        // The router of a site denies without a word.
+        if network.role().is_some() && !is_seen(&network, &common)? {
+            return Err(NodeError::Unknown(common.name.clone()));
+        }
         Ok(Node { common, addresses, _alive: alive, runtime: Some(runtime) })
     }
 
@@ -109,6 +122,22 @@ impl Drop for Node {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }
+    }
+}
+
+/// Whether another session sees the node.
+fn is_seen(network: &Network, common: &Common) -> Result<bool, NodeError> {
+    let (other, _) = network.open()?;
+    let own = key::alive(&common.name, &common.boot);
+    let end = Instant::now() + SEEN;
+    loop {
+        if other.liveliness().get(&own).wait().map_err(failed)?.recv().is_ok() {
+            return Ok(true);
+        }
+        if Instant::now() > end {
+            return Ok(false);
+        }
+        thread::sleep(PAUSE);
     }
 }
 
