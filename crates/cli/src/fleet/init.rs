@@ -12,8 +12,8 @@ use crate::pasteable::quoted;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Each node, operator and viewer gets one file, which it needs and nobody else: a Zenoh configuration with \
-its certificate and its key. Copy it to its computer. The name in the certificate is who it is.
+Each node, operator and viewer gets one file: a Zenoh configuration with its certificate and its key. Copy \
+it to the computer of its owner, and nowhere else. The name in the certificate is who it is.
 
 Run it again with more names to add them. Certificates and keys that are there stay. Remove a file and run \
 it again to withdraw what it allows. Then copy router.json5 to the router, and start the router again.
