@@ -1,6 +1,6 @@
 //! The folders and files of a site. Only their owner reads them.
 
-use std::fs::{self, DirBuilder, OpenOptions};
+use std::fs::{self, DirBuilder, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::Path;
@@ -14,6 +14,12 @@ use crate::key::Name;
 /// Creates a folder if it is not there.
 pub(super) fn create(path: &Path) -> Result<(), SiteError> {
     DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(|it| failed(path, it))
+}
+
+/// Keeps other runs out of a folder until it is dropped.
+pub(super) fn lock(path: &Path) -> Result<File, SiteError> {
+    let lock = || File::open(path).and_then(|folder| folder.lock().map(|()| folder));
+    lock().map_err(|error| failed(path, error))
 }
 
 /// Writes a file as a whole: a reader, and a power cut, find the old one or the new one.

@@ -88,6 +88,11 @@ pub struct Member {
 /// A name has two roles, the router has no address, a file cannot be read or written.
 pub fn init(plan: &Plan) -> Result<Site, SiteError> {
     let site = &plan.folder;
+    if plan.router.is_empty() && !site.exists() {
+        return Err(SiteError::NoRouter(site.clone()));
+    }
+    folder::create(site)?;
+    let _lock = folder::lock(site)?;
     let mut known = BTreeMap::new();
     for role in Role::ALL {
         for (name, certificate) in folder::members(&role.folder(site))? {
@@ -108,7 +113,6 @@ pub fn init(plan: &Plan) -> Result<Site, SiteError> {
     if !wanted.is_empty() && wanted != addresses {
         return Err(SiteError::OtherRouter(addresses.join(", ")));
     }
-    folder::create(site)?;
     let mut signer = Signer { site, days: plan.days, authority: None };
     let mut router = match router {
         Some(router) => router,

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::str::FromStr;
 
 /// The usual port of Zenoh.
 const PORT: u16 = 7447;
 
-/// A name or an IP address of a computer, and a port.
+/// A name or an IPv4 address of a computer, and a port. Zenoh does not take a certificate of an IPv6 one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// The name or the IP address.
+    /// The name or the address.
     pub host: String,
     /// The port.
     pub port: u16,
@@ -20,7 +20,7 @@ pub struct Place {
 /// A text says nothing about a place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the address of a router is a name or an IP address, such as 10.0.0.5 or plant.local:{PORT}"
+    "the address of a router is a name or an IPv4 address, such as 10.0.0.5 or plant.local:{PORT}"
 )]
 pub struct BadPlace;
 
@@ -28,13 +28,13 @@ impl Place {
     /// The addresses at which a router listens: these IP addresses. With a name, all of its computer.
     pub(super) fn listened(places: &[Self]) -> Vec<String> {
         let known = |it: &Self| match &*it.host {
-            "localhost" => Some(IpAddr::V4(Ipv4Addr::LOCALHOST)),
+            "localhost" => Some(Ipv4Addr::LOCALHOST),
             host => host.parse().ok(),
         };
         let is_any = places.iter().any(|it| known(it).is_none());
         let of = |it: &Self| {
-            let ip = known(it).filter(|_| !is_any).unwrap_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
-            format!("tls/{}", SocketAddr::new(ip, it.port))
+            let ip = known(it).filter(|_| !is_any).unwrap_or(Ipv4Addr::UNSPECIFIED);
+            format!("tls/{}", SocketAddrV4::new(ip, it.port))
         };
         places.iter().map(of).collect::<BTreeSet<_>>().into_iter().collect()
     }
@@ -49,12 +49,6 @@ impl FromStr for Place {
     type Err = BadPlace;
 
     fn from_str(text: &str) -> Result<Self, BadPlace> {
-        if let Ok(socket) = text.parse::<SocketAddr>() {
-            return Ok(Place { host: socket.ip().to_string(), port: socket.port() });
-        }
-        if let Ok(ip) = text.parse::<IpAddr>() {
-            return Ok(Place { host: ip.to_string(), port: PORT });
-        }
         let (host, port) = match text.split_once(':') {
             Some((host, port)) => (host, port.parse().map_err(|_| BadPlace)?),
             None => (text, PORT),
@@ -72,9 +66,6 @@ impl FromStr for Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.host.parse() {
-            Ok(ip) => SocketAddr::new(ip, self.port).fmt(f),
-            Err(_) => write!(f, "{}:{}", self.host, self.port),
-        }
+        write!(f, "{}:{}", self.host, self.port)
     }
 }

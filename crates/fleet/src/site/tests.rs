@@ -150,6 +150,27 @@ fn a_second_run_adds_members_and_keeps_all_else() {
 }
 
 #[test]
+fn runs_at_the_same_time_wait_for_each_other() {
+    let folder = Folder::new();
+    std::thread::scope(|scope| {
+        for number in 0..6 {
+            let name = format!("arm{number}");
+            let plan = folder.plan(&[(Role::Node, &name)]);
+            scope.spawn(move || init(&plan).unwrap());
+        }
+    });
+    let subjects: Vec<_> = (0..6).map(|number| format!("arm{number}")).collect();
+    assert_eq!(folder.subjects(), subjects);
+    let authority = fs::read_to_string(folder.0.join("ca/ca.pem")).unwrap();
+    for name in subjects {
+        let path = folder.0.join(format!("nodes/{name}.json5"));
+        let tls = member(&path, "transport")["link"]["tls"].take();
+        let trusted = tls["root_ca_certificate_base64"].as_str().unwrap();
+        assert_eq!(BASE64_STANDARD.decode(trusted).unwrap(), authority.as_bytes());
+    }
+}
+
+#[test]
 fn a_file_that_is_removed_withdraws_access_and_needs_no_authority() {
     let folder = Folder::new();
     init(&folder.plan(&ALL)).unwrap();
@@ -201,10 +222,19 @@ fn a_router_listens_at_ip_addresses_and_for_names_at_all() {
     };
     assert_eq!(listened(&["10.0.0.5", "localhost:1"]), ["tls/10.0.0.5:7447", "tls/127.0.0.1:1"]);
     assert_eq!(listened(&["10.0.0.5", "plant.local"]), ["tls/0.0.0.0:7447"]);
-    assert_eq!(listened(&["::1", "[fe80::1]:7"]), ["tls/[::1]:7447", "tls/[fe80::1]:7"]);
-    for bad in
-        ["", "a b", "plant:", "plant:x", "plant:70000", "tls/plant", "plant,other", "a..b", "*"]
-    {
+    for bad in [
+        "::1",
+        "[::1]:7",
+        "",
+        "a b",
+        "plant:",
+        "plant:x",
+        "plant:70000",
+        "tls/plant",
+        "plant,other",
+        "a..b",
+        "*",
+    ] {
         assert_eq!(bad.parse::<Place>(), Err(BadPlace), "{bad}");
     }
 }
