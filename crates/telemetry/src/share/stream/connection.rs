@@ -16,6 +16,8 @@ use crate::signal::{Motor, Signal};
 
 /// A share that is silent for this time after a question is stopped, in ns.
 const SILENCE: u64 = 2_000_000_000;
+/// The same before it has answered at all: it may have many programs at this moment.
+const OPENING: u64 = 10_000_000_000;
 /// The most bytes that are taken at once. A share that sends more is read on at the next call.
 const AT_ONCE: usize = 4 << 20;
 /// A change of the other wall clock that is told, in seconds.
@@ -32,6 +34,8 @@ pub(super) struct Connection {
     clock: Option<Clock>,
     /// The wall clock of the share, as it was told last.
     told: Option<f64>,
+    /// Whether it has answered a question.
+    has_begun: bool,
     /// When it fell silent, until what waited has come.
     silent: Option<u64>,
     /// Which of the wanted signals each subscription has.
@@ -71,6 +75,7 @@ impl Connection {
             heard: now,
             clock,
             told,
+            has_begun: false,
             silent,
             subscriptions,
             groups,
@@ -126,8 +131,8 @@ impl Connection {
     /// Whether a request has had no answer, and nothing else came, for too long.
     pub(super) fn is_silent(&mut self, now: u64) -> bool {
         let oldest = self.pending.values().map(|(_, sent)| *sent).min();
-        let is_silent =
-            oldest.is_some_and(|sent| now.saturating_sub(sent.max(self.heard)) > SILENCE);
+        let limit = if self.has_begun { SILENCE } else { OPENING };
+        let is_silent = oldest.is_some_and(|sent| now.saturating_sub(sent.max(self.heard)) > limit);
         if is_silent {
             self.silent.get_or_insert(self.heard);
         }
@@ -199,10 +204,12 @@ impl Connection {
         items: &mut VecDeque<Item>,
     ) -> Result<(), String> {
         let Some((asked, sent)) = self.pending.remove(&id) else { return Ok(()) };
+        let is_again = self.is_again(asked);
+        self.has_begun = true;
         let answer = match result {
             Ok(answer) => answer,
             // The question was too old. The next one is not.
-            Err(_) if self.has_begun(asked) => return Ok(()),
+            Err(_) if is_again => return Ok(()),
             Err(refusal) => return Err(refusal.message),
         };
         match (asked, answer) {
@@ -229,7 +236,8 @@ impl Connection {
         Ok(())
     }
 
-    fn has_begun(&self, asked: Asked) -> bool {
+    /// Whether it is asked again and again.
+    fn is_again(&self, asked: Asked) -> bool {
         asked == Asked::Rates || asked == Asked::Lines && self.clock.is_some()
     }
 
