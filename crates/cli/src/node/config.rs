@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use motorlink::rmd;
 use motorlink::st;
+use motorlink_fleet::ros2;
 use motorlink_telemetry::share::opening::Limits;
 use serde::Deserialize;
 
@@ -20,6 +21,7 @@ pub struct Config {
     /// How long a motor stays with the program that changed it.
     lease_seconds: Option<f64>,
     limits: LimitsOf,
+    ros2: ros2::Settings,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -59,6 +61,14 @@ impl Config {
             return Err(Failure::usage(format!("lease_seconds is 0 to {LONGEST_LEASE}")));
         }
         Ok(Some(Duration::from_secs_f64(seconds)))
+    }
+
+    /// What the node does for ROS 2 machines of this domain, or of that of the file.
+    pub fn ros2(&self, domain: Option<u32>) -> Result<ros2::Settings, Failure> {
+        let mut settings = self.ros2.clone();
+        settings.domain = domain.unwrap_or(settings.domain);
+        settings.check().map_err(Failure::usage)?;
+        Ok(settings)
     }
 
     /// What no program may exceed.

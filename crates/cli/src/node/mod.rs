@@ -11,6 +11,7 @@ use motorlink_fleet::clock::Boot;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::{Network, NetworkError};
 use motorlink_fleet::node::{Node, NodeError, Options};
+use motorlink_fleet::ros2::Ros2;
 use motorlink_fleet::site::Role;
 use motorlink_telemetry::share::message::Line;
 use motorlink_telemetry::share::server::Server;
@@ -50,6 +51,9 @@ all may stop it. Limits of --config hold for all programs. A node cannot stop a 
 killed with SIGKILL or frozen, if the cable to the drive is cut, or if the computer stops. If people can \
 be hurt, use an emergency stop in hardware.
 
+ROS 2: with --ros2 the node publishes joint states and diagnostics, and has the services stop_all and \
+clear_faults. With joints in --config it obeys joint commands. docs/ROS2.md has the rules.
+
 Output: a line when programs can connect, then one line per event. SIGINT, SIGTERM and the other signals \
 that end a program stop the motors first. Exit code 0, or 3 if a motor did not confirm that it stops.")]
 pub struct Args {
@@ -63,13 +67,19 @@ pub struct Args {
     at: Option<String>,
     #[command(flatten)]
     network: NetworkArgs,
-    /// A file with limits of motors, in TOML
+    /// A file with limits of motors and joints, in TOML
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     config: Option<PathBuf>,
     /// How often the main values of each motor are published, 10ms to 60s
     #[arg(long, value_name = "TIME", default_value = "100ms",
         value_parser = span_up_to(Duration::from_secs(60)))]
     period: Duration,
+    /// Speak to ROS 2 machines whose middleware is rmw_zenoh, too
+    #[arg(long)]
+    ros2: bool,
+    /// Their domain, 0 to 232 [default: that of --config, or 0]
+    #[arg(long, value_name = "NUMBER", requires = "ros2")]
+    ros2_domain: Option<u32>,
     /// Print JSON, one object per line
     #[arg(long)]
     json: bool,
@@ -93,6 +103,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     let limits = config.limits()?;
+    let ros2 = args.ros2.then(|| config.ros2(args.ros2_domain)).transpose()?;
     let mut server = Server::open(&path, PROGRAM, args.lines.open(limits)?)?;
     server.lease(config.lease()?.unwrap_or(LEASE));
     server.limit(limits);
@@ -103,6 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         network,
         clock: Arc::new(Boot),
         period: args.period,
+        ros2,
     };
     let (node, outcome) = match start(&mut server, options) {
         Ok(Some(node)) => {
@@ -164,14 +176,29 @@ fn ready(
     let at = format!("unix:{}", path.display());
     let ports: Vec<_> = lines.iter().map(|line| format!("zenoh:{name}/{}", line.line)).collect();
     if args.json {
-        return output::print_line(&json!({
+        let mut ready = json!({
             "event": "ready", "node": name.as_str(), "addresses": node.addresses(), "at": at,
             "lines": share::lines_in_json(lines), "ports": ports,
-        }));
+        });
+        if let Some(Ros2 { domain, publishes, obeys, services, joints, .. }) = node.ros2() {
+            ready["ros2"] = json!({
+                "domain": domain, "publishes": publishes, "obeys": obeys, "services": services,
+                "joints": joints,
+            });
+        }
+        return output::print_line(&ready);
     }
     output::print_line(&format!("node {name} at {}", node.addresses().join(", ")))?;
     for (line, port) in lines.iter().zip(&ports) {
         output::print_line(&format!("  -p {port}  is {}", line.port))?;
+    }
+    if let Some(Ros2 { domain, publishes, obeys, services, .. }) = node.ros2() {
+        let names = [publishes, obeys, services].map(|it| it.join(", "));
+        let [publishes, obeys, services] = names;
+        let obeys = if obeys.is_empty() { "nothing".to_owned() } else { obeys };
+        output::print_line(&format!(
+            "  ROS 2 domain {domain}: publishes {publishes}; obeys {obeys}; services {services}"
+        ))?;
     }
     output::print_line(&share::lines_in_words(&format!("share at {at}"), lines))
 }

@@ -21,6 +21,7 @@ use zenoh::liveliness::LivelinessToken;
 use crate::clock::Clock;
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
+use crate::ros2::{Ros2, Settings};
 use common::Common;
 
 /// The longest time until others see a node.
@@ -42,12 +43,15 @@ pub struct Options {
     pub clock: Arc<dyn Clock>,
     /// How often the main values of each motor are published.
     pub period: Duration,
+    /// What it does for ROS 2 machines.
+    pub ros2: Option<Settings>,
 }
 
 /// A node that runs. When it is dropped, all its sessions end.
 pub struct Node {
     common: Arc<Common>,
     addresses: Vec<String>,
+    ros2: Option<Ros2>,
     /// That it is there.
     _alive: LivelinessToken,
     runtime: Option<Runtime>,
@@ -68,6 +72,9 @@ pub enum NodeError {
     /// The share.
     #[error("the share of the node: {0}")]
     Share(#[from] std::io::Error),
+    /// ROS 2.
+    #[error("ROS 2: {0}")]
+    Ros2(std::io::Error),
 }
 
 impl Node {
@@ -76,7 +83,7 @@ impl Node {
     /// # Errors
     /// The network, or the name is taken.
     pub fn start(options: Options) -> Result<Self, NodeError> {
-        let Options { name, share, program, network, clock, period } = options;
+        let Options { name, share, program, network, clock, period, ros2 } = options;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("node")
@@ -106,12 +113,26 @@ impl Node {
         if network.role().is_some() && !is_seen(&network, &common)? {
             return Err(NodeError::Unknown(common.name.clone()));
         }
-        Ok(Node { common, addresses, _alive: alive, runtime: Some(runtime) })
+        let ros2 = match ros2 {
+            None => None,
+            Some(settings) => {
+                let Common { name, share, clock, zenoh, .. } = &*common;
+                let (name, clock) = (name.as_str(), Arc::clone(clock));
+                let started = Ros2::start(&settings, name, share, clock, zenoh);
+                Some(runtime.block_on(started).map_err(NodeError::Ros2)?)
+            }
+        };
+        Ok(Node { common, addresses, ros2, _alive: alive, runtime: Some(runtime) })
     }
 
     /// The addresses of this node.
     pub fn addresses(&self) -> &[String] {
         &self.addresses
+    }
+
+    /// What ROS 2 machines see of it.
+    pub fn ros2(&self) -> Option<&Ros2> {
+        self.ros2.as_ref()
     }
 }
 

@@ -84,6 +84,7 @@ fn start(
         network,
         clock,
         period: Duration::from_millis(50),
+        ros2: None,
     })
 }
 

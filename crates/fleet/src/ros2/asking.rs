@@ -1,0 +1,117 @@
+//! What a node asks of its motors through its share.
+
+use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, ReadStatus, Status as RmdStatus};
+use motorlink_proto::st::{Command, Flags, MAX_PAYLOAD, RegisterId, Request, Status};
+use motorlink_telemetry::share::message::{Answer, Ask, MotorName, Reason, StoppedMotor};
+use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::signal::Motor;
+
+/// Exchanges with a motor.
+#[derive(Clone)]
+pub struct Asking {
+    pub(super) program: Program,
+    pub(super) line: String,
+    pub(super) motor: Motor,
+    pub(super) speaks: Speaks,
+}
+
+/// How a command is sent.
+#[derive(Debug, Clone, Copy)]
+pub struct Sent {
+    /// It is not sent later, in seconds.
+    pub time_to_live: f64,
+    /// It is not sent if the motor was stopped since the last command without this.
+    pub continues: bool,
+}
+
+/// The time to live of what moves nothing, in seconds.
+const READ: f64 = 2.0;
+
+impl Asking {
+    async fn send(&self, bytes: Vec<u8>, sent: Sent) -> Result<Vec<u8>, Refusal> {
+        let Sent { time_to_live, continues } = sent;
+        let (line, motor) = (self.line.clone(), self.motor.number());
+        match self.program.ask(Ask::Command { line, motor, bytes, time_to_live, continues }).await?
+        {
+            Answer::Command { bytes } => Ok(bytes),
+            _ => Err(self.unfit()),
+        }
+    }
+
+    /// Sends a request to an ST drive; gives the payload of its acknowledge.
+    pub async fn st(&self, request: &Request<'_>, sent: Sent) -> Result<Vec<u8>, Refusal> {
+        let mut payload = [0; MAX_PAYLOAD];
+        let payload = request.payload(&mut payload).ok_or_else(|| self.unfit())?;
+        self.send([&[request.code().number()], payload].concat(), sent).await
+    }
+
+    /// Sends eight bytes to an RMD motor; gives the eight of its reply.
+    pub async fn rmd(&self, bytes: [u8; 8], sent: Sent) -> Result<[u8; 8], Refusal> {
+        self.send(bytes.to_vec(), sent).await?.try_into().map_err(|_| self.unfit())
+    }
+
+    /// Reads a register of an ST motor.
+    pub async fn register(&self, register: RegisterId, sent: Sent) -> Result<i32, Refusal> {
+        let reply = self.st(&Request::GetRegister(register), sent).await?;
+        self.speaks.profile().and_then(|it| register.decode(it, &reply)).ok_or_else(|| self.unfit())
+    }
+
+    /// The state and the faults of an ST motor.
+    pub async fn state(&self, sent: Sent) -> Result<(Status, Flags), Refusal> {
+        let status = self.register(RegisterId::STATUS, sent).await?;
+        let flags = self.register(RegisterId::FLAGS, Sent { continues: true, ..sent }).await?;
+        Ok((Status::from(status as u8), Flags(flags as u32)))
+    }
+
+    /// Acknowledges the faults. Returns the text of those that remain.
+    pub async fn clear_faults(&self) -> Result<Option<String>, Refusal> {
+        let sent = Sent { time_to_live: READ, continues: false };
+        let Motor::St(_) = self.motor else {
+            let left = RmdStatus::decode(&self.rmd(ClearErrors.encode(), sent).await?).errors;
+            return Ok((!left.is_empty()).then(|| left.to_string()));
+        };
+        let flags = self.register(RegisterId::FLAGS, sent).await?;
+        if flags == 0 {
+            return Ok(None);
+        }
+        self.st(&Request::ExecuteCommand(Command::FaultAck), sent).await?;
+        let (status, Flags(flags)) = self.state(sent).await?;
+        Ok((flags != 0).then(|| format!("its state is {status}, FLAGS {flags:#010x}")))
+    }
+
+    /// The text of the errors of an RMD motor.
+    pub async fn errors(&self, sent: Sent) -> Result<Option<String>, Refusal> {
+        let errors = RmdStatus::decode(&self.rmd(ReadStatus.encode(), sent).await?).errors;
+        Ok((!errors.is_empty()).then(|| errors.to_string()))
+    }
+
+    /// Stops the motor. Gives why it was not confirmed.
+    pub async fn stop(&self) -> Option<String> {
+        let motor = MotorName { line: self.line.clone(), motor: self.motor.number() };
+        match stop(&self.program, Some(motor)).await {
+            Ok(motors) => motors.into_iter().find_map(|motor| motor.failure),
+            Err(refusal) => Some(refusal.message),
+        }
+    }
+
+    fn unfit(&self) -> Refusal {
+        let message = "the reply does not fit the request".to_owned();
+        Refusal { reason: Reason::Line, message, code: None }
+    }
+}
+
+/// Stops a motor, or all that the lines can have. Gives how they took it.
+pub async fn stop(
+    program: &Program,
+    motor: Option<MotorName>,
+) -> Result<Vec<StoppedMotor>, Refusal> {
+    match program.ask(Ask::Stop { motor }).await? {
+        Answer::Stop { motors } => Ok(motors),
+        _ => Err(Refusal {
+            reason: Reason::Line,
+            message: "the share gives another answer".to_owned(),
+            code: None,
+        }),
+    }
+}

@@ -1,0 +1,385 @@
+//! Which commands of other computers are obeyed, and when motors stop. It uses no clock and no network
+//! itself: the time is an argument, in seconds. After each input, take all [`next`](Commands::next) outputs.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use super::cdr;
+use super::joint::{Joint, Mode, Reference};
+use super::pace::{Late, Pace};
+use super::readings::Readings;
+use super::types::JointState;
+use super::wire::{Attachment, Gid};
+
+/// The most publishers that are remembered.
+const PUBLISHERS: usize = 16;
+/// How long the last refusal is shown, in seconds.
+const SHOWN: f64 = 5.0;
+
+/// What holds for all commands.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules {
+    /// A motor stops if no command for it comes for this time, in seconds.
+    pub time_to_live: f64,
+    /// How far the first position may be from the measured one, in rad.
+    pub start_within: f64,
+    /// Older values are none, in seconds.
+    pub fresh: f64,
+}
+
+/// The commands of all joints of a node.
+#[derive(Debug)]
+pub struct Commands {
+    rules: Rules,
+    joints: Vec<(Joint, Phase)>,
+    publishers: BTreeMap<Gid, Pace>,
+    /// Who commands, and when it did last.
+    holder: Option<(Gid, f64)>,
+    motions: u64,
+    outputs: VecDeque<Output>,
+    accepted: u64,
+    refused: BTreeMap<&'static str, u64>,
+    last_refused: Option<(f64, String)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Phase {
+    /// No command has come for the time to live.
+    Resting,
+    /// The last command came at this time.
+    Moving { motion: u64, heard: f64 },
+    /// Its stop is not confirmed yet.
+    Stopping,
+    /// It takes no command until none has come for the time to live.
+    Blocked { why: String, heard: f64 },
+}
+
+/// What is to be done with a motor.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Output {
+    /// Send it a command.
+    Send(Order),
+    /// Stop it, and say with [`Commands::stopped`] how it went.
+    Stop(usize),
+}
+
+/// A command for a motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Order {
+    /// The joint, in the order of the file.
+    pub joint: usize,
+    /// Orders of one motion have the same number. A stop ends a motion.
+    pub motion: u64,
+    /// The command.
+    pub reference: Reference,
+    /// It is not sent later.
+    pub until: f64,
+}
+
+/// How a joint takes commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shown<'a> {
+    /// The text for people.
+    pub words: &'a str,
+    /// Whether it takes none for now.
+    pub is_blocked: bool,
+}
+
+/// Why a sample moves nothing: a kind that is counted, and words.
+type Refused = (&'static str, String);
+
+impl Commands {
+    /// Commands of these joints.
+    pub fn new(joints: &[Joint], rules: Rules) -> Self {
+        Commands {
+            rules,
+            joints: joints.iter().map(|joint| (joint.clone(), Phase::Resting)).collect(),
+            publishers: BTreeMap::new(),
+            holder: None,
+            motions: 0,
+            outputs: VecDeque::new(),
+            accepted: 0,
+            refused: BTreeMap::new(),
+            last_refused: None,
+        }
+    }
+
+    /// A sample has come. It is obeyed as a whole or not at all.
+    pub fn receive(
+        &mut self,
+        now: f64,
+        attachment: Option<&[u8]>,
+        payload: &[u8],
+        readings: &Readings,
+    ) {
+        self.tick(now);
+        match self.obey(now, attachment, payload, readings) {
+            Ok(()) => self.accepted += 1,
+            Err((kind, why)) => {
+                *self.refused.entry(kind).or_default() += 1;
+                self.last_refused = Some((now, why));
+            }
+        }
+    }
+
+    /// The time has passed. Call it at [`wake`](Self::wake) at the latest.
+    pub fn tick(&mut self, now: f64) {
+        for (number, (_, phase)) in self.joints.iter_mut().enumerate() {
+            match *phase {
+                Phase::Moving { heard, .. } if now - heard >= self.rules.time_to_live => {
+                    *phase = Phase::Stopping;
+                    self.outputs.push_back(Output::Stop(number));
+                }
+                Phase::Blocked { heard, .. } if now - heard >= self.rules.time_to_live => {
+                    *phase = Phase::Resting;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// When something happens without an input.
+    pub fn wake(&self) -> Option<f64> {
+        let heard = self.joints.iter().filter_map(|(_, phase)| match phase {
+            Phase::Moving { heard, .. } | Phase::Blocked { heard, .. } => Some(*heard),
+            Phase::Resting | Phase::Stopping => None,
+        });
+        heard.reduce(f64::min).map(|heard| heard + self.rules.time_to_live)
+    }
+
+    /// What is to be done next.
+    pub fn next(&mut self) -> Option<Output> {
+        self.outputs.pop_front()
+    }
+
+    /// A motion failed. With `stops` its motor is stopped.
+    pub fn failed(&mut self, now: f64, joint: usize, motion: u64, why: String, stops: bool) {
+        let Some((Joint { name, .. }, phase)) = self.joints.get_mut(joint) else { return };
+        if !matches!(*phase, Phase::Moving { motion: own, .. } if own == motion) {
+            return;
+        }
+        self.last_refused = Some((now, format!("{name}: {why}")));
+        *self.refused.entry("failed").or_default() += 1;
+        *phase = Phase::Blocked { why, heard: now };
+        if stops {
+            self.outputs.push_back(Output::Stop(joint));
+        }
+    }
+
+    /// All motions end: somebody stops their motors. `joint` is one, or all.
+    pub fn block(&mut self, now: f64, joint: Option<usize>, why: &str) {
+        let numbers = joint.map_or(0..self.joints.len(), |it| it..it + 1);
+        for number in numbers {
+            if let Some((_, Phase::Moving { motion, .. })) = self.joints.get(number) {
+                self.failed(now, number, *motion, why.to_owned(), true);
+            }
+        }
+    }
+
+    /// How a stop went.
+    pub fn stopped(&mut self, now: f64, joint: usize, failure: Option<String>) {
+        let Some((_, phase)) = self.joints.get_mut(joint) else { return };
+        match failure {
+            Some(why) => *phase = Phase::Blocked { why, heard: now },
+            None if *phase == Phase::Stopping => *phase = Phase::Resting,
+            None => {}
+        }
+    }
+
+    /// The joints, in the order of their numbers.
+    pub fn joints(&self) -> impl Iterator<Item = &Joint> {
+        self.joints.iter().map(|(joint, _)| joint)
+    }
+
+    /// How a joint takes commands. `None`: it is read only.
+    pub fn phase(&self, name: &str) -> Option<Shown<'_>> {
+        let (joint, phase) = self.joints.iter().find(|(joint, _)| joint.name == name)?;
+        joint.command?;
+        let (words, is_blocked) = match phase {
+            Phase::Resting => ("at rest", false),
+            Phase::Moving { .. } => ("moving", false),
+            Phase::Stopping => ("stopping", false),
+            Phase::Blocked { why, .. } => (why.as_str(), true),
+        };
+        Some(Shown { words, is_blocked })
+    }
+
+    /// Why the last sample was refused, for a while.
+    pub fn last_refused(&self, now: f64) -> Option<&str> {
+        let (at, why) = self.last_refused.as_ref()?;
+        (now - at < SHOWN).then_some(why)
+    }
+
+    /// How many samples were obeyed, and how many were refused, by kind.
+    pub fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        let refused = self.refused.iter().map(|(kind, count)| (*kind, *count));
+        std::iter::once(("accepted", self.accepted)).chain(refused)
+    }
+
+    fn obey(
+        &mut self,
+        now: f64,
+        attachment: Option<&[u8]>,
+        payload: &[u8],
+        readings: &Readings,
+    ) -> Result<(), Refused> {
+        let attachment = attachment.and_then(Attachment::decode).ok_or_else(|| {
+            let why = "a sample without the attachment of rmw_zenoh 0.2.4 or later";
+            ("not_rmw_zenoh", why.to_owned())
+        })?;
+        self.in_time(now, &attachment)?;
+        let wanted = self.wanted(payload)?;
+        // While commands come, a blocked joint stays blocked.
+        for (number, ..) in &wanted {
+            if let Phase::Blocked { heard, .. } = &mut self.joints[*number].1 {
+                *heard = now;
+            }
+        }
+        self.hold(now, attachment.gid)?;
+        for (number, mode, value) in &wanted {
+            self.permit(now, *number, *mode, *value, readings)?;
+        }
+        let references = wanted.iter().map(|(number, mode, value)| {
+            self.joints[*number].0.reference(*mode, *value).map_err(|why| ("bad_value", why))
+        });
+        let references: Vec<_> = references.collect::<Result<_, _>>()?;
+        for ((joint, ..), reference) in wanted.into_iter().zip(references) {
+            let motion = match self.joints[joint].1 {
+                Phase::Moving { motion, .. } => motion,
+                _ => {
+                    self.motions += 1;
+                    self.motions
+                }
+            };
+            self.joints[joint].1 = Phase::Moving { motion, heard: now };
+            let until = now + self.rules.time_to_live;
+            self.outputs.push_back(Output::Send(Order { joint, motion, reference, until }));
+        }
+        Ok(())
+    }
+
+    /// Whether a sample comes when it was sent.
+    fn in_time(&mut self, now: f64, sample: &Attachment) -> Result<(), Refused> {
+        let time_to_live = self.rules.time_to_live;
+        let late = match self.publishers.get_mut(&sample.gid) {
+            Some(pace) => match pace.take(now, sample, time_to_live) {
+                Ok(()) => return Ok(()),
+                Err(late) => late,
+            },
+            None => {
+                if self.publishers.len() == PUBLISHERS {
+                    let by_age = |(_, one): &(&Gid, &Pace), (_, two): &(&Gid, &Pace)| {
+                        one.heard().total_cmp(&two.heard())
+                    };
+                    let oldest = self.publishers.iter().min_by(by_age).map(|(gid, _)| *gid);
+                    oldest.and_then(|gid| self.publishers.remove(&gid));
+                }
+                self.publishers.insert(sample.gid, Pace::new(now, sample));
+                Late::New
+            }
+        };
+        Err(match late {
+            Late::Repeated => ("repeated", "a sample that came before".to_owned()),
+            Late::Old(by) => ("old", format!("a sample that waited for {by:.1} s")),
+            Late::New => {
+                let why = format!(
+                    "the publisher is new, or its samples waited somewhere: it is obeyed {time_to_live} s \
+                     later"
+                );
+                ("new_publisher", why)
+            }
+        })
+    }
+
+    /// What a message asks of joints.
+    fn wanted(&self, payload: &[u8]) -> Result<Vec<(usize, Mode, f64)>, Refused> {
+        let unreadable = || ("unreadable", "a sample that cannot be read as JointState".to_owned());
+        let message: JointState = cdr::decode(payload).ok_or_else(unreadable)?;
+        let JointState { name: names, position, velocity, effort, .. } = &message;
+        let lengths = [position, velocity, effort].map(Vec::len);
+        if lengths.into_iter().any(|length| length != 0 && length != names.len()) {
+            let [position, velocity, effort] = lengths;
+            let why = format!(
+                "{} names, {position} positions, {velocity} velocities and {effort} efforts",
+                names.len()
+            );
+            return Err(("bad_lengths", why));
+        }
+        let mut known = BTreeSet::new();
+        let wanted = names.iter().enumerate().map(|(at, name)| {
+            let number = self.joints.iter().position(|(joint, _)| joint.name == *name);
+            let number = number.ok_or_else(|| ("unknown_joint", format!("no joint {name:?}")))?;
+            if !known.insert(number) {
+                return Err(("joint_twice", format!("{name} twice in one sample")));
+            }
+            let Some(mode) = self.joints[number].0.command else {
+                return Err(("read_only_joint", format!("{name} has no command in the file")));
+            };
+            let (array, what) = match mode {
+                Mode::Position => (position, "position"),
+                Mode::Velocity => (velocity, "velocity"),
+                Mode::Effort => (effort, "effort"),
+            };
+            let missing = || ("bad_lengths", format!("no {what} for {name}"));
+            let value = *array.get(at).ok_or_else(missing)?;
+            match value.is_finite() {
+                true => Ok((number, mode, value)),
+                false => Err(("bad_value", format!("the {what} of {name} is {value}"))),
+            }
+        });
+        wanted.collect()
+    }
+
+    /// One publisher commands at a time.
+    fn hold(&mut self, now: f64, gid: Gid) -> Result<(), Refused> {
+        let is_held =
+            |(holder, last): &(Gid, f64)| *holder != gid && now - last < self.rules.time_to_live;
+        if self.holder.as_ref().is_some_and(is_held) {
+            return Err(("other_publisher", "another publisher commands".to_owned()));
+        }
+        self.holder = Some((gid, now));
+        Ok(())
+    }
+
+    /// Whether a joint may be commanded now.
+    fn permit(
+        &self,
+        now: f64,
+        number: usize,
+        mode: Mode,
+        value: f64,
+        readings: &Readings,
+    ) -> Result<(), Refused> {
+        let (joint, phase) = &self.joints[number];
+        let name = &joint.name;
+        match phase {
+            Phase::Moving { .. } => return Ok(()),
+            Phase::Stopping => return Err(("stopping", format!("{name} is still being stopped"))),
+            Phase::Blocked { why, .. } => {
+                let time_to_live = self.rules.time_to_live;
+                let why = format!("{name}: {why}; send nothing for {time_to_live} s, then start");
+                return Err(("blocked", why));
+            }
+            Phase::Resting => {}
+        }
+        if mode != Mode::Position {
+            return Ok(());
+        }
+        let measured =
+            readings.fresh(joint, now, self.rules.fresh).and_then(|it| it.position(joint));
+        let Some(measured) = measured else {
+            return Err(("unknown_position", format!("the position of {name} is not known")));
+        };
+        let most = self.rules.start_within;
+        if (value - measured).abs() > most {
+            let why = format!(
+                "{name} is at {measured:.3} rad, and the first position is {value:.3} rad: it must be \
+                 within {most} rad"
+            );
+            return Err(("far_start", why));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;
