@@ -44,7 +44,7 @@ LOAD ?= 4
 SECONDS ?= 60
 
 .PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
-.PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
+.PHONY: ros2 install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -90,6 +90,12 @@ e2e: $(VENV)/ready ## 9 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
+
+ros2: $(VENV)/ready ## 8 min: a node and a ROS 2 machine in Rust; not in `make test`
+	$(PROGRAM)
+	$(CARGO) build --locked --manifest-path tests/ros2/Cargo.toml --target-dir target/ros2
+	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink ROS2_PEER=$(CURDIR)/target/ros2/debug/ros2-peer \
+		$(PYTEST) -p conftest ../ros2 $(T)
 
 web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size

@@ -146,6 +146,7 @@ def nodes(start, sim, tmp_path):
         running.ready = ready = json.loads(running.line(0))
         assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]
         running.path, running.address = path, ready["addresses"][0]
+        running.drives = drives
         started.append(running)
         return running
 

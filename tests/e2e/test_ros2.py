@@ -411,9 +411,41 @@ def test_stop_all_stops_motors_and_says_so(node, robot, direct):
         assert abs(direct.rpm()) < 30
 
 
-def test_clear_faults_says_which_motors_have_some_left(node, robot, direct):
-    response = robot.call("/arm1/clear_faults")
-    assert response.success, response
+def test_a_fault_ends_a_motion_until_it_is_cleared_and_commands_begin_again(node, robot, direct, diagnostics):
+    sim = node.drives
+    fault = {"port": f"pty:{sim.st}", "motor": 1, "fault": "OVER_TEMP"}
+    with Publisher(node, **wheel()):
+        turns(direct)
+        sim.do("fault", **fault, hold=True)
+        stands(direct)
+        eventually(lambda: diagnostics("wheel").level == 2, "an error", within=5)
+        assert "OVER_TEMP" in diagnostics("wheel").details["faults"]
+        response = robot.call("/arm1/clear_faults")
+        assert not response.success and response.message.startswith("st0, motor 1: "), response
+        sim.do("fault", **fault, hold=False)
+        response = robot.call("/arm1/clear_faults")
+        assert response.success and response.message == "all motors confirmed", response
+        # The publisher sends on.
+        time.sleep(0.5)
+        assert abs(direct.rpm()) < 30
+    time.sleep(2 * LIVE)
+    eventually(lambda: diagnostics("wheel").level == 0, "no error", within=5)
+    with Publisher(node, **wheel()):
+        turns(direct)
+
+
+def test_a_motor_that_does_not_answer_is_stale_and_has_no_state(node, robot, diagnostics):
+    states = robot.hears("/arm1/joint_states", STATE)
+    eventually(lambda: states and states[-1].name == ["wheel", "arm", "watched"], "all joints", within=20)
+    node.drives.process.send_signal(signal.SIGSTOP)
+    try:
+        eventually(lambda: diagnostics("wheel").level == diagnostics("arm").level == 3, "STALE", within=20)
+        before = len(states)
+        time.sleep(0.3)
+        assert len(states) == before
+    finally:
+        node.drives.process.send_signal(signal.SIGCONT)
+    eventually(lambda: diagnostics("arm").level == 0, "OK", within=30)
 
 
 def test_a_file_that_is_not_possible_is_refused(run, file):

@@ -53,6 +53,12 @@ enum Phase {
     Blocked { why: String, heard: f64 },
 }
 
+impl Phase {
+    fn is_motion(&self, number: u64) -> bool {
+        matches!(self, Phase::Moving { motion, .. } if *motion == number)
+    }
+}
+
 /// What is to be done with a motor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Output {
@@ -151,10 +157,15 @@ impl Commands {
         self.outputs.pop_front()
     }
 
+    /// Whether this motion of a joint has neither failed nor ended.
+    pub fn goes_on(&self, joint: usize, motion: u64) -> bool {
+        self.joints.get(joint).is_some_and(|(_, phase)| phase.is_motion(motion))
+    }
+
     /// A motion failed. With `stops` its motor is stopped.
     pub fn failed(&mut self, now: f64, joint: usize, motion: u64, why: String, stops: bool) {
         let Some((Joint { name, .. }, phase)) = self.joints.get_mut(joint) else { return };
-        if !matches!(*phase, Phase::Moving { motion: own, .. } if own == motion) {
+        if !phase.is_motion(motion) {
             return;
         }
         self.last_refused = Some((now, format!("{name}: {why}")));

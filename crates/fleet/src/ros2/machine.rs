@@ -91,12 +91,16 @@ impl Shared {
         let shared = Arc::new(shared);
         for ((number, (asking, _)), orders) in shared.motors.iter().enumerate().zip(orders) {
             let mover = Mover::new(asking.clone(), Arc::clone(&shared.clock));
-            let failing = Arc::clone(&shared);
-            tokio::spawn(mover.follow(orders, move |order, Failed { why, stops }| {
+            let (asked, failing) = (Arc::clone(&shared), Arc::clone(&shared));
+            let goes_on = move |order: Order| {
+                asked.with(|machine, _| machine.commands.goes_on(number, order.motion))
+            };
+            let failed = move |order: Order, Failed { why, stops }| {
                 failing.with(|machine, now| {
                     machine.commands.failed(now, number, order.motion, why, stops);
                 });
-            }));
+            };
+            tokio::spawn(mover.follow(orders, goes_on, failed));
         }
         shared
     }
@@ -268,9 +272,11 @@ impl Machine {
             .joints()
             .position(|joint| joint.line == *line && joint.motor.number() == *motor);
         let Some(number) = joint else { return };
-        let fault = self.commands.joints().nth(number).and_then(|joint| {
-            self.readings.of(joint)?.faults(joint.motor).filter(|(_, is_present)| *is_present)
-        });
+        let fault = self
+            .commands
+            .joints()
+            .nth(number)
+            .and_then(|joint| self.readings.of(joint)?.faults(joint.motor));
         if let Some((words, _)) = fault {
             self.commands.block(now, Some(number), &words);
         }

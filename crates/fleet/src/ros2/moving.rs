@@ -42,21 +42,29 @@ impl Mover {
         Mover { asking, clock, begun: None, is_started: false }
     }
 
-    /// Carries out orders as they come, and says which motions fail.
+    /// Carries out orders as they come, while their motion goes on, and says which motions fail.
     pub async fn follow(
         mut self,
         mut orders: watch::Receiver<Option<Order>>,
+        goes_on: impl Fn(Order) -> bool,
         failed: impl Fn(Order, Failed),
     ) {
         while orders.changed().await.is_ok() {
             let Some(order) = *orders.borrow_and_update() else { continue };
-            if let Err(why) = self.carry_out(order).await {
+            if let Err(why) = self.carry_out(order, &goes_on).await {
                 failed(order, why);
             }
         }
     }
 
-    async fn carry_out(&mut self, order: Order) -> Result<(), Failed> {
+    async fn carry_out(
+        &mut self,
+        order: Order,
+        goes_on: impl Fn(Order) -> bool,
+    ) -> Result<(), Failed> {
+        if !goes_on(order) {
+            return Ok(());
+        }
         let Some(begin) = self.sent(order) else { return Ok(()) };
         if self.begun.is_none_or(|(motion, _)| motion != order.motion) {
             (self.begun, self.is_started) = (None, false);
@@ -67,7 +75,8 @@ impl Mover {
                 Err(Refusal { message: why, .. }) => return Err(Failed { why, stops: false }),
             }
         }
-        let Some(sent) = self.sent(order) else { return Ok(()) };
+        // A stop before the read of `begin` has ended the motion. One after it is seen by the share.
+        let Some(sent) = self.sent(order).filter(|_| goes_on(order)) else { return Ok(()) };
         let done = match order.reference {
             Reference::Rmd(bytes) => self.asking.rmd(bytes, sent).await.map(drop),
             Reference::Rpm(rpm) => self.turn(rpm, sent).await,

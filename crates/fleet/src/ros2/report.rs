@@ -17,8 +17,8 @@ enum Level {
     Stale = 3,
 }
 
-/// The state of all joints whose values are not older than `age` seconds. An array in which no joint has a
-/// value is empty; otherwise NaN marks a missing value. The stamp is that of the oldest value. `None` without joints.
+/// The state of all joints whose values are not older than `age` seconds. NaN marks a missing value. Without a
+/// torque constant there are no efforts. The stamp is that of the oldest value. `None` without joints.
 pub fn joint_state(
     joints: &[Joint],
     readings: &Readings,
@@ -30,18 +30,16 @@ pub fn joint_state(
     let oldest =
         fresh.iter().filter_map(|(joint, reading)| reading.wall(joint)).reduce(f64::min)?;
     let array = |value: fn(&Reading, &Joint) -> Option<f64>| {
-        let values: Vec<_> = fresh.iter().map(|(joint, reading)| value(reading, joint)).collect();
-        match values.iter().any(Option::is_some) {
-            true => values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect(),
-            false => Vec::new(),
-        }
+        let values = fresh.iter().map(|(joint, reading)| value(reading, joint).unwrap_or(f64::NAN));
+        values.collect::<Vec<_>>()
     };
+    let has_effort = fresh.iter().any(|(joint, _)| joint.effort_nm(0.0).is_some());
     Some(JointState {
         header: header(oldest),
         name: fresh.iter().map(|(joint, _)| joint.name.clone()).collect(),
         position: array(Reading::position),
         velocity: array(Reading::velocity),
-        effort: array(Reading::effort),
+        effort: if has_effort { array(Reading::effort) } else { Vec::new() },
     })
 }
 
@@ -138,4 +136,75 @@ fn pair(key: &str, value: impl ToString) -> KeyValue {
 
 fn header(wall: f64) -> Header {
     Header { stamp: Time::of(wall), frame_id: String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::commands::Rules;
+    use super::super::joint::tests::{joint, lines};
+    use super::super::readings::tests::readings;
+    use super::*;
+
+    fn joints() -> Vec<Joint> {
+        vec![
+            joint("arm", "line=rmd0 motor=1 command=velocity torque_constant_nm_per_a=2"),
+            joint("wheel", "line=st0 motor=1"),
+            joint("away", "line=rmd0 motor=2"),
+        ]
+    }
+
+    /// An error of the arm: the voltage is low.
+    fn values() -> Readings {
+        let arm: &[_] = &[
+            ("multi_turn_angle_degrees", 180.0),
+            ("speed_dps", 360.0),
+            ("iq_amps", 0.5),
+            ("errors", 1.0),
+        ];
+        readings(&[("rmd0", arm), ("st0", &[("SPEED_MEAS", 60.0)])])
+    }
+
+    #[test]
+    fn a_value_that_is_missing_is_nan_and_a_joint_that_is_missing_is_left_out() {
+        let state = joint_state(&joints(), &values(), 100.1, 0.5).unwrap();
+        assert_eq!(state.name, ["arm", "wheel"]);
+        assert_eq!(state.position[0], std::f64::consts::PI);
+        assert!(state.position[1].is_nan());
+        assert_eq!(state.velocity, [std::f64::consts::TAU; 2]);
+        assert_eq!(state.effort[0], 1.0);
+        assert_eq!(state.header.stamp, Time { sec: 1_000_020, nanosec: 500_000_000 });
+        let wheel = joint_state(&joints()[1..2], &values(), 100.1, 0.5).unwrap();
+        assert!(wheel.position[0].is_nan() && wheel.effort.is_empty());
+        assert_eq!(joint_state(&joints(), &values(), 100.6, 0.5), None);
+    }
+
+    fn levels(now: f64, lines: &[Line]) -> Vec<(u8, String)> {
+        let (joints, readings) = (joints(), values());
+        let rules = Rules { time_to_live: 0.2, start_within: 0.2, fresh: 0.5 };
+        let known = Known {
+            node: "arm1",
+            joints: &joints,
+            lines,
+            latched_by: None,
+            readings: &readings,
+            commands: &Commands::new(&joints, rules),
+            now,
+            age: 0.5,
+        };
+        let status = known.diagnostics(1.0).status.into_iter().skip(1);
+        status.map(|status| (status.level.0, status.message)).collect()
+    }
+
+    #[test]
+    fn faults_silence_and_stops_that_failed_have_their_levels() {
+        let (mut lines, level) = (lines(), |now, lines: &_| {
+            levels(now, lines).into_iter().map(|(level, _)| level).collect::<Vec<_>>()
+        });
+        assert_eq!(level(100.1, &lines), [2, 0, 3]);
+        assert_eq!(level(100.6, &lines), [3, 3, 3]);
+        lines[0].unstopped = vec![1];
+        assert_eq!(level(100.6, &lines), [3, 2, 3]);
+        let (_, words) = &levels(100.6, &lines)[1];
+        assert!(words.contains("may be turning"), "{words}");
+    }
 }

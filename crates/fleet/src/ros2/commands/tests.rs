@@ -261,6 +261,15 @@ fn a_motion_that_failed_is_not_tried_again_while_commands_come() {
 }
 
 #[test]
+fn a_motion_goes_on_until_it_fails_or_ends() {
+    let (mut commands, mut publisher) = ready();
+    publisher.send(&mut commands, READ, &wheel(1.0));
+    assert!(commands.goes_on(1, 1) && !commands.goes_on(1, 2) && !commands.goes_on(0, 1));
+    commands.block(READ, None, "stop_all");
+    assert!(!commands.goes_on(1, 1));
+}
+
+#[test]
 fn all_motions_end_when_somebody_stops_all() {
     let (mut commands, mut publisher) = ready();
     publisher.send(&mut commands, READ, &wheel(1.0));
