@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -26,6 +27,8 @@ from rosbags.highlevel import AnyReader  # noqa: E402
 from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
 
+from ruamel.yaml import YAML  # noqa: E402
+
 from robot import DIAGNOSTICS, STATE, TRIGGER, Robot  # noqa: E402
 
 ROUNDS = int(os.environ.get("ROUNDS", "5"))
@@ -35,6 +38,7 @@ PERIOD = 0.02
 #: An exchange, and what a loaded machine takes.
 SLACK = 0.5
 RPM = 2 * math.pi / 60
+EXAMPLE = Path(__file__).parents[2] / "examples/ros2_control"
 FILE = f"""
 [ros2]
 time_to_live_seconds = {LIVE}
@@ -446,6 +450,26 @@ def test_a_motor_that_does_not_answer_is_stale_and_has_no_state(node, robot, dia
     finally:
         node.drives.process.send_signal(signal.SIGCONT)
     eventually(lambda: diagnostics("arm").level == 0, "OK", within=30)
+
+
+def test_the_files_of_the_example_have_the_names_that_the_node_announces(nodes):  # noqa: F811
+    ready = json.loads(nodes("arm1", "--ros2", "--config", EXAMPLE / "node.toml").out[0])["ros2"]
+    control = ElementTree.parse(EXAMPLE / "arm.urdf").getroot().find("ros2_control")
+    params = {param.get("name"): param.text for param in control.findall("hardware/param")}
+    assert [params["joint_commands_topic"]] == ready["obeys"]
+    assert params["joint_states_topic"] in ready["publishes"]
+    assert float(params["trigger_joint_command_threshold"]) < 0
+    assert [joint.get("name") for joint in control.findall("joint")] == ready["joints"]
+    file = (EXAMPLE / "node.toml").read_text()
+    for joint in control.findall("joint"):
+        (command,) = [it.get("name") for it in joint.findall("command_interface")]
+        assert f'command = "{command}"' in file.split(f'name = "{joint.get("name")}"')[1].split("[[")[0]
+        assert {it.get("name") for it in joint.findall("state_interface")} == {"position", "velocity"}
+    controllers = YAML(typ="safe").load(EXAMPLE / "controllers.yaml")
+    parameters = controllers["arm_controller"]["ros__parameters"]
+    assert parameters["joints"] == ready["joints"]
+    rate = controllers["controller_manager"]["ros__parameters"]["update_rate"]
+    assert rate >= 5 / float(file.split("time_to_live_seconds = ")[1].split()[0])
 
 
 def test_a_file_that_is_not_possible_is_refused(run, file):

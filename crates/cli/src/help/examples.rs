@@ -51,6 +51,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("share release", "share release --at unix:./share"),
     ("node", "node -p ./st0 -p slcan:./can0 --name arm1"),
     ("node", "node -p sim: --name arm1 --json"),
+    ("node", "node -p sim: --name arm1 --ros2"),
     ("fleet", "fleet list"),
     ("fleet", "fleet stop-all"),
     ("fleet list", "fleet list"),

@@ -42,7 +42,7 @@ impl Mover {
         Mover { asking, clock, begun: None, is_started: false }
     }
 
-    /// Carries out orders as they come, while their motion goes on, and says which motions fail.
+    /// Carries out orders as they come, while their motion goes on. Reports the motions that fail.
     pub async fn follow(
         mut self,
         mut orders: watch::Receiver<Option<Order>>,
