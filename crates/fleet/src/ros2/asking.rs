@@ -1,7 +1,7 @@
 //! What a node asks of its motors through its share.
 
 use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, ReadStatus, Status as RmdStatus};
-use motorlink_proto::st::{Command, Flags, MAX_PAYLOAD, RegisterId, Request, Status};
+use motorlink_proto::st::{Command, Flags, MAX_PAYLOAD, RegisterId, Request, Starting, Status};
 use motorlink_telemetry::share::message::{Answer, Ask, MotorName, Reason, StoppedMotor};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
@@ -64,6 +64,20 @@ impl Asking {
         Ok((Status::from(status as u8), Flags(flags as u32)))
     }
 
+    /// Checks that a START_MOTOR had an effect: a drive acknowledges it in any case.
+    pub async fn started(&self) -> Result<(), Refusal> {
+        let mut starting = Starting::default();
+        let _ = starting.replied(0);
+        while let Request::GetRegister(register) = starting.request() {
+            let sent = Sent { time_to_live: READ, continues: true };
+            let bits = self.register(register, sent).await?;
+            if let Some(result) = starting.replied(bits) {
+                return result.map(drop).map_err(|why| refused(why.to_string()));
+            }
+        }
+        Ok(())
+    }
+
     /// Acknowledges the faults. Returns the text of those that remain.
     pub async fn clear_faults(&self) -> Result<Option<String>, Refusal> {
         let sent = Sent { time_to_live: READ, continues: false };
@@ -99,6 +113,11 @@ impl Asking {
         let message = "the reply does not fit the request".to_owned();
         Refusal { reason: Reason::Line, message, code: None }
     }
+}
+
+/// What a drive refused.
+pub fn refused(message: String) -> Refusal {
+    Refusal { reason: Reason::Refused, message, code: None }
 }
 
 /// Stops a motor, or all that the lines can have. Gives how they took it.

@@ -3,29 +3,38 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::st::{Command, NotStarted, Ramp, RegisterId, Request, Starting, Status};
+use motorlink_proto::st::{Command, NotStarted, Ramp, Request, Status};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::Refusal;
 use tokio::sync::watch;
 
-use super::asking::{Asking, Sent};
+use super::asking::{Asking, Sent, refused};
 use super::commands::Order;
 use super::joint::Reference;
 use crate::clock::Clock;
 
 /// How long a ramp of an ST drive to the next speed takes, in ms.
 const RAMP_MS: u16 = 50;
-/// A motion fails if its motor has acknowledged no command for this time, in seconds.
+/// A motion fails if its motor acknowledges no command for this time, in seconds.
 const PATIENCE: f64 = 0.5;
 
 /// Moves the motor of a joint.
 pub struct Mover {
-    pub(super) asking: Asking,
-    pub(super) clock: Arc<dyn Clock>,
-    /// The motion that has begun, and when its motor acknowledged a command last.
-    begun: Option<(u64, f64)>,
-    /// Whether an ST motor was started in this motion.
+    asking: Asking,
+    clock: Arc<dyn Clock>,
+    /// The last motion.
+    motion: Option<Motion>,
+}
+
+struct Motion {
+    number: u64,
+    /// Whether commands follow a read that showed that the motor can be moved.
+    is_begun: bool,
+    /// Whether a start was sent to an ST motor, and whether it had an effect.
+    may_turn: bool,
     is_started: bool,
+    /// When the motion began, or the motor acknowledged a command last.
+    acknowledged: f64,
 }
 
 /// A motion that failed.
@@ -39,7 +48,7 @@ pub struct Failed {
 impl Mover {
     /// One that has moved nothing.
     pub fn new(asking: Asking, clock: Arc<dyn Clock>) -> Self {
-        Mover { asking, clock, begun: None, is_started: false }
+        Mover { asking, clock, motion: None }
     }
 
     /// Carries out orders as they come, while their motion goes on. Reports the motions that fail.
@@ -51,47 +60,55 @@ impl Mover {
     ) {
         while orders.changed().await.is_ok() {
             let Some(order) = *orders.borrow_and_update() else { continue };
-            if let Err(why) = self.carry_out(order, &goes_on).await {
-                failed(order, why);
+            let mut motion =
+                self.motion.take().filter(|it| it.number == order.motion).unwrap_or(Motion {
+                    number: order.motion,
+                    is_begun: false,
+                    may_turn: false,
+                    is_started: false,
+                    acknowledged: self.clock.now(),
+                });
+            let result = self.carry_out(order, &mut motion, &goes_on).await;
+            let now = self.clock.now();
+            match result {
+                Ok(true) => motion.acknowledged = now,
+                Ok(false) => {}
+                Err(why) if is_transient(&why) && now - motion.acknowledged < PATIENCE => {}
+                Err(Refusal { reason, message: why, .. }) => {
+                    let stops = motion.is_begun && !is_of_others(reason);
+                    failed(order, Failed { why, stops });
+                }
             }
+            self.motion = Some(motion);
         }
     }
 
+    /// Gives whether the motor has acknowledged the command.
     async fn carry_out(
-        &mut self,
+        &self,
         order: Order,
+        motion: &mut Motion,
         goes_on: impl Fn(Order) -> bool,
-    ) -> Result<(), Failed> {
+    ) -> Result<bool, Refusal> {
         if !goes_on(order) {
-            return Ok(());
+            return Ok(false);
         }
-        let Some(begin) = self.sent(order) else { return Ok(()) };
-        if self.begun.is_none_or(|(motion, _)| motion != order.motion) {
-            (self.begun, self.is_started) = (None, false);
-            let sent = Sent { continues: false, ..begin };
-            match self.begin(order, sent).await {
-                Ok(true) => self.begun = Some((order.motion, self.clock.now())),
-                Ok(false) => return Ok(()),
-                Err(Refusal { message: why, .. }) => return Err(Failed { why, stops: false }),
+        let Some(sent) = self.sent(order) else { return Ok(false) };
+        if !motion.is_begun {
+            motion.is_begun = self.begin(order, Sent { continues: false, ..sent }).await?;
+            // A stop before the read of `begin` has ended the motion. One after it is seen by the share.
+            if !motion.is_begun || !goes_on(order) {
+                return Ok(false);
             }
         }
-        // A stop before the read of `begin` has ended the motion. One after it is seen by the share.
-        let Some(sent) = self.sent(order).filter(|_| goes_on(order)) else { return Ok(()) };
-        let done = match order.reference {
-            Reference::Rmd(bytes) => self.asking.rmd(bytes, sent).await.map(drop),
-            Reference::Rpm(rpm) => self.turn(rpm, sent).await,
-        };
-        let now = self.clock.now();
-        match (done, &mut self.begun) {
-            (Ok(()), Some((_, acknowledged))) => *acknowledged = now,
-            (Err(why), Some((_, acknowledged)))
-                if is_transient(&why) && now - *acknowledged < PATIENCE => {}
-            (Err(Refusal { reason, message: why, .. }), _) => {
-                return Err(Failed { why, stops: !is_of_others(reason) });
-            }
-            (Ok(()), None) => {}
+        match order.reference {
+            Reference::Rmd(bytes) => match self.sent(order) {
+                Some(sent) => self.asking.rmd(bytes, sent).await.map(|_| true),
+                None => Ok(false),
+            },
+            Reference::Rpm(0) => self.rest(motion).await,
+            Reference::Rpm(rpm) => self.turn(order, rpm, motion).await,
         }
-        Ok(())
     }
 
     /// How a command of an order is sent. `None`: it is too late.
@@ -120,41 +137,30 @@ impl Mover {
         }
     }
 
-    /// A speed of an ST motor: a start, a ramp or a stop.
-    async fn turn(&mut self, rpm: i32, sent: Sent) -> Result<(), Refusal> {
-        if rpm == 0 {
-            // The next speed begins again.
-            self.begun = None;
-            return match std::mem::take(&mut self.is_started) {
-                true => self.asking.stop().await.map_or(Ok(()), |why| Err(refused(why))),
-                false => Ok(()),
-            };
-        }
-        let ramp = Ramp { speed_rpm: rpm, duration_ms: RAMP_MS };
-        self.asking.st(&Request::SetRamp(ramp), sent).await?;
-        if self.is_started {
-            return Ok(());
-        }
-        self.asking.st(&Request::ExecuteCommand(Command::StartMotor), sent).await?;
-        self.is_started = true;
-        // The drive acknowledges a start in any case.
-        let mut starting = Starting::default();
-        let _ = starting.replied(0);
-        loop {
-            let register = match starting.request() {
-                Request::GetRegister(register) => register,
-                _ => RegisterId::STATUS,
-            };
-            let bits = self.asking.register(register, sent).await?;
-            if let Some(result) = starting.replied(bits) {
-                return result.map(drop).map_err(|why| refused(why.to_string()));
-            }
+    /// Stops an ST motor. The next speed begins again.
+    async fn rest(&self, motion: &mut Motion) -> Result<bool, Refusal> {
+        (motion.is_begun, motion.is_started) = (false, false);
+        match std::mem::take(&mut motion.may_turn) {
+            true => self.asking.stop().await.map_or(Ok(true), |why| Err(refused(why))),
+            false => Ok(true),
         }
     }
-}
 
-fn refused(message: String) -> Refusal {
-    Refusal { reason: Reason::Refused, message, code: None }
+    /// Turns an ST motor: a ramp, and a start if it was not started.
+    async fn turn(&self, order: Order, rpm: i32, motion: &mut Motion) -> Result<bool, Refusal> {
+        let ramp = Request::SetRamp(Ramp { speed_rpm: rpm, duration_ms: RAMP_MS });
+        let Some(sent) = self.sent(order) else { return Ok(false) };
+        self.asking.st(&ramp, sent).await?;
+        if motion.is_started {
+            return Ok(true);
+        }
+        let Some(sent) = self.sent(order) else { return Ok(false) };
+        motion.may_turn = true;
+        self.asking.st(&Request::ExecuteCommand(Command::StartMotor), sent).await?;
+        self.asking.started().await?;
+        motion.is_started = true;
+        Ok(true)
+    }
 }
 
 /// Whether the next command may succeed without anybody's help.
