@@ -89,7 +89,7 @@ async fn velocity(
     let node = context.create_node("commands").build()?;
     let publisher = node.create_pub::<JointState>(topic).build()?;
     let mut command = JointState { name: vec![joint.to_owned()], ..JointState::default() };
-    command.velocity = vec![value].into();
+    command.velocity = vec![value];
     let (end, mut sent) = (Instant::now() + time, 0);
     while Instant::now() < end {
         publisher.async_publish(&command).await?;

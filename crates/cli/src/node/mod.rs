@@ -11,7 +11,7 @@ use motorlink_fleet::clock::Boot;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::{Network, NetworkError};
 use motorlink_fleet::node::{Node, NodeError, Options};
-use motorlink_fleet::ros2::Ros2;
+use motorlink_fleet::ros2::{Ros2, StartError};
 use motorlink_fleet::site::Role;
 use motorlink_telemetry::share::message::Line;
 use motorlink_telemetry::share::server::Server;
@@ -210,6 +210,7 @@ impl From<NodeError> for Failure {
             NodeError::Unknown(_) => failure.trying(
                 "copy router.json5 of `fleet init` to the router, and start the router again",
             ),
+            NodeError::Ros2(StartError::Joint(why)) => Failure::usage(why),
             NodeError::NameTaken(_) => failure.trying("give each node a --name of its own"),
             NodeError::Network(NetworkError::Nobody(_)) => {
                 failure.trying("is a router or a node with --listen there?")

@@ -21,7 +21,7 @@ use zenoh::liveliness::LivelinessToken;
 use crate::clock::Clock;
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
-use crate::ros2::{Ros2, Settings};
+use crate::ros2::{Ros2, Settings, StartError};
 use common::Common;
 
 /// The longest time until others see a node.
@@ -73,8 +73,8 @@ pub enum NodeError {
     #[error("the share of the node: {0}")]
     Share(#[from] std::io::Error),
     /// ROS 2.
-    #[error("ROS 2: {0}")]
-    Ros2(std::io::Error),
+    #[error(transparent)]
+    Ros2(#[from] StartError),
 }
 
 impl Node {
@@ -119,7 +119,7 @@ impl Node {
                 let Common { name, share, clock, zenoh, .. } = &*common;
                 let (name, clock) = (name.as_str(), Arc::clone(clock));
                 let started = Ros2::start(&settings, name, share, clock, zenoh);
-                Some(runtime.block_on(started).map_err(NodeError::Ros2)?)
+                Some(runtime.block_on(started)?)
             }
         };
         Ok(Node { common, addresses, ros2, _alive: alive, runtime: Some(runtime) })

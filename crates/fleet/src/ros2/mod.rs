@@ -59,6 +59,17 @@ pub struct Ros2 {
     _tokens: Vec<LivelinessToken>,
 }
 
+/// Why a node does not speak to ROS 2 machines.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// A joint of the file is not possible.
+    #[error("{0}")]
+    Joint(String),
+    /// The share or the network.
+    #[error("ROS 2: {0}")]
+    Failed(#[from] io::Error),
+}
+
 impl Ros2 {
     /// Begins, as a program at the share of the node.
     ///
@@ -70,13 +81,13 @@ impl Ros2 {
         share: &Arc<dyn Address>,
         clock: Arc<dyn Clock>,
         zenoh: &Zenoh,
-    ) -> io::Result<Self> {
+    ) -> Result<Self, StartError> {
         let (program, mut listener, _) = Program::connect(share, "ros2").await?;
         let lines = timeout(LINES, machine::lines(&program, &mut listener))
             .await
             .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
         let joints = settings.joint.iter().map(|joint| joint.find(&lines));
-        let joints = joints.collect::<Result<Vec<_>, _>>().map_err(io::Error::other)?;
+        let joints = joints.collect::<Result<Vec<_>, _>>().map_err(StartError::Joint)?;
         let has_commands = joints.iter().any(|joint| joint.command.is_some());
         let names = joints.iter().map(|joint| joint.name.clone()).collect();
         let fresh = FRESH.max(FRESH_PERIODS / settings.rate_hz);

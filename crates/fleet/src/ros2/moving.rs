@@ -51,7 +51,7 @@ impl Mover {
         Mover { asking, clock, motion: None }
     }
 
-    /// Carries out orders as they come, while their motion goes on. Reports the motions that fail.
+    /// Carries out orders in their order, while their motion goes on. Reports the motions that fail.
     pub async fn follow(
         mut self,
         mut orders: watch::Receiver<Option<Order>>,
