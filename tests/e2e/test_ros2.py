@@ -446,6 +446,19 @@ def test_a_latch_holds_until_commands_begin_again(node, direct, run, diagnostics
         quiet(direct)
 
 
+def test_a_latch_without_a_stop_and_a_program_that_takes_the_motor_stop_it(node, direct, run):
+    with Publisher(node, **wheel()):
+        turns(direct)
+        run("fleet", "latch", **via(node)).ended(0)
+        stands(direct)
+        run("fleet", "release", **via(node)).ended(0)
+    time.sleep(2 * LIVE)
+    with Publisher(node, **wheel()):
+        turns(direct)
+        assert direct.ask("take", motor={"line": "st0", "motor": 1})["kind"] == "answer"
+        stands(direct)
+
+
 def test_another_program_that_holds_the_motor_is_not_disturbed(node, direct, diagnostics):
     assert direct.command("st0", 1, 7, *struct.pack("<iH", 600, 100))["kind"] == "answer"
     assert direct.command("st0", 1, 3, 1)["kind"] == "answer"

@@ -30,7 +30,7 @@ pub struct Rules {
 #[derive(Debug)]
 pub struct Commands {
     rules: Rules,
-    joints: Vec<(Joint, Phase)>,
+    joints: Vec<Commanded>,
     publishers: BTreeMap<Gid, Pace>,
     /// Who commands, and when it did last.
     holder: Option<(Gid, f64)>,
@@ -41,14 +41,20 @@ pub struct Commands {
     last_refused: Option<(f64, String)>,
 }
 
+#[derive(Debug)]
+struct Commanded {
+    joint: Joint,
+    phase: Phase,
+    /// Stops whose end is not known. Until then no motion begins: they would end it later.
+    stops: u32,
+}
+
 #[derive(Debug, Clone, PartialEq)]
 enum Phase {
-    /// No command has come for the time to live.
+    /// No command has come for the time to live, or none at all.
     Resting,
     /// The last command came at this time.
     Moving { motion: u64, heard: f64 },
-    /// Its stop is not confirmed yet.
-    Stopping,
     /// It takes no command until none has come for the time to live.
     Blocked { why: String, heard: f64 },
 }
@@ -98,7 +104,10 @@ impl Commands {
     pub fn new(joints: &[Joint], rules: Rules) -> Self {
         Commands {
             rules,
-            joints: joints.iter().map(|joint| (joint.clone(), Phase::Resting)).collect(),
+            joints: joints
+                .iter()
+                .map(|joint| Commanded { joint: joint.clone(), phase: Phase::Resting, stops: 0 })
+                .collect(),
             publishers: BTreeMap::new(),
             holder: None,
             motions: 0,
@@ -129,25 +138,25 @@ impl Commands {
 
     /// The time has passed. Call it at [`wake`](Self::wake) at the latest.
     pub fn tick(&mut self, now: f64) {
-        for (number, (_, phase)) in self.joints.iter_mut().enumerate() {
-            match *phase {
-                Phase::Moving { heard, .. } if now - heard >= self.rules.time_to_live => {
-                    *phase = Phase::Stopping;
-                    self.outputs.push_back(Output::Stop(number));
-                }
-                Phase::Blocked { heard, .. } if now - heard >= self.rules.time_to_live => {
-                    *phase = Phase::Resting;
-                }
-                _ => {}
+        for number in 0..self.joints.len() {
+            let phase = &mut self.joints[number].phase;
+            let is_moving = match *phase {
+                Phase::Moving { heard, .. } if now - heard >= self.rules.time_to_live => true,
+                Phase::Blocked { heard, .. } if now - heard >= self.rules.time_to_live => false,
+                _ => continue,
+            };
+            *phase = Phase::Resting;
+            if is_moving {
+                self.stop(number);
             }
         }
     }
 
     /// When something happens without an input.
     pub fn wake(&self) -> Option<f64> {
-        let heard = self.joints.iter().filter_map(|(_, phase)| match phase {
-            Phase::Moving { heard, .. } | Phase::Blocked { heard, .. } => Some(*heard),
-            Phase::Resting | Phase::Stopping => None,
+        let heard = self.joints.iter().filter_map(|it| match it.phase {
+            Phase::Moving { heard, .. } | Phase::Blocked { heard, .. } => Some(heard),
+            Phase::Resting => None,
         });
         heard.reduce(f64::min).map(|heard| heard + self.rules.time_to_live)
     }
@@ -159,28 +168,34 @@ impl Commands {
 
     /// Whether this motion of a joint has neither failed nor ended.
     pub fn goes_on(&self, joint: usize, motion: u64) -> bool {
-        self.joints.get(joint).is_some_and(|(_, phase)| phase.is_motion(motion))
+        self.joints.get(joint).is_some_and(|it| it.phase.is_motion(motion))
     }
 
     /// A motion failed. With `stops` its motor is stopped.
     pub fn failed(&mut self, now: f64, joint: usize, motion: u64, why: String, stops: bool) {
-        let Some((Joint { name, .. }, phase)) = self.joints.get_mut(joint) else { return };
-        if !phase.is_motion(motion) {
+        if !self.goes_on(joint, motion) {
             return;
         }
+        let Commanded { joint: Joint { name, .. }, phase, .. } = &mut self.joints[joint];
         self.last_refused = Some((now, format!("{name}: {why}")));
         *self.refused.entry("failed").or_default() += 1;
         *phase = Phase::Blocked { why, heard: now };
         if stops {
-            self.outputs.push_back(Output::Stop(joint));
+            self.stop(joint);
         }
+    }
+
+    fn stop(&mut self, joint: usize) {
+        self.joints[joint].stops += 1;
+        self.outputs.push_back(Output::Stop(joint));
     }
 
     /// All motions end: somebody stops their motors. `joint` is one, or all.
     pub fn block(&mut self, now: f64, joint: Option<usize>, why: &str) {
         let numbers = joint.map_or(0..self.joints.len(), |it| it..it + 1);
         for number in numbers {
-            if let Some((_, Phase::Moving { motion, .. })) = self.joints.get(number) {
+            if let Some(Phase::Moving { motion, .. }) = self.joints.get(number).map(|it| &it.phase)
+            {
                 self.failed(now, number, *motion, why.to_owned(), true);
             }
         }
@@ -188,27 +203,27 @@ impl Commands {
 
     /// How a stop went.
     pub fn stopped(&mut self, now: f64, joint: usize, failure: Option<String>) {
-        let Some((_, phase)) = self.joints.get_mut(joint) else { return };
-        match failure {
-            Some(why) => *phase = Phase::Blocked { why, heard: now },
-            None if *phase == Phase::Stopping => *phase = Phase::Resting,
-            None => {}
+        let Some(commanded) = self.joints.get_mut(joint) else { return };
+        commanded.stops = commanded.stops.saturating_sub(1);
+        if let Some(why) = failure {
+            commanded.phase = Phase::Blocked { why, heard: now };
         }
     }
 
     /// The joints, in the order of their numbers.
     pub fn joints(&self) -> impl Iterator<Item = &Joint> {
-        self.joints.iter().map(|(joint, _)| joint)
+        self.joints.iter().map(|it| &it.joint)
     }
 
     /// How a joint takes commands. `None`: it is read only.
     pub fn phase(&self, name: &str) -> Option<Shown<'_>> {
-        let (joint, phase) = self.joints.iter().find(|(joint, _)| joint.name == name)?;
+        let Commanded { joint, phase, stops } =
+            self.joints.iter().find(|it| it.joint.name == name)?;
         joint.command?;
         let (words, is_blocked) = match phase {
+            Phase::Resting if *stops > 0 => ("stopping", false),
             Phase::Resting => ("at rest", false),
             Phase::Moving { .. } => ("moving", false),
-            Phase::Stopping => ("stopping", false),
             Phase::Blocked { why, .. } => (why.as_str(), true),
         };
         Some(Shown { words, is_blocked })
@@ -241,7 +256,7 @@ impl Commands {
         let wanted = self.wanted(payload)?;
         // While commands come, a blocked joint stays blocked.
         for (number, ..) in &wanted {
-            if let Phase::Blocked { heard, .. } = &mut self.joints[*number].1 {
+            if let Phase::Blocked { heard, .. } = &mut self.joints[*number].phase {
                 *heard = now;
             }
         }
@@ -250,18 +265,18 @@ impl Commands {
             self.permit(now, *number, *mode, *value, readings)?;
         }
         let references = wanted.iter().map(|(number, mode, value)| {
-            self.joints[*number].0.reference(*mode, *value).map_err(|why| ("bad_value", why))
+            self.joints[*number].joint.reference(*mode, *value).map_err(|why| ("bad_value", why))
         });
         let references: Vec<_> = references.collect::<Result<_, _>>()?;
         for ((joint, ..), reference) in wanted.into_iter().zip(references) {
-            let motion = match self.joints[joint].1 {
+            let motion = match self.joints[joint].phase {
                 Phase::Moving { motion, .. } => motion,
                 _ => {
                     self.motions += 1;
                     self.motions
                 }
             };
-            self.joints[joint].1 = Phase::Moving { motion, heard: now };
+            self.joints[joint].phase = Phase::Moving { motion, heard: now };
             let until = now + self.rules.time_to_live;
             self.outputs.push_back(Output::Send(Order { joint, motion, reference, until }));
         }
@@ -317,12 +332,12 @@ impl Commands {
         }
         let mut known = BTreeSet::new();
         let wanted = names.iter().enumerate().map(|(at, name)| {
-            let number = self.joints.iter().position(|(joint, _)| joint.name == *name);
+            let number = self.joints.iter().position(|it| it.joint.name == *name);
             let number = number.ok_or_else(|| ("unknown_joint", format!("no joint {name:?}")))?;
             if !known.insert(number) {
                 return Err(("joint_twice", format!("{name} twice in one sample")));
             }
-            let Some(mode) = self.joints[number].0.command else {
+            let Some(mode) = self.joints[number].joint.command else {
                 return Err(("read_only_joint", format!("{name} has no command in the file")));
             };
             let (array, what) = match mode {
@@ -360,15 +375,17 @@ impl Commands {
         value: f64,
         readings: &Readings,
     ) -> Result<(), Refused> {
-        let (joint, phase) = &self.joints[number];
+        let Commanded { joint, phase, stops } = &self.joints[number];
         let name = &joint.name;
         match phase {
             Phase::Moving { .. } => return Ok(()),
-            Phase::Stopping => return Err(("stopping", format!("{name} is still being stopped"))),
             Phase::Blocked { why, .. } => {
                 let time_to_live = self.rules.time_to_live;
                 let why = format!("{name}: {why}; send nothing for {time_to_live} s, then start");
                 return Err(("blocked", why));
+            }
+            Phase::Resting if *stops > 0 => {
+                return Err(("stopping", format!("{name} is still being stopped")));
             }
             Phase::Resting => {}
         }

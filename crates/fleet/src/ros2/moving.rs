@@ -30,8 +30,9 @@ struct Motion {
     number: u64,
     /// Whether commands follow a read that showed that the motor can be moved.
     is_begun: bool,
-    /// Whether a start was sent to an ST motor, and whether it had an effect.
-    may_turn: bool,
+    /// Whether a command may have moved the motor.
+    may_move: bool,
+    /// Whether the start of an ST motor had an effect.
     is_started: bool,
     /// When the motion began, or the motor acknowledged a command last.
     acknowledged: f64,
@@ -64,7 +65,7 @@ impl Mover {
                 self.motion.take().filter(|it| it.number == order.motion).unwrap_or(Motion {
                     number: order.motion,
                     is_begun: false,
-                    may_turn: false,
+                    may_move: false,
                     is_started: false,
                     acknowledged: self.clock.now(),
                 });
@@ -74,9 +75,8 @@ impl Mover {
                 Ok(true) => motion.acknowledged = now,
                 Ok(false) => {}
                 Err(why) if is_transient(&why) && now - motion.acknowledged < PATIENCE => {}
-                Err(Refusal { reason, message: why, .. }) => {
-                    let stops = motion.is_begun && !is_of_others(reason);
-                    failed(order, Failed { why, stops });
+                Err(Refusal { message: why, .. }) => {
+                    failed(order, Failed { why, stops: motion.may_move });
                 }
             }
             self.motion = Some(motion);
@@ -103,7 +103,11 @@ impl Mover {
         }
         match order.reference {
             Reference::Rmd(bytes) => match self.sent(order) {
-                Some(sent) => self.asking.rmd(bytes, sent).await.map(|_| true),
+                Some(sent) => {
+                    let result = self.asking.rmd(bytes, sent).await;
+                    motion.may_move |= result.as_ref().map_or_else(may_be_sent, |_| true);
+                    result.map(|_| true)
+                }
                 None => Ok(false),
             },
             Reference::Rpm(0) => self.rest(motion).await,
@@ -140,7 +144,7 @@ impl Mover {
     /// Stops an ST motor. The next speed begins again.
     async fn rest(&self, motion: &mut Motion) -> Result<bool, Refusal> {
         (motion.is_begun, motion.is_started) = (false, false);
-        match std::mem::take(&mut motion.may_turn) {
+        match std::mem::take(&mut motion.may_move) {
             true => self.asking.stop().await.map_or(Ok(true), |why| Err(refused(why))),
             false => Ok(true),
         }
@@ -155,7 +159,7 @@ impl Mover {
             return Ok(true);
         }
         let Some(sent) = self.sent(order) else { return Ok(false) };
-        motion.may_turn = true;
+        motion.may_move = true;
         self.asking.st(&Request::ExecuteCommand(Command::StartMotor), sent).await?;
         self.asking.started().await?;
         motion.is_started = true;
@@ -169,7 +173,8 @@ fn is_transient(why: &Refusal) -> bool {
     matches!(why.reason, Busy | Expired | Line | Silent | Unconfirmed | Unheard)
 }
 
-/// Whether somebody else has stopped the motor, or moves it.
-fn is_of_others(reason: Reason) -> bool {
-    matches!(reason, Reason::Held | Reason::Latched | Reason::Overtaken | Reason::Displaced)
+/// Whether the drive may have executed a command that was refused.
+fn may_be_sent(why: &Refusal) -> bool {
+    use Reason::{Busy, Expired, Held, Latched, Overtaken, Usage};
+    !matches!(why.reason, Busy | Expired | Held | Latched | Overtaken | Usage)
 }

@@ -293,6 +293,22 @@ fn a_stop_that_failed_is_said() {
 }
 
 #[test]
+fn no_motion_begins_before_the_end_of_a_stop_is_known() {
+    let (mut commands, mut publisher) = ready();
+    publisher.send(&mut commands, READ, &wheel(1.0));
+    commands.failed(READ + 0.01, 1, 1, "a fault".to_owned(), true);
+    outputs(&mut commands);
+    // It is blocked no more, and its stop is still under way.
+    let later = READ + 0.01 + LIVE + 1e-3;
+    publisher.send(&mut commands, later, &wheel(1.0));
+    assert_eq!(outputs(&mut commands), []);
+    assert_eq!(commands.phase("wheel").unwrap().words, "stopping");
+    commands.stopped(later, 1, None);
+    publisher.send(&mut commands, later + 0.02, &wheel(1.0));
+    assert!(sends(&outputs(&mut commands)[0]));
+}
+
+#[test]
 fn publishers_without_end_are_forgotten() {
     let mut commands = commands();
     for number in 0..=u8::MAX {
