@@ -52,7 +52,7 @@ impl Mover {
         Mover { asking, clock, motion: None }
     }
 
-    /// Carries out orders in their order, while their motion goes on. Reports the motions that fail.
+    /// Carries out the newest order, again and again, if its motion goes on. Reports motions that fail.
     pub async fn follow(
         mut self,
         mut orders: watch::Receiver<Option<Order>>,
