@@ -77,7 +77,7 @@ def file(tmp_path):
 
 
 @pytest.fixture
-def node(nodes, file):  # noqa: F811
+def node(nodes, file):
     """A node for ROS 2 with the name arm1, a wheel and an arm."""
     return nodes("arm1", "--ros2", "--config", file)
 
@@ -524,7 +524,7 @@ def test_a_motor_that_does_not_answer_is_stale_and_has_no_state(node, robot, dia
     eventually(lambda: diagnostics("arm").level == 0, "OK", within=30)
 
 
-def test_the_files_of_the_example_have_the_names_that_the_node_announces(nodes):  # noqa: F811
+def test_the_files_of_the_example_have_the_names_that_the_node_announces(nodes):
     ready = json.loads(nodes("arm1", "--ros2", "--config", EXAMPLE / "node.toml").out[0])["ros2"]
     control = ElementTree.parse(EXAMPLE / "arm.urdf").getroot().find("ros2_control")
     params = {param.get("name"): param.text for param in control.findall("hardware/param")}

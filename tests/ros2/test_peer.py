@@ -10,14 +10,13 @@ import pytest
 
 from program import eventually
 from sharing import Client, event
-from test_node import nodes  # noqa: F401
 from test_ros2 import FILE, RPM, angle, stands
 
 PEER = os.environ.get("ROS2_PEER")
 
 
 @pytest.fixture
-def node(nodes, tmp_path):  # noqa: F811
+def node(nodes, tmp_path):
     file = tmp_path / "node.toml"
     file.write_text(FILE)
     return nodes("arm1", "--ros2", "--config", file)
