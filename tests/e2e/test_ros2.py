@@ -266,7 +266,8 @@ def test_a_motor_stops_when_its_publisher_is_lost(node, direct, how):
 def test_an_arm_follows_positions_and_stops_with_its_publisher(node, robot, direct):
     states = robot.hears("/arm1/joint_states", STATE)
     command = robot.commands()
-    eventually(lambda: states, "a state", within=20)
+    # The first states may have no value yet.
+    eventually(lambda: states and math.isfinite(states[-1].position[1]), "a position", within=20)
     began, end = states[-1].position[1], time.monotonic() + 20
     # A program that has to wait for the machine begins again where the arm is.
     while states[-1].position[1] < began + 0.5:

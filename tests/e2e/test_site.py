@@ -94,7 +94,7 @@ def hears_events(site, session, who):
 
 
 def hears_all(site, session, who):
-    return hears(session, f"{ROOT}/**", within=PAUSE)
+    return hears(session, f"{ROOT}/**", within=2.2)
 
 
 def joins_to_see(site, session, who):
