@@ -44,7 +44,7 @@ LOAD ?= 4
 SECONDS ?= 60
 
 .PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
-.PHONY: ros2 install-c pictures semver oldest fmt clean toolchain nightly packages board-target
+.PHONY: ros2 fleet-scale fleet-faults install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -236,6 +236,16 @@ view: web ## how old and how smooth what the page draws is, and its memory
 	-@tests/install browser
 	$(CARGO) build --release --locked -p motorlink-cli
 	cd web && MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure tests/view
+
+# SECONDS=60 of each size. MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md.
+fleet-scale: $(VENV)/ready ## 10 to 1000 simulated drives in nodes: losses, latency, CPU
+	$(CARGO) build --release --locked -p motorlink-cli
+	cd benchmarks/fleet && SECONDS=$(SECONDS) $(VENV)/bin/python scale.py
+
+# ROUNDS=30 of each fault. T="router cut" runs some of them.
+fleet-faults: $(VENV)/ready ## 20 min: what stops and what is lost when parts of a fleet fail
+	$(CARGO) build --release --locked -p motorlink-cli
+	cd benchmarks/fleet && $(VENV)/bin/python faults.py $(T)
 
 pictures: web $(VENV)/ready ## draws scenarios (docs/pictures) and screens of the program (docs/*.svg)
 	mkdir -p docs/pictures

@@ -19,7 +19,7 @@ from sharing import Client, samples
 
 SECONDS = float(os.environ.get("SECONDS", "60"))
 #: Nodes, and drives of each.
-SIZES = [(1, 10), (1, 100), (10, 10), (10, 100)]
+SIZES = [tuple(map(int, it.split("x"))) for it in os.environ.get("SIZES", "1x10 1x100 10x10 10x100").split()]
 #: How often nodes publish, and how often the recorder reads, in seconds.
 PERIOD = float(os.environ.get("PERIOD", "1"))
 #: The most drives of a port: 2 motors of an ST drive, the others on a CAN bus.

@@ -154,6 +154,15 @@ def test_the_table_has_all_drives_and_sums_of_nodes(run, via, arms, watchers):
     assert max(map(len, text.splitlines())) <= 80
 
 
+def test_a_node_that_does_not_answer_is_not_left_out(run, via, arms):
+    os.kill(arms[1].process.pid, signal.SIGSTOP)
+    try:
+        table = run("fleet", "watch", *via, "--once").ended(3)
+    finally:
+        os.kill(arms[1].process.pid, signal.SIGCONT)
+    assert table.out.startswith("1 node, 6 drives") and "no answer of arm2" in table.err
+
+
 def test_the_table_on_the_screen_has_keys(motorlink, via, arms):
     terminal = Terminal([motorlink, "fleet", "watch", *via], 80, 24)
     try:
@@ -186,6 +195,9 @@ def test_a_command_is_for_all_motors_of_its_kind(run, via, arms):
     assert all(line.startswith("arm2/rmd0/2: ") for line in text.ended(0).out.splitlines())
     refused = run("fleet", "command", *via, "--", "st", "start").ended(2)
     assert "`start` is not for a fleet" in refused.err
+    # The motor that is named is the motor that it is for.
+    for words in ("st stop -p sim:", "st stop -m 2", "st get SPEED_MEAS --port=sim:", "rmd stop --id 1", "rmd stop --all"):
+        assert "is not for a fleet" in run("fleet", "command", *via, "--", *words.split()).ended(2).err
     missing = run("fleet", "command", *via, "--node", "arm9", "--", "st", "info").ended(3)
     assert "no node arm9" in missing.err
     failed = run("fleet", "command", *via, "--", "st", "get", "PFC_I_KP").ended(1)
@@ -198,6 +210,8 @@ def test_settings_of_siblings_are_compared(run, via, arms):
     port = f"zenoh:arm2/st0?via={arms[0].address}"
     run("st", "-p", port, "set", "SPEED_KP", "300").ended(0)
     [one] = check(run(*words, "--json").ended(1).out)
+    alone = run("fleet", "settings", "diff", *via, "--node", "arm1", "--name", "/st0/1").ended(3)
+    assert "nothing to compare with" in alone.err
     assert (one["protocol"], one["setting"]) == ("st", "SPEED_KP")
     assert [it["drives"] for it in one["values"] if it["value"].startswith("300")] == [["arm2/st0/1"]]
 

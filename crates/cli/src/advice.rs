@@ -11,6 +11,9 @@ pub const LIST_REGISTERS: &str = "`motorlink st registers` lists them";
 /// After a stop that failed.
 pub const STOP_AGAIN: &str = "repeat the stop; end other programs that use the port; if the motor \
                               still turns, use the emergency stop";
+/// After a stop that a node did not answer, or did not confirm.
+pub const STOP_NODES_AGAIN: &str =
+    "repeat the stop; if a motor still turns, use the emergency stop";
 /// After a raw STOP_MOTOR that failed.
 pub const STOP_PADS: &str = "`motorlink st stop` repeats the stop and completes a cut-off frame";
 /// After a motion command to an RMD motor that has an error.

@@ -16,6 +16,7 @@ use motorlink::{rmd, st};
 use motorlink_fleet::directory;
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
+use motorlink_proto::units::CentiDps;
 use motorlink_telemetry::share::message::{Ask, Event, Happening};
 use world::{Cable, World, eventually};
 
@@ -154,6 +155,27 @@ fn a_stream_of_references_that_ends_stops_the_motor_though_the_program_lives() {
     stands(&world);
     let why = left(&mut witness);
     assert!(why.starts_with("st0, motor 1: no new command for"), "{why}");
+}
+
+#[test]
+fn who_is_refused_has_no_motor_to_stop() {
+    let world = World::new("refused");
+    let open = |who: &str| {
+        let port: PortName = world.port("rmd0", &world.address, who).parse().unwrap();
+        rmd::Client::open(&port, rmd::Options::default()).unwrap()
+    };
+    let (alice, bob) = (open("&as=alice"), open("&as=bob"));
+    let speed = CentiDps(36_000);
+    alice.motor(1).unwrap().set_speed(speed).unwrap();
+    let fast = |dps: f64| dps > 300.0;
+    world.share.reaches("rmd1.speed_dps", fast);
+    bob.motor(1).unwrap().set_speed(speed).unwrap_err();
+    assert!(bob.moving().is_empty(), "{:?}", bob.moving());
+    // What a command does that waits for the end of its move, and was refused.
+    assert!(bob.stop_on_drop().stop_now().is_empty());
+    drop(bob);
+    world.share.reaches("rmd1.speed_dps", fast);
+    assert_eq!(alice.moving().len(), 1);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use motorlink_fleet::network::{Network, VARIABLE};
 /// Where the nodes are.
 #[derive(clap::Args)]
 pub struct Via {
-    /// Addresses with commas between them, or a Zenoh configuration (.json5), such as your file of `fleet init`
+    /// Addresses with commas between them, of which the first that answers is used, or a Zenoh configuration (.json5), such as your file of `fleet init`
     #[arg(long, value_name = "NETWORK", env = VARIABLE)]
     pub via: Option<Network>,
 }

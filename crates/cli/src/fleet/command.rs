@@ -5,6 +5,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
+use clap::Args as _;
+use clap::parser::ValueSource;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
@@ -16,52 +18,22 @@ use super::found::found;
 use crate::failure::Failure;
 use crate::output::{note, print_line};
 
-/// Commands that move no motor and end by themselves.
-const ST: [&str; 17] = [
-    "info",
-    "status",
-    "registers",
-    "get",
-    "segment",
-    "dump",
-    "diff",
-    "set",
-    "stop",
-    "stop-ramp",
-    "revup-data",
-    "revup",
-    "fault-ack",
-    "iqdref-clear",
-    "pfc",
-    "restore",
-    "help",
-];
-const RMD: [&str; 15] = [
-    "scan",
-    "status",
-    "dump",
-    "diff",
-    "angle",
-    "pid",
-    "acceleration",
-    "accel",
-    "encoder",
-    "off",
-    "stop",
-    "clear-errors",
-    "restore",
-    "encoder-offset",
-    "help",
-];
+/// Commands that read, stop or acknowledge, and end by themselves.
+const ST: [&str; 9] =
+    ["info", "status", "registers", "get", "segment", "dump", "diff", "stop", "fault-ack"];
+const RMD: [&str; 8] =
+    ["scan", "status", "dump", "diff", "angle", "encoder", "stop", "clear-errors"];
+/// Options that would be about another motor than the one that is named, or damage its data.
+const OF_MOTORS: [&str; 6] = ["port", "motor", "id", "all", "fault", "profile"];
 /// Commands that run at the same time.
 const AT_ONCE: usize = 8;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 The words behind -- are those behind `motorlink`, without port and motor: st or rmd, then a command. It \
-is carried out for each motor of this kind that has answered its node. Commands that move motors are \
-refused: a motor turns as long as the program that turned it, so command it through its own port, such \
-as -p zenoh:arm1/st0.
+is carried out for each motor of this kind that has answered its node. These are commands that read, \
+stop or acknowledge faults. Others are for one motor at a time, through its own port, such as \
+-p zenoh:arm1/st0.
 
 Exit code: the greatest of all commands, at most 3.")]
 pub struct Args {
@@ -133,13 +105,40 @@ fn protocol(words: &[String]) -> Result<Protocol, Failure> {
     };
     // Options of the command come behind it: their values could be taken for it.
     match words.get(1) {
-        Some(command) if commands.contains(&command.as_str()) => Ok(protocol),
+        Some(command) if commands.contains(&command.as_str()) => {
+            check_options(protocol, words)?;
+            Ok(protocol)
+        }
         Some(command) => Err(Failure::usage(format!(
             "`{command}` is not for a fleet; these are: {}",
             commands.join(", ")
         ))),
         None => Err(Failure::usage("the command is missing behind st or rmd")),
     }
+}
+
+/// The command is for the motor that is named, and no option may say otherwise.
+fn check_options(protocol: Protocol, words: &[String]) -> Result<(), Failure> {
+    let command = clap::Command::new("motorlink");
+    let command = match protocol {
+        Protocol::St => crate::st::Args::augment_args(command),
+        Protocol::Rmd => crate::rmd::Args::augment_args(command),
+    };
+    let read = command.try_get_matches_from(words);
+    let read = read.map_err(|error| Failure::usage(error.to_string().trim().to_owned()))?;
+    let inner = read.subcommand().map(|(_, inner)| inner);
+    for matches in [Some(&read), inner].into_iter().flatten() {
+        let is_given = |option: &&&str| {
+            let source =
+                matches.try_contains_id(option).ok().and_then(|_| matches.value_source(option));
+            source == Some(ValueSource::CommandLine)
+        };
+        if let Some(option) = OF_MOTORS.iter().find(is_given) {
+            return Err(Failure::usage(format!("--{option} is not for a fleet"))
+                .trying("choose motors with --node and --name, before the --"));
+        }
+    }
+    Ok(())
 }
 
 /// Runs all commands, some at the same time, and prints what they say in the order of the motors.
@@ -211,18 +210,52 @@ mod tests {
         let program = crate::Cli::command();
         for (protocol, commands) in [("st", &ST[..]), ("rmd", &RMD)] {
             let of = program.find_subcommand(protocol).unwrap();
-            for command in commands.iter().filter(|it| **it != "help") {
+            for command in commands {
                 assert!(of.find_subcommand(command).is_some(), "{protocol} {command}");
             }
         }
     }
 
     #[test]
+    fn no_option_is_about_another_motor() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        for text in [
+            "st stop -p sim:",
+            "st stop -psim:",
+            "st get SPEED_MEAS --port=sim:",
+            "st stop -m 2",
+            "st stop -m2",
+            "st status --motor 1",
+            "rmd stop --id 1",
+            "rmd stop -i 1",
+            "rmd stop --all",
+            "st get SPEED_MEAS --fault drop=1",
+            "st info --profile spec",
+            "st get SPEED_MEAS --prof spec",
+        ] {
+            assert!(protocol(&words(text)).is_err(), "{text}");
+        }
+        for text in
+            ["st get SPEED_MEAS BUS_VOLTAGE", "st get SPEED_MEAS --json", "st status --timeout 2s"]
+        {
+            assert!(protocol(&words(text)).is_ok(), "{text}");
+        }
+    }
+
+    #[test]
     fn what_moves_a_motor_is_refused() {
         let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
-        for text in
-            ["st start", "st ramp 100 1000", "rmd speed 90", "rmd run", "st -m start", "st raw 1"]
-        {
+        for text in [
+            "st start",
+            "st ramp 100 1000",
+            "rmd speed 90",
+            "rmd run",
+            "st -m start",
+            "st set RAMP_FINAL_SPEED 2500",
+            "st restore x",
+            "rmd off",
+            "st raw 1",
+        ] {
             assert!(protocol(&words(text)).is_err(), "{text}");
         }
         assert_eq!(protocol(&words("st get SPEED_MEAS")).ok(), Some(Protocol::St));

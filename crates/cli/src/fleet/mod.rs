@@ -39,7 +39,7 @@ enum Task {
     Watch(watch::Args),
     /// Record the motors of all nodes in one MCAP file, with the time of this computer
     Record(record::Args),
-    /// Carry out a command of st or rmd for the motors of all nodes, if it moves none
+    /// Read, stop or acknowledge faults with a command of st or rmd, for the motors of all nodes
     Command(command::Args),
     /// Compare the settings of the motors of all nodes
     Settings(settings::Args),

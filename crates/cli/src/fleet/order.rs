@@ -48,7 +48,7 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
     if args.nodes.is_empty() {
         let names: Vec<_> = told.iter().map(|(name, _)| name.as_str()).collect();
         output::note(format!(
-            "a node that is away is not found; those that are there: {}",
+            "asked: {}; a node that cannot be reached now is not asked: name it with --node",
             names.join(", ")
         ));
     }
@@ -70,11 +70,11 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
     }
     match (away.is_empty(), is_done) {
         (true, true) => Ok(()),
-        (true, false) => Err(Failure::link(share::UNCONFIRMED).trying(advice::STOP_AGAIN)),
+        (true, false) => Err(Failure::link(share::UNCONFIRMED).trying(advice::STOP_NODES_AGAIN)),
         (false, _) if order == Order::StopAll => {
             let names = away.join(", ");
             Err(Failure::link(format!("motors of {names} may still turn: no answer to the stop"))
-                .trying(advice::STOP_AGAIN))
+                .trying(advice::STOP_NODES_AGAIN))
         }
         (false, _) => Err(Failure::link(format!("no answer of {}", away.join(", ")))),
     }

@@ -62,6 +62,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         for line in info.lines {
             let is_meant = |motor: &u8| name(&node, &line, *motor).contains(&args.name);
             let motors: Vec<u8> = line.heard.iter().copied().filter(is_meant).collect();
+            if motors.is_empty() {
+                continue;
+            }
             let (node, network) = (node.clone(), network.clone());
             readers.push(thread::spawn(move || read_line(&node, network, &line, &motors)));
         }
@@ -88,6 +91,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if failed > 0 {
         let motors = counted(failed, "motor");
         return Err(Failure::link(format!("the settings of {motors} could not be read")));
+    }
+    if let Some((kind, motors)) = kinds.iter().find(|(_, motors)| motors.len() == 1) {
+        let only = &motors[0].0;
+        return Err(Failure::link(format!(
+            "{only} is the only {kind} motor: nothing to compare with"
+        )));
     }
     let compared: Vec<_> = kinds
         .iter()

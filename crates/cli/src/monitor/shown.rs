@@ -23,7 +23,7 @@ pub struct Running {
     #[cfg(feature = "fleet")]
     #[arg(long = "node", value_name = "NAME", requires = "fleet")]
     nodes: Vec<motorlink_fleet::key::Name>,
-    /// With --fleet: addresses with commas between them, or a Zenoh configuration (.json5)
+    /// With --fleet: addresses with commas between them, of which the first that answers is used, or a Zenoh configuration (.json5)
     #[cfg(feature = "fleet")]
     #[arg(long, value_name = "NETWORK", requires = "fleet")]
     via: Option<motorlink_fleet::network::Network>,

@@ -21,7 +21,7 @@ pub struct Config {
     /// How long a motor stays with the program that changed it.
     lease_seconds: Option<f64>,
     limits: LimitsOf,
-    ros2: ros2::Settings,
+    ros2: Option<ros2::Settings>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -63,9 +63,14 @@ impl Config {
         Ok(Some(Duration::from_secs_f64(seconds)))
     }
 
+    /// Whether the file is about ROS 2.
+    pub fn has_ros2(&self) -> bool {
+        self.ros2.is_some()
+    }
+
     /// What the node does for ROS 2 machines of this domain, or of that of the file.
     pub fn ros2(&self, domain: Option<u32>) -> Result<ros2::Settings, Failure> {
-        let mut settings = self.ros2.clone();
+        let mut settings = self.ros2.clone().unwrap_or_default();
         settings.domain = domain.unwrap_or(settings.domain);
         settings.check().map_err(Failure::usage)?;
         Ok(settings)

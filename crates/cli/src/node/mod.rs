@@ -104,6 +104,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     interrupt::hold();
     let limits = config.limits()?;
     let ros2 = args.ros2.then(|| config.ros2(args.ros2_domain)).transpose()?;
+    if ros2.is_none() && config.has_ros2() {
+        output::note("the file has [ros2], which is used with --ros2 only");
+    }
     let mut server = Server::open(&path, PROGRAM, args.lines.open(limits)?)?;
     server.lease(config.lease()?.unwrap_or(LEASE));
     server.limit(limits);

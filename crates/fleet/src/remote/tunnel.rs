@@ -36,6 +36,10 @@ const WAIT: f64 = 0.25;
 const ANSWER: Duration = Duration::from_millis(1000);
 /// How long a node is looked for, in seconds.
 const FOUND: f64 = 1.0;
+/// How long a node that is there may take to begin a session, in seconds.
+const JOINED: f64 = 2.0;
+/// A question before the session is asked again after this time: it may be lost on a busy network.
+const ASKED: Duration = Duration::from_millis(400);
 /// The pause after an answer that did not come.
 const PAUSE: Duration = Duration::from_millis(50);
 /// A program that has ended waits so long for the node to know it.
@@ -166,10 +170,10 @@ impl Tunnel {
         let begun = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
-            match line.ask(scope, &join, Priority::RealTime, ANSWER).await {
+            match line.ask(scope, &join, Priority::RealTime, ASKED).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
-                None if Boot.now() > begun + FOUND => {
+                None if Boot.now() > begun + JOINED => {
                     return Err(failed(line.unanswered(scope)));
                 }
                 None => sleep(PAUSE).await,
@@ -431,7 +435,7 @@ impl Tunnel {
 async fn run_of(zenoh: &Zenoh, node: &Name) -> Result<Name, Unreachable> {
     let end = Boot.now() + FOUND;
     loop {
-        let tokens = zenoh.liveliness().get(key::alive_of(node)).timeout(ANSWER).await;
+        let tokens = zenoh.liveliness().get(key::alive_of(node)).timeout(ASKED).await;
         let tokens = tokens.map_err(|error| Unreachable::Failed(error.to_string()))?;
         let mut runs = BTreeSet::new();
         while let Ok(reply) = tokens.recv_async().await {
@@ -459,7 +463,7 @@ impl Line {
         let Line { node, who, .. } = self;
         let right = scope.word();
         format!(
-            "node {node} is there, but does not answer: it hangs, or {who} may not be allowed to {right}"
+            "node {node} is there, but does not answer: it is busy or hangs, or {who} may not be allowed to {right}"
         )
     }
 

@@ -31,6 +31,8 @@ type Hear = fn(&Arc<Shared>, &Sample);
 /// The nodes of a network, until this is dropped.
 pub struct View {
     shared: Arc<Shared>,
+    /// The nodes that were there at the begin, and did not answer.
+    silent: Vec<Name>,
     _subscribers: Vec<Subscriber<()>>,
 }
 
@@ -64,18 +66,26 @@ impl View {
             subscribers.push(subscriber.map_err(failed)?);
         }
         let now = Boot.now();
+        let mut silent = Vec::new();
         for ((node, _), info) in directory::nodes(network)? {
-            if let Some(info) = info {
-                shared.picture().state(node, info, now);
+            match info {
+                Some(info) => shared.picture().state(node, info, now),
+                None => silent.push(node),
             }
         }
         shared.ask_columns();
-        Ok(View { shared, _subscribers: subscribers })
+        Ok(View { shared, silent, _subscribers: subscribers })
     }
 
     /// The nodes that have said something.
     pub fn nodes(&self) -> std::collections::BTreeMap<Name, Node> {
         self.shared.picture().nodes()
+    }
+
+    /// The nodes that are there, and have said nothing yet.
+    pub fn silent(&self) -> Vec<&Name> {
+        let nodes = self.shared.picture().nodes();
+        self.silent.iter().filter(|node| !nodes.contains_key(node)).collect()
     }
 
     /// The motors that have answered.

@@ -332,6 +332,12 @@ impl PortError {
         !self.is_interruption() && !is_answered
     }
 
+    /// Whether the drive did not get the request: the program that holds the port has not sent it.
+    pub fn is_unsent(&self) -> bool {
+        use NotDone::{Held, Latched, Unsent, Usage};
+        matches!(self, PortError::NotDone { kind: Latched | Held | Usage | Unsent, .. })
+    }
+
     /// Whether the program that holds the port has no reply of the drive. What stops a motor it has
     /// repeated before.
     pub fn is_given_up(&self) -> bool {

@@ -26,6 +26,8 @@ pub(super) struct Session {
     host: Host,
     /// Motors that were given something to do and not switched off.
     moving: MotorSet,
+    /// Those whose last motion command was the first one: nothing turns them if it was not sent.
+    begun: MotorSet,
     /// Motors that only a frame with four torques reached, and from which no reply was expected. Such
     /// a motor may be absent, or moving.
     unexpected: MotorSet,
@@ -102,6 +104,7 @@ impl Session {
             port,
             host,
             moving: MotorSet::EMPTY,
+            begun: MotorSet::EMPTY,
             unexpected: MotorSet::EMPTY,
             expected: MotorSet::EMPTY,
             patience: SETTLE_LIMIT + times.into(),
@@ -150,6 +153,12 @@ impl Session {
     pub(super) fn not_done(&mut self, now: Instant, id: MotorId, why: PortError) {
         if matches!(why, PortError::NotDone { kind: NotDone::Silent, .. }) {
             self.missed.insert(id);
+        }
+        // Who holds the motor answers for it.
+        let is_held = matches!(why, PortError::NotDone { kind: NotDone::Held, .. });
+        if is_held || why.is_unsent() && self.begun.contains(id) {
+            self.moving.remove(id);
+            self.unexpected.remove(id);
         }
         if self.busy().contains(id) {
             self.cancel(now, id);
@@ -397,6 +406,8 @@ impl Session {
             true => moved.without(self.expected),
             false => MotorSet::EMPTY,
         };
+        let before = self.moving.union(self.unexpected);
+        self.begun = self.begun.union(moved).without(moved.intersection(before));
         self.unexpected = self.unexpected.union(unexpected);
         self.moving = self.moving.union(moved.without(unexpected));
     }

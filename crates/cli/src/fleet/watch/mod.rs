@@ -68,7 +68,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         print(&Shown::of(&view, args.sort, args.only, &args.name), args)?;
         match args.every {
             Some(every) if interrupt::wait(every) => {}
-            _ => return Ok(()),
+            _ => break,
+        }
+    }
+    match &view.silent()[..] {
+        [] => Ok(()),
+        silent => {
+            let names: Vec<_> = silent.iter().map(|node| node.as_str()).collect();
+            Err(Failure::link(format!("no answer of {}", names.join(", "))))
         }
     }
 }
