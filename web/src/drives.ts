@@ -109,6 +109,12 @@ export const isSearched = computed(
 /** The rates of all signals that are read. */
 export const rates = signal<readonly SignalRate[]>([]);
 
+/** The share counts from the last values on: with less than this part of its rate a signal is not read now. */
+const READ = 0.25;
+
+/** Whether values of a signal come. */
+export const isRead = ({ achieved, predicted }: SignalRate) => achieved * predicted > READ;
+
 /**
  * Whether a motor does not answer. Without an event about it that is a motor which the last search did
  * not find, and of which no values come. No motor of a lost line answers.
@@ -118,7 +124,7 @@ export function isSilent(line: string, motor: number): boolean {
   const last = motorEvents.value.get(nameOf(line, motor))?.event;
   if (last === 'silent') return true;
   if (last === 'answers' || last === 'stopped') return false;
-  if (rates.value.some((one) => one.line === line && one.motor === motor && one.achieved > 0)) return false;
+  if (rates.value.some((one) => one.line === line && one.motor === motor && isRead(one))) return false;
   // While stops are repeated nothing is read, and nothing else says that it is silent.
   if (last === 'stop-failed') return true;
   const isSearched = found.value.has(line) || searchFailed.value.has(line);

@@ -1,6 +1,6 @@
 // The lines that the share holds, and how often signals are read from them.
 import { useEffect } from 'preact/hooks';
-import { isSilent, lineEvents, rates, watchRates } from '../drives';
+import { isRead, isSilent, lineEvents, rates, watchRates } from '../drives';
 import { nameOf, rate, timeOfDay } from '../format';
 import { entries, lines, motors, refreshLines, refreshMotors, searchFailed, searching, unconfirmed, welcome } from '../link';
 import type { Line, LineCounts } from '../wire';
@@ -37,7 +37,7 @@ function errors({ exchanges, silent, refused, failed, lost }: LineCounts): strin
 function LineState({ line }: { line: string }) {
   const last = lineEvents.value.get(line);
   const found = motors.value.get(line) ?? [];
-  const isRead = rates.value.some((one) => one.line === line && one.achieved > 0);
+  const answers = rates.value.some((one) => one.line === line && isRead(one));
   if (last?.event === 'lost') {
     return (
       <>
@@ -52,7 +52,7 @@ function LineState({ line }: { line: string }) {
       </>
     );
   }
-  if (isRead) return <span class="chip ok">● answers</span>;
+  if (answers) return <span class="chip ok">● answers</span>;
   if (last) {
     return (
       <>

@@ -1,5 +1,6 @@
 //! `motorlink fleet command`: a command of `motorlink st` or `motorlink rmd` for the motors of many nodes.
 
+use std::ffi::OsString;
 use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -60,7 +61,7 @@ struct Job {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let protocol = protocol(&args.words)?;
     let network = args.at.via.network();
-    let program = std::env::current_exe()?;
+    let program = program()?;
     let mut jobs = Vec::new();
     for (node, info) in found(&network, &args.nodes)? {
         let remote = Remote::new(node.clone(), network.clone());
@@ -75,8 +76,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                     Protocol::St => ["-m", &motor],
                     Protocol::Rmd => ["-i", &motor],
                 };
-                let mut command = Command::new(&program);
-                command.arg(&args.words[0]).args(["-p", &remote.port(&line.line)]).args(of_motor);
+                let (interpreter, script) = program.split_at(1);
+                let mut command = Command::new(&interpreter[0]);
+                command
+                    .args(script)
+                    .arg(&args.words[0])
+                    .args(["-p", &remote.port(&line.line)])
+                    .args(of_motor);
                 if let Some(profile) = &line.profile {
                     command.args(["--profile", profile]);
                 }
@@ -91,6 +97,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .trying("`motorlink fleet list` shows nodes and motors"));
     }
     carry_out(jobs, args.at.json)
+}
+
+/// This program. The package for Python is a script.
+fn program() -> Result<Vec<OsString>, Failure> {
+    let own = std::env::current_exe()?;
+    let is_script = own.file_stem().is_none_or(|name| name != "motorlink");
+    let words = std::env::args_os().skip(1);
+    let script: Vec<_> = words.take_while(|word| word != "fleet").collect();
+    Ok([own.into()].into_iter().chain(script.into_iter().filter(|_| is_script)).collect())
 }
 
 /// What the words are for.

@@ -1,7 +1,7 @@
 //! All nodes of a network as one share: for programs that show or command a fleet.
 //!
 //! Its lines are `NODE/LINE`. A node that goes away keeps its lines, and its subscriptions go on when it is
-//! back. [`merge`] decides, without sockets and clocks.
+//! back. `merge` decides, without sockets and clocks.
 
 mod member;
 mod merge;
