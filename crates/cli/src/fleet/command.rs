@@ -99,13 +99,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     carry_out(jobs, args.at.json)
 }
 
-/// This program. The package for Python is a script.
+/// This program. The package for Python is a script, whose interpreter knows its folder by its own name.
 fn program() -> Result<Vec<OsString>, Failure> {
     let own = std::env::current_exe()?;
-    let is_script = own.file_stem().is_none_or(|name| name != "motorlink");
-    let words = std::env::args_os().skip(1);
-    let script: Vec<_> = words.take_while(|word| word != "fleet").collect();
-    Ok([own.into()].into_iter().chain(script.into_iter().filter(|_| is_script)).collect())
+    match own.file_stem().is_some_and(|name| name == "motorlink") {
+        true => Ok(vec![own.into()]),
+        false => Ok(std::env::args_os().take_while(|word| word != "fleet").collect()),
+    }
 }
 
 /// What the words are for.
