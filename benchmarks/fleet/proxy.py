@@ -1,4 +1,4 @@
-"""A cable between TCP programs of this computer that can be cut: nothing passes, and nobody is told."""
+"""A TCP connection between programs of this computer that can be cut: it stays open, and nothing passes."""
 
 import select
 import socket

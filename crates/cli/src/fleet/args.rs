@@ -2,6 +2,7 @@
 
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::{Network, VARIABLE};
+use motorlink_telemetry::share::message::Line;
 
 /// Where the nodes are.
 #[derive(clap::Args)]
@@ -21,6 +22,19 @@ pub struct At {
     pub json: bool,
 }
 
+/// The motors that a command is for.
+#[derive(clap::Args)]
+pub struct Motors {
+    #[command(flatten)]
+    pub at: At,
+    /// Only this node, which must be there; may be repeated
+    #[arg(long = "node", value_name = "NAME")]
+    pub nodes: Vec<Name>,
+    /// Motors with this in their name, such as /st0/ or /st0/1
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    name: String,
+}
+
 #[derive(clap::Args)]
 pub struct OrderArgs {
     #[command(flatten)]
@@ -28,6 +42,18 @@ pub struct OrderArgs {
     /// Only this node, which must answer; may be repeated
     #[arg(long = "node", value_name = "NAME")]
     pub nodes: Vec<Name>,
+}
+
+impl Motors {
+    /// The motors of a line that are meant: their names, and their numbers.
+    pub fn of_line<'a>(
+        &'a self,
+        node: &'a Name,
+        line: &'a Line,
+    ) -> impl Iterator<Item = (String, u8)> + 'a {
+        let named = move |motor: &u8| (format!("{node}/{}/{motor}", line.line), *motor);
+        line.heard.iter().map(named).filter(|(name, _)| name.contains(&self.name))
+    }
 }
 
 impl Via {

@@ -8,13 +8,12 @@ use std::thread;
 
 use clap::Args as _;
 use clap::parser::ValueSource;
-use motorlink_fleet::key::Name;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::Protocol;
 use serde_json::Value;
 
-use super::args::At;
+use super::args::Motors;
 use super::found::found;
 use crate::failure::Failure;
 use crate::output::{note, print_line};
@@ -39,13 +38,7 @@ stop or acknowledge faults. Others are for one motor at a time, through its own 
 Exit code: the greatest of all commands, at most 3.")]
 pub struct Args {
     #[command(flatten)]
-    at: At,
-    /// Only this node, which must be there; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    nodes: Vec<Name>,
-    /// Motors with this in their name, such as /st0/ or /1
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    name: String,
+    motors: Motors,
     /// st or rmd, and a command: -- st get SPEED_MEAS
     #[arg(last = true, required = true, value_name = "WORD")]
     words: Vec<String>,
@@ -60,17 +53,14 @@ struct Job {
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let protocol = protocol(&args.words)?;
-    let network = args.at.via.network();
+    let at = &args.motors.at;
+    let network = at.via.network();
     let program = program()?;
     let mut jobs = Vec::new();
-    for (node, info) in found(&network, &args.nodes)? {
+    for (node, info) in found(&network, &args.motors.nodes)? {
         let remote = Remote::new(node.clone(), network.clone());
         for line in info.lines.iter().filter(|line| line.protocol == protocol) {
-            for motor in &line.heard {
-                let name = format!("{node}/{}/{motor}", line.line);
-                if !name.contains(&args.name) {
-                    continue;
-                }
+            for (name, motor) in args.motors.of_line(&node, line) {
                 let motor = motor.to_string();
                 let of_motor = match protocol {
                     Protocol::St => ["-m", &motor],
@@ -86,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 if let Some(profile) = &line.profile {
                     command.args(["--profile", profile]);
                 }
-                command.args(args.at.json.then_some("--json")).args(&args.words[1..]);
+                command.args(at.json.then_some("--json")).args(&args.words[1..]);
                 command.stdin(Stdio::null());
                 jobs.push(Job { name, command });
             }
@@ -96,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::link(format!("no {} motor has answered", args.words[0]))
             .trying("`motorlink fleet list` shows nodes and motors"));
     }
-    carry_out(jobs, args.at.json)
+    carry_out(jobs, at.json)
 }
 
 /// This program. The package for Python is a script, whose interpreter knows its folder by its own name.

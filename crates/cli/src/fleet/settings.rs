@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::thread;
 
 use motorlink::settings::{Dump, Tunable, dump};
-use motorlink::st::Profile;
 use motorlink::{rmd, st};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::{Line, Protocol};
+use motorlink_telemetry::share::words::Speaks;
 use serde_json::json;
 
-use super::args::At;
+use super::args::Motors;
 use super::found::found;
 use crate::failure::Failure;
 use crate::output::{Printer, note};
@@ -29,19 +29,7 @@ pub struct Args {
 enum Command {
     /// Show what differs between motors of the same kind: firmware and settings (exit code 1 if some
     /// differ)
-    Diff(DiffArgs),
-}
-
-#[derive(clap::Args)]
-struct DiffArgs {
-    #[command(flatten)]
-    at: At,
-    /// Only this node, which must be there; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    nodes: Vec<Name>,
-    /// Motors with this in their name, such as /st0/1
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    name: String,
+    Diff(Motors),
 }
 
 /// The settings of a motor as text, by name.
@@ -60,8 +48,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut readers = Vec::new();
     for (node, info) in found(&network, &args.nodes)? {
         for line in info.lines {
-            let is_meant = |motor: &u8| name(&node, &line, *motor).contains(&args.name);
-            let motors: Vec<u8> = line.heard.iter().copied().filter(is_meant).collect();
+            let motors: Vec<_> = args.of_line(&node, &line).collect();
             if motors.is_empty() {
                 continue;
             }
@@ -71,7 +58,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let (mut kinds, mut failed): (BTreeMap<&str, OfKind>, _) = (BTreeMap::new(), 0_u64);
     for reader in readers {
-        for Read { protocol, name, values } in reader.join().unwrap_or_default() {
+        // A line that could not be read must not be left out.
+        let read = reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        for Read { protocol, name, values } in read {
             match values {
                 Ok(values) => kinds.entry(protocol).or_default().push((name, values)),
                 Err(why) => {
@@ -122,17 +111,16 @@ struct Read {
     values: Result<Values, String>,
 }
 
-fn name(node: &Name, line: &Line, motor: u8) -> String {
-    format!("{node}/{}/{motor}", line.line)
-}
-
 /// Reads all settings of motors of a line.
-fn read_line(node: &Name, network: Network, line: &Line, motors: &[u8]) -> Vec<Read> {
+fn read_line(node: &Name, network: Network, line: &Line, motors: &[(String, u8)]) -> Vec<Read> {
     let port = Remote::new(node.clone(), network).port(&line.line);
     let protocol = line.protocol.word();
     let read = |values: &dyn Fn(u8) -> Result<Values, String>| {
-        let one =
-            |motor: &u8| Read { protocol, name: name(node, line, *motor), values: values(*motor) };
+        let one = |(name, motor): &(String, u8)| Read {
+            protocol,
+            name: name.clone(),
+            values: values(*motor),
+        };
         motors.iter().map(one).collect()
     };
     let failed = |why: String| read(&|_| Err(why.clone()));
@@ -142,10 +130,8 @@ fn read_line(node: &Name, network: Network, line: &Line, motors: &[u8]) -> Vec<R
     };
     match line.protocol {
         Protocol::St => {
-            let profile = Profile::ALL.into_iter();
-            let profile = profile.into_iter().find(|it| Some(it.name()) == line.profile.as_deref());
-            let options =
-                st::Options { profile: profile.unwrap_or_default(), ..Default::default() };
+            let profile = Speaks::of(line).and_then(Speaks::profile).unwrap_or_default();
+            let options = st::Options { profile, ..Default::default() };
             match st::Client::open(&port, options) {
                 Ok(client) => read(&|number| values(client.motor(number).map_err(text)?)),
                 Err(error) => failed(error.to_string()),

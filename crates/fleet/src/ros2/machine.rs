@@ -1,7 +1,6 @@
 //! The tasks of a node for ROS 2, and what they share.
 
 use std::collections::BTreeSet;
-use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -267,16 +266,10 @@ impl Machine {
     /// Takes samples. A fault ends the motion of its joint.
     fn take(&mut self, now: f64, data: &Data) {
         let Some((line, motor)) = self.readings.take(now, data) else { return };
-        let joint = self
-            .commands
-            .joints()
-            .position(|joint| joint.line == *line && joint.motor.number() == *motor);
-        let Some(number) = joint else { return };
-        let fault = self
-            .commands
-            .joints()
-            .nth(number)
-            .and_then(|joint| self.readings.of(joint)?.faults(joint.motor));
+        let is_of = |joint: &Joint| joint.line == *line && joint.motor.number() == *motor;
+        let joint = self.commands.joints().enumerate().find(|(_, joint)| is_of(joint));
+        let Some((number, joint)) = joint else { return };
+        let fault = self.readings.of(joint).and_then(|it| it.faults(joint.motor));
         if let Some((words, _)) = fault {
             self.commands.block(now, Some(number), &words);
         }
@@ -306,27 +299,5 @@ impl<'a> Publisher<'a> {
             .attachment(attachment.encode())
             .congestion_control(CongestionControl::Drop)
             .wait();
-    }
-}
-
-/// The lines of a share, before its listener has somebody else.
-///
-/// # Errors
-/// The share does not say it.
-pub async fn lines(program: &Program, listener: &mut Listener) -> io::Result<Vec<Line>> {
-    let others = async {
-        loop {
-            if let Err(error) = listener.next().await {
-                return error;
-            }
-        }
-    };
-    tokio::select! {
-        answer = program.ask(Ask::Lines) => match answer {
-            Ok(Answer::Lines { lines, .. }) => Ok(lines),
-            Ok(_) => Err(io::Error::other("it gives another answer")),
-            Err(refusal) => Err(io::Error::other(refusal.message)),
-        },
-        error = others => Err(error),
     }
 }

@@ -83,7 +83,7 @@ impl Ros2 {
         zenoh: &Zenoh,
     ) -> Result<Self, StartError> {
         let (program, mut listener, _) = Program::connect(share, "ros2").await?;
-        let lines = timeout(LINES, machine::lines(&program, &mut listener))
+        let (lines, _) = timeout(LINES, program.lines(&mut listener))
             .await
             .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
         let joints = settings.joint.iter().map(|joint| joint.find(&lines));

@@ -19,7 +19,7 @@ pub struct Drive {
     pub line: String,
     /// The motor.
     pub motor: Motor,
-    /// Its values, by the name of the signal. NaN is no value.
+    /// Its last values, by the name of the signal.
     pub values: BTreeMap<String, f64>,
     /// When they came. `None`: none has come.
     pub at: Option<f64>,

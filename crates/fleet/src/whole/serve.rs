@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use motorlink_telemetry::share::address::Unreachable;
 use motorlink_telemetry::share::frame::{self, Frame, Reader};
@@ -68,7 +68,7 @@ pub(super) struct Serving {
     out: Vec<u8>,
     news: Receiver<News>,
     told: Sender<News>,
-    /// Its liveliness subscriber ends with the handler.
+    /// Nodes that come and go.
     seen: zenoh::pubsub::Subscriber<FifoChannelHandler<Sample>>,
     known: Known,
     zenoh: Arc<Zenoh>,
@@ -151,7 +151,7 @@ impl Serving {
 
     /// Takes the requests of the program. `false`: it leaves.
     fn requests(&mut self) -> io::Result<bool> {
-        self.merge.at(Boot.now(), wall());
+        self.merge.at(Boot.now(), Boot.wall());
         while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
             let request: Request = decode(&frame.payload).map_err(io::Error::other)?;
             if !self.merge.asked(request) {
@@ -238,7 +238,7 @@ impl Serving {
     }
 
     fn heard(&mut self, News { node, run, what }: News) {
-        self.merge.at(Boot.now(), wall());
+        self.merge.at(Boot.now(), Boot.wall());
         if self.links.get(&node).is_none_or(|link| link.run != run) {
             return;
         }
@@ -293,9 +293,4 @@ impl Serving {
         }
         Ok(())
     }
-}
-
-/// The wall clock, in seconds since 1970.
-fn wall() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }

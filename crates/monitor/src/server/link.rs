@@ -265,18 +265,9 @@ impl Link {
 
 /// Asks for the lines, and whether motion is refused.
 async fn lines(program: &Program, listener: &mut Listener) -> io::Result<(Vec<Line>, bool)> {
-    let lines = tokio::select! {
-        answer = timeout(HELLO, program.ask(Ask::Lines)) => answer,
-        // Events come before the answer.
-        error = async { loop { if let Err(error) = listener.next().await { break error } } } => {
-            return Err(error);
-        }
-    };
-    match lines.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))? {
-        Ok(Answer::Lines { lines, latched_by }) => Ok((lines, latched_by.is_some())),
-        Ok(_) => Err(io::Error::other("it gives another answer")),
-        Err(refusal) => Err(io::Error::other(refusal.message)),
-    }
+    let told = timeout(HELLO, program.lines(listener)).await;
+    let (lines, latched_by) = told.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
+    Ok((lines, latched_by.is_some()))
 }
 
 /// Whether the lines are the same, besides their clocks.

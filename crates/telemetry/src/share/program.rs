@@ -15,7 +15,7 @@ use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, oneshot};
 use super::VERSION;
 use super::address::Address;
 use super::frame::{self, Frame, Kind, Reader};
-use super::message::{self, Answer, Ask, Reason, Request, Text};
+use super::message::{self, Answer, Ask, Line, Reason, Request, Text};
 
 pub use super::dialogue::Refusal;
 
@@ -139,6 +139,30 @@ impl Program {
             return Err(self.shared.ended());
         }
         answer.await.unwrap_or_else(|_| Err(self.shared.ended()))
+    }
+
+    /// The lines of the share and who latched it, before anybody else reads the listener. Events that come
+    /// before the answer are dropped.
+    ///
+    /// # Errors
+    /// The share does not say it, or has ended.
+    pub async fn lines(&self, listener: &mut Listener) -> io::Result<(Vec<Line>, Option<String>)> {
+        let ended = async {
+            loop {
+                if let Err(error) = listener.next().await {
+                    return error;
+                }
+            }
+        };
+        let answer = tokio::select! {
+            answer = self.ask(Ask::Lines) => answer,
+            error = ended => return Err(error),
+        };
+        match answer {
+            Ok(Answer::Lines { lines, latched_by }) => Ok((lines, latched_by)),
+            Ok(_) => Err(io::Error::other("it gives another answer")),
+            Err(refusal) => Err(io::Error::other(refusal.message)),
+        }
     }
 
     /// Ends the connection at once: the share stops the motors that it turned.

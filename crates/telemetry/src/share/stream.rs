@@ -124,7 +124,7 @@ impl Stream {
     fn connect(&mut self, now: u64) {
         if self.connecting.is_none() && now >= self.next {
             let (share, (sender, connecting)) = (Arc::clone(&self.followed.share), channel());
-            // Without a thread the sender is gone. Nobody may wait any more.
+            // If there is no thread, the receiver notices that. The stream may have ended meanwhile.
             let thread = thread::Builder::new().name("motorlink-connect".to_owned());
             let _ = thread.spawn(move || sender.send(share.follow()).is_ok());
             self.connecting = Some(connecting);

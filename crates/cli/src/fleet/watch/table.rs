@@ -166,7 +166,7 @@ impl Row {
             Some((value, unit)) => right(&format!("{value:.decimals$} {unit}"), width),
             None => right("-", width),
         };
-        // An old state is no state.
+        // What the motor does now is not known.
         let state = match self.state.as_deref() {
             _ if self.is_old() => "old",
             Some(state) => state,

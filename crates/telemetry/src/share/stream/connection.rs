@@ -20,7 +20,7 @@ const SILENCE: u64 = 2_000_000_000;
 const OPENING: u64 = 10_000_000_000;
 /// The most bytes that are taken at once. A share that sends more is read on at the next call.
 const AT_ONCE: usize = 4 << 20;
-/// A change of the other wall clock that is told, in seconds.
+/// How much the clock of the share must change to be told again, in seconds.
 const WORTH_TELLING: f64 = 0.005;
 
 #[derive(Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Connection {
     /// When bytes came, or when it was connected.
     heard: u64,
     clock: Option<Clock>,
-    /// The wall clock of the share, as it was told last.
+    /// How far the clock of the share was ahead when that was told last, in seconds.
     told: Option<f64>,
     /// Whether it has answered a question.
     has_begun: bool,
