@@ -129,6 +129,48 @@ def test_a_node_that_is_killed_is_away_and_comes_back(show, arms, nodes, watcher
         eventually(lambda: page.act("arm2/st0", 1, "START_MOTOR")["reason"] == "latched", "the latch")
 
 
+def test_a_node_that_vanished_is_missed_by_programs_that_come_later(show, arms, nodes, via, run, tmp_path):
+    def left_out(*words):
+        return run("fleet", *words, *via, within=60).ended(3)
+
+    arms[1].kill()
+    eventually(lambda: run("fleet", "list", *via).code == 3, "arm1 knows it")
+    assert "arm2  away for " in left_out("list").out
+    listed = check(left_out("list", "--json").out)
+    assert [(it["node"], it["answers"]) for it in listed] == [("arm1", True), ("arm2", False)]
+    assert listed[1]["away_seconds"] > 0
+    stopped = left_out("stop-all")
+    assert "arm1/st0, motor 1: it confirmed the stop" in stopped.out
+    assert "motors of arm2 may still turn" in stopped.err
+    assert "no answer of arm2" in left_out("watch", "--once").err
+    summed = check(left_out("watch", "--once", "--by-node", "--json").out)
+    assert [(it["node"], it["drives"]) for it in summed] == [("arm1", 6), ("arm2", 0)]
+    for words in (("settings", "diff"), ("record", "-o", tmp_path / "all.mcap", "--duration", "1s")):
+        assert "node arm2 went away" in left_out(*words).err
+    assert "went away" in run("fleet", "command", *via, "--", "st", "get", "STATUS").ended(3).err
+    # A monitor that starts now counts its motors as not stopped.
+    _, _, site = show()
+    with site.page() as page:
+        page.alive()
+
+        def failed():
+            motors = page.ask("stop-all")["motors"]
+            return [it["line"] for it in motors if it.get("failure") and not it.get("absent")]
+
+        eventually(lambda: failed() == ["arm2"], "the motors of arm2")
+    # Whoever knows that it will not come back says so.
+    confirmed = run("fleet", "stop-all", *via, "--without", "arm2", within=60).ended(0)
+    assert "arm2" not in confirmed.out + confirmed.err
+    run("fleet", "release", *via, "--without", "arm2").ended(0)
+    # The same name, started again.
+    arm2 = nodes("arm2")
+    run("fleet", "list", *via).ended(0)
+    arm2.process.send_signal(signal.SIGTERM)
+    assert arm2.wait(20) == 0
+    assert len(run("fleet", "list", *via, "--json").ended(0).lines) == 1, "it ended by itself"
+    run("fleet", "stop-all", *via, within=60).ended(0)
+
+
 def test_a_port_of_a_node_is_shown_with_its_fleet(run):
     refused = run("monitor", "-p", "zenoh:arm1/st0").ended(2)
     assert "--fleet" in refused.err

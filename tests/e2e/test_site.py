@@ -32,6 +32,7 @@ def site(motorlink, tmp_path_factory):
     site.shares = {name: site.node(name) for name in ("arm1", "arm2")}
     site.direct = Client(site.shares["arm1"], "looks")
     site.alice = network(site.file("alice"))
+    site.nodes = {name: network(site.file(name)) for name in ("arm1", "arm2")}
 
     def alive():
         tokens = site.alice.liveliness().get(f"{ROOT}/arm1/node/alive/*")
@@ -40,7 +41,8 @@ def site(motorlink, tmp_path_factory):
     (site.boot,) = eventually(alive, "the node arm1")
     eventually(lambda: answers(site.alice, f"{ROOT}/arm1/st0/1/columns"), "columns")
     yield site
-    site.alice.close()
+    for session in (site.alice, *site.nodes.values()):
+        session.close()
     site.end()
 
 
@@ -67,6 +69,20 @@ def sessions(site):
 
 def sees_nodes(site, session, who):
     return any("/arm1/" in it for it in tokens(session, f"{ROOT}/*/node/alive/*"))
+
+
+def hears_of_nodes(site, session, who):
+    seen = threading.Event()
+    key = f"{ROOT}/*/node/alive/*"
+    subscriber = session.liveliness().declare_subscriber(key, lambda it: seen.set(), history=True)
+    came = seen.wait(PAUSE)
+    subscriber.undeclare()
+    return came
+
+
+def hears_of_ends(site, session, who):
+    ended = f"{ROOT}/arm1/node/ended/false"
+    return hears(session, f"{ROOT}/*/node/ended/*", lambda: site.nodes["arm1"].put(ended, ""))
 
 
 def asks_info(site, session, who):
@@ -155,6 +171,11 @@ def says_false_state(site, session, who):
                  lambda: session.put(f"{ROOT}/arm1/node/false/samples", "false"))
 
 
+def says_that_arm1_ends(site, session, who):
+    ended = f"{ROOT}/arm1/node/ended/false"
+    return hears(site.nodes["arm2"], f"{ROOT}/*/node/ended/*", lambda: session.put(ended, ""))
+
+
 def answers_as_arm1(site, session, who):
     key = f"{ROOT}/arm1/node/info/false"
     queryable = session.declare_queryable(key, lambda query: query.reply(key, "false"))
@@ -230,8 +251,11 @@ WHAT = [
     *(joins_to_see, reads, stops, moves, moves_as_another, asks_with_wildcards),
     *(says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1),
     *(takes_requests_of_others, sees_programs, says_that_alice_is_gone),
+    *(hears_of_nodes, hears_of_ends, says_that_arm1_ends),
 ]
-SEE = {sees_nodes, asks_info, asks_columns, hears_state, hears_samples, hears_events, joins_to_see, reads}
+SEE = {sees_nodes, asks_info, asks_columns, hears_state, hears_samples, hears_events, joins_to_see, reads,
+       hears_of_nodes}
+MEET = {hears_of_nodes, hears_of_ends}
 #: All else is denied. The node itself is the control of what others may not do in its name.
 MAY = {
     "nobody": set(),
@@ -239,9 +263,9 @@ MAY = {
     "stranger": set(),
     "bob": SEE,
     "alice": SEE | {stops, moves, says_that_alice_is_gone},
-    "arm2": set(),
-    "arm1": {says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1,
-             takes_requests_of_others, sees_programs},
+    "arm2": MEET,
+    "arm1": MEET | {says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1,
+             takes_requests_of_others, sees_programs, says_that_arm1_ends},
 }
 
 
@@ -481,7 +505,12 @@ def test_access_is_withdrawn_when_the_router_starts_again(site, sessions, run):
     site.running[0] = site.route()
     site.running.pop()
     alice = ["fleet", "list", "--via", site.file("alice"), "--json"]
-    eventually(lambda: len(run(*alice).lines) == 2, "both nodes, by themselves", within=20)
+
+    def both():
+        listed = run(*alice)
+        return listed.code == 0 and len(listed.lines) == 2
+
+    eventually(both, "both nodes, by themselves", within=20)
     assert len(run("fleet", "list", "--via", site.file("carol"), "--json").ended(0).lines) == 2
     hidden = run("fleet", "list", "--via", copy).ended(0).out
     assert "No node is at this network that bob may see" in hidden

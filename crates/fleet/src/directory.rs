@@ -14,11 +14,21 @@ use crate::remote;
 /// How long nodes may take for an answer.
 const ANSWER: Duration = Duration::from_secs(2);
 
-/// The nodes that are there, by name and run, and what each says of itself. `None`: it does not answer.
+/// The nodes of a network.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Directory {
+    /// Those that are there, by name and run, and what each says of itself. `None`: it does not answer.
+    pub nodes: BTreeMap<(Name, Name), Option<Info>>,
+    /// Those that went away without an end, as others saw it, and for how long, in seconds. Their motors may
+    /// turn.
+    pub away: BTreeMap<Name, f64>,
+}
+
+/// Looks which nodes are there.
 ///
 /// # Errors
 /// The network.
-pub fn nodes(network: &Network) -> Result<BTreeMap<(Name, Name), Option<Info>>, NetworkError> {
+pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
     let zenoh = remote::zenoh_of(network)?;
     let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
     let tokens = zenoh.liveliness().get(key::all_alive()).timeout(ANSWER).wait();
@@ -42,5 +52,24 @@ pub fn nodes(network: &Network) -> Result<BTreeMap<(Name, Name), Option<Info>>, 
             nodes.insert(node, info);
         }
     }
-    Ok(nodes)
+    let away = away(nodes.values().flatten(), |node| nodes.keys().any(|(name, _)| name == node));
+    Ok(Directory { nodes, away })
+}
+
+/// The nodes that others saw go away, and for how long at least, in seconds, without those that are there.
+pub(crate) fn away<'a>(
+    infos: impl Iterator<Item = &'a Info>,
+    is_here: impl Fn(&Name) -> bool,
+) -> BTreeMap<Name, f64> {
+    let mut away = BTreeMap::new();
+    for info in infos {
+        for gone in &info.away {
+            let Ok(node) = gone.node.parse() else { continue };
+            if !is_here(&node) {
+                let longest = away.entry(node).or_insert(0.0_f64);
+                *longest = longest.max(info.t - gone.since);
+            }
+        }
+    }
+    away
 }

@@ -113,6 +113,11 @@ pub fn all_alive() -> String {
     format!("{ROOT}/*/{WHOLE}/alive/*")
 }
 
+/// That a run of a node ends, with its motors stopped.
+pub fn ended(node: &Name, boot: &Name) -> String {
+    format!("{ROOT}/{node}/{WHOLE}/ended/{boot}")
+}
+
 /// What a node says of itself: a query.
 pub fn info(node: &Name, boot: &Name) -> String {
     format!("{ROOT}/{node}/{WHOLE}/info/{boot}")
@@ -209,7 +214,7 @@ impl Asker {
 
 const ASK: &str = "ask";
 
-/// The node and its run, in a key that [`alive`] or [`info`] made.
+/// The node and its run, in a key that [`alive`], [`ended`] or [`info`] made.
 pub fn run_of(key: &str) -> Option<(Name, Name)> {
     let [_, boot] = behind_node(key)?[..] else { return None };
     Some((node_of(key)?, boot.parse().ok()?))

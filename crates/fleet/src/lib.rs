@@ -21,6 +21,7 @@ pub mod network;
 pub mod node;
 pub mod port;
 pub mod remote;
+mod roll;
 pub mod ros2;
 pub mod site;
 pub mod view;

@@ -160,4 +160,17 @@ pub struct Info {
     /// Who stopped the motors, if motion is refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latched_by: Option<String>,
+    /// The other nodes that this one saw go away without an end, and that are not back: killed, or their
+    /// network is cut. Their motors may turn.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub away: Vec<Away>,
+}
+
+/// A node that went away without an end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Away {
+    /// Its name.
+    pub node: String,
+    /// Since when, by the clock of the node that says so, in seconds.
+    pub since: f64,
 }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use asking::Asker;
 use motorlink::port::{NotDone, PortError, PortName};
 use motorlink::{rmd, st};
-use motorlink_fleet::directory;
+use motorlink_fleet::directory::{self, Directory};
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_proto::units::CentiDps;
@@ -255,9 +255,36 @@ fn two_nodes_with_one_name_are_told_apart() {
     turn(&st(&world, ""));
     let _bridge = Cable::at(&bridge, &world.address);
     let network = format!("tcp/{}", world.address).parse().unwrap();
-    eventually("the nodes do not meet", || directory::nodes(&network).unwrap().len() == 2);
+    eventually("the nodes do not meet", || directory::nodes(&network).unwrap().nodes.len() == 2);
     for world in [&world, &twin] {
         let error = open(&world.port("st0", &world.address, "")).err().unwrap().to_string();
         assert!(error.contains("2 nodes have the name twins"), "{error}");
     }
+}
+
+#[test]
+fn nodes_remember_one_that_went_away_until_it_is_back() {
+    let one = World::new("seen1");
+    let cable = Cable::to(&one.address);
+    let mut two = World::joined("seen2", &cable.address);
+    let network = format!("tcp/{}", one.address).parse().unwrap();
+    let names = || {
+        let Directory { nodes, away } = directory::nodes(&network).unwrap();
+        let here: Vec<_> = nodes.into_keys().map(|(node, _)| node.to_string()).collect();
+        let away: Vec<_> = away.into_keys().map(|node| node.to_string()).collect();
+        (here.join(" "), away.join(" "))
+    };
+    let both = ("seen1 seen2".to_owned(), String::new());
+    eventually("both nodes", || names() == both);
+    cable.cut();
+    eventually("seen2 is missed", || names() == ("seen1".to_owned(), "seen2".to_owned()));
+    cable.mend();
+    eventually("seen2 is back", || names() == both);
+    two.end_node();
+    eventually("seen2 is missed", || names() == ("seen1".to_owned(), "seen2".to_owned()));
+    drop(two);
+    let mut again = World::joined("seen2", &one.address);
+    eventually("seen2 is started again", || names() == both);
+    again.leave();
+    eventually("seen2 has ended", || names() == ("seen1".to_owned(), String::new()));
 }

@@ -22,14 +22,24 @@ pub struct At {
     pub json: bool,
 }
 
+/// The nodes that a command is for: all that are there, and that went away without an end.
+#[derive(clap::Args)]
+pub struct Nodes {
+    /// Only this node, which must answer; may be repeated
+    #[arg(long = "node", value_name = "NAME")]
+    pub named: Vec<Name>,
+    /// Not this node, such as one that went away and will not come back; may be repeated
+    #[arg(long, value_name = "NAME", conflicts_with = "named")]
+    without: Vec<Name>,
+}
+
 /// The motors that a command is for.
 #[derive(clap::Args)]
 pub struct Motors {
     #[command(flatten)]
     pub at: At,
-    /// Only this node, which must be there; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    pub nodes: Vec<Name>,
+    #[command(flatten)]
+    pub nodes: Nodes,
     /// Motors with this in their name, such as /st0/ or /st0/1
     #[arg(long, value_name = "TEXT", default_value = "")]
     name: String,
@@ -39,9 +49,14 @@ pub struct Motors {
 pub struct OrderArgs {
     #[command(flatten)]
     pub at: At,
-    /// Only this node, which must answer; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    pub nodes: Vec<Name>,
+    #[command(flatten)]
+    pub nodes: Nodes,
+}
+
+impl Nodes {
+    pub fn has(&self, node: &Name) -> bool {
+        (self.named.is_empty() || self.named.contains(node)) && !self.without.contains(node)
+    }
 }
 
 impl Motors {

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink_fleet::directory;
+use motorlink_fleet::directory::{self, Directory};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::message::Info;
 use motorlink_fleet::network::Network;
 
+use super::args::Nodes;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::note;
@@ -16,9 +17,8 @@ const SEARCH: Duration = Duration::from_secs(5);
 /// How often they are asked meanwhile.
 const AGAIN: Duration = Duration::from_millis(100);
 
-/// The nodes that are there, or these of them, once they know motors of their lines. Each must be there and
-/// answer.
-pub fn found(network: &Network, wanted: &[Name]) -> Result<Vec<(Name, Info)>, Failure> {
+/// These nodes, once they know motors of their lines. Each must be there and answer.
+pub fn found(network: &Network, wanted: &Nodes) -> Result<Vec<(Name, Info)>, Failure> {
     let end = Instant::now() + SEARCH;
     loop {
         let nodes = there(network, wanted)?;
@@ -43,10 +43,16 @@ pub fn found(network: &Network, wanted: &[Name]) -> Result<Vec<(Name, Info)>, Fa
     }
 }
 
-fn there(network: &Network, wanted: &[Name]) -> Result<Vec<(Name, Info)>, Failure> {
+fn there(network: &Network, wanted: &Nodes) -> Result<Vec<(Name, Info)>, Failure> {
     let mut found = Vec::new();
-    for ((node, _), info) in directory::nodes(network)? {
-        if !wanted.is_empty() && !wanted.contains(&node) {
+    let Directory { nodes, away } = directory::nodes(network)?;
+    if let Some((node, seconds)) = away.iter().find(|(node, _)| wanted.has(node)) {
+        return Err(gone(node, *seconds).trying(format!(
+            "`--without {node}` leaves it out, `--node NAME` asks only for others"
+        )));
+    }
+    for ((node, _), info) in nodes {
+        if !wanted.has(&node) {
             continue;
         }
         let info = info.ok_or_else(|| Failure::link(format!("node {node} does not answer")))?;
@@ -56,7 +62,8 @@ fn there(network: &Network, wanted: &[Name]) -> Result<Vec<(Name, Info)>, Failur
         }
         found.push((node, info));
     }
-    if let Some(missing) = wanted.iter().find(|it| found.iter().all(|(node, _)| node != *it)) {
+    if let Some(missing) = wanted.named.iter().find(|it| found.iter().all(|(node, _)| node != *it))
+    {
         return Err(Failure::link(format!("no node {missing} is at this network"))
             .trying("`motorlink fleet list` shows those that are there"));
     }
@@ -64,4 +71,11 @@ fn there(network: &Network, wanted: &[Name]) -> Result<Vec<(Name, Info)>, Failur
         return Err(Failure::link("no node is at this network"));
     }
     Ok(found)
+}
+
+/// A node went away this many seconds ago.
+pub fn gone(node: &Name, seconds: f64) -> Failure {
+    Failure::link(format!(
+        "node {node} went away {seconds:.0} s ago without an end: it was killed, or its network is cut"
+    ))
 }

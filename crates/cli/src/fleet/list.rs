@@ -1,24 +1,25 @@
 //! `motorlink fleet list`
 
-use motorlink_fleet::directory::nodes;
+use motorlink_fleet::directory::{self, Directory};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::message::Info;
 use motorlink_telemetry::share::message::Line;
 use serde_json::{Value, json};
 
 use super::args::At;
+use super::found::gone;
 use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 
 pub fn run(at: &At) -> Result<(), Failure> {
     let network = at.via.network();
-    let nodes = nodes(&network)?;
+    let Directory { nodes, away } = directory::nodes(&network)?;
     if nodes.is_empty() && !at.json {
         let limit = network.name().map_or_else(String::new, |name| format!(" that {name} may see"));
         print_line(&format!("No node is at this network{limit}."))?;
     }
-    let width =
-        nodes.keys().map(|(name, _)| name.as_str().len()).max().unwrap_or(0).max("node".len());
+    let names = nodes.keys().map(|(name, _)| name).chain(away.keys());
+    let width = names.map(|name| name.as_str().len()).max().unwrap_or(0).max("node".len());
     if !nodes.is_empty() && !at.json {
         print_line(&format!(
             "{:<width$}  {:<6}  {:<8}  {:<10}  port",
@@ -35,10 +36,16 @@ pub fn run(at: &At) -> Result<(), Failure> {
             )?,
         }
     }
-    match nodes.iter().find(|(_, info)| info.is_none()) {
-        Some(((name, _), _)) => Err(Failure::link(format!("node {name} does not answer"))),
-        None => Ok(()),
+    for (name, seconds) in &away {
+        printer.result(
+            format!("{name:<width$}  away for {seconds:.0} s", name = name.as_str()),
+            json!({"node": name.as_str(), "answers": false, "away_seconds": seconds}),
+        )?;
     }
+    if let Some(((name, _), _)) = nodes.iter().find(|(_, info)| info.is_none()) {
+        return Err(Failure::link(format!("node {name} does not answer")));
+    }
+    away.iter().next().map_or(Ok(()), |(name, seconds)| Err(gone(name, *seconds)))
 }
 
 fn text(name: &Name, info: &Info, width: usize) -> String {

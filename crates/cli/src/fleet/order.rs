@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use motorlink_fleet::directory;
+use motorlink_fleet::directory::{self, Directory};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::remote::Remote;
@@ -12,7 +12,7 @@ use serde_json::json;
 use super::args::OrderArgs;
 use crate::advice;
 use crate::failure::Failure;
-use crate::output::{self, print_line};
+use crate::output::print_line;
 use crate::share::{self, Connection};
 
 /// What all nodes are told.
@@ -25,15 +25,16 @@ pub enum Order {
 
 pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
     let network = args.at.via.network();
-    let found = directory::nodes(&network)?.into_keys();
-    let is_meant = |(name, _): &(Name, Name)| args.nodes.is_empty() || args.nodes.contains(name);
+    let Directory { nodes: found, away } = directory::nodes(&network)?;
     let mut nodes: Vec<(Name, Option<Name>)> =
-        found.filter(is_meant).map(|(name, boot)| (name, Some(boot))).collect();
-    for name in &args.nodes {
+        found.into_keys().map(|(name, boot)| (name, Some(boot))).collect();
+    // Those that went away may be back just now.
+    for name in away.keys().chain(&args.nodes.named) {
         if nodes.iter().all(|(found, _)| found != name) {
             nodes.push((name.clone(), None));
         }
     }
+    nodes.retain(|(name, _)| args.nodes.has(name));
     if nodes.is_empty() {
         let none = Failure::link("no node is at this network, so nothing was sent");
         return Err(none.trying("name the nodes that must answer with --node"));
@@ -45,13 +46,6 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
             (name, thread::spawn(move || tell(&node, boot, network, order)))
         })
         .collect();
-    if args.nodes.is_empty() {
-        let names: Vec<_> = told.iter().map(|(name, _)| name.as_str()).collect();
-        output::note(format!(
-            "asked: {}; a node that cannot be reached now is not asked: name it with --node",
-            names.join(", ")
-        ));
-    }
     let (mut is_done, mut away) = (true, Vec::new());
     for (name, told) in told {
         match told.join().unwrap_or_else(|_| Err("it could not be asked".to_owned())) {

@@ -2,12 +2,11 @@
 
 use motorlink::rmd::MotorId;
 use motorlink::st::MotorNumber;
-use motorlink_fleet::key::Name;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::message::Protocol;
 
-use super::args::Via;
+use super::args::{Nodes, Via};
 use super::found::found;
 use crate::failure::Failure;
 use crate::output::note;
@@ -17,9 +16,8 @@ use crate::record::{Place, What, run_on};
 pub struct Args {
     #[command(flatten)]
     via: Via,
-    /// Only this node, which must be there; may be repeated
-    #[arg(long = "node", value_name = "NAME")]
-    nodes: Vec<Name>,
+    #[command(flatten)]
+    nodes: Nodes,
     #[command(flatten)]
     what: What,
 }

@@ -129,7 +129,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     // The motors stop first, then the network is left.
     let outcome = share::serve(server, args.json, outcome);
-    drop(node);
+    match (node, &outcome) {
+        (Some(node), Ok(())) => node.end(),
+        (node, _) => drop(node),
+    }
     outcome
 }
 

@@ -15,6 +15,7 @@ use super::sessions::Sessions;
 use crate::clock::Clock;
 use crate::key::Name;
 use crate::message::Answer;
+use crate::roll::Roll;
 use crate::weight::Lines;
 
 /// What all tasks of a node have.
@@ -29,6 +30,8 @@ pub(super) struct Common {
     pub(super) zenoh: Zenoh,
     pub(super) state: RwLock<State>,
     pub(super) sessions: Mutex<Sessions>,
+    /// The other nodes.
+    pub(super) roll: Mutex<Roll>,
 }
 
 /// What the node knows of its share.

@@ -3,6 +3,7 @@
 mod common;
 mod door;
 mod gate;
+mod others;
 mod outbox;
 mod publish;
 mod session;
@@ -47,7 +48,8 @@ pub struct Options {
     pub ros2: Option<Settings>,
 }
 
-/// A node that runs. When it is dropped, all its sessions end.
+/// A node that runs. When it is dropped, all its sessions end, and others remember that it went away
+/// without an [`end`](Self::end).
 pub struct Node {
     common: Arc<Common>,
     addresses: Vec<String>,
@@ -94,7 +96,7 @@ impl Node {
             return Err(NodeError::NameTaken(name));
         }
         let boot = Name::random()?;
-        let (state, sessions) = (RwLock::default(), Mutex::default());
+        let (state, sessions, roll) = (RwLock::default(), Mutex::default(), Mutex::default());
         let own = OnceLock::new();
         let common = Arc::new(Common {
             name,
@@ -106,7 +108,9 @@ impl Node {
             zenoh,
             state,
             sessions,
+            roll,
         });
+        others::follow(&common).map_err(failed)?;
         runtime.block_on(publish::start(&common, period))?;
         let alive = door::open(&common, &runtime).map_err(failed)?;
         // The router of a site denies without a word.
@@ -128,6 +132,11 @@ impl Node {
     /// The addresses of this node.
     pub fn addresses(&self) -> &[String] {
         &self.addresses
+    }
+
+    /// Leaves the network, and says that its motors have been stopped.
+    pub fn end(self) {
+        others::say_end(&self.common);
     }
 
     /// What ROS 2 machines see of it.

@@ -179,6 +179,7 @@ impl Common {
             lines: state.known.clone(),
             searching: state.searching.iter().cloned().collect(),
             latched_by: state.latched_by.clone(),
+            away: self.roll().away(),
         }
     }
 

@@ -12,7 +12,7 @@ use crate::key::{self, Name, Scope};
 
 /// The rules for these members. All else is denied.
 pub(super) fn control(members: &BTreeMap<Name, Role>) -> Value {
-    let (seeing, answering) = (seeing(), answering());
+    let (seeing, answering) = (seeing(), [answering(), meeting()].concat());
     let mut rules = [&seeing[..], &answering].concat();
     let (mut subjects, mut policies) = (Vec::new(), Vec::new());
     for (name, role) in members {
@@ -62,6 +62,19 @@ fn answering() -> Vec<Value> {
     vec![going("questions", &["query"], &asked)]
 }
 
+/// What all nodes see of each other: who is there, and who ends.
+fn meeting() -> Vec<Value> {
+    let any = Name::any();
+    let nodes = [key::all_alive()];
+    let ends = [key::ended(&any, &any)];
+    vec![
+        coming("others", &["declare_liveliness_subscriber"], &nodes),
+        coming("ends", &["declare_subscriber"], &ends),
+        going("others", &["liveliness_token"], &nodes),
+        going("ends", &["put"], &ends),
+    ]
+}
+
 /// What a node says in its own name.
 fn of_node(name: &Name) -> Vec<Value> {
     let alive = [key::alive_of(name)];
@@ -71,7 +84,7 @@ fn of_node(name: &Name) -> Vec<Value> {
         coming(&format!("says {name}"), &says, &[key::all_of(name)]),
         coming(&format!("alive {name}"), &["liveliness_token", "liveliness_query"], &alive),
         coming(&format!("programs {name}"), &["declare_liveliness_subscriber"], &here),
-        going(&format!("tokens {name}"), &["liveliness_token"], &[alive, here].concat()),
+        going(&format!("tokens {name}"), &["liveliness_token"], &here),
     ]
 }
 

@@ -2,6 +2,7 @@
 
 mod picture;
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -67,7 +68,7 @@ impl View {
         }
         let now = Boot.now();
         let mut silent = Vec::new();
-        for ((node, _), info) in directory::nodes(network)? {
+        for ((node, _), info) in directory::nodes(network)?.nodes {
             match info {
                 Some(info) => shared.picture().state(node, info, now),
                 None => silent.push(node),
@@ -78,7 +79,7 @@ impl View {
     }
 
     /// The nodes that have said something.
-    pub fn nodes(&self) -> std::collections::BTreeMap<Name, Node> {
+    pub fn nodes(&self) -> BTreeMap<Name, Node> {
         self.shared.picture().nodes()
     }
 
@@ -86,6 +87,12 @@ impl View {
     pub fn silent(&self) -> Vec<&Name> {
         let nodes = self.shared.picture().nodes();
         self.silent.iter().filter(|node| !nodes.contains_key(node)).collect()
+    }
+
+    /// The nodes that went away without an end and that were not seen here, and for how long, in seconds.
+    pub fn away(&self) -> BTreeMap<Name, f64> {
+        let nodes = self.nodes();
+        directory::away(nodes.values().map(|node| &node.info), |node| nodes.contains_key(node))
     }
 
     /// The motors that have answered.

@@ -141,6 +141,7 @@ mod tests {
             lines: vec![line],
             searching: Vec::new(),
             latched_by: None,
+            away: Vec::new(),
         }
     }
 

@@ -15,12 +15,15 @@ use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc::{Receiver, Sender, UnboundedSender, channel, unbounded_channel};
 use tokio::time::{Instant, sleep_until};
 use zenoh::Session as Zenoh;
-use zenoh::handlers::FifoChannelHandler;
+use zenoh::handlers::{FifoChannelHandler, RingChannel, RingChannelHandler};
+use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
 use super::merge::{Merge, Out};
 use crate::clock::{Boot, Clock};
+use crate::directory;
 use crate::key::{self, Name};
+use crate::message::Info;
 use crate::remote::{PATIENCE, Remote};
 
 /// The pause between two attempts to connect to a node.
@@ -31,6 +34,8 @@ const WAITING: usize = 1 << 20;
 const LONGEST: usize = frame::LONGEST;
 /// Messages of nodes that wait.
 const QUEUE: usize = 64;
+/// The same of what nodes say of themselves. Older ones are dropped: they are said again.
+const STATES: usize = 64;
 
 /// What a node has said.
 struct News {
@@ -69,7 +74,9 @@ pub(super) struct Serving {
     news: Receiver<News>,
     told: Sender<News>,
     /// Nodes that come and go.
-    seen: zenoh::pubsub::Subscriber<FifoChannelHandler<Sample>>,
+    seen: Subscriber<FifoChannelHandler<Sample>>,
+    /// What nodes say of themselves.
+    states: Subscriber<RingChannelHandler<Sample>>,
     known: Known,
     zenoh: Arc<Zenoh>,
 }
@@ -86,8 +93,13 @@ impl Serving {
         zenoh: Arc<Zenoh>,
         socket: StdStream,
     ) -> io::Result<()> {
-        let seen = zenoh.liveliness().declare_subscriber(key::all_alive()).history(true).await;
+        // Those that are there already are asked for below. While a subscriber gets them too, the answer is
+        // empty.
+        let seen = zenoh.liveliness().declare_subscriber(key::all_alive()).await;
         let seen = seen.map_err(io::Error::other)?;
+        let states = zenoh.declare_subscriber(key::state(&Name::any()));
+        let states = states.with(RingChannel::new(STATES)).await;
+        let states = states.map_err(io::Error::other)?;
         let (reader, writer) = UnixStream::from_std(socket)?.into_split();
         let (told, news) = channel(QUEUE);
         let mut serving = Serving {
@@ -102,6 +114,7 @@ impl Serving {
             news,
             told,
             seen,
+            states,
             known,
             zenoh: Arc::clone(&zenoh),
         };
@@ -144,6 +157,7 @@ impl Serving {
                 }
                 Some(news) = self.news.recv(), if self.out.len() < WAITING => self.heard(news),
                 Ok(sample) = self.seen.recv_async() => self.saw(&sample),
+                Ok(sample) = self.states.recv_async() => self.told_away(&sample),
                 () = sleep_until(next) => {}
             }
         }
@@ -203,6 +217,18 @@ impl Serving {
         let link = self.links.entry(node);
         let link = link.or_insert(Link { run: 0, requests: None, next: Some(now) });
         link.next = link.next.map(|_| now);
+    }
+
+    /// A node says which others went away before this program came.
+    fn told_away(&mut self, sample: &Sample) {
+        let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
+        let away = directory::away(info.iter(), |node| self.links.contains_key(node));
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        for node in away.into_keys().filter(|node| (self.is_meant)(node)) {
+            known.entry(node).or_default();
+        }
+        drop(known);
+        self.remember();
     }
 
     /// Nodes that were there before keep their lines.

@@ -66,8 +66,14 @@ impl World {
         format!("zenoh:{}/{line}?via=tcp/{address}{options}", self.name)
     }
 
+    /// The node vanishes, as if it was killed.
     pub fn end_node(&mut self) {
         self.node = None;
+    }
+
+    /// The node ends by itself.
+    pub fn leave(&mut self) {
+        self.node.take().unwrap().end();
     }
 }
 

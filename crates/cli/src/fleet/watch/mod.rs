@@ -3,8 +3,10 @@
 mod live;
 mod table;
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use motorlink_fleet::key::Name;
 use motorlink_fleet::view::View;
 
 use super::args::Via;
@@ -71,13 +73,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             _ => break,
         }
     }
-    match &view.silent()[..] {
-        [] => Ok(()),
-        silent => {
-            let names: Vec<_> = silent.iter().map(|node| node.as_str()).collect();
-            Err(Failure::link(format!("no answer of {}", names.join(", "))))
-        }
+    let away = view.away();
+    let missing: BTreeSet<_> = view.silent().into_iter().chain(away.keys()).collect();
+    if missing.is_empty() {
+        return Ok(());
     }
+    let names: Vec<_> = missing.into_iter().map(Name::as_str).collect();
+    Err(Failure::link(format!("no answer of {}", names.join(", "))))
 }
 
 /// Waits until each motor has values, for a moment.

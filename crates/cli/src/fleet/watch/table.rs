@@ -248,25 +248,38 @@ pub struct Sum {
     latched_by: Option<String>,
     /// How long the node has been silent, in seconds.
     age: f64,
+    is_away: bool,
 }
 
 impl Sum {
+    /// A node that went away before this program came.
+    fn away(node: Name, age: f64) -> Self {
+        let (drives, turning, faulty, old) = (0, 0, 0, 0);
+        Sum {
+            node,
+            drives,
+            turning,
+            faulty,
+            old,
+            hottest: None,
+            latched_by: None,
+            age,
+            is_away: true,
+        }
+    }
+
     pub fn name(&self) -> &str {
         self.node.as_str()
     }
 
-    pub fn is_away(&self) -> bool {
-        self.age > AWAY
-    }
-
     pub fn is_bad(&self) -> bool {
-        self.faulty > 0 || self.old > 0 || self.is_away()
+        self.faulty > 0 || self.old > 0 || self.is_away
     }
 
     pub fn text(&self, name_width: usize) -> String {
         let number = |it: usize, width| right(&it.to_string(), width);
         let state = match &self.latched_by {
-            _ if self.is_away() => format!("away for {:.0} s", self.age),
+            _ if self.is_away => format!("away for {:.0} s", self.age),
             Some(by) => format!("latched by {by}"),
             None => "here".to_owned(),
         };
@@ -319,6 +332,7 @@ pub fn sums(nodes: &BTreeMap<Name, Node>, drives: &[Drive], now: f64) -> Vec<Sum
             hottest: rows.iter().filter_map(|row| Some(row.temperature?.0)).reduce(f64::max),
             latched_by: node.info.latched_by.clone(),
             age: now - node.at,
+            is_away: now - node.at > AWAY,
         }
     };
     nodes.iter().map(of_node).collect()
@@ -334,7 +348,9 @@ impl Shown {
     pub fn of(view: &View, sort: Sort, only: Only, name: &str) -> Self {
         let (drives, now) = (view.drives(), View::now());
         let rows = rows(&drives, now, sort, only, name);
-        Shown { rows, sums: sums(&view.nodes(), &drives, now) }
+        let mut sums = sums(&view.nodes(), &drives, now);
+        sums.extend(view.away().into_iter().map(|(node, age)| Sum::away(node, age)));
+        Shown { rows, sums }
     }
 
     /// How wide the first column is.
@@ -362,8 +378,8 @@ pub fn summary(sums: &[Sum]) -> String {
         let names: Vec<_> = sums.iter().filter(is).map(|it| it.node.as_str()).collect();
         (!names.is_empty()).then(|| format!("{what}: {}", names.join(", ")))
     };
-    parts.extend(named("away", &|it| it.is_away()));
-    parts.extend(named("latched", &|it| it.latched_by.is_some() && !it.is_away()));
+    parts.extend(named("away", &|it| it.is_away));
+    parts.extend(named("latched", &|it| it.latched_by.is_some() && !it.is_away));
     parts.join("; ")
 }
 
