@@ -93,6 +93,27 @@ def asks_columns(site, session, who):
     return bool(answers(session, f"{ROOT}/arm1/st0/1/columns"))
 
 
+def asks_identity(site, session, who):
+    return bool(answers(session, f"{ROOT}/arm1/st0/1/identity"))
+
+
+def asks_register(site, session, who):
+    return bool(answers(session, f"{ROOT}/arm1/st0/1/registers/STATUS"))
+
+
+def asks_all_registers(site, session, who):
+    return bool(answers(session, f"{ROOT}/*/*/*/registers/*", timeout=5))
+
+
+def asks_settings(site, session, who):
+    return bool(answers(session, f"{ROOT}/arm1/st0/1/settings", timeout=5))
+
+
+def hears_why_not(site, session, who):
+    replies = session.get(f"{ROOT}/arm1/st7/1/identity", timeout=PAUSE)
+    return any(b"no line" in it.err.payload.to_bytes() for it in replies if it.ok is None)
+
+
 def hears_state(site, session, who):
     return hears(session, f"{ROOT}/arm1/node/state", within=2.2)
 
@@ -185,6 +206,15 @@ def answers_as_arm1(site, session, who):
     return came
 
 
+def answers_about_a_drive_as_arm1(site, session, who):
+    key = f"{ROOT}/arm1/false/1/identity"
+    queryable = session.declare_queryable(key, lambda query: query.reply(key, "false"))
+    time.sleep(0.1)
+    came = b"false" in answers(site.alice, f"{ROOT}/*/*/*/identity")
+    queryable.undeclare()
+    return came
+
+
 def answers_others_queries_as_arm1(site, session, who):
     """It may answer in its own name, and answers in that of arm1."""
     key = f"{ROOT}/{who}/node/info/false"
@@ -247,14 +277,16 @@ def says_that_alice_is_gone(site, session, who):
 
 
 WHAT = [
-    *(sees_nodes, asks_info, asks_columns, hears_state, hears_samples, hears_events, hears_all),
+    *(sees_nodes, asks_info, asks_columns, asks_identity, asks_register, asks_all_registers, asks_settings),
+    # What is under way of an earlier subscription would also come to that to all.
+    *(hears_why_not, hears_all, hears_state, hears_samples, hears_events),
     *(joins_to_see, reads, stops, moves, moves_as_another, asks_with_wildcards),
-    *(says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1),
-    *(takes_requests_of_others, sees_programs, says_that_alice_is_gone),
+    *(says_false_state, answers_as_arm1, answers_about_a_drive_as_arm1, answers_others_queries_as_arm1),
+    *(is_alive_as_arm1, takes_requests_of_others, sees_programs, says_that_alice_is_gone),
     *(hears_of_nodes, hears_of_ends, says_that_arm1_ends),
 ]
-SEE = {sees_nodes, asks_info, asks_columns, hears_state, hears_samples, hears_events, joins_to_see, reads,
-       hears_of_nodes}
+SEE = {sees_nodes, asks_info, asks_columns, asks_identity, asks_register, asks_all_registers, asks_settings,
+       hears_why_not, hears_state, hears_samples, hears_events, joins_to_see, reads, hears_of_nodes}
 MEET = {hears_of_nodes, hears_of_ends}
 #: All else is denied. The node itself is the control of what others may not do in its name.
 MAY = {
@@ -264,8 +296,9 @@ MAY = {
     "bob": SEE,
     "alice": SEE | {stops, moves, says_that_alice_is_gone},
     "arm2": MEET,
-    "arm1": MEET | {says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1,
-             takes_requests_of_others, sees_programs, says_that_arm1_ends},
+    "arm1": MEET | {says_false_state, answers_as_arm1, answers_about_a_drive_as_arm1,
+                    answers_others_queries_as_arm1, is_alive_as_arm1, takes_requests_of_others,
+                    sees_programs, says_that_arm1_ends},
 }
 
 

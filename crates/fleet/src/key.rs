@@ -178,6 +178,60 @@ pub(crate) fn all_columns(node: &Name) -> String {
     format!("{ROOT}/{node}/*/*/columns")
 }
 
+/// What programs ask of a motor without a session: queries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum About {
+    /// What the drive is.
+    Identity,
+    /// The values of registers.
+    Registers,
+    /// The file of its settings.
+    Settings,
+}
+
+impl About {
+    /// All of them.
+    pub const ALL: [Self; 3] = [About::Identity, About::Registers, About::Settings];
+
+    /// The part of keys behind the motor.
+    const fn words(self) -> &'static str {
+        match self {
+            About::Identity => "identity",
+            About::Registers => "registers/*",
+            About::Settings => "settings",
+        }
+    }
+}
+
+/// What is asked of a motor: a query. That of registers is about all that can be read.
+pub fn about(node: &Name, line: &str, motor: u8, about: About) -> String {
+    format!("{ROOT}/{node}/{line}/{motor}/{}", about.words())
+}
+
+/// A register of a motor: a query. It has this key in the answer to a query about all of them, too.
+pub fn register(node: &Name, line: &str, motor: u8, name: &str) -> String {
+    format!("{ROOT}/{node}/{line}/{motor}/registers/{name}")
+}
+
+/// What is asked of all motors of a node.
+pub(crate) fn all_about(node: &Name, about: About) -> String {
+    format!("{ROOT}/{node}/*/*/{}", about.words())
+}
+
+/// The line and the motor in the key of a query, if it names one motor of one node.
+pub(crate) fn one_motor(key: &str) -> Option<(&str, &str)> {
+    let mut parts = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/');
+    let mut part = || parts.next().filter(|part| !part.contains('*'));
+    let (_node, line, motor, _about) = (part()?, part()?, part()?, part()?);
+    Some((line, motor))
+}
+
+/// The register in the key of a query, if it names one of one motor.
+pub(crate) fn one_register(key: &str) -> Option<&str> {
+    one_motor(key)?;
+    key.rsplit('/').next().filter(|name| !name.contains('*'))
+}
+
 /// The node of any key.
 pub fn node_of(key: &str) -> Option<Name> {
     key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?.parse().ok()
@@ -265,6 +319,30 @@ mod tests {
         ] {
             assert_eq!(Asker::of(key), None, "{key}");
         }
+    }
+
+    #[test]
+    fn a_query_names_one_motor_or_several() {
+        let node = name("arm1");
+        for it in About::ALL {
+            assert_eq!(one_motor(&about(&node, "st0", 1, it)), Some(("st0", "1")), "{it:?}");
+            assert_eq!(one_motor(&all_about(&node, it)), None, "{it:?}");
+        }
+        let key = register(&node, "st0", 1, "SPEED_MEAS");
+        assert_eq!((one_motor(&key), one_register(&key)), (Some(("st0", "1")), Some("SPEED_MEAS")));
+        assert_eq!(one_register(&about(&node, "st0", 1, About::Registers)), None);
+        for key in [
+            "motorlink/v1/*/st0/1/identity",
+            "motorlink/v1/arm1/s$*/1/identity",
+            "motorlink/v1/arm1/st0/**",
+            "motorlink/v1/arm1/st0/1/**",
+            "motorlink/v1/arm1/st0/1",
+            "motorlink/**",
+            "**",
+        ] {
+            assert_eq!(one_motor(key), None, "{key}");
+        }
+        assert_eq!(one_motor("motorlink/v1/arm1/st0/-1/settings"), Some(("st0", "-1")));
     }
 
     #[test]

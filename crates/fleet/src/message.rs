@@ -1,7 +1,9 @@
 //! What goes around the messages of a share. Requests are the payloads of queries, replies those of
 //! their answers: JSON, but the messages of a share to a program, which are its stream of bytes.
 
-use motorlink_telemetry::share::message::{self as share, Line};
+use std::collections::BTreeMap;
+
+use motorlink_telemetry::share::message::{self as share, Line, Protocol, Reason};
 use serde::{Deserialize, Serialize};
 
 /// The longest sign-of-life deadline of a program, in seconds.
@@ -173,4 +175,47 @@ pub struct Away {
     pub node: String,
     /// Since when, by the clock of the node that says so, in seconds.
     pub since: f64,
+}
+
+/// What a drive is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// The line.
+    pub line: String,
+    /// The number or ID of the motor.
+    pub motor: u8,
+    /// What it speaks.
+    pub protocol: Protocol,
+    /// The profile in which the node reads the frames of an ST drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// What the drive says of itself: an ST drive its `board` and its `firmware`, an RMD motor nothing.
+    pub drive: BTreeMap<String, String>,
+}
+
+/// A register that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// Its name.
+    pub name: String,
+    /// In its unit; `null`: the drive gives a value that cannot be one, and `text` says why.
+    pub value: Option<f64>,
+    /// As text: a state, faults, a version, or the value with its decimals.
+    pub text: String,
+    /// The symbol of the unit; empty without one.
+    pub unit: String,
+}
+
+/// Why a query about a motor gets no answer: the payload of an error reply.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoAnswer {
+    /// What it is about.
+    pub key: String,
+    /// The kind of error.
+    pub reason: Reason,
+    /// The same as a sentence.
+    pub message: String,
+    /// The error code in the reply of an ST drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<u8>,
 }

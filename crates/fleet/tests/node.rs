@@ -14,11 +14,15 @@ use asking::Asker;
 use motorlink::port::{NotDone, PortError, PortName};
 use motorlink::{rmd, st};
 use motorlink_fleet::directory::{self, Directory};
+use motorlink_fleet::key::{self, About};
+use motorlink_fleet::message::NoAnswer;
+use motorlink_fleet::network::Network;
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_proto::units::CentiDps;
-use motorlink_telemetry::share::message::{Ask, Event, Happening};
+use motorlink_telemetry::share::message::{Ask, Event, Happening, Reason};
 use world::{Cable, World, eventually};
+use zenoh::Wait;
 
 fn open(name: &str) -> Result<st::Client, st::Error> {
     let port: PortName = name.parse().unwrap();
@@ -287,4 +291,21 @@ fn nodes_remember_one_that_went_away_until_it_is_back() {
     eventually("seen2 is started again", || names() == both);
     again.leave();
     eventually("seen2 has ended", || names() == ("seen1".to_owned(), String::new()));
+}
+
+#[test]
+fn a_node_without_a_reader_says_that_it_cannot_read_drives() {
+    let world = World::new("unread");
+    let network = Network::Connect(vec![format!("tcp/{}", world.address)]);
+    let (zenoh, _) = network.open().unwrap();
+    for about in About::ALL {
+        let key = key::about(&"unread".parse().unwrap(), "st0", 1, about);
+        let replies = zenoh.get(&key).wait().unwrap();
+        let error = replies.recv().unwrap().into_result().unwrap_err();
+        let why: NoAnswer = serde_json::from_slice(&error.payload().to_bytes()).unwrap();
+        assert_eq!((why.key, why.reason), (key, Reason::Usage));
+        assert!(why.message.contains("`monitor`"), "{}", why.message);
+        assert!(replies.recv().is_err());
+    }
+    zenoh.close().wait().unwrap();
 }

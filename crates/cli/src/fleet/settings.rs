@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::thread;
 
-use motorlink::settings::{Dump, Tunable, dump};
+use motorlink::settings::{Dump, Tunable, dump, fact};
 use motorlink::{rmd, st};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
@@ -151,7 +151,7 @@ fn values<M: Tunable<Error: std::fmt::Display>>(motor: M) -> Result<Values, Stri
         .map(|(setting, digits)| (setting.name.clone(), setting.shown(digits)))
         .collect();
     for line in dump.identity() {
-        let (what, is) = line.split_once(": ").unwrap_or((line, ""));
+        let (what, is) = fact(line);
         values.insert(what.to_owned(), is.to_owned());
     }
     values.extend(dump.absent().iter().map(|name| (name.clone(), "refused".to_owned())));

@@ -14,7 +14,7 @@ use zenoh::{Session as Zenoh, Wait};
 use super::sessions::Sessions;
 use crate::clock::Clock;
 use crate::key::Name;
-use crate::message::Answer;
+use crate::message::{Answer, NoAnswer};
 use crate::roll::Roll;
 use crate::weight::Lines;
 
@@ -42,6 +42,8 @@ pub(super) struct State {
     pub(super) latched_by: Option<String>,
     /// The lines on which motors are looked for.
     pub(super) searching: BTreeSet<String>,
+    /// The lines whose port is lost, and what the share says of it.
+    pub(super) lost: BTreeMap<String, String>,
     /// When the share said so.
     pub(super) t: f64,
     /// The columns of the samples that are published, by key.
@@ -62,7 +64,18 @@ pub(super) fn answer(query: &Query, answer: &Answer) {
 /// Answers a query with a text for this key. The program asks again if the answer does not come.
 pub(super) fn reply(query: &Query, key: &str, value: &impl Serialize) {
     let text = serde_json::to_vec(value).unwrap_or_default();
-    let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).express(true).wait();
+    reply_with(query, key, text, Encoding::APPLICATION_JSON);
+}
+
+/// Answers a query with bytes for this key.
+pub(super) fn reply_with(query: &Query, key: &str, bytes: Vec<u8>, encoding: Encoding) {
+    let _ = query.reply(key, bytes).encoding(encoding).express(true).wait();
+}
+
+/// Says why a query gets no answer.
+pub(super) fn refuse(query: &Query, why: &NoAnswer) {
+    let text = serde_json::to_vec(why).unwrap_or_default();
+    let _ = query.reply_err(text).encoding(Encoding::APPLICATION_JSON).wait();
 }
 
 /// Answers a query with a part of the share's stream.

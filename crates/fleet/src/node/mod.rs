@@ -6,6 +6,8 @@ mod gate;
 mod others;
 mod outbox;
 mod publish;
+mod queries;
+mod reader;
 mod session;
 mod sessions;
 
@@ -24,6 +26,8 @@ use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
 use common::Common;
+
+pub use reader::{Drive, Reader, Reading};
 
 /// The longest time until others see a node.
 const SEEN: Duration = Duration::from_secs(2);
@@ -46,6 +50,8 @@ pub struct Options {
     pub period: Duration,
     /// What it does for ROS 2 machines.
     pub ros2: Option<Settings>,
+    /// Reads its drives for queries. Without it they are refused.
+    pub reader: Option<Arc<dyn Reader>>,
 }
 
 /// A node that runs. When it is dropped, all its sessions end, and others remember that it went away
@@ -85,7 +91,7 @@ impl Node {
     /// # Errors
     /// The network, or the name is taken.
     pub fn start(options: Options) -> Result<Self, NodeError> {
-        let Options { name, share, program, network, clock, period, ros2 } = options;
+        let Options { name, share, program, network, clock, period, ros2, reader } = options;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("node")
@@ -112,6 +118,7 @@ impl Node {
         });
         others::follow(&common).map_err(failed)?;
         runtime.block_on(publish::start(&common, period))?;
+        runtime.block_on(queries::open(&common, reader))?;
         let alive = door::open(&common, &runtime).map_err(failed)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {

@@ -11,7 +11,7 @@ use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, DropRule, Event, Group, Line, SignalName, Text, decode,
+    Answer, Ask, DropRule, Event, Group, Happening, Line, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program};
 use motorlink_telemetry::share::words::Speaks;
@@ -66,7 +66,10 @@ impl Common {
         while let Ok(Frame { kind, payload }) = listener.next().await {
             match kind {
                 Kind::Text => match decode(&payload) {
-                    Ok(Text::Event(event)) => self.publish_event(&event),
+                    Ok(Text::Event(event)) => {
+                        self.follow_port(&event);
+                        self.publish_event(&event);
+                    }
                     Ok(Text::Group(group)) => {
                         let key = key::columns(&self.name, &group.line, group.motor);
                         self.put(&key, &group);
@@ -183,16 +186,35 @@ impl Common {
         }
     }
 
-    /// Answers what the node is, as it is now.
-    pub(super) async fn say_info(&self, query: &Query) {
-        // Without an answer of the share the last state is given.
+    /// Learns the state of the share as it is now. Without an answer the last one is kept.
+    pub(super) async fn refresh(&self) {
         let age = self.clock.now() - self.state.read().unwrap_or_else(PoisonError::into_inner).t;
         if age > FRESH
             && let Some(own) = self.own.get()
         {
             let _ = timeout(STATE, self.learn(own)).await;
         }
+    }
+
+    /// Answers what the node is, as it is now.
+    pub(super) async fn say_info(&self, query: &Query) {
+        self.refresh().await;
         reply(query, &key::info(&self.name, &self.boot), &self.info());
+    }
+
+    /// Remembers whether the port of a line is lost.
+    fn follow_port(&self, event: &Event) {
+        let Event { line: Some(line), event, message, .. } = event else { return };
+        match event {
+            Happening::Lost => self.state_mut().lost.insert(line.clone(), message.clone()),
+            Happening::Back | Happening::Closed => self.state_mut().lost.remove(line),
+            _ => None,
+        };
+    }
+
+    /// What the share says of a line whose port is lost.
+    pub(super) fn lost(&self, line: &str) -> Option<String> {
+        self.state.read().unwrap_or_else(PoisonError::into_inner).lost.get(line).cloned()
     }
 
     fn columns_of(&self, group: Group) {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::role::Role;
-use crate::key::{self, Name, Scope};
+use crate::key::{self, About, Name, Scope};
 
 /// The rules for these members. All else is denied.
 pub(super) fn control(members: &BTreeMap<Name, Role>) -> Value {
@@ -43,7 +43,7 @@ fn seeing() -> Vec<Value> {
         key::all_samples(&any),
         key::all_columns(&any),
     ];
-    let asked = [key::all_info(), key::all_columns(&any)];
+    let asked = asked_of_all();
     vec![
         coming("nodes", &["liveliness_query", "declare_liveliness_subscriber"], &nodes),
         coming("published", &["declare_subscriber"], &published),
@@ -54,11 +54,18 @@ fn seeing() -> Vec<Value> {
     ]
 }
 
+/// What all programs may ask of all nodes.
+fn asked_of_all() -> Vec<String> {
+    let any = Name::any();
+    let about = About::ALL.map(|about| key::all_about(&any, about));
+    [&[key::all_info(), key::all_columns(&any)][..], &about].concat()
+}
+
 /// What all nodes are asked. Whether a program may ask it was decided before.
 fn answering() -> Vec<Value> {
     let any = Name::any();
     let asks = Scope::ALL.map(|scope| key::ask(&any, &any, scope, &any, &any));
-    let asked = [&asks[..], &[key::all_info(), key::all_columns(&any)]].concat();
+    let asked = [&asks[..], &asked_of_all()].concat();
     vec![going("questions", &["query"], &asked)]
 }
 

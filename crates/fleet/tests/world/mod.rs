@@ -91,6 +91,7 @@ fn start(
         clock,
         period: Duration::from_millis(50),
         ros2: None,
+        reader: None,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Exchanges with a motor through a share.
 
 use motorlink_proto::rmd::{Command as _, MotorId, ReadMotionStatus};
-use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, RegisterId, Request};
+use motorlink_proto::st::{ErrorCode, MAX_PAYLOAD, MotorNumber, Profile, RegisterId, Request};
 use motorlink_telemetry::line::Request as LineRequest;
 use motorlink_telemetry::share::message::{Answer, Ask, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
@@ -143,6 +143,12 @@ impl<'a> Exchanges<'a> {
     pub(super) fn place(&self) -> String {
         format!("{}, motor {}", self.target.name.line, self.target.name.motor)
     }
+}
+
+/// Whether a motor refuses what was asked of it. Not: the drive has no motor of this number.
+pub(super) fn is_refused_by_motor(refusal: &Refusal) -> bool {
+    let code = refusal.code.map(ErrorCode::from);
+    refusal.reason == Reason::Refused && code != Some(ErrorCode::BadMotorSelected)
 }
 
 /// Whether asking again may help: the line failed, or answers were not confirmed.

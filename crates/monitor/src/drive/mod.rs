@@ -22,11 +22,12 @@ mod write;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use motorlink::settings::Dump;
 use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 
-use crate::message::{Answer, Ask, Limit, Mode};
+use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
 use control::Control;
 use exchange::Exchanges;
 use target::{Target, usage};
@@ -84,9 +85,7 @@ impl Drives {
                 let speaks = self.speaks(&line)?;
                 Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
             }
-            Ask::Describe { line } => {
-                Ok(Answer::Describe(Box::new(describe::describe(&line, self.speaks(&line)?))))
-            }
+            Ask::Describe { line } => Ok(Answer::Describe(Box::new(self.describe(&line)?))),
             Ask::Read { motor, names } => {
                 let target = self.target(motor)?;
                 let values = registers::read(&Exchanges::new(view, &target), &names).await?;
@@ -109,10 +108,7 @@ impl Drives {
                 let write = write::Write { target, name, value, to_rom };
                 Ok(Answer::Write { values: write.carry_out(&self.control, view, drive).await? })
             }
-            Ask::Dump { motor } => {
-                let target = self.target(motor)?;
-                settings::dump(&self.control, &Exchanges::new(view, &target)).await
-            }
+            Ask::Dump { motor } => Ok(settings::as_file(&motor, &self.dump(&motor, view).await?)),
             Ask::Diff { motor, text } => {
                 let target = self.target(motor)?;
                 settings::diff(&self.control, &Exchanges::new(view, &target), &text).await
@@ -125,6 +121,50 @@ impl Drives {
                 run.carry_out(&self.control, drive).await
             }
         }
+    }
+
+    /// What the drives of a line have.
+    ///
+    /// # Errors
+    /// The line is unknown.
+    pub fn describe(&self, line: &str) -> Result<Description, Refusal> {
+        Ok(describe::describe(line, self.speaks(line)?))
+    }
+
+    /// Reads registers, in the order of their names. One that the drive refuses does not hide the others.
+    ///
+    /// # Errors
+    /// A name is unknown: nothing is sent. The line fails. The motor is unknown or silent.
+    pub async fn read(
+        &self,
+        motor: &MotorName,
+        names: &[String],
+        view: &Program,
+    ) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
+        let target = self.target(motor.clone())?;
+        registers::read_each(&Exchanges::new(view, &target), names).await
+    }
+
+    /// What is known of a drive: [`Dump::identity`], without the settings.
+    ///
+    /// # Errors
+    /// The line fails. The motor is unknown or silent.
+    pub async fn identity(
+        &self,
+        motor: &MotorName,
+        view: &Program,
+    ) -> Result<Vec<String>, Refusal> {
+        let target = self.target(motor.clone())?;
+        settings::identity(&self.control, &Exchanges::new(view, &target)).await
+    }
+
+    /// Reads all settings of a motor.
+    ///
+    /// # Errors
+    /// The line fails. The motor is unknown or silent.
+    pub async fn dump(&self, motor: &MotorName, view: &Program) -> Result<Dump, Refusal> {
+        let target = self.target(motor.clone())?;
+        settings::dump(&self.control, &Exchanges::new(view, &target)).await
     }
 
     fn limits(&self) -> Result<Vec<Limit>, Refusal> {

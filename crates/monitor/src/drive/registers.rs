@@ -12,7 +12,7 @@ use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Quantity};
 
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
+use super::exchange::{ATTEMPTS, Exchanges, is_refused_by_motor, is_worth_repeating};
 use super::target::{Target, usage};
 use super::value;
 use crate::message::{Register, Value};
@@ -133,14 +133,31 @@ fn setting_value<T: Tuning>(
     Some(value::of_setting(block.settings.get(at)?, *digits.get(at)?))
 }
 
-/// Reads values. One that the drive refuses does not hide the others.
-///
-/// # Errors
-/// A name is unknown: nothing is sent. The line fails. The values are never confirmed.
+/// Reads values, as [`read_each`]. Those that the drive refuses have the reason as their text.
 pub(super) async fn read(
     exchanges: &Exchanges<'_>,
     names: &[String],
 ) -> Result<Vec<Value>, Refusal> {
+    let values = match read_each(exchanges, names).await {
+        // The drive has no such motor.
+        Err(why) if why.reason == Reason::Refused => vec![Err(why); names.len()],
+        values => values?,
+    };
+    let or_why = |(name, value): (&String, Result<_, Refusal>)| {
+        value.unwrap_or_else(|why| value::text(name, why.message))
+    };
+    Ok(names.iter().zip(values).map(or_why).collect())
+}
+
+/// Reads values, in the order of their names. One that the drive refuses does not hide the others.
+///
+/// # Errors
+/// A name is unknown: nothing is sent. The line fails. The drive has no such motor. The values are never
+/// confirmed.
+pub(super) async fn read_each(
+    exchanges: &Exchanges<'_>,
+    names: &[String],
+) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
     let places = names.iter().map(|name| Ok((name, Place::named(exchanges.target, name)?)));
     let places = places.collect::<Result<Vec<_>, Refusal>>()?;
     let _lane = exchanges.lane().await;
@@ -156,14 +173,14 @@ pub(super) async fn read(
 async fn read_once(
     exchanges: &Exchanges<'_>,
     places: &[(&String, Place)],
-) -> Result<Vec<Value>, Refusal> {
+) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
     let mut replies: Vec<(Request, Result<Vec<u8>, Refusal>)> = Vec::new();
     let mut values = Vec::new();
     for (name, place) in places {
         let request = match place.request(exchanges) {
             Ok(request) => request,
             Err(why) => {
-                values.push(value::text(name, why));
+                values.push(Err(usage(why)));
                 continue;
             }
         };
@@ -177,8 +194,10 @@ async fn read_once(
             }
         };
         values.push(match &replies[at].1 {
-            Ok(reply) => place.value(name, exchanges, reply).ok_or_else(|| exchanges.unfit())?,
-            Err(why) if why.reason == Reason::Refused => value::text(name, why.message.clone()),
+            Ok(reply) => {
+                Ok(place.value(name, exchanges, reply).ok_or_else(|| exchanges.unfit())?)
+            }
+            Err(why) if is_refused_by_motor(why) => Err(why.clone()),
             Err(why) => return Err(why.clone()),
         });
     }

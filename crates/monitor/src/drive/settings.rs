@@ -6,16 +6,16 @@ use std::sync::Arc;
 use motorlink::settings::{
     Ask, Cause, Comparison, Difference, Dump, FileError, Next, Permissions, Procedure,
     RestoreError, RmdTuning, SettingsFile, StTuning, Step, StepError, Tuning, Unread, Writing,
+    identify,
 };
-use motorlink_proto::st::ErrorCode;
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::control::Control;
-use super::exchange::Exchanges;
+use super::exchange::{Exchanges, is_refused_by_motor};
 use super::target::{Target, refusal, usage};
 use crate::message::{self, Answer};
 
@@ -71,8 +71,7 @@ impl fmt::Display for Failed {
 
 impl StepError for Failed {
     fn is_refusal(&self) -> bool {
-        let code = self.refusal.code.map(ErrorCode::from);
-        self.refusal.reason == Reason::Refused && code != Some(ErrorCode::BadMotorSelected)
+        is_refused_by_motor(&self.refusal)
     }
 
     fn is_line_failure(&self) -> bool {
@@ -112,18 +111,33 @@ async fn run<T: Tuned, R>(
     }
 }
 
-/// Writes all settings of a motor as a file.
-pub(super) async fn dump(control: &Control, exchanges: &Exchanges<'_>) -> Result<Answer, Refusal> {
+/// What is known of a drive, in lines.
+pub(super) async fn identity(
+    control: &Control,
+    exchanges: &Exchanges<'_>,
+) -> Result<Vec<String>, Refusal> {
     let _lane = exchanges.lane().await;
-    let name = &exchanges.target.name;
-    let file = format!("{}_motor{}.toml", name.line, name.motor);
-    let dump = tuned!(exchanges.target, |tuning| {
+    tuned!(exchanges.target, |tuning| {
+        let lines = run(control, exchanges, &tuning, identify(tuning)).await;
+        lines.map_err(|failed| failed.refusal)
+    })
+}
+
+/// Reads all settings of a motor.
+pub(super) async fn dump(control: &Control, exchanges: &Exchanges<'_>) -> Result<Dump, Refusal> {
+    let _lane = exchanges.lane().await;
+    tuned!(exchanges.target, |tuning| {
         let dump = run(control, exchanges, &tuning, Dump::reading(tuning)).await;
         dump.map_err(|failed| failed.refusal)
-    })?;
+    })
+}
+
+/// A dump as the answer to a page.
+pub(super) fn as_file(name: &MotorName, dump: &Dump) -> Answer {
+    let file = format!("{}_motor{}.toml", name.line, name.motor);
     let refused = |name: &String| format!("the motor refuses to read {name}");
     let warnings = dump.absent().iter().map(refused).collect();
-    Ok(Answer::Dump { text: dump.text(), file, warnings })
+    Answer::Dump { text: dump.text(), file, warnings }
 }
 
 /// Compares a file with a motor.

@@ -30,6 +30,42 @@ pub fn dump<M: Tunable>(motor: &M) -> Result<Dump, M::Error> {
     Dump::reading(motor.tuning()).run(motor)
 }
 
+/// Reads what is known of the drive, in steps: the lines of [`Dump::identity`]. The motor itself must answer,
+/// too.
+pub fn identify<'a, T, E>(tuning: T) -> Procedure<'a, T::Id, E, Result<Vec<String>, E>>
+where
+    T: Tuning + Send + Sync + 'a,
+    E: StepError + Send + 'a,
+{
+    Procedure::new(|line| async move {
+        line.motion().await?;
+        let identity = identity(&tuning, &line).await?;
+        line.confirm().await?;
+        Ok(identity)
+    })
+}
+
+/// The name and the value in a line of an identity: `firmware: NAME 1.0` has `firmware`.
+pub fn fact(line: &str) -> (&str, &str) {
+    line.split_once(": ").unwrap_or((line, ""))
+}
+
+async fn identity<T: Tuning, E: StepError>(
+    tuning: &T,
+    line: &Line<T::Id, E>,
+) -> Result<Vec<String>, E> {
+    let mut identity = Vec::new();
+    for number in 0..tuning.identity() {
+        match line.identity(number).await {
+            Ok(text) => identity.extend(text),
+            // Firmware 5.0 does not know the request for its version.
+            Err(error) if error.is_refusal() => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(identity)
+}
+
 impl Dump {
     /// Reads all settings that a motor has, in steps. A setting that the motor refuses to read is left
     /// out.
@@ -42,16 +78,8 @@ impl Dump {
     }
 
     async fn read<T: Tuning, E: StepError>(tuning: &T, line: &Line<T::Id, E>) -> Result<Self, E> {
-        let mut dump =
-            Dump { kind: tuning.kind(), identity: vec![], blocks: vec![], absent: vec![] };
-        for number in 0..tuning.identity() {
-            match line.identity(number).await {
-                Ok(text) => dump.identity.extend(text),
-                // Firmware 5.0 does not know the request for its version.
-                Err(error) if error.is_refusal() => {}
-                Err(error) => return Err(error),
-            }
-        }
+        let identity = identity(tuning, line).await?;
+        let mut dump = Dump { kind: tuning.kind(), identity, blocks: vec![], absent: vec![] };
         for Block { id, settings, heading, .. } in tuning.blocks() {
             match line.read(id).await {
                 Ok(digits) => {

@@ -29,7 +29,7 @@ pub use motorlink_proto::st::NotASetting;
 use motorlink_proto::units::Scale;
 
 pub use compare::{Comparison, Difference, Unread};
-pub use dump::{Dump, dump};
+pub use dump::{Dump, dump, fact, identify};
 pub use file::{FileError, Problem, SettingsFile};
 pub use procedure::{Next, Procedure, Step};
 pub use restore::{Cause, Permissions, RestoreError, Undone};

@@ -1,0 +1,214 @@
+//! Queries about motors, without a session: what drives are, their registers and their settings.
+
+use std::io;
+use std::sync::Arc;
+
+use motorlink_proto::st::ErrorCode;
+use motorlink_telemetry::share::message::{Line, Reason};
+use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::words::Speaks;
+use serde::Serialize;
+use tokio::runtime::Handle;
+use tokio::sync::Semaphore;
+use tokio::task::block_in_place;
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::key_expr::keyexpr;
+use zenoh::query::Query;
+
+use super::common::{Common, refuse, reply_with};
+use super::reader::{Drive, Reader};
+use crate::key::{self, About};
+use crate::message::{Identity, NoAnswer};
+
+/// Queries that are carried out at one time.
+const MOST: usize = 4;
+/// The format of a file of settings.
+const TOML: &str = "application/toml";
+
+/// What answers queries about motors.
+struct Queries {
+    common: Arc<Common>,
+    reader: Option<Arc<dyn Reader>>,
+    /// All queries are one program at the share, so that they take no more of a line than one.
+    program: Program,
+    places: Arc<Semaphore>,
+}
+
+/// The content of a reply.
+type Content = (Vec<u8>, Encoding);
+/// A reply with its key, or why there is none.
+type Reply = (String, Result<Content, Refusal>);
+
+/// Takes queries from now on.
+pub(super) async fn open(common: &Arc<Common>, reader: Option<Arc<dyn Reader>>) -> io::Result<()> {
+    let (program, mut listener, _) = Program::connect(&common.share, "queries").await?;
+    tokio::spawn(async move { while listener.next().await.is_ok() {} });
+    let places = Arc::new(Semaphore::new(MOST));
+    let queries = Arc::new(Queries { common: Arc::clone(common), reader, program, places });
+    for about in About::ALL {
+        let (queries, handle) = (Arc::clone(&queries), Handle::current());
+        let take = move |query: Query| queries.take(about, query, &handle);
+        let key = key::all_about(&common.name, about);
+        let declared = common.zenoh.declare_queryable(key).callback(take).background();
+        declared.wait().map_err(io::Error::other)?;
+    }
+    Ok(())
+}
+
+impl Queries {
+    fn take(self: &Arc<Self>, about: About, query: Query, handle: &Handle) {
+        let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
+            let message = format!("{MOST} such queries are carried out already; ask again");
+            return refuse(&query, &no_answer(query.key_expr(), refusal(Reason::Busy, message)));
+        };
+        let queries = Arc::clone(self);
+        handle.spawn(async move {
+            queries.answer(about, &query).await;
+            drop(place);
+        });
+    }
+
+    async fn answer(&self, about: About, query: &Query) {
+        self.common.refresh().await;
+        let asked = query.key_expr();
+        match self.drives(about, asked) {
+            Ok(drives) => {
+                for drive in drives {
+                    let answers = self.read(about, drive, asked).await;
+                    // A network that is slow must not hold up sessions.
+                    block_in_place(|| say(query, answers));
+                }
+            }
+            Err(why) => block_in_place(|| say(query, vec![(asked.to_string(), Err(why))])),
+        }
+    }
+
+    /// The motors that a query is about: the one that it names, or those that have answered.
+    fn drives(&self, about: About, asked: &keyexpr) -> Result<Vec<Drive>, Refusal> {
+        let lines = self.common.known_lines();
+        let drive = |line: &Line, motor| {
+            let (program, line) = (self.program.clone(), line.clone());
+            Drive { program, line, motor }
+        };
+        if let Some((name, number)) = key::one_motor(asked) {
+            let line = lines.iter().find(|line| line.line == name).ok_or_else(|| {
+                let known: Vec<_> = lines.iter().map(|line| line.line.as_str()).collect();
+                usage(format!("no line `{name}`; the lines are {}", known.join(", ")))
+            })?;
+            let motor = motor(line, number)
+                .ok_or_else(|| usage(format!("{name}: no motor can have the number `{number}`")))?;
+            return Ok(vec![drive(line, motor)]);
+        }
+        let all = lines.iter().flat_map(|line| line.heard.iter().map(move |motor| (line, *motor)));
+        let key = |line: &Line, motor| key::about(&self.common.name, &line.line, motor, about);
+        let meant = all.filter(|(line, motor)| covers(asked, &key(line, *motor)));
+        Ok(meant.map(|(line, motor)| drive(line, motor)).collect())
+    }
+
+    /// The answers about a motor.
+    async fn read(&self, about: About, drive: Drive, asked: &keyexpr) -> Vec<Reply> {
+        let (line, motor) = (drive.line.line.clone(), drive.motor);
+        let answers = self.try_read(about, drive, asked).await;
+        answers.unwrap_or_else(|why| {
+            // What waited for a port that is lost has expired.
+            let is_old = why.reason == Reason::Expired;
+            let why = self.lost(&line).filter(|_| is_old).unwrap_or(why);
+            let key = match key::one_motor(asked) {
+                Some(_) => asked.to_string(),
+                None => key::about(&self.common.name, &line, motor, about),
+            };
+            vec![(key, Err(why))]
+        })
+    }
+
+    async fn try_read(
+        &self,
+        about: About,
+        drive: Drive,
+        asked: &keyexpr,
+    ) -> Result<Vec<Reply>, Refusal> {
+        let reader = self.reader.as_ref().ok_or_else(|| {
+            usage("this node cannot read drives: its program was built without `monitor`")
+        })?;
+        let (line, motor) = (drive.line.clone(), drive.motor);
+        let key = key::about(&self.common.name, &line.line, motor, about);
+        let of = |name: &String| key::register(&self.common.name, &line.line, motor, name);
+        let mut names = match about {
+            About::Registers => reader.registers(&line),
+            About::Identity | About::Settings => Vec::new(),
+        };
+        names.retain(|name| covers(asked, &of(name)));
+        if about == About::Registers && names.is_empty() {
+            // A number, or a name that the reader refuses with those that are alike.
+            let Some(name) = key::one_register(asked) else { return Ok(vec![]) };
+            names.push(name.to_owned());
+        }
+        if let Some(why) = self.lost(&line.line) {
+            return Err(why);
+        }
+        Ok(match about {
+            About::Identity => {
+                let drive = reader.identity(drive).await?;
+                let Line { line, protocol, profile, .. } = line;
+                vec![(key, Ok(json(&Identity { line, motor, protocol, profile, drive })))]
+            }
+            About::Settings => {
+                let text = reader.settings(drive).await?;
+                vec![(key, Ok((text.into_bytes(), Encoding::from(TOML))))]
+            }
+            About::Registers => {
+                let keys: Vec<_> = names.iter().map(of).collect();
+                let values = reader.read(drive, names).await?.into_iter();
+                keys.into_iter().zip(values.map(|value| value.map(|it| json(&it)))).collect()
+            }
+        })
+    }
+
+    /// Why nothing can be read of a line whose port is lost.
+    fn lost(&self, line: &str) -> Option<Refusal> {
+        self.common.lost(line).map(|message| refusal(Reason::Line, message))
+    }
+}
+
+/// Replies to a query.
+fn say(query: &Query, answers: Vec<Reply>) {
+    for (key, answer) in answers {
+        match answer {
+            Ok((bytes, encoding)) => reply_with(query, &key, bytes, encoding),
+            Err(why) => refuse(query, &no_answer(&key, why)),
+        }
+    }
+}
+
+/// Whether a query asks for a key.
+fn covers(asked: &keyexpr, key: &str) -> bool {
+    keyexpr::new(key).is_ok_and(|key| asked.intersects(key))
+}
+
+/// The motor of a line with this number.
+fn motor(line: &Line, number: &str) -> Option<u8> {
+    // Replies have the number as it is written elsewhere: not `01`.
+    let number = number.parse().ok().filter(|it: &u8| it.to_string() == number)?;
+    Speaks::of(line)?.motor(number).map(|_| number)
+}
+
+fn json(value: &impl Serialize) -> Content {
+    (serde_json::to_vec(value).unwrap_or_default(), Encoding::APPLICATION_JSON)
+}
+
+fn no_answer(key: &str, why: Refusal) -> NoAnswer {
+    let Refusal { reason, message, code } = why;
+    // The drive itself says that it has no such motor.
+    let is_absent = code.map(ErrorCode::from) == Some(ErrorCode::BadMotorSelected);
+    let reason = if is_absent { Reason::Unheard } else { reason };
+    NoAnswer { key: key.to_owned(), reason, message, code }
+}
+
+fn usage(message: impl Into<String>) -> Refusal {
+    refusal(Reason::Usage, message)
+}
+
+fn refusal(reason: Reason, message: impl Into<String>) -> Refusal {
+    Refusal { reason, message: message.into(), code: None }
+}
