@@ -5,16 +5,21 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-from bench import Bench, percentile, publish, table, until
+import zenoh
+from bench import MOTORLINK, ROOT, Bench, percentile, publish, table, until
 from proxy import Cable
 
+from fleeting import network, runs
 from sharing import Client
+from siting import Site as SecureSite
+from siting import joins, member, strangers, turn
 
 ROUNDS = int(os.environ.get("ROUNDS", "30"))
 DEADLINE = 0.5
@@ -210,6 +215,49 @@ def slow_viewer(site):
     return row("5 frozen viewers; `fleet stop-all`", ROUNDS, times, recorded)
 
 
+def flood(is_silent):
+    """200 strangers at the router of a site; the operator is connected, and stops a motor."""
+    times = []
+    with Bench() as bench:
+        site = SecureSite(MOTORLINK, bench.folder)
+        bench.callback(site.end)
+        site.route()
+        site.direct = Client(site.node("arm1"), "looks")
+        with network(site.file("alice")) as session:
+            (site.boot,) = runs(session, "arm1")
+            alice = member(site, session, "alice")
+            assert joins(alice)
+            for _ in range(ROUNDS):
+                turn(site)
+                with strangers(site.address, 200, is_silent):
+                    began = time.monotonic()
+                    alice.stop({"line": "st0", "motor": 1})
+                    until(lambda: site.direct.rpm() < 1300, "a motor that stops")
+                    times.append(time.monotonic() - began)
+                    assert not is_admitted(site.file("stranger"))
+                until(lambda: abs(site.direct.rpm()) < 30, "a motor at rest")
+    how = "silent" if is_silent else "without a certificate"
+    return row(f"200 strangers, {how}; a stop", ROUNDS, stopped=times)
+
+
+def is_admitted(file):
+    try:
+        network(file).close()
+    except zenoh.ZError:
+        return False
+    return True
+
+
+def clock_jump():
+    """The clock of a node jumps: a test with a clock of its own."""
+    words = ["cargo", "test", "-q", "-p", "motorlink-fleet", "--all-features", "--locked", "--test", "node"]
+    words += ["a_clock_that_jumps", "--", "--nocapture"]
+    environment = {**os.environ, "ROUNDS": str(ROUNDS)}
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, env=environment, check=True)
+    times = [int(text) / 1000 for text in re.findall(r"stopped after (\d+) ms", done.stdout)]
+    return row("network cut, and the clock of the node jumps", ROUNDS, stopped=times)
+
+
 FAULTS = {
     "killed": lambda site: [lost_commander(site, "commander killed", signal.SIGKILL)],
     "frozen": lambda site: [lost_commander(site, "commander frozen", signal.SIGSTOP)],
@@ -218,11 +266,19 @@ FAULTS = {
     "cut": lambda site: [network_cut(site, seconds) for seconds in CUTS],
     "viewer": lambda site: [slow_viewer(site)],
 }
+#: Those that make their own site.
+APART = {
+    "flood": lambda: [flood(is_silent) for is_silent in (True, False)],
+    "clock": lambda: [clock_jump()],
+}
 
 
 def main():
     rows = []
-    for name in sys.argv[1:] or FAULTS:
+    for name in sys.argv[1:] or (*FAULTS, *APART):
+        if name in APART:
+            rows += APART[name]()
+            continue
         with Site() as site:
             rows += FAULTS[name](site)
     publish("fleet-faults", table(HEADS, rows))

@@ -1,7 +1,10 @@
 """A network with a router for the tests, and what somebody may try in it through Zenoh."""
 
+import contextlib
 import json
 import os
+import socket
+import ssl
 import struct
 import subprocess
 import threading
@@ -128,3 +131,31 @@ def leaves(site, it):
     site.direct.ask("stop", motor={"line": "st0", "motor": 2})
     it.ask("see", {"ask": "leave", "why": "end"}, PAUSE)
     eventually(lambda: abs(site.direct.rpm(2)) < 30, "motor 2 at rest", within=20)
+
+
+@contextlib.contextmanager
+def strangers(address, count, is_silent):
+    """Connections without a certificate. Silent ones say nothing at all."""
+    host, port = address.removeprefix("tls/").split(":")
+    context = ssl._create_unverified_context()
+    connected = []
+
+    def attack():
+        with socket.create_connection((host, int(port)), timeout=20) as stranger:
+            connected.append(stranger)
+            try:
+                if not is_silent:
+                    context.wrap_socket(stranger, suppress_ragged_eofs=False).recv(1)
+                stranger.recv(1)
+            except OSError:
+                pass
+
+    for _ in range(count):
+        threading.Thread(target=attack, daemon=True).start()
+    try:
+        eventually(lambda: len(connected) == count, f"{count} connections")
+        yield
+    finally:
+        for stranger in connected:
+            with contextlib.suppress(OSError):
+                stranger.shutdown(socket.SHUT_RDWR)

@@ -158,7 +158,7 @@ def test_a_node_that_vanished_is_missed_by_programs_that_come_later(show, arms, 
             return [it["line"] for it in motors if it.get("failure") and not it.get("absent")]
 
         eventually(lambda: failed() == ["arm2"], "the motors of arm2")
-    # Whoever knows that it will not come back says so.
+    # A person who knows its motors at rest leaves it out.
     confirmed = run("fleet", "stop-all", *via, "--without", "arm2", within=60).ended(0)
     assert "arm2" not in confirmed.out + confirmed.err
     run("fleet", "release", *via, "--without", "arm2").ended(0)

@@ -3,13 +3,10 @@ the programs of the tests speak the messages themselves.
 """
 
 import base64
-import contextlib
 import json
 import re
 import shutil
 import signal
-import socket
-import ssl
 import subprocess
 import sys
 import threading
@@ -22,7 +19,9 @@ import zenoh
 from fleeting import network
 from program import children, eventually
 from sharing import Client
-from siting import PAUSE, RAMP, ROOT, START, Site, answers, hears, joins, leaves, member, tokens, turn
+from siting import (
+    PAUSE, RAMP, ROOT, START, Site, answers, hears, joins, leaves, member, strangers, tokens, turn,
+)
 
 @pytest.fixture(scope="module")
 def site(motorlink, tmp_path_factory):
@@ -495,35 +494,14 @@ def test_the_router_tells_a_node_at_once_that_a_program_was_killed(site):
 def test_a_flood_of_strangers_does_not_delay_a_stop(site, sessions, how):
     """The operator is connected. For some seconds new programs cannot connect: Zenoh needs 0.1 s for each
     connection that fails. So these tests come late."""
-    host, port = site.address.removeprefix("tls/").split(":")
-    context = ssl._create_unverified_context()
-    strangers = []
-
-    def attack():
-        with socket.create_connection((host, int(port)), timeout=20) as stranger:
-            strangers.append(stranger)
-            try:
-                if how != "silent":
-                    context.wrap_socket(stranger, suppress_ragged_eofs=False).recv(1)
-                stranger.recv(1)
-            except OSError:
-                pass
-
     turn(site)
     alice = member(site, sessions("alice"), "alice")
     assert joins(alice)
-    for _ in range(200):
-        threading.Thread(target=attack, daemon=True).start()
-    try:
-        eventually(lambda: len(strangers) == 200, "200 connections")
+    with strangers(site.address, 200, is_silent=how == "silent"):
         began = time.monotonic()
         assert alice.stop({"line": "st0", "motor": 1})["kind"] == "answer"
         assert time.monotonic() - began < 1
         eventually(lambda: abs(site.direct.rpm()) < 30, "motor 1 at rest", within=20)
-    finally:
-        for stranger in strangers:
-            with contextlib.suppress(OSError):
-                stranger.shutdown(socket.SHUT_RDWR)
 
 
 def test_access_is_withdrawn_when_the_router_starts_again(site, sessions, run):

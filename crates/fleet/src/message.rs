@@ -173,7 +173,7 @@ pub struct Info {
 pub struct Away {
     /// Its name.
     pub node: String,
-    /// Since when, by the clock of the node that says so, in seconds.
+    /// When that was, by the clock of the node that says it, in seconds.
     pub since: f64,
 }
 

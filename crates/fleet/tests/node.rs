@@ -8,6 +8,7 @@ mod drives;
 mod shared;
 mod world;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use asking::Asker;
@@ -21,7 +22,7 @@ use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_proto::units::CentiDps;
 use motorlink_telemetry::share::message::{Ask, Event, Happening, Reason};
-use world::{Cable, World, eventually};
+use world::{Cable, Jumping, World, eventually};
 use zenoh::Wait;
 
 fn open(name: &str) -> Result<st::Client, st::Error> {
@@ -117,6 +118,42 @@ fn a_network_that_is_cut_stops_the_motor_at_the_deadline() {
     cable.mend();
     std::thread::sleep(Duration::from_millis(500));
     stands(&world);
+}
+
+/// How often a clock jumps. The measurement of faults asks for more.
+fn rounds() -> u32 {
+    std::env::var("ROUNDS").map_or(2, |text| text.parse().unwrap())
+}
+
+#[test]
+fn a_clock_that_jumps_leaves_no_motor_turning() {
+    let clock = Arc::new(Jumping::default());
+    let world = World::with("jumps", Duration::from_secs(5), clock.clone());
+    let cable = Cable::to(&world.address);
+    let port = world.port("st0", &cable.address, "&deadline=500ms");
+    // The wall clock is set, or the computer was suspended.
+    let jumps = [(0.0, 3600.0), (0.0, -7200.0), (600.0, 600.0)];
+    for (round, (now, wall)) in (0..rounds()).zip(jumps.into_iter().cycle()) {
+        let client = open(&port).unwrap();
+        turn(&client);
+        turns(&world);
+        if now == 0.0 {
+            clock.jump(now, wall);
+            turn(&client);
+            turns(&world);
+        }
+        cable.cut();
+        clock.jump(now, -wall);
+        let began = Instant::now();
+        world.share.reaches("st1.speed_rpm", |rpm| rpm < 1250.0);
+        println!("round {round}: stopped after {} ms", began.elapsed().as_millis());
+        cable.mend();
+        drop(client);
+        stands(&world);
+        // A new program knows the time.
+        turn(&st(&world, ""));
+        stands(&world);
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub struct Nodes {
     /// Only this node, which must answer; may be repeated
     #[arg(long = "node", value_name = "NAME")]
     pub named: Vec<Name>,
-    /// Not this node, such as one that went away and will not come back; may be repeated
+    /// Without this node, which may have vanished; may be repeated
     #[arg(long, value_name = "NAME", conflicts_with = "named")]
     without: Vec<Name>,
 }

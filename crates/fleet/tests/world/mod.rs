@@ -99,6 +99,30 @@ pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
+/// A clock that jumps.
+#[derive(Default)]
+pub struct Jumping {
+    /// By how many seconds it is ahead, and the wall clock.
+    ahead: Mutex<(f64, f64)>,
+}
+
+impl Jumping {
+    pub fn jump(&self, now: f64, wall: f64) {
+        let mut ahead = self.ahead.lock().unwrap();
+        *ahead = (ahead.0 + now, ahead.1 + wall);
+    }
+}
+
+impl Clock for Jumping {
+    fn now(&self) -> f64 {
+        Boot.now() + self.ahead.lock().unwrap().0
+    }
+
+    fn wall(&self) -> f64 {
+        Boot.wall() + self.ahead.lock().unwrap().1
+    }
+}
+
 /// TCP connections to an address. While they are cut they stay open, and nothing passes.
 pub struct Cable {
     pub address: String,
