@@ -490,6 +490,46 @@ def test_the_router_tells_a_node_at_once_that_a_program_was_killed(site):
     eventually(lambda: abs(site.direct.rpm()) < 30, "motor 1 at rest", within=20)
 
 
+def test_many_messages_in_both_directions_lose_no_connection(site):
+    """The router writes to a TLS connection while it reads from it, on two threads."""
+    arm1, alice = site.nodes["arm1"], network(site.file("alice"))
+    ask, sample = f"{ROOT}/arm1/node/ask/many/see/alice/many", f"{ROOT}/arm1/many/1/samples"
+    tokens = [arm1.liveliness().declare_token(f"{ROOT}/arm1/node/alive/many"),
+              alice.liveliness().declare_token(f"{ROOT}/arm1/node/here/many/alice/many")]
+    gone, heard, answered = [], [], []
+
+    def seen(it):
+        if it.kind == zenoh.SampleKind.DELETE:
+            gone.append(str(it.key_expr))
+
+    declared = [
+        alice.liveliness().declare_subscriber(f"{ROOT}/*/node/alive/*", seen, history=True),
+        arm1.liveliness().declare_subscriber(f"{ROOT}/arm1/node/here/*/*/*", seen, history=True),
+        alice.declare_subscriber(sample, heard.append),
+        arm1.declare_queryable(ask, lambda query: query.reply(query.key_expr, b"answer")),
+    ]
+    ends = threading.Event()
+
+    def publish():
+        while not ends.is_set():
+            for size in range(20):
+                arm1.put(sample, b"m" * size)
+            time.sleep(0.0005)
+
+    publisher = threading.Thread(target=publish)
+    publisher.start()
+    end = time.monotonic() + 3
+    while time.monotonic() < end:
+        answered += [it for it in alice.get(ask, timeout=5) if it.ok]
+    ends.set()
+    publisher.join()
+    assert not gone and site.running[0].process.poll() is None
+    assert len(heard) > 1000 and len(answered) > 100, (len(heard), len(answered))
+    for it in (*declared, *tokens):
+        it.undeclare()
+    alice.close()
+
+
 @pytest.mark.parametrize("how", ["silent", "without a certificate"])
 def test_a_flood_of_strangers_does_not_delay_a_stop(site, sessions, how):
     """The operator is connected. For some seconds new programs cannot connect: Zenoh needs 0.1 s for each
