@@ -234,7 +234,7 @@ def flood(is_silent):
                     alice.stop({"line": "st0", "motor": 1})
                     until(lambda: site.direct.rpm() < 1300, "a motor that stops")
                     times.append(time.monotonic() - began)
-                    assert not is_admitted(site.file("stranger"))
+                assert is_admitted(site.file("bob")) and not is_admitted(site.file("stranger"))
                 until(lambda: abs(site.direct.rpm()) < 30, "a motor at rest")
     how = "silent" if is_silent else "without a certificate"
     return row(f"200 strangers, {how}; a stop", ROUNDS, stopped=times)

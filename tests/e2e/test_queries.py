@@ -163,6 +163,7 @@ def test_unknown_names_are_told_apart(asker):
         ("st0/x/settings", "usage", "no motor can have the number `x`"),
         ("rmd0/99/registers/iq_amps", "usage", "no motor can have the number `99`"),
         ("st0/1/registers/SPEED_MEAZ", "usage", "did you mean `SPEED_MEAS`"),
+        (f"st0/1/registers/{65 * 'S'}", "usage", "has up to 64 bytes"),
         ("rmd0/2/registers/SPEED_MEAS", "usage", "no setting or value `SPEED_MEAS`"),
         ("st0/5/identity", "unheard", "no motor of this number"),
         ("st0/5/registers/*", "unheard", "no motor of this number"),

@@ -11,6 +11,8 @@ use crate::message::Info;
 use crate::network::{Network, NetworkError};
 use crate::remote;
 
+/// Nodes that went away are believed up to this number: a node may say what it likes.
+const MOST_AWAY: usize = 256;
 /// How long nodes may take for an answer.
 const ANSWER: Duration = Duration::from_secs(2);
 
@@ -65,7 +67,7 @@ pub(crate) fn away<'a>(
     for info in infos {
         for gone in &info.away {
             let Ok(node) = gone.node.parse() else { continue };
-            if !is_here(&node) {
+            if !is_here(&node) && (away.len() < MOST_AWAY || away.contains_key(&node)) {
                 let longest = away.entry(node).or_insert(0.0_f64);
                 *longest = longest.max(info.t - gone.since);
             }

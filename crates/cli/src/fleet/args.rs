@@ -28,9 +28,9 @@ pub struct Nodes {
     /// Only this node, which must answer; may be repeated
     #[arg(long = "node", value_name = "NAME")]
     pub named: Vec<Name>,
-    /// Without this node, which may have vanished; may be repeated
+    /// This node vanished for good: nothing misses it; may be repeated
     #[arg(long, value_name = "NAME", conflicts_with = "named")]
-    without: Vec<Name>,
+    gone: Vec<Name>,
 }
 
 /// The motors that a command is for.
@@ -55,7 +55,12 @@ pub struct OrderArgs {
 
 impl Nodes {
     pub fn has(&self, node: &Name) -> bool {
-        (self.named.is_empty() || self.named.contains(node)) && !self.without.contains(node)
+        self.named.is_empty() || self.named.contains(node)
+    }
+
+    /// Whether a node that vanished is missed.
+    pub fn misses(&self, node: &Name) -> bool {
+        self.has(node) && !self.gone.contains(node)
     }
 }
 

@@ -57,10 +57,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let network = at.via.network();
     let program = program()?;
     let mut jobs = Vec::new();
-    for (node, info) in found(&network, &args.motors.nodes)? {
+    let found = found(&network, &args.motors.nodes)?;
+    for (node, info) in &found.nodes {
         let remote = Remote::new(node.clone(), network.clone());
         for line in info.lines.iter().filter(|line| line.protocol == protocol) {
-            for (name, motor) in args.motors.of_line(&node, line) {
+            for (name, motor) in args.motors.of_line(node, line) {
                 let motor = motor.to_string();
                 let of_motor = match protocol {
                     Protocol::St => ["-m", &motor],
@@ -82,11 +83,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         }
     }
-    if jobs.is_empty() {
-        return Err(Failure::link(format!("no {} motor has answered", args.words[0]))
-            .trying("`motorlink fleet list` shows nodes and motors"));
-    }
-    carry_out(jobs, at.json)
+    found.then(match jobs.is_empty() {
+        true => Err(Failure::link(format!("no {} motor has answered", args.words[0]))
+            .trying("`motorlink fleet list` shows nodes and motors")),
+        false => carry_out(jobs, at.json),
+    })
 }
 
 /// This program. The package for Python is a script, whose interpreter knows its folder by its own name.

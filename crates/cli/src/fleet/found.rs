@@ -17,14 +17,33 @@ const SEARCH: Duration = Duration::from_secs(5);
 /// How often they are asked meanwhile.
 const AGAIN: Duration = Duration::from_millis(100);
 
-/// These nodes, once they know motors of their lines. Each must be there and answer.
-pub fn found(network: &Network, wanted: &Nodes) -> Result<Vec<(Name, Info)>, Failure> {
+/// The nodes that answer.
+pub struct Found {
+    pub nodes: Vec<(Name, Info)>,
+    /// Why that is not all of them.
+    missing: Option<Failure>,
+}
+
+impl Found {
+    /// All nodes, or none if one is missing.
+    pub fn whole(self) -> Result<Vec<(Name, Info)>, Failure> {
+        self.missing.map_or(Ok(self.nodes), Err)
+    }
+
+    /// The outcome of what was done at those that answer.
+    pub fn then(self, outcome: Result<(), Failure>) -> Result<(), Failure> {
+        outcome.and(self.missing.map_or(Ok(()), Err))
+    }
+}
+
+/// These nodes, once they know motors of their lines.
+pub fn found(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
     let end = Instant::now() + SEARCH;
     loop {
-        let nodes = there(network, wanted)?;
+        let found = there(network, wanted)?;
         let mut searching = Vec::new();
         let mut is_early = false;
-        for (node, info) in &nodes {
+        for (node, info) in &found.nodes {
             for line in info.lines.iter().filter(|line| info.searching.contains(&line.line)) {
                 is_early |= line.heard.is_empty();
                 searching.push(format!("{node}/{}", line.line));
@@ -39,38 +58,43 @@ pub fn found(network: &Network, wanted: &Nodes) -> Result<Vec<(Name, Info)>, Fai
                 searching.join(", ")
             ));
         }
-        return Ok(nodes);
+        for (node, info) in &found.nodes {
+            for line in info.lines.iter().filter(|line| line.heard.is_empty()) {
+                note(format!("{node}/{}: no motor has answered, left out", line.line));
+            }
+        }
+        return Ok(found);
     }
 }
 
-fn there(network: &Network, wanted: &Nodes) -> Result<Vec<(Name, Info)>, Failure> {
-    let mut found = Vec::new();
+fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
+    let mut found: Vec<(Name, Info)> = Vec::new();
     let Directory { nodes, away } = directory::nodes(network)?;
-    if let Some((node, seconds)) = away.iter().find(|(node, _)| wanted.has(node)) {
-        return Err(gone(node, *seconds).trying(format!(
-            "`--without {node}` leaves it out, `--node NAME` asks only for others"
-        )));
+    let mut missing = away.iter().find(|(node, _)| wanted.misses(node)).map(|(node, seconds)| {
+        gone(node, *seconds).trying(format!("if that is known, give `--gone {node}`"))
+    });
+    let is_known = |node: &Name| nodes.keys().any(|(known, _)| known == node);
+    if let (None, Some(node)) = (&missing, wanted.named.iter().find(|node| !is_known(node))) {
+        let none = Failure::link(format!("no node {node} is at this network"));
+        missing = Some(none.trying("`motorlink fleet list` shows those that are there"));
     }
     for ((node, _), info) in nodes {
         if !wanted.has(&node) {
             continue;
         }
-        let info = info.ok_or_else(|| Failure::link(format!("node {node} does not answer")))?;
         if found.iter().any(|(known, _)| *known == node) {
             let why = format!("2 nodes have the name {node}: give each a --name of its own");
             return Err(Failure::link(why));
         }
-        found.push((node, info));
-    }
-    if let Some(missing) = wanted.named.iter().find(|it| found.iter().all(|(node, _)| node != *it))
-    {
-        return Err(Failure::link(format!("no node {missing} is at this network"))
-            .trying("`motorlink fleet list` shows those that are there"));
+        match info {
+            Some(info) => found.push((node, info)),
+            None => missing = Some(Failure::link(format!("node {node} does not answer"))),
+        }
     }
     if found.is_empty() {
-        return Err(Failure::link("no node is at this network"));
+        return Err(missing.unwrap_or_else(|| Failure::link("no node is at this network")));
     }
-    Ok(found)
+    Ok(Found { nodes: found, missing })
 }
 
 /// A node went away this many seconds ago.

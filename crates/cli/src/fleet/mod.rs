@@ -24,9 +24,9 @@ tcp/127.0.0.1:7447.
 stop-all latches each node, then stops its motors. It asks again until each node has it. A latch refuses \
 motion of all programs until `motorlink fleet release`.
 
-Exit code 0, or 3 if a node does not answer or a motor did not confirm its stop. So does a node that \
-others saw vanish (killed, or its network is cut) until it is back; --without NAME leaves it out. What \
-no other node saw is not known: name with --node those that must answer.")]
+Exit code 0, or 3 if a node does not answer or a motor did not confirm its stop. Exit code 3 also if \
+other nodes saw a node vanish (killed, or its network is cut), until it is back; --gone NAME says that \
+it will not come back. What no other node saw is not known: name with --node those that must answer.")]
 pub struct Args {
     #[command(subcommand)]
     task: Task,

@@ -12,7 +12,8 @@ use serde_json::json;
 use super::args::OrderArgs;
 use crate::advice;
 use crate::failure::Failure;
-use crate::output::print_line;
+use crate::interrupt;
+use crate::output::{keep_error, kept_error, print_line};
 use crate::share::{self, Connection};
 
 /// What all nodes are told.
@@ -25,11 +26,17 @@ pub enum Order {
 
 pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
     let network = args.at.via.network();
+    if order == Order::StopAll {
+        // A signal, or a reader that is gone, must not leave a node without its stop.
+        interrupt::complete_stop("motors of the fleet");
+        keep_error();
+    }
     let Directory { nodes: found, away } = directory::nodes(&network)?;
     let mut nodes: Vec<(Name, Option<Name>)> =
         found.into_keys().map(|(name, boot)| (name, Some(boot))).collect();
     // Those that went away may be back just now.
-    for name in away.keys().chain(&args.nodes.named) {
+    let missed = away.keys().filter(|node| args.nodes.misses(node));
+    for name in missed.chain(&args.nodes.named) {
         if nodes.iter().all(|(found, _)| found != name) {
             nodes.push((name.clone(), None));
         }
@@ -43,12 +50,14 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
         .into_iter()
         .map(|(name, boot)| {
             let (node, network) = (name.clone(), network.clone());
-            (name, thread::spawn(move || tell(&node, boot, network, order)))
+            let thread = thread::Builder::new();
+            (name, thread.spawn(move || tell(&node, boot, network, order)))
         })
         .collect();
     let (mut is_done, mut away) = (true, Vec::new());
     for (name, told) in told {
-        match told.join().unwrap_or_else(|_| Err("it could not be asked".to_owned())) {
+        let told = told.map(|it| it.join().unwrap_or_else(|_| Err("it failed".to_owned())));
+        match told.unwrap_or_else(|error| Err(format!("it could not be asked: {error}"))) {
             Ok(motors) => is_done &= say(args, order, &name, motors)?,
             Err(why) => {
                 let message = format!("node {name}: {why}");
@@ -62,8 +71,11 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
             }
         }
     }
+    if order == Order::StopAll {
+        interrupt::stop_is_complete();
+    }
     match (away.is_empty(), is_done) {
-        (true, true) => Ok(()),
+        (true, true) => kept_error(),
         (true, false) => Err(Failure::link(share::UNCONFIRMED).trying(advice::STOP_NODES_AGAIN)),
         (false, _) if order == Order::StopAll => {
             let names = away.join(", ");

@@ -9,7 +9,6 @@ use motorlink_telemetry::share::message::Protocol;
 use super::args::{Nodes, Via};
 use super::found::found;
 use crate::failure::Failure;
-use crate::output::note;
 use crate::record::{Place, What, run_on};
 
 #[derive(clap::Args)]
@@ -25,11 +24,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let network = args.via.network();
     let mut ports = Vec::new();
-    for (node, info) in found(&network, &args.nodes)? {
+    for (node, info) in found(&network, &args.nodes)?.whole()? {
         let remote = Remote::new(node.clone(), network.clone());
         for line in info.lines {
             if line.heard.is_empty() {
-                note(format!("{node}/{}: no motor has answered, left out", line.line));
                 continue;
             }
             let mut place = Place { port: remote.port(&line.line), ..Place::default() };

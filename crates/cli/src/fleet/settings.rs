@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let Command::Diff(args) = &args.command;
     let network = args.at.via.network();
     let mut readers = Vec::new();
-    for (node, info) in found(&network, &args.nodes)? {
+    for (node, info) in found(&network, &args.nodes)?.whole()? {
         for line in info.lines {
             let motors: Vec<_> = args.of_line(&node, &line).collect();
             if motors.is_empty() {

@@ -124,16 +124,20 @@ impl Node {
         if network.role().is_some() && !is_seen(&network, &common)? {
             return Err(NodeError::Unknown(common.name.clone()));
         }
-        let ros2 = match ros2 {
-            None => None,
-            Some(settings) => {
-                let Common { name, share, clock, zenoh, .. } = &*common;
-                let (name, clock) = (name.as_str(), Arc::clone(clock));
-                let started = Ros2::start(&settings, name, share, clock, zenoh);
-                Some(runtime.block_on(started)?)
+        let started = ros2.map(|settings| {
+            let Common { name, share, clock, zenoh, .. } = &*common;
+            let (name, clock) = (name.as_str(), Arc::clone(clock));
+            runtime.block_on(Ros2::start(&settings, name, share, clock, zenoh))
+        });
+        let node = |ros2| Node { common, addresses, ros2, _alive: alive, runtime: Some(runtime) };
+        match started.transpose() {
+            Ok(ros2) => Ok(node(ros2)),
+            Err(error) => {
+                // Others have seen it already.
+                node(None).end();
+                Err(error.into())
             }
-        };
-        Ok(Node { common, addresses, ros2, _alive: alive, runtime: Some(runtime) })
+        }
     }
 
     /// The addresses of this node.

@@ -17,9 +17,12 @@ use motorlink_telemetry::share::program::{Listener, Program};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
+use tokio::runtime::Handle;
+use tokio::task::block_in_place;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
+use zenoh::key_expr::keyexpr;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
@@ -50,7 +53,12 @@ pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<
     let names = common.known_lines().into_iter().map(|line| line.line);
     common.state_mut().searching.extend(names);
     let columns = Arc::clone(common);
-    let asked = move |query: Query| columns.say_columns(&query);
+    let handle = Handle::current();
+    let asked = move |query: Query| {
+        let columns = Arc::clone(&columns);
+        // A program that does not read may hold up its answer.
+        handle.spawn(async move { block_in_place(|| columns.say_columns(&query)) });
+    };
     let key = key::all_columns(&common.name);
     let declared = common.zenoh.declare_queryable(key).callback(asked).background();
     declared.wait().map_err(io::Error::other)?;
@@ -76,6 +84,8 @@ impl Common {
                         groups.insert(group.group, (group.line.clone(), group.motor));
                         self.columns_of(group);
                     }
+                    // It may be the event that a port is back.
+                    Ok(Text::Missed { .. }) => self.state_mut().lost.clear(),
                     _ => {}
                 },
                 Kind::Data => {
@@ -224,12 +234,13 @@ impl Common {
 
     fn say_columns(&self, query: &Query) {
         let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
-        for (key, group) in &state.columns {
-            let is_meant = zenoh::key_expr::KeyExpr::try_from(key.as_str())
-                .is_ok_and(|key| query.key_expr().intersects(&key));
-            if is_meant {
-                reply(query, key, group);
-            }
+        let is_meant =
+            |key: &str| keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key));
+        let meant = state.columns.iter().filter(|(key, _)| is_meant(key));
+        let meant: Vec<_> = meant.map(|(key, group)| (key.clone(), group.clone())).collect();
+        drop(state);
+        for (key, group) in meant {
+            reply(query, &key, &group);
         }
     }
 

@@ -23,6 +23,8 @@ use crate::message::{Identity, NoAnswer};
 
 /// Queries that are carried out at one time.
 const MOST: usize = 4;
+/// The longest name of a register that is looked for, in bytes.
+const LONGEST: usize = 64;
 /// The format of a file of settings.
 const TOML: &str = "application/toml";
 
@@ -142,6 +144,9 @@ impl Queries {
         if about == About::Registers && names.is_empty() {
             // A number, or a name that the reader refuses with those that are alike.
             let Some(name) = key::one_register(asked) else { return Ok(vec![]) };
+            if name.len() > LONGEST {
+                return Err(usage(format!("the name of a register has up to {LONGEST} bytes")));
+            }
             names.push(name.to_owned());
         }
         if let Some(why) = self.lost(&line.line) {

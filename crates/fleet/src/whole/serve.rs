@@ -17,6 +17,7 @@ use tokio::time::{Instant, sleep_until};
 use zenoh::Session as Zenoh;
 use zenoh::handlers::{FifoChannelHandler, RingChannel, RingChannelHandler};
 use zenoh::pubsub::Subscriber;
+use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 
 use super::merge::{Merge, Out};
@@ -32,6 +33,8 @@ const AGAIN: Duration = Duration::from_millis(500);
 const WAITING: usize = 1 << 20;
 /// The longest request of a program: one may have the signals of all drives.
 const LONGEST: usize = frame::LONGEST;
+/// How long nodes may take at first to say who went away.
+const FIRST: Duration = Duration::from_millis(500);
 /// Messages of nodes that wait.
 const QUEUE: usize = 64;
 /// The same of what nodes say of themselves. Older ones are dropped: they are said again.
@@ -123,6 +126,14 @@ impl Serving {
         while let Ok(reply) = tokens.recv_async().await {
             if let Ok(sample) = reply.into_result() {
                 serving.saw(&sample);
+            }
+        }
+        let infos = zenoh.get(key::all_info()).target(QueryTarget::All);
+        let infos = infos.consolidation(ConsolidationMode::None).timeout(FIRST).await;
+        let infos = infos.map_err(io::Error::other)?;
+        while let Ok(reply) = infos.recv_async().await {
+            if let Ok(sample) = reply.into_result() {
+                serving.told_away(&sample);
             }
         }
         serving.remember();

@@ -249,6 +249,8 @@ pub struct Sum {
     /// How long the node has been silent, in seconds.
     age: f64,
     is_away: bool,
+    /// Whether this program has seen it.
+    is_seen: bool,
 }
 
 impl Sum {
@@ -265,6 +267,7 @@ impl Sum {
             latched_by: None,
             age,
             is_away: true,
+            is_seen: false,
         }
     }
 
@@ -277,7 +280,10 @@ impl Sum {
     }
 
     pub fn text(&self, name_width: usize) -> String {
-        let number = |it: usize, width| right(&it.to_string(), width);
+        let number = |it: usize, width| match self.is_seen {
+            true => right(&it.to_string(), width),
+            false => right("-", width),
+        };
         let state = match &self.latched_by {
             _ if self.is_away => format!("away for {:.0} s", self.age),
             Some(by) => format!("latched by {by}"),
@@ -309,10 +315,11 @@ impl Sum {
     }
 
     pub fn object(&self) -> Value {
+        let count = |it: usize| self.is_seen.then_some(it);
         json!({
-            "node": self.node.as_str(), "drives": self.drives, "turning": self.turning,
-            "faulty": self.faulty, "old": self.old, "hottest_celsius": self.hottest,
-            "latched_by": self.latched_by, "age_seconds": self.age,
+            "node": self.node.as_str(), "away": self.is_away, "drives": count(self.drives),
+            "turning": count(self.turning), "faulty": count(self.faulty), "old": count(self.old),
+            "hottest_celsius": self.hottest, "latched_by": self.latched_by, "age_seconds": self.age,
         })
     }
 }
@@ -333,6 +340,7 @@ pub fn sums(nodes: &BTreeMap<Name, Node>, drives: &[Drive], now: f64) -> Vec<Sum
             latched_by: node.info.latched_by.clone(),
             age: now - node.at,
             is_away: now - node.at > AWAY,
+            is_seen: true,
         }
     };
     nodes.iter().map(of_node).collect()
