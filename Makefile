@@ -242,8 +242,8 @@ fleet-scale: $(VENV)/ready ## 10 to 1000 simulated drives in nodes: losses, late
 	$(CARGO) build --release --locked -p motorlink-cli
 	cd benchmarks/fleet && SECONDS=$(SECONDS) $(VENV)/bin/python scale.py
 
-# ROUNDS=30 of each fault. T="router cut" runs some of them.
-fleet-faults: $(VENV)/ready ## 20 min: what stops and what is lost when parts of a fleet fail
+# ROUNDS=30 of each fault. T="router cut" runs some of them. flood takes 10 min.
+fleet-faults: $(VENV)/ready ## 30 min: what stops and what is lost when parts of a fleet fail
 	$(CARGO) build --release --locked -p motorlink-cli
 	cd benchmarks/fleet && $(VENV)/bin/python faults.py $(T)
 
