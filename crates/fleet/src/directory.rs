@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use zenoh::Wait;
+use zenoh::handlers::DefaultHandler;
 use zenoh::query::{ConsolidationMode, QueryTarget};
+use zenoh::session::SessionGetBuilder;
+use zenoh::{Session as Zenoh, Wait};
 
 use crate::key::{self, Name};
 use crate::message::Info;
@@ -26,6 +28,13 @@ pub struct Directory {
     pub away: BTreeMap<Name, f64>,
 }
 
+impl Directory {
+    /// Whether a node of this name is there.
+    pub fn has(&self, node: &Name) -> bool {
+        self.nodes.keys().any(|(name, _)| name == node)
+    }
+}
+
 /// Looks which nodes are there.
 ///
 /// # Errors
@@ -41,12 +50,7 @@ pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
             nodes.insert(node, None);
         }
     }
-    let infos = zenoh
-        .get(key::all_info())
-        .target(QueryTarget::All)
-        .consolidation(ConsolidationMode::None)
-        .timeout(ANSWER)
-        .wait();
+    let infos = ask_all(&zenoh, key::all_info(), ANSWER).wait();
     for reply in infos.map_err(failed)? {
         let Ok(sample) = reply.into_result() else { continue };
         let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
@@ -54,8 +58,19 @@ pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
             nodes.insert(node, info);
         }
     }
-    let away = away(nodes.values().flatten(), |node| nodes.keys().any(|(name, _)| name == node));
-    Ok(Directory { nodes, away })
+    let mut found = Directory { nodes, away: BTreeMap::new() };
+    found.away = away(found.nodes.values().flatten(), |node| found.has(node));
+    Ok(found)
+}
+
+/// A question to all nodes.
+pub(crate) fn ask_all(
+    zenoh: &Zenoh,
+    key: String,
+    patience: Duration,
+) -> SessionGetBuilder<'_, 'static, DefaultHandler> {
+    let question = zenoh.get(key).target(QueryTarget::All);
+    question.consolidation(ConsolidationMode::None).timeout(patience)
 }
 
 /// The nodes that others saw go away, and for how long at least, in seconds, without those that are there.

@@ -163,14 +163,14 @@ impl DeadMan {
     /// The page is not alive or has ended its motion since the command, or the motor was stopped.
     pub fn permit(&mut self, ticket: &Ticket, hold: bool, now: Instant) -> Result<(), Refusal> {
         if !self.is_alive(now) {
-            return Err(refusal(Reason::Lapsed, "the page gives no sign of life"));
+            return Err(Refusal::new(Reason::Lapsed, "the page gives no sign of life"));
         }
         let stops = self.stops_of(ticket.motor.as_ref());
         if ticket.ends != self.ends || ticket.stops != stops {
-            return Err(refusal(Reason::Overtaken, "a stop came first; nothing was sent"));
+            return Err(Refusal::new(Reason::Overtaken, "a stop came first; nothing was sent"));
         }
         if hold && ticket.releases != self.releases {
-            return Err(refusal(Reason::Lapsed, "the key or the finger of hold-to-run is up"));
+            return Err(Refusal::new(Reason::Lapsed, "the key or the finger of hold-to-run is up"));
         }
         let hold = hold || self.motion.is_some_and(|motion| motion.hold);
         self.motion = Some(Motion { hold });
@@ -202,10 +202,6 @@ impl DeadMan {
         let shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
         self.stops.of(motor) + shared.of(motor)
     }
-}
-
-fn refusal(reason: Reason, message: &str) -> Refusal {
-    Refusal { reason, message: message.to_owned(), code: None }
 }
 
 #[cfg(test)]

@@ -130,7 +130,7 @@ impl Page {
 
     fn lapse(&self, control: &mut Control, lapse: Lapse) {
         if let Some(drive) = control.drive.take() {
-            drive.close_because(refusal(Reason::Lapsed, lapse.to_string()));
+            drive.close_because(Refusal::new(Reason::Lapsed, lapse.to_string()));
         }
         // If it takes no texts, it learns from the next beat that it holds no motors.
         let _ = self.out.try_send(encode(&Text::Lapsed { message: lapse.to_string() }));
@@ -166,7 +166,7 @@ impl Page {
                 Ok(())
             }
             Err((Some(id), why)) => {
-                self.refuse(id, usage(why)).await;
+                self.refuse(id, Refusal::usage(why)).await;
                 Ok(())
             }
             Err((None, why)) => Err(why),
@@ -200,7 +200,7 @@ impl Page {
             | Ask::Take { .. }
             | Ask::Leave { .. } => {
                 let message = "a page may not send this request".to_owned();
-                return Err(Refusal { reason: Reason::Forbidden, message, code: None });
+                return Err(Refusal::new(Reason::Forbidden, message));
             }
         }
         self.view()?.pass(&request).await.map_err(|error| lost(&error.to_string()))
@@ -292,7 +292,7 @@ impl Page {
     fn place(&self) -> Result<OwnedSemaphorePermit, Refusal> {
         let busy = format!("{REQUESTS} requests are under way, which is the limit");
         let permit = Arc::clone(&self.requests).try_acquire_owned();
-        permit.map_err(|_| refusal(Reason::Busy, busy))
+        permit.map_err(|_| Refusal::new(Reason::Busy, busy))
     }
 
     /// Whether this page may ask for that.
@@ -321,7 +321,7 @@ impl Page {
     fn check_operator(&self) -> Result<(), Refusal> {
         match self.may.role {
             Role::Operator => Ok(()),
-            Role::Viewer => Err(refusal(
+            Role::Viewer => Err(Refusal::new(
                 Reason::Forbidden,
                 "a viewer may see everything and stop, nothing else",
             )),
@@ -332,7 +332,7 @@ impl Page {
     fn check_port(&self, port: &str) -> Result<(), Refusal> {
         let is_address = port.parse::<PortName>().is_ok_and(|port| port.is_address());
         match is_address && !self.may.opens_addresses {
-            true => Err(refusal(
+            true => Err(Refusal::new(
                 Reason::Forbidden,
                 "this monitor is open to the network, so its pages connect to no network address; start it \
                  with --open-addresses, or give it the port with -p",
@@ -501,12 +501,4 @@ fn line_of(ask: &Ask) -> Option<String> {
 pub fn encode(text: &impl serde::Serialize) -> String {
     // The messages have string keys and no maps, which is all that could fail.
     serde_json::to_string(text).unwrap_or_default()
-}
-
-fn usage(why: String) -> Refusal {
-    refusal(Reason::Usage, why)
-}
-
-fn refusal(reason: Reason, message: impl Into<String>) -> Refusal {
-    Refusal { reason, message: message.into(), code: None }
 }

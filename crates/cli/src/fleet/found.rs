@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink_fleet::directory::{self, Directory};
+use motorlink_fleet::directory;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::message::Info;
 use motorlink_fleet::network::Network;
@@ -69,16 +69,17 @@ pub fn found(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
 
 fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
     let mut found: Vec<(Name, Info)> = Vec::new();
-    let Directory { nodes, away } = directory::nodes(network)?;
-    let mut missing = away.iter().find(|(node, _)| wanted.misses(node)).map(|(node, seconds)| {
-        gone(node, *seconds).trying(format!("if that is known, give `--gone {node}`"))
-    });
-    let is_known = |node: &Name| nodes.keys().any(|(known, _)| known == node);
-    if let (None, Some(node)) = (&missing, wanted.named.iter().find(|node| !is_known(node))) {
+    let directory = directory::nodes(network)?;
+    let mut missing =
+        directory.away.iter().find(|(node, _)| wanted.misses(node)).map(|(node, seconds)| {
+            gone(node, *seconds).trying(format!("if that is known, give `--gone {node}`"))
+        });
+    let unknown = wanted.named.iter().find(|node| !directory.has(node));
+    if let (None, Some(node)) = (&missing, unknown) {
         let none = Failure::link(format!("no node {node} is at this network"));
         missing = Some(none.trying("`motorlink fleet list` shows those that are there"));
     }
-    for ((node, _), info) in nodes {
+    for ((node, _), info) in directory.nodes {
         if !wanted.has(&node) {
             continue;
         }
@@ -88,13 +89,18 @@ fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
         }
         match info {
             Some(info) => found.push((node, info)),
-            None => missing = Some(Failure::link(format!("node {node} does not answer"))),
+            None => missing = Some(silent(&node)),
         }
     }
     if found.is_empty() {
         return Err(missing.unwrap_or_else(|| Failure::link("no node is at this network")));
     }
     Ok(Found { nodes: found, missing })
+}
+
+/// A node is there, but does not say anything.
+pub fn silent(node: &Name) -> Failure {
+    Failure::link(format!("node {node} does not answer"))
 }
 
 /// A node went away this many seconds ago.

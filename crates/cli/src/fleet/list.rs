@@ -7,7 +7,7 @@ use motorlink_telemetry::share::message::Line;
 use serde_json::{Value, json};
 
 use super::args::At;
-use super::found::gone;
+use super::found::{gone, silent};
 use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 
@@ -43,7 +43,7 @@ pub fn run(at: &At) -> Result<(), Failure> {
         )?;
     }
     if let Some(((name, _), _)) = nodes.iter().find(|(_, info)| info.is_none()) {
-        return Err(Failure::link(format!("node {name} does not answer")));
+        return Err(silent(name));
     }
     away.iter().next().map_or(Ok(()), |(name, seconds)| Err(gone(name, *seconds)))
 }

@@ -8,6 +8,7 @@ use motorlink_telemetry::share::message::{Group, Line};
 use motorlink_telemetry::share::program::Program;
 use serde::Serialize;
 use zenoh::bytes::Encoding;
+use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
@@ -54,6 +55,11 @@ impl Common {
     pub(super) fn lines(&self) -> Arc<Lines> {
         Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner).lines)
     }
+}
+
+/// Whether a query asks for a key.
+pub(super) fn covers(asked: &keyexpr, key: &str) -> bool {
+    keyexpr::new(key).is_ok_and(|key| asked.intersects(key))
 }
 
 /// Answers a query of a program.

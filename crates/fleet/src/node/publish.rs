@@ -22,11 +22,10 @@ use tokio::task::block_in_place;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
-use zenoh::key_expr::keyexpr;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::common::{Common, State, reply};
+use super::common::{Common, State, covers, reply};
 use crate::key;
 use crate::message::Info;
 use crate::weight::Lines;
@@ -234,9 +233,7 @@ impl Common {
 
     fn say_columns(&self, query: &Query) {
         let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
-        let is_meant =
-            |key: &str| keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key));
-        let meant = state.columns.iter().filter(|(key, _)| is_meant(key));
+        let meant = state.columns.iter().filter(|(key, _)| covers(query.key_expr(), key));
         let meant: Vec<_> = meant.map(|(key, group)| (key.clone(), group.clone())).collect();
         drop(state);
         for (key, group) in meant {

@@ -16,7 +16,7 @@ use zenoh::bytes::Encoding;
 use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
-use super::common::{Common, refuse, reply_with};
+use super::common::{Common, covers, refuse, reply_with};
 use super::reader::{Drive, Reader};
 use crate::key::{self, About};
 use crate::message::{Identity, NoAnswer};
@@ -62,7 +62,10 @@ impl Queries {
     fn take(self: &Arc<Self>, about: About, query: Query, handle: &Handle) {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             let message = format!("{MOST} such queries are carried out already; ask again");
-            return refuse(&query, &no_answer(query.key_expr(), refusal(Reason::Busy, message)));
+            return refuse(
+                &query,
+                &no_answer(query.key_expr(), Refusal::new(Reason::Busy, message)),
+            );
         };
         let queries = Arc::clone(self);
         handle.spawn(async move {
@@ -96,10 +99,11 @@ impl Queries {
         if let Some((name, number)) = key::one_motor(asked) {
             let line = lines.iter().find(|line| line.line == name).ok_or_else(|| {
                 let known: Vec<_> = lines.iter().map(|line| line.line.as_str()).collect();
-                usage(format!("no line `{name}`; the lines are {}", known.join(", ")))
+                Refusal::usage(format!("no line `{name}`; the lines are {}", known.join(", ")))
             })?;
-            let motor = motor(line, number)
-                .ok_or_else(|| usage(format!("{name}: no motor can have the number `{number}`")))?;
+            let motor = motor(line, number).ok_or_else(|| {
+                Refusal::usage(format!("{name}: no motor can have the number `{number}`"))
+            })?;
             return Ok(vec![drive(line, motor)]);
         }
         let all = lines.iter().flat_map(|line| line.heard.iter().map(move |motor| (line, *motor)));
@@ -131,7 +135,7 @@ impl Queries {
         asked: &keyexpr,
     ) -> Result<Vec<Reply>, Refusal> {
         let reader = self.reader.as_ref().ok_or_else(|| {
-            usage("this node cannot read drives: its program was built without `monitor`")
+            Refusal::usage("this node cannot read drives: its program was built without `monitor`")
         })?;
         let (line, motor) = (drive.line.clone(), drive.motor);
         let key = key::about(&self.common.name, &line.line, motor, about);
@@ -145,7 +149,9 @@ impl Queries {
             // A number, or a name that the reader refuses with those that are alike.
             let Some(name) = key::one_register(asked) else { return Ok(vec![]) };
             if name.len() > LONGEST {
-                return Err(usage(format!("the name of a register has up to {LONGEST} bytes")));
+                return Err(Refusal::usage(format!(
+                    "the name of a register has up to {LONGEST} bytes"
+                )));
             }
             names.push(name.to_owned());
         }
@@ -172,7 +178,7 @@ impl Queries {
 
     /// Why nothing can be read of a line whose port is lost.
     fn lost(&self, line: &str) -> Option<Refusal> {
-        self.common.lost(line).map(|message| refusal(Reason::Line, message))
+        self.common.lost(line).map(|message| Refusal::new(Reason::Line, message))
     }
 }
 
@@ -184,11 +190,6 @@ fn say(query: &Query, answers: Vec<Reply>) {
             Err(why) => refuse(query, &no_answer(&key, why)),
         }
     }
-}
-
-/// Whether a query asks for a key.
-fn covers(asked: &keyexpr, key: &str) -> bool {
-    keyexpr::new(key).is_ok_and(|key| asked.intersects(key))
 }
 
 /// The motor of a line with this number.
@@ -208,12 +209,4 @@ fn no_answer(key: &str, why: Refusal) -> NoAnswer {
     let is_absent = code.map(ErrorCode::from) == Some(ErrorCode::BadMotorSelected);
     let reason = if is_absent { Reason::Unheard } else { reason };
     NoAnswer { key: key.to_owned(), reason, message, code }
-}
-
-fn usage(message: impl Into<String>) -> Refusal {
-    refusal(Reason::Usage, message)
-}
-
-fn refusal(reason: Reason, message: impl Into<String>) -> Refusal {
-    Refusal { reason, message: message.into(), code: None }
 }

@@ -90,7 +90,7 @@ impl Session {
                 }
             }
         };
-        let refusal = Refusal { reason: Reason::Lapsed, message: why.clone(), code: None };
+        let refusal = Refusal::new(Reason::Lapsed, &why);
         self.program.close_because(refusal);
         if let Some(Pull { query, .. }) = self.pull.take() {
             answer(&query, &Answer::Over { t: self.now(), why: why.clone() });

@@ -111,13 +111,13 @@ impl Asking {
 
     fn unfit(&self) -> Refusal {
         let message = "the reply does not fit the request".to_owned();
-        Refusal { reason: Reason::Line, message, code: None }
+        Refusal::new(Reason::Line, message)
     }
 }
 
 /// What a drive refused.
 pub fn refused(message: String) -> Refusal {
-    Refusal { reason: Reason::Refused, message, code: None }
+    Refusal::new(Reason::Refused, message)
 }
 
 /// Stops a motor, or all that the lines can have. Gives how they took it.
@@ -127,10 +127,6 @@ pub async fn stop(
 ) -> Result<Vec<StoppedMotor>, Refusal> {
     match program.ask(Ask::Stop { motor }).await? {
         Answer::Stop { motors } => Ok(motors),
-        _ => Err(Refusal {
-            reason: Reason::Line,
-            message: "the share gives another answer".to_owned(),
-            code: None,
-        }),
+        _ => Err(Refusal::new(Reason::Line, "the share gives another answer")),
     }
 }

@@ -9,7 +9,6 @@ use std::time::Duration;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::message::Group;
 use zenoh::pubsub::Subscriber;
-use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 use zenoh::{Session as Zenoh, Wait};
 
@@ -142,17 +141,12 @@ impl Shared {
         }
         *asked = now;
         let shared = Arc::clone(self);
-        let question = self
-            .zenoh
-            .get(key::all_columns(&Name::any()))
-            .target(QueryTarget::All)
-            .consolidation(ConsolidationMode::None)
-            .timeout(ANSWER)
-            .callback(move |reply| {
-                if let Ok(sample) = reply.into_result() {
-                    shared.columns(&sample);
-                }
-            });
+        let question = directory::ask_all(&self.zenoh, key::all_columns(&Name::any()), ANSWER);
+        let question = question.callback(move |reply| {
+            if let Ok(sample) = reply.into_result() {
+                shared.columns(&sample);
+            }
+        });
         // Samples that come later ask again.
         let _ = question.wait();
     }

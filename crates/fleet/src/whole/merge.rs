@@ -231,7 +231,7 @@ impl Merge {
         match &ask {
             Ask::Hello { protocol, .. } if *protocol != VERSION => {
                 let message = format!("the fleet speaks version {VERSION}");
-                self.refuse(id, usage(message));
+                self.refuse(id, Refusal::usage(message));
             }
             Ask::Hello { .. } => {
                 let share = "fleet".to_owned();
@@ -257,18 +257,20 @@ impl Merge {
             Ask::Unsubscribe { subscription } => {
                 let answer = match self.unsubscribe(*subscription) {
                     true => Ok(Answer::Unsubscribe),
-                    false => Err(usage(format!("there is no subscription {subscription}"))),
+                    false => {
+                        Err(Refusal::usage(format!("there is no subscription {subscription}")))
+                    }
                 };
                 self.end(id, answer);
             }
             Ask::Leave { .. } => return false,
             Ask::Ports | Ask::Scan { .. } | Ask::Open { .. } => {
                 let why = "ports of a node are opened at the node: `motorlink node -p PORT`";
-                self.refuse(id, usage(why.to_owned()));
+                self.refuse(id, Refusal::usage(why.to_owned()));
             }
             _ => match names::line_of(&mut ask).map(std::mem::take) {
                 Some(line) => self.one(id, ask, &line),
-                None => self.refuse(id, usage("the fleet does not know this request".to_owned())),
+                None => self.refuse(id, Refusal::usage("the fleet does not know this request")),
             },
         }
         true
@@ -542,8 +544,8 @@ impl Merge {
     fn known(&self, line: &str) -> Result<(Name, String), Refusal> {
         match names::at_node(line) {
             Some((node, line)) if self.members.contains_key(&node) => Ok((node, line.to_owned())),
-            Some((node, _)) => Err(usage(format!("the fleet has no node {node}"))),
-            None => Err(usage(format!("a line of the fleet is NODE/LINE, not `{line}`"))),
+            Some((node, _)) => Err(Refusal::usage(format!("the fleet has no node {node}"))),
+            None => Err(Refusal::usage(format!("a line of the fleet is NODE/LINE, not `{line}`"))),
         }
     }
 
@@ -590,20 +592,16 @@ impl Merge {
     }
 }
 
-fn usage(message: String) -> Refusal {
-    Refusal { reason: Reason::Usage, message, code: None }
-}
-
 /// A node came too late for a command.
 fn expired(node: &Name) -> Refusal {
     let message =
         format!("node {node} was not connected within the time to live; nothing was sent");
-    Refusal { reason: Reason::Expired, message, code: None }
+    Refusal::new(Reason::Expired, message)
 }
 
 /// A node did not get a request, or did not answer it.
 fn away(node: &Name, why: &str) -> Refusal {
-    Refusal { reason: Reason::Line, message: format!("node {node} is away: {why}"), code: None }
+    Refusal::new(Reason::Line, format!("node {node} is away: {why}"))
 }
 
 #[cfg(test)]

@@ -83,7 +83,7 @@ impl Round {
             true => Ok(answer),
             false => {
                 let message = format!("not at all nodes: {}", missing.join("; "));
-                Err(Refusal { reason: Reason::Line, message, code: None })
+                Err(Refusal::new(Reason::Line, message))
             }
         }
     }

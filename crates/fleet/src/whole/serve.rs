@@ -17,7 +17,6 @@ use tokio::time::{Instant, sleep_until};
 use zenoh::Session as Zenoh;
 use zenoh::handlers::{FifoChannelHandler, RingChannel, RingChannelHandler};
 use zenoh::pubsub::Subscriber;
-use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::{Sample, SampleKind};
 
 use super::merge::{Merge, Out};
@@ -128,8 +127,7 @@ impl Serving {
                 serving.saw(&sample);
             }
         }
-        let infos = zenoh.get(key::all_info()).target(QueryTarget::All);
-        let infos = infos.consolidation(ConsolidationMode::None).timeout(FIRST).await;
+        let infos = directory::ask_all(&zenoh, key::all_info(), FIRST).await;
         let infos = infos.map_err(io::Error::other)?;
         while let Ok(reply) = infos.recv_async().await {
             if let Ok(sample) = reply.into_result() {
@@ -234,6 +232,9 @@ impl Serving {
     fn told_away(&mut self, sample: &Sample) {
         let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
         let away = directory::away(info.iter(), |node| self.links.contains_key(node));
+        if away.is_empty() {
+            return;
+        }
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         for node in away.into_keys().filter(|node| (self.is_meant)(node)) {
             known.entry(node).or_default();

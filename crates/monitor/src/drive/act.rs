@@ -11,7 +11,7 @@ use motorlink_telemetry::share::program::{Program, Refusal};
 use super::commands::Command;
 use super::control::{Control, Motion, Permitted};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
-use super::target::{Target, refusal, usage};
+use super::target::Target;
 use crate::message::Value;
 
 /// A command of a page.
@@ -33,7 +33,9 @@ impl Act {
     ) -> Result<Vec<Value>, Refusal> {
         let request = self.command.request(&self.target, &self.values)?;
         if self.command.wears_rom() && !self.to_rom {
-            return Err(usage("this command wears the ROM of the motor; nothing was sent"));
+            return Err(Refusal::usage(
+                "this command wears the ROM of the motor; nothing was sent",
+            ));
         }
         if may_move(&request) {
             return self.move_motor(control, drive, &request).await;
@@ -102,7 +104,7 @@ pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
             Ok(_) => Ok(()),
             Err(why) => {
                 let message = format!("{}: the motor did not start: {why}", reads.place());
-                Err(refusal(Reason::Refused, message))
+                Err(Refusal::new(Reason::Refused, message))
             }
         };
     }

@@ -15,7 +15,7 @@ use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
-use super::target::{Target, usage};
+use super::target::Target;
 use super::value;
 use crate::message::{self, Field, Value};
 
@@ -49,7 +49,7 @@ impl Command {
         let all = Self::all(target.speaks);
         all.iter().find(|command| command.name() == name).copied().ok_or_else(|| {
             let names: Vec<&str> = all.iter().map(Command::name).collect();
-            usage(format!("no command `{name}`; the commands are {}", names.join(", ")))
+            Refusal::usage(format!("no command `{name}`; the commands are {}", names.join(", ")))
         })
     }
 
@@ -116,11 +116,16 @@ impl Command {
                 false => format!("its values are {}", names.join(", ")),
             };
             let command = self.name();
-            return Err(usage(format!("{command} has no value `{name}`; {has}; nothing was sent")));
+            return Err(Refusal::usage(format!(
+                "{command} has no value `{name}`; {has}; nothing was sent"
+            )));
         }
         let wanted = |name: &str| {
             values.get(name).copied().ok_or_else(|| {
-                usage(format!("{} needs the value `{name}`; nothing was sent", self.name()))
+                Refusal::usage(format!(
+                    "{} needs the value `{name}`; nothing was sent",
+                    self.name()
+                ))
             })
         };
         match self {
@@ -130,7 +135,7 @@ impl Command {
                     payload.extend(st_bytes(&field, wanted(field.value.name)?)?);
                 }
                 let request = StRequest::decode(*profile, code.number(), &payload)
-                    .map_err(|error| usage(error.doc()))?;
+                    .map_err(|error| Refusal::usage(error.doc()))?;
                 let motor = match request {
                     // About the drive.
                     StRequest::GetBoardInfo | StRequest::GetFirmwareVersion => 0,
@@ -139,7 +144,9 @@ impl Command {
                 Ok(Request::st(motor, request))
             }
             Command::Rmd(row) => {
-                let Motor::Rmd(id) = target.motor else { return Err(usage("not an RMD motor")) };
+                let Motor::Rmd(id) = target.motor else {
+                    return Err(Refusal::usage("not an RMD motor"));
+                };
                 let mut data = [u8::from(row.code), 0, 0, 0, 0, 0, 0, 0];
                 for field in row.request {
                     let name = field.name_with_unit().to_string();
@@ -149,7 +156,9 @@ impl Command {
                 }
                 Ok(Request::Rmd(id, data))
             }
-            Command::Execute(_) => self.plain(target.motor).ok_or_else(|| usage("not an ST drive")),
+            Command::Execute(_) => {
+                self.plain(target.motor).ok_or_else(|| Refusal::usage("not an ST drive"))
+            }
         }
     }
 
@@ -250,7 +259,9 @@ fn st_bytes(field: &StNumber, wanted: f64) -> Result<Vec<u8>, Refusal> {
         // A negative duration or angle beyond all bounds is checked with the whole request.
         return match value.is_finite() {
             true => Ok(value.to_le_bytes().to_vec()),
-            false => Err(usage(format!("{name}: {wanted} is not a number; nothing was sent"))),
+            false => {
+                Err(Refusal::usage(format!("{name}: {wanted} is not a number; nothing was sent")))
+            }
         };
     }
     let digits = exactly(&field.scale, name, wanted)?;
@@ -294,14 +305,19 @@ fn rmd_digits(field: &RmdField, name: &str, wanted: f64) -> Result<i64, Refusal>
             let all: Vec<_> =
                 words.iter().map(|(number, word)| format!("{number} ({word})")).collect();
             let all = all.join(", ");
-            return Err(usage(format!("{name}: {wanted} is none of {all}; nothing was sent")));
+            return Err(Refusal::usage(format!(
+                "{name}: {wanted} is none of {all}; nothing was sent"
+            )));
         }
         return Ok(digits);
     }
-    field.scale.wanted(wanted).map_err(|why| usage(format!("{name}: {why}; nothing was sent")))
+    field
+        .scale
+        .wanted(wanted)
+        .map_err(|why| Refusal::usage(format!("{name}: {why}; nothing was sent")))
 }
 
 /// The digits of a value in its range.
 fn exactly(scale: &Scale, name: &str, wanted: f64) -> Result<i64, Refusal> {
-    scale.wanted(wanted).map_err(|why| usage(format!("{name}: {why}; nothing was sent")))
+    scale.wanted(wanted).map_err(|why| Refusal::usage(format!("{name}: {why}; nothing was sent")))
 }

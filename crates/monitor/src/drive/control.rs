@@ -11,7 +11,7 @@ use tokio::task::JoinHandle;
 
 use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
-use super::target::{Target, refusal};
+use super::target::Target;
 use crate::message::Ran;
 
 /// How a page's motion is permitted.
@@ -187,7 +187,7 @@ pub(super) async fn send(
 }
 
 fn overtaken() -> Refusal {
-    refusal(Reason::Overtaken, "a stop came first; nothing was sent")
+    Refusal::new(Reason::Overtaken, "a stop came first; nothing was sent")
 }
 
 impl Stops<'_> {

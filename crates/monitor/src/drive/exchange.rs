@@ -9,7 +9,7 @@ use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::OwnedMutexGuard;
 
-use super::target::{Target, refusal, usage};
+use super::target::Target;
 
 /// How long a request that moves nothing may wait until it is sent, in seconds.
 const TIME_TO_LIVE: f64 = 2.0;
@@ -66,7 +66,7 @@ impl<'a> Exchanges<'a> {
         match request {
             LineRequest::St(motor, request) => self.st(*motor, &request.request()).await,
             LineRequest::Rmd(_, data) => self.rmd(*data).await.map(Vec::from),
-            _ => Err(usage("pages send no such request")),
+            _ => Err(Refusal::usage("pages send no such request")),
         }
     }
 
@@ -115,7 +115,7 @@ impl<'a> Exchanges<'a> {
             "{place}: the command was sent, and its reply may be one to another request: the line failed, or \
              a reply came twice or late; check the motor"
         );
-        refusal(Reason::Unconfirmed, message)
+        Refusal::new(Reason::Unconfirmed, message)
     }
 
     /// The motor of an ST drive, and the profile.
@@ -136,7 +136,7 @@ impl<'a> Exchanges<'a> {
 
     /// The reply is none of those of the request.
     pub(super) fn unfit(&self) -> Refusal {
-        refusal(Reason::Line, format!("{}: the reply does not fit the request", self.place()))
+        Refusal::new(Reason::Line, format!("{}: the reply does not fit the request", self.place()))
     }
 
     /// The motor, for messages.

@@ -8,7 +8,6 @@ use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::signal::Motor;
 
-use super::target::usage;
 use crate::message::Mode;
 
 /// The limits of a motor, and what they need to know of it.
@@ -50,7 +49,7 @@ impl Limited {
                 self.st.current_s16a = most.map(|digits| digits as u16);
             }
             (Motor::St(_), Mode::Position) => {
-                return Err(usage("the position of an ST motor cannot be limited"));
+                return Err(Refusal::usage("the position of an ST motor cannot be limited"));
             }
             (Motor::Rmd(_), Mode::Speed) => {
                 let most = within(most, SpeedLimit::UNIT)?;
@@ -87,11 +86,11 @@ impl Limited {
             Request::St(motor, request) => {
                 let seen = self.seen();
                 let request = request.request();
-                self.account.check(seen, *motor, &request).map_err(|why| usage(words(why)))
+                self.account.check(seen, *motor, &request).map_err(|why| Refusal::usage(words(why)))
             }
             Request::Rmd(_, data) => match self.rmd.check(data) {
                 Ok(()) => Ok(Effect::None),
-                Err(why) => Err(usage(format!("{why}; nothing was sent"))),
+                Err(why) => Err(Refusal::usage(format!("{why}; nothing was sent"))),
             },
             _ => Ok(Effect::None),
         }
@@ -141,5 +140,7 @@ fn positive(scale: Scale) -> Scale {
 /// The digits of a limit: none of them exceeds it.
 fn within(most: Option<f64>, scale: Scale) -> Result<Option<i64>, Refusal> {
     let scale = Scale { rounding: Rounding::Inward, ..scale };
-    most.map(|most| scale.wanted(most)).transpose().map_err(|why| usage(format!("a limit: {why}")))
+    most.map(|most| scale.wanted(most))
+        .transpose()
+        .map_err(|why| Refusal::usage(format!("a limit: {why}")))
 }

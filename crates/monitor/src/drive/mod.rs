@@ -30,7 +30,7 @@ use motorlink_telemetry::share::words::Speaks;
 use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
 use control::Control;
 use exchange::Exchanges;
-use target::{Target, usage};
+use target::Target;
 
 pub use control::Motion;
 
@@ -80,7 +80,9 @@ impl Drives {
             | Ask::Record { .. }
             | Ask::EndRecording
             | Ask::Recordings
-            | Ask::Recording { .. } => Err(usage("the server carries this out without drives")),
+            | Ask::Recording { .. } => {
+                Err(Refusal::usage("the server carries this out without drives"))
+            }
             Ask::Motors { line } => {
                 let speaks = self.speaks(&line)?;
                 Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
@@ -188,7 +190,7 @@ impl Drives {
     fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {
         self.lines.get(line).copied().ok_or_else(|| {
             let names: Vec<&str> = self.lines.keys().map(String::as_str).collect();
-            usage(format!("no line `{line}`; the lines are {}", names.join(", ")))
+            Refusal::usage(format!("no line `{line}`; the lines are {}", names.join(", ")))
         })
     }
 

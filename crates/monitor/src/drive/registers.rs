@@ -13,7 +13,7 @@ use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Quantity};
 
 use super::exchange::{ATTEMPTS, Exchanges, is_refused_by_motor, is_worth_repeating};
-use super::target::{Target, usage};
+use super::target::Target;
 use super::value;
 use crate::message::{Register, Value};
 
@@ -66,7 +66,7 @@ impl Place {
             }
             _ => (None, format!("there is no register `{name}`")),
         };
-        found.ok_or_else(|| usage(format!("{why}; nothing was sent")))
+        found.ok_or_else(|| Refusal::usage(format!("{why}; nothing was sent")))
     }
 
     /// The request that reads it. The error says why it cannot be read.
@@ -180,7 +180,7 @@ async fn read_once(
         let request = match place.request(exchanges) {
             Ok(request) => request,
             Err(why) => {
-                values.push(Err(usage(why)));
+                values.push(Err(Refusal::usage(why)));
                 continue;
             }
         };

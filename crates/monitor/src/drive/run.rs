@@ -26,7 +26,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval_at};
 use super::act::started;
 use super::control::{Control, Motion, Permitted, Running, send};
 use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
-use super::target::{Target, refusal, usage};
+use super::target::Target;
 use crate::message::{Answer, Mode, Ran};
 
 /// The time between two references.
@@ -82,7 +82,7 @@ impl Run {
         if !(self.rate.is_finite() && self.rate > 0.0) {
             let message =
                 format!("the rate {} is not a positive number; nothing was sent", self.rate);
-            return Err(usage(message));
+            return Err(Refusal::usage(message));
         }
         self.check(control)?;
         let stops = control.stops(&self.target);
@@ -126,7 +126,7 @@ impl Run {
                 if let Some(limit) = control
                     .limited(&self.target, |limited| limited.most(self.target.motor, Mode::Speed))
                 {
-                    return Err(usage(format!(
+                    return Err(Refusal::usage(format!(
                         "the motor of a torque command turns as fast as its load allows, and its speed is \
                          limited to {limit} rpm; nothing was sent"
                     )));
@@ -151,7 +151,7 @@ impl Run {
         let most = f64::from(u16::MAX);
         if duration > most {
             let least = 1000.0 * way / most;
-            return Err(usage(format!(
+            return Err(Refusal::usage(format!(
                 "a ramp of the drive lasts up to {} s: the rate is {least:.1} or more; nothing was sent",
                 most / 1000.0
             )));
@@ -188,7 +188,7 @@ impl<M: Motion> Begun<'_, M> {
     }
 
     fn id(&self) -> Result<MotorId, Refusal> {
-        self.reads().of_rmd().ok_or_else(|| usage("not an RMD motor"))
+        self.reads().of_rmd().ok_or_else(|| Refusal::usage("not an RMD motor"))
     }
 
     fn eight(&self, replies: &[Vec<u8>]) -> Result<[u8; 8], Refusal> {
@@ -217,7 +217,7 @@ impl<M: Motion> Begun<'_, M> {
     /// Registers of an ST motor.
     async fn registers(&self, registers: &[RegisterId]) -> Result<Vec<i32>, Refusal> {
         let Some((motor, profile)) = self.reads().of_st() else {
-            return Err(usage("not an ST motor"));
+            return Err(Refusal::usage("not an ST motor"));
         };
         let read =
             |register: &RegisterId| Request::st(motor.number(), StRequest::GetRegister(*register));
@@ -287,7 +287,7 @@ impl<M: Motion> Begun<'_, M> {
         let (status, read) = self.state(&[RegisterId::SPEED_MEAS]).await?;
         if status == Status::Idle && self.run.to == 0.0 {
             let place = self.reads().place();
-            return Err(usage(format!(
+            return Err(Refusal::usage(format!(
                 "{place}: it is at rest, and the target is 0; nothing was sent"
             )));
         }
@@ -334,7 +334,7 @@ impl<M: Motion> Begun<'_, M> {
             _ => return Ok((status, rest)),
         };
         let message = format!("{}: the motor does not start: {why}", self.reads().place());
-        Err(refusal(Reason::Refused, message))
+        Err(Refusal::new(Reason::Refused, message))
     }
 
     async fn start(&self, motor: MotorNumber) -> Result<(), Refusal> {
@@ -427,7 +427,7 @@ fn is_ended_by_others(why: &Refusal) -> bool {
 }
 
 fn wanted<Q: Quantity>(value: f64) -> Result<Q, Refusal> {
-    Q::wanted(value).map_err(|why| usage(format!("{why}; nothing was sent")))
+    Q::wanted(value).map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))
 }
 
 /// A speed of an ST motor, rpm.
@@ -442,9 +442,9 @@ fn current(value: f64) -> Result<i16, Refusal> {
 }
 
 fn whole(value: f64, scale: Scale) -> Result<i64, Refusal> {
-    scale.wanted(value).map_err(|why| usage(format!("{why}; nothing was sent")))
+    scale.wanted(value).map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))
 }
 
 fn no_position() -> Refusal {
-    usage("the position of an ST motor cannot be controlled like this; nothing was sent")
+    Refusal::usage("the position of an ST motor cannot be controlled like this; nothing was sent")
 }

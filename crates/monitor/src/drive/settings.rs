@@ -16,7 +16,7 @@ use motorlink_telemetry::signal::Motor;
 
 use super::control::Control;
 use super::exchange::{Exchanges, is_refused_by_motor};
-use super::target::{Target, refusal, usage};
+use super::target::Target;
 use crate::message::{self, Answer};
 
 /// The settings of a motor of either protocol.
@@ -50,7 +50,9 @@ macro_rules! tuned {
                 let $tuning = RmdTuning { motor };
                 $then
             }
-            (Motor::St(_), Speaks::Rmd) => Err(usage("the line has drives of another protocol")),
+            (Motor::St(_), Speaks::Rmd) => {
+                Err(Refusal::usage("the line has drives of another protocol"))
+            }
         }
     };
 }
@@ -189,7 +191,8 @@ pub(super) async fn restore(
             }
         }
     });
-    let lost = || refusal(Reason::Line, "the restore ended without a result; compare the settings");
+    let lost =
+        || Refusal::new(Reason::Line, "the restore ended without a result; compare the settings");
     restoring.await.unwrap_or_else(|_| Err(lost()))
 }
 
@@ -205,7 +208,7 @@ pub(super) async fn write(
     let permissions = Permissions { rom: to_rom, running: true };
     tuned!(exchanges.target, |tuning| {
         let file = SettingsFile::one(&tuning, name, value)
-            .map_err(|problem| usage(format!("{problem}; nothing was sent")))?;
+            .map_err(|problem| Refusal::usage(format!("{problem}; nothing was sent")))?;
         set(control, exchanges, tuning, &file, permissions).await?;
         let has = |names: &Vec<String>| names.iter().any(|one| one == name);
         let blocks = tuning.blocks().into_iter();
@@ -242,7 +245,7 @@ async fn compare<T: Tuned>(
 }
 
 fn not_a_file(error: FileError) -> Refusal {
-    usage(format!("{error}; nothing was sent"))
+    Refusal::usage(format!("{error}; nothing was sent"))
 }
 
 fn not_restored(error: RestoreError<Failed>) -> Refusal {
@@ -259,7 +262,7 @@ fn not_restored(error: RestoreError<Failed>) -> Refusal {
         },
         _ => Reason::Refused,
     };
-    refusal(reason, message)
+    Refusal::new(reason, message)
 }
 
 fn described(one: &Difference<'_>) -> message::Difference {

@@ -1,6 +1,6 @@
 //! A motor of a line, and refusals of this side.
 
-use motorlink_telemetry::share::message::{MotorName, Reason};
+use motorlink_telemetry::share::message::MotorName;
 use motorlink_telemetry::share::program::{Lane, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
@@ -16,9 +16,9 @@ pub(super) struct Target {
 impl Target {
     /// The motor of this number on a line.
     pub(super) fn new(line: &str, number: u8, speaks: Speaks) -> Result<Self, Refusal> {
-        let motor = speaks
-            .motor(number)
-            .ok_or_else(|| usage(format!("{line}: no motor can have the number {number}")))?;
+        let motor = speaks.motor(number).ok_or_else(|| {
+            Refusal::usage(format!("{line}: no motor can have the number {number}"))
+        })?;
         Ok(Target { name: MotorName { line: line.to_owned(), motor: number }, motor, speaks })
     }
 
@@ -30,13 +30,4 @@ impl Target {
         };
         (self.name.line.clone(), motor)
     }
-}
-
-/// The request is not possible. Nothing was sent.
-pub(super) fn usage(message: impl Into<String>) -> Refusal {
-    refusal(Reason::Usage, message)
-}
-
-pub(super) fn refusal(reason: Reason, message: impl Into<String>) -> Refusal {
-    Refusal { reason, message: message.into(), code: None }
 }

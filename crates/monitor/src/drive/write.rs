@@ -12,7 +12,7 @@ use super::control::{Control, Motion, Permitted, send};
 use super::exchange::Exchanges;
 use super::registers::{self, Place};
 use super::settings;
-use super::target::{Target, refusal, usage};
+use super::target::Target;
 use super::value;
 use crate::message::Value;
 
@@ -39,7 +39,10 @@ impl Write {
                 register.not_a_setting(profile).map(|why| (register, profile, why))
             }
             (Place::Measured(..), _) => {
-                return Err(usage(format!("{} is measured and cannot be written", self.name)));
+                return Err(Refusal::usage(format!(
+                    "{} is measured and cannot be written",
+                    self.name
+                )));
             }
             _ => None,
         };
@@ -90,7 +93,7 @@ async fn written(
             {
                 let place = exchanges.place();
                 let message = format!("{place}: the drive did not take the value of {register}");
-                return Err(refusal(Reason::Refused, message));
+                return Err(Refusal::new(Reason::Refused, message));
             }
             let reading = motorlink_proto::st::Reading { register, bits: read, profile };
             vec![value::of_register(&register.to_string(), reading)]
@@ -102,15 +105,15 @@ async fn written(
 fn digits(register: RegisterId, value: f64, profile: Profile) -> Result<i32, Refusal> {
     let is_writable = register.shape().is_some_and(|shape| registers::is_writable(&shape, profile));
     if !is_writable {
-        return Err(usage(format!("{register} cannot be written; nothing was sent")));
+        return Err(Refusal::usage(format!("{register} cannot be written; nothing was sent")));
     }
     let bits = parse_value(register, &value.to_string(), profile, false)
-        .map_err(|why| usage(format!("{why}; nothing was sent")))?;
+        .map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))?;
     let ramp = Ramp { speed_rpm: bits, duration_ms: 0 };
     if register == RegisterId::RAMP_FINAL_SPEED && !ramp.is_possible() {
         let most = Ramp::MAX_SPEED_RPM;
         let message = format!("{register}: {value} rpm is beyond ±{most} rpm; nothing was sent");
-        return Err(usage(message));
+        return Err(Refusal::usage(message));
     }
     Ok(bits)
 }

@@ -62,7 +62,8 @@ impl Making {
         telling.0.send_replace(Some(Recorded::starting(&order.by)));
         let thread = std::thread::Builder::new().name("monitor-record".to_owned());
         let thread = thread.spawn(move || run(&order, &telling, &of_thread, &end, begun));
-        let thread = thread.map_err(|error| usage(format!("cannot start a thread: {error}")))?;
+        let thread =
+            thread.map_err(|error| Refusal::usage(format!("cannot start a thread: {error}")))?;
         Ok(Making { ends, abort, thread })
     }
 
@@ -164,7 +165,7 @@ fn start(order: &Order, telling: &Telling, abort: &Abort) -> Result<Recorder, Re
             name = numbers.next().map(|number| Name::of(SystemTime::now(), number));
         }
         let Some(file) = name.clone() else {
-            return Err(usage("all names of this second are taken".to_owned()));
+            return Err(Refusal::usage("all names of this second are taken"));
         };
         config.output.path = order.folder.join(file.to_string());
         telling.change(|told| told.name = file.to_string());
@@ -187,7 +188,9 @@ fn make(folder: &Path) -> Result<(), Refusal> {
         return Ok(());
     }
     let made = std::fs::create_dir(folder);
-    made.map_err(|error| usage(format!("cannot make the folder {}: {error}", folder.display())))
+    made.map_err(|error| {
+        Refusal::usage(format!("cannot make the folder {}: {error}", folder.display()))
+    })
 }
 
 impl Order {
@@ -197,7 +200,7 @@ impl Order {
             let profile = Profile::ALL.into_iter();
             let profile = profile.into_iter().find(|it| Some(it.name()) == line.profile.as_deref());
             Ok(Port {
-                name: name.parse().map_err(|error| usage(format!("{error}")))?,
+                name: name.parse().map_err(|error| Refusal::usage(format!("{error}")))?,
                 profile: profile.unwrap_or_default(),
                 timeout: None,
                 motors: Vec::new(),
@@ -272,9 +275,5 @@ fn refused(error: &RecordError) -> Refusal {
         RecordError::Line(_) | RecordError::Share { .. } | RecordError::Ended(_) => Reason::Line,
         _ => Reason::Usage,
     };
-    Refusal { reason, message: error.to_string(), code: None }
-}
-
-pub fn usage(message: String) -> Refusal {
-    Refusal { reason: Reason::Usage, message, code: None }
+    Refusal::new(reason, error.to_string())
 }

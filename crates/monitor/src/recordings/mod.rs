@@ -28,7 +28,7 @@ pub use part::{MOST_SIGNALS, Wanted};
 
 use crate::message::{Answer, Ask, Recorded};
 use folder::Folder;
-use make::{Making, Order, usage};
+use make::{Making, Order};
 
 /// The rates of signals, in Hz, as `motorlink record` takes them.
 const RATES: RangeInclusive<f64> = 0.1..=1000.0;
@@ -79,11 +79,11 @@ impl Recordings {
                 let rate = rate.unwrap_or(RATE);
                 if !RATES.contains(&rate) {
                     let (least, most) = (RATES.start(), RATES.end());
-                    return Err(usage(format!("a rate is {least} to {most} Hz")));
+                    return Err(Refusal::usage(format!("a rate is {least} to {most} Hz")));
                 }
                 let period = Micros((1e6 / rate).round() as u64);
                 let share::Answer::Lines { lines, .. } = view?.ask(share::Ask::Lines).await? else {
-                    return Err(usage("the share gives another answer".to_owned()));
+                    return Err(Refusal::usage("the share gives another answer"));
                 };
                 Ok(Answer::Record { name: self.record(by, period, lines).await? })
             }
@@ -94,9 +94,9 @@ impl Recordings {
             Ask::Recording { name } => {
                 let file = self.open(&name)?;
                 let read = self.reading(move |_| part::content(name, file)).await?;
-                read.map(Answer::Recording).map_err(usage)
+                read.map(Answer::Recording).map_err(Refusal::usage)
             }
-            _ => Err(usage("this is not a request about recordings".to_owned())),
+            _ => Err(Refusal::usage("this is not a request about recordings")),
         }
     }
 
@@ -113,19 +113,19 @@ impl Recordings {
             let told = self.told.borrow().clone();
             if let Some(told) = told.filter(Recorded::is_active) {
                 let message = format!("{} records already, for {}", told.name, told.by);
-                return Err(Refusal { reason: Reason::Busy, message, code: None });
+                return Err(Refusal::new(Reason::Busy, message));
             }
             let (folder, share) = (self.path.clone(), Arc::clone(&self.share));
             let order = Order { folder, share, lines, period, by: by.to_owned() };
             *making = Some(Making::start(order, self.told.clone(), begun)?);
         }
-        let fault = || usage("the server has a fault".to_owned());
+        let fault = || Refusal::usage("the server has a fault");
         begins.await.unwrap_or_else(|_| Err(fault()))
     }
 
     /// Ends the recording, and waits until its file is whole.
     async fn end(&self) -> Result<Recorded, Refusal> {
-        let nothing = || usage("nothing is recorded".to_owned());
+        let nothing = || Refusal::usage("nothing is recorded");
         let mut told = self.watch();
         if !told.borrow().as_ref().is_some_and(Recorded::is_active) {
             return Err(nothing());
@@ -152,8 +152,8 @@ impl Recordings {
         let active = told.filter(Recorded::is_active).and_then(|told| Name::new(&told.name));
         let listed = self.reading(move |folder| folder.list(active.as_ref())).await?;
         let folder = self.path.display().to_string();
-        let (recordings, older) =
-            listed.map_err(|error| usage(format!("cannot read the folder {folder}: {error}")))?;
+        let (recordings, older) = listed
+            .map_err(|error| Refusal::usage(format!("cannot read the folder {folder}: {error}")))?;
         let older = u32::try_from(older).unwrap_or(u32::MAX);
         Ok(Answer::Recordings { folder, recordings, older })
     }
@@ -166,7 +166,7 @@ impl Recordings {
         let checked = Name::new(name).ok_or(io::ErrorKind::NotFound.into());
         let opened = checked.and_then(|name| folder::open(&self.path, &name));
         opened.map_err(|error: io::Error| {
-            usage(match error.kind() {
+            Refusal::usage(match error.kind() {
                 io::ErrorKind::NotFound => format!("there is no recording `{name}`"),
                 _ => format!("cannot read `{name}`: {error}"),
             })
@@ -195,7 +195,7 @@ impl Recordings {
                 is_wanted.load(Ordering::Relaxed)
             })
         });
-        read.await?.map(Option::unwrap_or_default).map_err(usage)
+        read.await?.map(Option::unwrap_or_default).map_err(Refusal::usage)
     }
 
     /// Reads in a thread of its own, after those that read now.
@@ -205,7 +205,7 @@ impl Recordings {
     ) -> Result<T, Refusal> {
         let mut folder = Arc::clone(&self.folder).lock_owned().await;
         let read = spawn_blocking(move || read(&mut folder)).await;
-        read.map_err(|_| usage("the recording cannot be read: the server has a fault".to_owned()))
+        read.map_err(|_| Refusal::usage("the recording cannot be read: the server has a fault"))
     }
 
     fn making(&self) -> MutexGuard<'_, Option<Making>> {

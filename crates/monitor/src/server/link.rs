@@ -293,10 +293,10 @@ pub async fn stop_all(program: &Program) -> Result<Vec<StoppedMotor>, Refusal> {
 /// That the share is lost, and what becomes of a stop.
 fn until_back(Refusal { message, .. }: Refusal) -> Refusal {
     let again = format!("If it is back within {} s, the stop is sent", PENDING.as_secs());
-    Refusal { message: format!("{message}. {again}"), reason: Reason::Line, code: None }
+    Refusal::new(Reason::Line, format!("{message}. {again}"))
 }
 
 /// Nothing can be asked of the share.
 pub fn lost(why: &str) -> Refusal {
-    Refusal { reason: Reason::Line, message: format!("the share is lost: {why}"), code: None }
+    Refusal::new(Reason::Line, format!("the share is lost: {why}"))
 }

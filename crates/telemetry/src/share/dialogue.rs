@@ -43,6 +43,18 @@ pub struct Refusal {
     pub code: Option<u8>,
 }
 
+impl Refusal {
+    /// A refusal that is not the answer of a drive.
+    pub fn new(reason: Reason, message: impl Into<String>) -> Self {
+        Self { reason, message: message.into(), code: None }
+    }
+
+    /// The request is not possible. Nothing was sent.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::new(Reason::Usage, message)
+    }
+}
+
 /// The bytes are not those of a share.
 #[derive(Debug, thiserror::Error)]
 pub enum DialogueError {

@@ -114,7 +114,7 @@ impl Program {
             Ok((program, listener, _)) => Ok((program, listener)),
             Err(error) => {
                 let message = format!("the share is lost: {error}; nothing was sent");
-                Err(Refusal { reason: Reason::Line, message, code: None })
+                Err(Refusal::new(Reason::Line, message))
             }
         }
     }
@@ -308,6 +308,5 @@ impl Shared {
 }
 
 fn ended() -> Refusal {
-    let message = "the share has ended; it stops the motors that this page turned".to_owned();
-    Refusal { reason: Reason::Line, message, code: None }
+    Refusal::new(Reason::Line, "the share has ended; it stops the motors that this page turned")
 }

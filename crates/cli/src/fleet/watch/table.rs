@@ -248,7 +248,6 @@ pub struct Sum {
     latched_by: Option<String>,
     /// How long the node has been silent, in seconds.
     age: f64,
-    is_away: bool,
     /// Whether this program has seen it.
     is_seen: bool,
 }
@@ -257,26 +256,20 @@ impl Sum {
     /// A node that went away before this program came.
     fn away(node: Name, age: f64) -> Self {
         let (drives, turning, faulty, old) = (0, 0, 0, 0);
-        Sum {
-            node,
-            drives,
-            turning,
-            faulty,
-            old,
-            hottest: None,
-            latched_by: None,
-            age,
-            is_away: true,
-            is_seen: false,
-        }
+        let (hottest, latched_by, is_seen) = (None, None, false);
+        Sum { node, drives, turning, faulty, old, hottest, latched_by, age, is_seen }
     }
 
     pub fn name(&self) -> &str {
         self.node.as_str()
     }
 
+    fn is_away(&self) -> bool {
+        !self.is_seen || self.age > AWAY
+    }
+
     pub fn is_bad(&self) -> bool {
-        self.faulty > 0 || self.old > 0 || self.is_away
+        self.faulty > 0 || self.old > 0 || self.is_away()
     }
 
     pub fn text(&self, name_width: usize) -> String {
@@ -285,7 +278,7 @@ impl Sum {
             false => right("-", width),
         };
         let state = match &self.latched_by {
-            _ if self.is_away => format!("away for {:.0} s", self.age),
+            _ if self.is_away() => format!("away for {:.0} s", self.age),
             Some(by) => format!("latched by {by}"),
             None => "here".to_owned(),
         };
@@ -317,7 +310,7 @@ impl Sum {
     pub fn object(&self) -> Value {
         let count = |it: usize| self.is_seen.then_some(it);
         json!({
-            "node": self.node.as_str(), "away": self.is_away, "drives": count(self.drives),
+            "node": self.node.as_str(), "away": self.is_away(), "drives": count(self.drives),
             "turning": count(self.turning), "faulty": count(self.faulty), "old": count(self.old),
             "hottest_celsius": self.hottest, "latched_by": self.latched_by, "age_seconds": self.age,
         })
@@ -339,7 +332,6 @@ pub fn sums(nodes: &BTreeMap<Name, Node>, drives: &[Drive], now: f64) -> Vec<Sum
             hottest: rows.iter().filter_map(|row| Some(row.temperature?.0)).reduce(f64::max),
             latched_by: node.info.latched_by.clone(),
             age: now - node.at,
-            is_away: now - node.at > AWAY,
             is_seen: true,
         }
     };
@@ -386,8 +378,8 @@ pub fn summary(sums: &[Sum]) -> String {
         let names: Vec<_> = sums.iter().filter(is).map(|it| it.node.as_str()).collect();
         (!names.is_empty()).then(|| format!("{what}: {}", names.join(", ")))
     };
-    parts.extend(named("away", &|it| it.is_away));
-    parts.extend(named("latched", &|it| it.latched_by.is_some() && !it.is_away));
+    parts.extend(named("away", &|it| it.is_away()));
+    parts.extend(named("latched", &|it| it.latched_by.is_some() && !it.is_away()));
     parts.join("; ")
 }
 

@@ -14,7 +14,7 @@ use motorlink_proto::rmd::{
 use super::connection::Connection;
 use super::place::Place;
 use crate::share::dialogue::{Ended, Refusal};
-use crate::share::message::{Answer, Ask, Reason};
+use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a host into commands, and their answers into replies.
 pub(super) struct ShareBus {
@@ -108,7 +108,7 @@ impl CanLink for ShareBus {
             (Some((_, data)), Some(id)) => self.request(id, *data),
             _ => {
                 let message = format!("a share does not send the frame {:#x}", frame.id());
-                let refusal = Refusal { reason: Reason::Usage, message, code: None };
+                let refusal = Refusal::usage(message);
                 Err(self.port.not_done(0, refusal))
             }
         }
