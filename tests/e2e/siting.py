@@ -14,6 +14,7 @@ import zenoh
 
 from fleeting import Member
 from program import Running, eventually
+from sharing import Client
 from shell import free_port
 from test_json import check
 
@@ -31,6 +32,8 @@ class Site:
 
     def __init__(self, motorlink, folder):
         self.motorlink, self.folder, self.running = motorlink, folder, []
+        #: The sockets of the nodes, and the programs that turn motors of arm1.
+        self.shares, self.turning = {}, {}
         self.address = f"tls/127.0.0.1:{free_port()}"
         self.members = ["--node", "arm1", "--node", "arm2", "--operator", "alice", "--viewer", "bob"]
         self.init("plant", "--router", self.address[4:], *self.members)
@@ -68,7 +71,7 @@ class Site:
         words = ["-p", "sim:", "--at", f"unix:{path}", "--network", self.file(name)]
         running = self.start("node", *words, "--timeout", "5s")
         assert json.loads(running.line(0))["node"] == name
-        return path
+        self.shares[name] = path
 
     def end(self):
         for running in reversed(self.running):
@@ -85,6 +88,15 @@ def answers(session, key, payload=None, **options):
 
 def tokens(session, key):
     return [str(it.ok.key_expr) for it in session.liveliness().get(key, timeout=PAUSE) if it.ok]
+
+
+def hears_tokens(session, key, within):
+    """Whether a token is there, or comes."""
+    heard = threading.Event()
+    subscriber = session.liveliness().declare_subscriber(key, lambda it: heard.set(), history=True)
+    came = heard.wait(within)
+    subscriber.undeclare()
+    return came
 
 
 def hears(session, key, cause=lambda: None, within=PAUSE):
@@ -116,21 +128,30 @@ def joins(it, scope="see"):
     return bool(joined) and joined["kind"] == "joined"
 
 
-def turn(site):
-    """Motor 1 turns, by a program at the share of arm1."""
-    if site.direct.rpm() > 1400:
+def turn(site, motor=1):
+    """A motor turns, by a program of its own at the share of arm1."""
+    if site.direct.rpm(motor) > 1400:
         return
-    eventually(lambda: site.direct.status() == IDLE, "motor 1 idle", within=20)
+    rest(site, motor)
+    eventually(lambda: site.direct.status(motor) == IDLE, f"motor {motor} idle", within=20)
+    site.turning[motor] = Client(site.shares["arm1"], "turns")
     for code in (RAMP, START):
-        assert site.direct.command("st0", 1, *code)["kind"] == "answer"
-    eventually(lambda: site.direct.rpm() > 1400, "motor 1 at speed", within=20)
+        assert site.turning[motor].command("st0", motor, *code)["kind"] == "answer"
+    eventually(lambda: site.direct.rpm(motor) > 1400, f"motor {motor} at speed", within=20)
+
+
+def rest(site, motor=1):
+    """A motor stops, and no program of the share holds it."""
+    site.direct.ask("stop", motor={"line": "st0", "motor": motor})
+    if motor in site.turning:
+        site.turning.pop(motor).socket.close()
+    eventually(lambda: abs(site.direct.rpm(motor)) < 30, f"motor {motor} at rest", within=20)
 
 
 def leaves(site, it):
     """Its motor stops, and is free."""
-    site.direct.ask("stop", motor={"line": "st0", "motor": 2})
+    rest(site, 2)
     it.ask("see", {"ask": "leave", "why": "end"}, PAUSE)
-    eventually(lambda: abs(site.direct.rpm(2)) < 30, "motor 2 at rest", within=20)
 
 
 @contextlib.contextmanager

@@ -20,7 +20,8 @@ from fleeting import network
 from program import children, eventually
 from sharing import Client
 from siting import (
-    PAUSE, RAMP, ROOT, START, Site, answers, hears, joins, leaves, member, strangers, tokens, turn,
+    PAUSE, RAMP, ROOT, START, Site, answers, hears, hears_tokens, joins, leaves, member, rest, strangers,
+    tokens, turn,
 )
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,8 @@ def site(motorlink, tmp_path_factory):
     """A site that all tests use."""
     site = Site(motorlink, tmp_path_factory.mktemp("site"))
     site.route()
-    site.shares = {name: site.node(name) for name in ("arm1", "arm2")}
+    for name in ("arm1", "arm2"):
+        site.node(name)
     site.direct = Client(site.shares["arm1"], "looks")
     site.alice = network(site.file("alice"))
     site.nodes = {name: network(site.file(name)) for name in ("arm1", "arm2")}
@@ -39,6 +41,9 @@ def site(motorlink, tmp_path_factory):
 
     (site.boot,) = eventually(alive, "the node arm1")
     eventually(lambda: answers(site.alice, f"{ROOT}/arm1/st0/1/columns"), "columns")
+    # The first start of a motor takes longer than PAUSE.
+    turn(site, 2)
+    rest(site, 2)
     yield site
     for session in (site.alice, *site.nodes.values()):
         session.close()
@@ -71,12 +76,7 @@ def sees_nodes(site, session, who):
 
 
 def hears_of_nodes(site, session, who):
-    seen = threading.Event()
-    key = f"{ROOT}/*/node/alive/*"
-    subscriber = session.liveliness().declare_subscriber(key, lambda it: seen.set(), history=True)
-    came = seen.wait(PAUSE)
-    subscriber.undeclare()
-    return came
+    return hears_tokens(session, f"{ROOT}/*/node/alive/*", PAUSE)
 
 
 def hears_of_ends(site, session, who):
@@ -196,35 +196,30 @@ def says_that_arm1_ends(site, session, who):
     return hears(site.nodes["arm2"], f"{ROOT}/*/node/ended/*", lambda: session.put(ended, ""))
 
 
+def answers_falsely(site, session, asked, key, *takes):
+    """Whether alice gets the answer of somebody who takes such queries."""
+    declared = [session.declare_queryable(it, lambda query: query.reply(key, "false")) for it in takes]
+    time.sleep(0.1)
+    came = b"false" in answers(site.alice, asked)
+    for queryable in declared:
+        queryable.undeclare()
+    return came
+
+
 def answers_as_arm1(site, session, who):
     key = f"{ROOT}/arm1/node/info/false"
-    queryable = session.declare_queryable(key, lambda query: query.reply(key, "false"))
-    time.sleep(0.1)
-    came = b"false" in answers(site.alice, f"{ROOT}/*/node/info/*")
-    queryable.undeclare()
-    return came
+    return answers_falsely(site, session, f"{ROOT}/*/node/info/*", key, key)
 
 
 def answers_about_a_drive_as_arm1(site, session, who):
     key = f"{ROOT}/arm1/false/1/identity"
-    queryable = session.declare_queryable(key, lambda query: query.reply(key, "false"))
-    time.sleep(0.1)
-    came = b"false" in answers(site.alice, f"{ROOT}/*/*/*/identity")
-    queryable.undeclare()
-    return came
+    return answers_falsely(site, session, f"{ROOT}/*/*/*/identity", key, key)
 
 
 def answers_others_queries_as_arm1(site, session, who):
     """It may answer in its own name, and answers in that of arm1."""
-    key = f"{ROOT}/{who}/node/info/false"
-    false = f"{ROOT}/arm1/node/info/false"
-    queryable = session.declare_queryable(f"{ROOT}/*/node/info/*", lambda it: it.reply(false, "false"))
-    own = session.declare_queryable(key, lambda it: it.reply(false, "false"))
-    time.sleep(0.1)
-    came = b"false" in answers(site.alice, f"{ROOT}/*/node/info/*")
-    own.undeclare()
-    queryable.undeclare()
-    return came
+    all_infos, false = f"{ROOT}/*/node/info/*", f"{ROOT}/arm1/node/info/false"
+    return answers_falsely(site, session, all_infos, false, all_infos, f"{ROOT}/{who}/node/info/false")
 
 
 def is_alive_as_arm1(site, session, who):
@@ -251,11 +246,7 @@ def sees_programs(site, session, who):
     token = site.alice.liveliness().declare_token(here)
     time.sleep(0.1)
     found = tokens(session, f"{ROOT}/arm1/node/here/*/*/*") + tokens(session, f"{ROOT}/**")
-    heard = threading.Event()
-    key = f"{ROOT}/arm1/node/here/*/*/*"
-    subscriber = session.liveliness().declare_subscriber(key, lambda it: heard.set(), history=True)
-    came = heard.wait(0.3) or here in found
-    subscriber.undeclare()
+    came = hears_tokens(session, f"{ROOT}/arm1/node/here/*/*/*", 0.3) or here in found
     token.undeclare()
     return came
 
@@ -368,6 +359,7 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
 
 
 def test_a_program_has_the_name_of_its_certificate(site, run):
+    rest(site)
     run(*st(site, "alice", "ramp", "500", "1s")).ended(0)
     arm1 = site.running[1]
     arm1.until(lambda: any('"alice (motorlink' in line for line in arm1.out), "the name alice")
@@ -481,6 +473,7 @@ time.sleep(600)
 
 
 def test_the_router_tells_a_node_at_once_that_a_program_was_killed(site):
+    rest(site)
     words = [sys.executable, "-c", TURNS, site.file("alice"), Path(__file__).parent]
     with children() as start:
         process = start(words, "turning")
