@@ -919,7 +919,11 @@ motor?: MotorName | null, } | { "ask": "take",
 /**
  * The motor.
  */
-motor: MotorName, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates" } | { "ask": "ports" } | { "ask": "scan", 
+motor: MotorName, } | { "ask": "latch" } | { "ask": "release" } | { "ask": "rates", 
+/**
+ * The line; all lines, without it.
+ */
+line?: string | null, } | { "ask": "ports" } | { "ask": "scan", 
 /**
  * The port, as `open` takes it.
  */
@@ -1023,7 +1027,7 @@ bytes: Array<number>, } | { "to": "confirm" } | { "to": "stop",
  */
 motors: Array<StoppedMotor>, } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
 /**
- * Those of all signals that are read.
+ * Those of the signals that are read.
  */
 rates: Array<SignalRate>, } | { "to": "ports", 
 /**

@@ -37,7 +37,7 @@ impl Lines {
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
             | Ask::Confirm { .. }
-            | Ask::Rates
+            | Ask::Rates { .. }
             | Ask::Ports
             | Ask::Frames { .. }
             | Ask::Leave { .. } => Kind::Reads,

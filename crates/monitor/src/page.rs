@@ -181,7 +181,7 @@ impl Page {
             | Ask::Signals { .. }
             | Ask::Subscribe { .. }
             | Ask::Unsubscribe { .. }
-            | Ask::Rates
+            | Ask::Rates { .. }
             | Ask::Ports
             | Ask::Frames { .. } => {}
             Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),

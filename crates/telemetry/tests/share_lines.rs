@@ -69,7 +69,7 @@ fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
         (reason, why.as_str()),
         (Reason::Usage, "no line `st1`; the lines are st0, rmd0, rmd1")
     );
-    assert!(matches!(other.ask(Ask::Rates), Ok(Answer::Rates { .. })));
+    assert!(matches!(other.ask(Ask::Rates { line: None }), Ok(Answer::Rates { .. })));
     // Programs may still mean the earlier line: its name is not used again.
     assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st2");
 }
@@ -96,7 +96,7 @@ fn requests_that_wait_when_a_line_is_closed_get_an_end() {
     let waiting: Vec<u32> =
         (0..100).map(|_| program.send(command("rmd0", 1, &[0x9c, 0, 0, 0, 0, 0, 0, 0]))).collect();
     let closing = program.send(close("rmd0"));
-    let rates = program.send(Ask::Rates);
+    let rates = program.send(Ask::Rates { line: None });
     for id in waiting {
         // It was carried out, or it says that the line has gone.
         let _ = program.end_of(id);

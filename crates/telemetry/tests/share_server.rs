@@ -252,9 +252,17 @@ fn samples_come_with_their_columns_while_another_program_commands() {
         is_st |= last("SPEED_MEAS").is_some_and(|rpm| rpm > 1000.0);
         is_rmd |= last("speed_dps").is_some_and(|dps| dps > 300.0);
     }
-    let Ok(Answer::Rates { rates }) = viewer.ask(Ask::Rates) else { panic!() };
+    let Ok(Answer::Rates { rates }) = viewer.ask(Ask::Rates { line: None }) else { panic!() };
     assert_eq!(rates.len(), 3);
     assert!(rates.iter().all(|rate| rate.asked == 0.01), "{rates:?}");
+    let of_st: Vec<_> = rates.into_iter().filter(|rate| rate.signal.line == "st0").collect();
+    let mut of_line = |line: &str| viewer.ask(Ask::Rates { line: Some(line.to_owned()) });
+    let Ok(Answer::Rates { rates }) = of_line("st0") else { panic!() };
+    assert_eq!(
+        rates.iter().map(|rate| &rate.signal).collect::<Vec<_>>(),
+        of_st.iter().map(|rate| &rate.signal).collect::<Vec<_>>()
+    );
+    assert_eq!(of_line("st7").unwrap_err().0, Reason::Usage);
 }
 
 /// The next rows of a subscription with rows, with their group.
@@ -672,7 +680,7 @@ fn a_stop_is_read_however_many_requests_are_under_way() {
     program.answer(stop);
     let ended: Vec<Reason> = program.others.iter().filter_map(refused).collect();
     assert!(ended.len() > 300 && ended.iter().all(|why| *why == Reason::Busy), "{ended:?}");
-    assert_eq!(program.ask(Ask::Rates).unwrap_err().0, Reason::Busy);
+    assert_eq!(program.ask(Ask::Rates { line: None }).unwrap_err().0, Reason::Busy);
     program.ask(Ask::Latch).unwrap();
 }
 

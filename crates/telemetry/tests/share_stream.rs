@@ -34,11 +34,15 @@ fn follow(share: &Share, line: &str) -> Result<Stream, String> {
 }
 
 fn follow_at(path: &Path, line: &str) -> Result<Stream, String> {
+    Stream::open(target(path, line), now)
+}
+
+fn target(path: &Path, line: &str) -> Followed {
     let wanted = |names: &[&str], period| Wanted {
         signals: names.iter().map(|name| Signal::named(motor(), name).unwrap()).collect(),
         period,
     };
-    let followed = Followed {
+    Followed {
         share: Arc::new(Local(path.to_owned())),
         line: line.to_owned(),
         speaks: Speaks::Rmd,
@@ -47,8 +51,7 @@ fn follow_at(path: &Path, line: &str) -> Result<Stream, String> {
             wanted(&["speed_dps", "multi_turn_angle_degrees"], 0.01),
             wanted(&["temperature_celsius", "voltage_volts"], 0.1),
         ],
-    };
-    Stream::open(followed, now)
+    }
 }
 
 /// Takes items until one is wanted, and gives all of them.
@@ -221,4 +224,19 @@ fn a_share_that_is_stopped_is_noticed_and_followed_again() {
     drop(frozen);
     until(&mut stream, |item| *item == Item::Up);
     until(&mut stream, is_row);
+}
+
+#[test]
+fn of_streams_that_are_opened_together_the_one_that_fails_is_told() {
+    let share = Share::new("follow-many");
+    let open = |lines: &[&str]| {
+        let targets = lines.iter().map(|line| target(&share.path, line));
+        Stream::open_all(targets.collect(), now)
+    };
+    for mut stream in open(&["rmd0"; 20]).unwrap() {
+        until(&mut stream, is_row);
+    }
+    let (number, why) = open(&["rmd0", "rmd0", "rmd7"]).unwrap_err();
+    assert_eq!(number, 2);
+    assert!(why.contains("rmd7"), "{why}");
 }

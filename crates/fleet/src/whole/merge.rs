@@ -240,7 +240,7 @@ impl Merge {
                 self.tell_away();
             }
             Ask::Lines => self.all(id, Kind::Lines),
-            Ask::Rates => self.all(id, Kind::Rates),
+            Ask::Rates { line: None } => self.all(id, Kind::Rates),
             Ask::Stop { motor: None } => {
                 self.stops_until = self.now + PENDING;
                 self.all(id, Kind::Stop);
@@ -449,7 +449,7 @@ impl Merge {
     fn ask_of(&self, kind: Kind, node: &Name) -> Option<Ask> {
         Some(match kind {
             Kind::Lines => Ask::Lines,
-            Kind::Rates => Ask::Rates,
+            Kind::Rates => Ask::Rates { line: None },
             Kind::Stop => Ask::Stop { motor: None },
             Kind::Latch => Ask::Latch,
             Kind::Release => Ask::Release,

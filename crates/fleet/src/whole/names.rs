@@ -23,7 +23,8 @@ pub(super) fn line_of(ask: &mut Ask) -> Option<&mut String> {
         | Ask::Command { line, .. }
         | Ask::Confirm { line, .. }
         | Ask::Close { line }
-        | Ask::Frames { line, .. } => Some(line),
+        | Ask::Frames { line, .. }
+        | Ask::Rates { line: Some(line) } => Some(line),
         Ask::Stop { motor: Some(motor) } | Ask::Take { motor } => Some(&mut motor.line),
         _ => None,
     }

@@ -29,21 +29,21 @@ pub(super) struct Followed {
     has_events_of_share: bool,
 }
 
-/// Asks a share to read these signals of a line. It has its own name for the line.
-pub(super) fn stream(
-    (share, name): Place,
-    line: &Line,
-    groups: &[Group],
-    by: &str,
-) -> Result<Stream, RecordError> {
+/// These signals of a line of a share, which has its own name for the line.
+pub(super) fn target((share, name): Place, line: &Line, groups: &[Group], by: &str) -> Target {
     let wanted = groups.iter().map(|group| Wanted {
         signals: group.motors.iter().flat_map(|(_, signals)| signals).copied().collect(),
         period: group.period.0 as f64 / 1e6,
     });
     let wanted = wanted.filter(|wanted| !wanted.signals.is_empty()).collect();
-    let target = Target { share, line: name, speaks: line.speaks, name: by.to_owned(), wanted };
-    let failed = |why| RecordError::Share { port: line.port.clone(), why };
-    Stream::open(target, || wall_now().0).map_err(failed)
+    Target { share, line: name, speaks: line.speaks, name: by.to_owned(), wanted }
+}
+
+/// Asks shares to read signals from now on. Each target has the name of its port.
+pub(super) fn streams(targets: Vec<(String, Target)>) -> Result<Vec<Stream>, RecordError> {
+    let (ports, targets): (Vec<_>, Vec<_>) = targets.into_iter().unzip();
+    let opened = Stream::open_all(targets, || wall_now().0);
+    opened.map_err(|(number, why)| RecordError::Share { port: ports[number].clone(), why })
 }
 
 impl Followed {
@@ -114,8 +114,7 @@ impl Followed {
             let motor = line.speaks.motor(rate.signal.motor)?;
             Some((Signal::named(motor, &rate.signal.name).ok()?, rate.achieved))
         };
-        let is_of_line = |rate: &&SignalRate| rate.signal.line == self.stream.line();
-        let rates: Vec<_> = rates.iter().filter(is_of_line).filter_map(signal).collect();
+        let rates: Vec<_> = rates.iter().filter_map(signal).collect();
         self.content.take_rates(&rates);
     }
 

@@ -21,6 +21,7 @@ use super::open::{Port, unsearched};
 use super::recorder::{RATES, TURN};
 use super::topics::Topics;
 use super::wall::{DayInUse, wall_now};
+use crate::error::RecordError;
 use crate::schema::name;
 use crate::write::Entry;
 
@@ -157,8 +158,10 @@ impl Seeker {
         runner.end();
         let groups = choice::choose(&line.motors, &[], self.config.period);
         let share = opened.share.ok_or("this is no line of a share")?;
-        let stream = followed::stream(share, &line, &groups, &self.config.by);
-        Ok(Found { stream: stream.map_err(|error| error.to_string())?, line, groups })
+        let target = followed::target(share, &line, &groups, &self.config.by);
+        let stream = Stream::open(target, || wall_now().0);
+        let failed = |why| RecordError::Share { port: line.port.clone(), why }.to_string();
+        Ok(Found { stream: stream.map_err(failed)?, line, groups })
     }
 }
 

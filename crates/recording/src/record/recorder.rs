@@ -15,7 +15,7 @@ use super::abort::Abort;
 use super::choice::{self, Group};
 use super::client::{Client, Lent};
 use super::content::{Content, Counts, Line};
-use super::followed::{self, Followed, Place};
+use super::followed::{self, Followed};
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
@@ -140,15 +140,27 @@ impl Recorder {
                 abort.check()?;
             }
         }
+        let choose = |it: &Opened| choice::choose(&it.line.motors, &config.signals, config.period);
+        let groups: Vec<_> = opened.iter().map(choose).collect();
+        let mut targets = Vec::new();
+        for (Opened { runner, line, share, .. }, groups) in opened.iter().zip(&groups) {
+            let Some(place) = share.clone() else { continue };
+            // The share reads the signals from now on.
+            runner.remote().end();
+            let target = followed::target(place, line, groups, &config.by);
+            targets.push((line.port.clone(), target));
+        }
+        let mut streams = followed::streams(targets)?.into_iter();
         let (mut topics, mut recorded) = (Topics::default(), Vec::new());
         let mut shares = BTreeSet::new();
-        for it in opened {
-            let groups = choice::choose(&it.line.motors, &config.signals, config.period);
-            recorded.push(match it.share.clone() {
-                Some((share, name)) => {
-                    // Shares differ in the names of their ports.
+        for (it, groups) in opened.into_iter().zip(groups) {
+            let followed = it.share.as_ref().and_then(|(share, _)| Some((share, streams.next()?)));
+            recorded.push(match followed {
+                Some((share, stream)) => {
+                    // Shares differ in the names of their ports. The first line of each has its events.
                     let is_first = shares.insert(share.port(""));
-                    Recorded::follow(it, (share, name), groups, &config.by, is_first, &mut topics)?
+                    let content = Content::new(it.line, groups, &mut topics);
+                    Recorded::Share(Followed::new(content, stream, is_first))
                 }
                 None => Recorded::read(it, groups, &mut topics)?,
             });
@@ -329,22 +341,6 @@ impl Recorded {
             runner.remote().with(|engine| engine.subscribe(theirs, wants))?;
         }
         Ok(Recorded::Engine { track, runner, lent, rates: Arc::default() })
-    }
-
-    /// Follows a line of a share. Its first line has the events of the share itself.
-    fn follow(
-        Opened { runner, line, .. }: Opened,
-        share: Place,
-        groups: Vec<Group>,
-        by: &str,
-        is_first: bool,
-        topics: &mut Topics,
-    ) -> Result<Self, RecordError> {
-        // The share reads the signals from now on.
-        runner.end();
-        let stream = followed::stream(share, &line, &groups, by)?;
-        let content = Content::new(line, groups, topics);
-        Ok(Recorded::Share(Followed::new(content, stream, is_first)))
     }
 
     fn content(&self) -> &Content {

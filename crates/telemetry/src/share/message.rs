@@ -126,8 +126,12 @@ pub enum Ask {
     Latch,
     /// Allows motion again.
     Release,
-    /// The rates of all signals that are read.
-    Rates,
+    /// The rates of the signals that are read.
+    Rates {
+        /// The line; all lines, without it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        line: Option<String>,
+    },
     /// The ports that the computer of the share has.
     Ports,
     /// Opens a port that no line has, asks what answers there at one rate, and closes it.
@@ -296,7 +300,7 @@ pub enum Answer {
     Release,
     /// To rates.
     Rates {
-        /// Those of all signals that are read.
+        /// Those of the signals that are read.
         rates: Vec<SignalRate>,
     },
     /// To ports.

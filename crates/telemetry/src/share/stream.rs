@@ -10,12 +10,17 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
 use super::address::Unreachable;
 use connection::Connection;
 pub use target::{Followed, Item, Wanted};
 
 /// Time between two attempts to reach a share, in ns.
 const AGAIN: u64 = 500_000_000;
+
+/// Streams that are opened at a time: each makes work for its share.
+const TOGETHER: usize = 8;
 
 /// A line of a share.
 #[derive(Debug)]
@@ -36,31 +41,49 @@ impl Stream {
     /// # Errors
     /// No share is there, or it refuses. The text says why.
     pub fn open(followed: Followed, now: impl Fn() -> u64) -> Result<Self, String> {
-        let mut stream = Stream {
+        let mut streams = Self::open_all(vec![followed], now).map_err(|(_, why)| why)?;
+        Ok(streams.remove(0))
+    }
+
+    /// Connects to many shares, some at a time, and waits for the answers of all.
+    ///
+    /// # Errors
+    /// The first that is not there or refuses: its number, and why.
+    pub fn open_all(
+        followed: Vec<Followed>,
+        now: impl Fn() -> u64,
+    ) -> Result<Vec<Self>, (usize, String)> {
+        let mut streams: Vec<_> = followed.into_iter().map(Self::new).collect();
+        loop {
+            let mut places = TOGETHER;
+            for (number, stream) in streams.iter_mut().enumerate() {
+                if !stream.is_ready() {
+                    let Some(left) = places.checked_sub(1) else { break };
+                    places = left;
+                }
+                stream.advance(now());
+                for item in &stream.items {
+                    if let Item::Down(why) = item {
+                        return Err((number, why.clone()));
+                    }
+                }
+            }
+            if streams.iter().all(Self::is_ready) {
+                return Ok(streams);
+            }
+            wait(&streams);
+        }
+    }
+
+    fn new(followed: Followed) -> Self {
+        Stream {
             followed,
             connecting: None,
             connection: None,
             next: 0,
             is_down: false,
             items: VecDeque::new(),
-        };
-        loop {
-            stream.advance(now());
-            if stream.is_ready() {
-                return Ok(stream);
-            }
-            for item in &stream.items {
-                if let Item::Down(why) = item {
-                    return Err(why.clone());
-                }
-            }
-            stream.wait();
         }
-    }
-
-    /// The name of the line.
-    pub fn line(&self) -> &str {
-        &self.followed.line
     }
 
     /// Whether it follows the signals now.
@@ -73,10 +96,10 @@ impl Stream {
         self.connection.as_ref().is_some_and(has_all)
     }
 
-    /// Asks for the rates of the share. It is not asked again before it has answered.
+    /// Asks for the rates of the line. It is not asked again before it has answered.
     pub fn ask_rates(&mut self, now: u64) {
         if let Some(connection) = &mut self.connection {
-            connection.ask_rates(now);
+            connection.ask_rates(&self.followed, now);
         }
     }
 
@@ -84,16 +107,6 @@ impl Stream {
     pub fn take(&mut self, now: u64) -> VecDeque<Item> {
         self.advance(now);
         std::mem::take(&mut self.items)
-    }
-
-    /// Waits for a moment until there is something to read.
-    fn wait(&self) {
-        use rustix::event::{PollFd, PollFlags, Timespec, poll};
-        let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
-        let mut fds = Vec::new();
-        fds.extend(self.connection.iter().map(|it| PollFd::new(it.socket(), PollFlags::IN)));
-        // A signal ends the wait early, which does no harm.
-        let _ = poll(&mut fds, Some(&wait));
     }
 
     fn advance(&mut self, now: u64) {
@@ -148,4 +161,13 @@ impl Stream {
             self.items.push_back(Item::Down(why));
         }
     }
+}
+
+/// Waits for a moment until there is something to read.
+fn wait(streams: &[Stream]) {
+    let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
+    let connections = streams.iter().filter_map(|stream| stream.connection.as_ref());
+    let mut fds: Vec<_> = connections.map(|it| PollFd::new(it.socket(), PollFlags::IN)).collect();
+    // A signal ends the wait early, which does no harm.
+    let _ = poll(&mut fds, Some(&wait));
 }

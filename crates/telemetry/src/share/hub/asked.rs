@@ -188,7 +188,7 @@ impl Hub {
                 }
                 Ok(Some(Answer::Release))
             }
-            Ask::Rates => self.rates(session, id),
+            Ask::Rates { line } => self.rates(session, id, line.as_deref()),
             Ask::Ports => self.list_ports(session, name, id),
             Ask::Scan { port, protocol, rate, timeout } => {
                 if timeout.is_some_and(|timeout| timeout > LONGEST_SCAN) {
@@ -414,14 +414,24 @@ impl Hub {
         Ok(())
     }
 
-    fn rates(&mut self, session: SessionId, id: u32) -> Result<Option<Answer>, Refused> {
+    fn rates(
+        &mut self,
+        session: SessionId,
+        id: u32,
+        line: Option<&str>,
+    ) -> Result<Option<Answer>, Refused> {
+        let lines = match line {
+            Some(line) => vec![self.line(line)?],
+            None => self.lines.keys().copied().collect(),
+        };
         let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
-        if self.lines.is_empty() {
+        if lines.is_empty() {
             return Ok(Some(Answer::Rates { rates: Vec::new() }));
         }
-        let part = asker.gather(id, self.lines.len(), Vec::new());
-        for (line, held) in &self.lines {
-            let tell = self.teller(session, None, *line);
+        let part = asker.gather(id, lines.len(), Vec::new());
+        for line in lines {
+            let held = &self.lines[&line];
+            let tell = self.teller(session, None, line);
             let task = move |engine: &mut Acquisition| {
                 tell(Work::Rates(part, engine.rates().collect()));
             };

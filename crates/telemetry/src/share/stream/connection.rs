@@ -16,7 +16,7 @@ use crate::signal::{Motor, Signal};
 
 /// A share that is silent for this time after a question is stopped, in ns.
 const SILENCE: u64 = 2_000_000_000;
-/// The same before it has answered at all: it may have many programs at this moment.
+/// The same before it has answered the first questions: many programs may come at this moment.
 const OPENING: u64 = 10_000_000_000;
 /// The most bytes that are taken at once. A share that sends more is read on at the next call.
 const AT_ONCE: usize = 4 << 20;
@@ -34,7 +34,7 @@ pub(super) struct Connection {
     clock: Option<Clock>,
     /// How far the clock of the share was ahead when that was told last, in seconds.
     told: Option<f64>,
-    /// Whether it has answered a question.
+    /// Whether it has answered the first questions.
     has_begun: bool,
     /// When it fell silent, until what waited has come.
     silent: Option<u64>,
@@ -104,10 +104,11 @@ impl Connection {
     }
 
     /// Asks for the rates and the clocks, unless it has not answered the last question.
-    pub(super) fn ask_rates(&mut self, now: u64) {
+    pub(super) fn ask_rates(&mut self, followed: &Followed, now: u64) {
         if self.pending.is_empty() {
             // A connection that is lost is noticed when it is read.
-            let _ = self.ask(Asked::Rates, Ask::Rates, now);
+            let rates = Ask::Rates { line: Some(followed.line.clone()) };
+            let _ = self.ask(Asked::Rates, rates, now);
             let _ = self.ask(Asked::Lines, Ask::Lines, now);
         }
     }
@@ -205,7 +206,7 @@ impl Connection {
     ) -> Result<(), String> {
         let Some((asked, sent)) = self.pending.remove(&id) else { return Ok(()) };
         let is_again = self.is_again(asked);
-        self.has_begun = true;
+        self.has_begun |= self.pending.is_empty();
         let answer = match result {
             Ok(answer) => answer,
             // The question was too old. The next one is not.
