@@ -1,6 +1,6 @@
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::message::{
-    ANY_MOTOR, Column, DropRule, Group, MotorName, Protocol, StoppedMotor,
+    ANY_MOTOR, Column, DropRule, Group, MotorName, Protocol, SignalRate, StoppedMotor,
 };
 
 use super::*;
@@ -199,6 +199,22 @@ fn a_command_goes_to_its_node_only() {
     fleet.refuses("arm2", request.id, Reason::Held, "rmd0, motor 1: bob has it");
     let (reason, message) = refused(&fleet.texts(), 3_000_000_000);
     assert_eq!((reason, message.as_str()), (Reason::Held, "arm2/rmd0, motor 1: bob has it"));
+}
+
+#[test]
+fn rates_of_a_line_are_those_of_its_node() {
+    let mut fleet = Fleet::of(&["arm1", "arm2"]);
+    fleet.asked(7, Ask::Rates { line: Some("arm2/rmd0".to_owned()) });
+    assert_eq!(fleet.requests("arm1"), []);
+    let request = fleet.one("arm2");
+    assert_eq!(request.ask, Ask::Rates { line: Some("rmd0".to_owned()) });
+    let rate = |line: &str| {
+        let signal = SignalName { line: line.to_owned(), motor: 1, name: "speed_dps".to_owned() };
+        SignalRate { signal, asked: 0.1, predicted: 0.1, achieved: 10.0 }
+    };
+    fleet.answers("arm2", request.id, Answer::Rates { rates: vec![rate("rmd0")] });
+    let rates = vec![rate("arm2/rmd0")];
+    assert_eq!(fleet.texts(), [Text::Answer { id: 7, answer: Answer::Rates { rates } }]);
 }
 
 #[test]
