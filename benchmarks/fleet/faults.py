@@ -224,8 +224,7 @@ def flood(is_silent):
         site = SecureSite(MOTORLINK, bench.folder)
         bench.callback(site.end)
         site.route()
-        site.node("arm1")
-        site.direct = Client(site.shares["arm1"], "looks")
+        site.direct = Client(site.node("arm1"), "looks")
         with network(site.file("alice")) as session:
             (site.boot,) = runs(session, "arm1")
             alice = member(site, session, "alice")

@@ -27,8 +27,8 @@ PORT = 20
 #: One of so many drives turns.
 TURNS = 10
 SPEED = struct.pack("<i", 9000)
-HEADS = ["drives", "nodes", "turning", "values/s", "lost", "without values, s", "recorder, % of a core", "a node, mean", "viewer",
-         "sample, ms, median", "99 %", "command, ms, median", "99 %", "most"]
+HEADS = ["drives", "nodes", "turning", "values/s", "lost", "without values, s", "recorder, % of a core",
+         "a node, mean", "viewer", "sample, ms, median", "99 %", "command, ms, median", "99 %", "most"]
 
 
 def configure(folder, drives):

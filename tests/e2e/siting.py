@@ -72,6 +72,7 @@ class Site:
         running = self.start("node", *words, "--timeout", "5s")
         assert json.loads(running.line(0))["node"] == name
         self.shares[name] = path
+        return path
 
     def end(self):
         for running in reversed(self.running):

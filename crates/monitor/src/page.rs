@@ -199,8 +199,7 @@ impl Page {
             | Ask::Confirm { .. }
             | Ask::Take { .. }
             | Ask::Leave { .. } => {
-                let message = "a page may not send this request".to_owned();
-                return Err(Refusal::new(Reason::Forbidden, message));
+                return Err(Refusal::new(Reason::Forbidden, "a page may not send this request"));
             }
         }
         self.view()?.pass(&request).await.map_err(|error| lost(&error.to_string()))

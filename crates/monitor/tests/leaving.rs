@@ -42,7 +42,7 @@ async fn event(watcher: &mut Listener, wanted: Happening) -> Event {
 }
 
 fn lapsed(message: &str) -> Refusal {
-    Refusal { reason: Reason::Lapsed, message: message.to_owned(), code: None }
+    Refusal::new(Reason::Lapsed, message)
 }
 
 #[tokio::test]

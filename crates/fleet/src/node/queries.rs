@@ -62,10 +62,8 @@ impl Queries {
     fn take(self: &Arc<Self>, about: About, query: Query, handle: &Handle) {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             let message = format!("{MOST} such queries are carried out already; ask again");
-            return refuse(
-                &query,
-                &no_answer(query.key_expr(), Refusal::new(Reason::Busy, message)),
-            );
+            let busy = Refusal::new(Reason::Busy, message);
+            return refuse(&query, &no_answer(query.key_expr(), busy));
         };
         let queries = Arc::clone(self);
         handle.spawn(async move {

@@ -110,8 +110,7 @@ impl Asking {
     }
 
     fn unfit(&self) -> Refusal {
-        let message = "the reply does not fit the request".to_owned();
-        Refusal::new(Reason::Line, message)
+        Refusal::new(Reason::Line, "the reply does not fit the request")
     }
 }
 

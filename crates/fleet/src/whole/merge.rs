@@ -266,7 +266,7 @@ impl Merge {
             Ask::Leave { .. } => return false,
             Ask::Ports | Ask::Scan { .. } | Ask::Open { .. } => {
                 let why = "ports of a node are opened at the node: `motorlink node -p PORT`";
-                self.refuse(id, Refusal::usage(why.to_owned()));
+                self.refuse(id, Refusal::usage(why));
             }
             _ => match names::line_of(&mut ask).map(std::mem::take) {
                 Some(line) => self.one(id, ask, &line),

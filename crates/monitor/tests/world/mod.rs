@@ -310,8 +310,7 @@ impl Drive {
 impl Motion for Drive {
     async fn program(&self, _: bool) -> Result<Program, Refusal> {
         if self.lapsed.load(Ordering::SeqCst) {
-            let message = "the page gives no sign of life".to_owned();
-            return Err(Refusal { reason: Reason::Lapsed, message, code: None });
+            return Err(Refusal::new(Reason::Lapsed, "the page gives no sign of life"));
         }
         let mut session = self.session.lock().await;
         if session.is_none() {

@@ -55,11 +55,11 @@ impl Stream {
     ) -> Result<Vec<Self>, (usize, String)> {
         let mut streams: Vec<_> = followed.into_iter().map(Self::new).collect();
         loop {
-            let mut places = TOGETHER;
+            let mut opening = 0;
             for (number, stream) in streams.iter_mut().enumerate() {
-                if !stream.is_ready() {
-                    let Some(left) = places.checked_sub(1) else { break };
-                    places = left;
+                opening += usize::from(!stream.is_ready());
+                if opening > TOGETHER {
+                    break;
                 }
                 stream.advance(now());
                 for item in &stream.items {
