@@ -18,11 +18,11 @@ PYTHON_VENV := $(CURDIR)/.venv-python
 BENCH_VENV := $(CURDIR)/.venv-bench
 PAGES_VENV := $(CURDIR)/.venv-pages
 
-# Which tests of a part to run: arguments of cargo test for unit, fuzz-replay and miri; of pytest, in
+# Which tests of a part to run: arguments of cargo test for unit and miri; of pytest, in
 # the folder of the tests, for e2e, python, pages and firmware-test.
 T =
 # Tests in Rust that take seconds. `make check` leaves them out, `make test` runs them.
-QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header)
+QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header every_target_stands)
 # AGAIN=1: the tests of pytest and Playwright that failed in the last run, or all if that did not come so far.
 FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
@@ -35,7 +35,7 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
-ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test fuzz-replay probe determinism test-socketcan deny
+ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test probe determinism test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python browser pages firmware-test ffi-test test-socketcan
@@ -119,12 +119,10 @@ firmware-test: $(VENV)/ready ## 6 min: boards in QEMU against the conformance ki
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
-# The fuzz targets are a workspace of their own with the same dependencies.
-FUZZ_TARGET := --target-dir $(DEBUG)/..
 lint: ## 6 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
-	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
+	cd fuzz/fuzzers && $(CARGO) fmt --check
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
 pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
@@ -136,11 +134,9 @@ ffi-test: ## 2 min: the C face: sanitizers, valgrind, C against the program
 	$(PROGRAM)
 	CARGO="$(CARGO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
 
-fuzz-replay: ## 1 min: fuzz targets with their seeds and old findings
-	cd fuzz && $(CARGO) test --locked $(FUZZ_TARGET) $(T)
-
 test-socketcan: ## 2 min: the port socketcan: in a CAN kernel in QEMU
-	CARGO="$(CARGO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
+	$(PROGRAM)
+	CARGO="$(CARGO)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/socketcan/run.sh || [ $$? -eq 77 ]
 
 SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(BOARD)/release $(DEBUG)/../bare-metal/prefix
 C_FOR_BOARDS := gcc-arm-none-eabi libnewlib-arm-none-eabi
@@ -173,7 +169,7 @@ deny: ## 4 min: licences, known holes; 0 if nothing changed; FORCE=1
 
 fuzz: nightly ## every fuzz target for SECONDS=60 each
 	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz
-	NIGHTLY=$(NIGHTLY) fuzz/run $(SECONDS)
+	NIGHTLY=$(NIGHTLY) fuzz/fuzzers/run $(SECONDS)
 
 # Checks that memory and descriptors do not grow.
 soak: ## a million exchanges with a thousand reconnects
@@ -280,11 +276,11 @@ semver: ## the public interface against the last release
 		-p motorlink-proto -p motorlink-sim -p motorlink --all-features
 
 fmt: ## formats the Rust code
-	for workspace in . fuzz probe firmware crates/ffi/bare-metal; do (cd $$workspace && $(CARGO) fmt --all) || exit; done
+	for workspace in . fuzz/fuzzers probe firmware crates/ffi/bare-metal; do (cd $$workspace && $(CARGO) fmt --all) || exit; done
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
-	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) web/node_modules web/dist probe/target fuzz/target firmware/target
+	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) web/node_modules web/dist probe/target fuzz/fuzzers/target firmware/target
 
 # ---- What they need ----
 NPM_FLAGS := --no-audit --no-fund --loglevel=error

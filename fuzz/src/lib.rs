@@ -1,5 +1,5 @@
 //! Functions that test every parser and state machine of Motorlink with any bytes. They panic on a
-//! failure. The fuzzers in `fuzz_targets` run them for hours (`make fuzz`); `tests/replay.rs` runs
+//! failure. The programs in `fuzzers` run them for hours (`make fuzz`); `tests/replay.rs` runs
 //! them with seeds and earlier findings in `make test`.
 #![deny(unsafe_code)]
 

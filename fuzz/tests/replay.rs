@@ -8,7 +8,7 @@ use motorlink_fuzz::{TARGETS, run, seeds};
 /// Each target needs its program and its line in Cargo.toml to be fuzzed.
 #[test]
 fn every_target_has_a_fuzzer() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzzers");
     let manifest = fs::read_to_string(root.join("Cargo.toml")).expect("it can be read");
     let programs = fs::read_dir(root.join("fuzz_targets")).expect("it can be listed");
     for (target, _) in TARGETS {
