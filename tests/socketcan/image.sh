@@ -2,7 +2,8 @@
 # Makes the folder $1 with what the virtual machine boots: `vmlinuz`, Debian's kernel, and
 # `initrd.gz`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our
 # programs and the checks. Debian's kernel and busybox are unpacked there, never installed.
-# Ends with 77 where the packages cannot be had. SUDO is what makes a command root's.
+# Ends with 77 where the packages cannot be had. MOTORLINK_BIN
+# is the built program, SUDO is what makes a command root's.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$1"
@@ -38,14 +39,9 @@ exec 9>"${TMPDIR:-/tmp}/motorlink-apt-$(id -u).lock"
 flock 9
 unpack_debian >&2 || unavailable "Debian's kernel cannot be downloaded"
 exec 9>&-
-# The program and the tests of the port as the other parts of `make test` build them.
-build() {
-    ${CARGO:-cargo} "$@" --workspace --all-features --locked --message-format=json-render-diagnostics |
-        sed -n 's/.*"executable":"\([^"]*\)".*/\1/p'
-}
-program=$(build build --bin motorlink)
-[ -x "$program" ]
-port=$(build test --test socketcan --no-run)
+# The tests of the port as the other parts of `make test` build them.
+port=$(${CARGO:-cargo} test --workspace --all-features --test socketcan --no-run --locked \
+    --message-format=json-render-diagnostics | sed -n 's/.*"executable":"\([^"]*\)".*/\1/p')
 [ -x "$port" ]
 
 root=$made/root
@@ -59,7 +55,7 @@ cp -r "$unpacked/$modules/kernel/net/can" "$root/$modules/kernel/net"
 cp -r "$unpacked/$modules/kernel/drivers/net/can" "$root/$modules/kernel/drivers/net"
 depmod -b "$root" "$version"
 cp "$unpacked/bin/busybox" "$root/bin"
-strip -o "$root/bin/motorlink" "$program"
+strip -o "$root/bin/motorlink" "$MOTORLINK_BIN"
 strip -o "$root/tests/port" "$port"
 cp "$tests/checks.sh" "$root/tests"
 cp "$tests/init" "$root"
@@ -68,7 +64,7 @@ cp "$(command -v ip)" "$root/sbin"
 for tool in candump cansend slcan_attach; do
     cp "$(command -v $tool)" "$root/bin"
 done
-ldd "$program" "$port" "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
+ldd "$MOTORLINK_BIN" "$port" "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
     grep -o '/[^ ]*\.so[^ ]*' | sort -u | xargs -I {} cp -L --parents {} "$root"
 (cd "$root" && find . | cpio -o -H newc -R 0:0 --quiet | gzip -1) >"$made/initrd.gz"
 cp "$unpacked/boot/vmlinuz-$version" "$made/vmlinuz"

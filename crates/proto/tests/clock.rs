@@ -70,6 +70,7 @@ fn recovery(before: u64) -> u64 {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn the_recovery_of_an_st_line_ends_when_the_clock_wraps() {
     for before in (0..1_200).step_by(7) {
         assert!(recovery(before * MS) < 3_000, "{before}");

@@ -425,6 +425,7 @@ proptest! {
 
 /// 4.5, 4.6 and table 3, SPEC-NOTES S17.
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn a_reply_of_another_size_is_damage() {
     let answered = |profile: Profile, request: &Request<'_>, size: usize| {
         let mut master = Master::new(MasterConfig { profile, ..MasterConfig::default() });
