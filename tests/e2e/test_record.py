@@ -478,11 +478,14 @@ def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, reco
 
 
 def eventually_stands(recording, values):
-    """Waits until the number of values stays the same for four lines; gives it."""
+    """Waits until the number of values stays the same for six lines, of a second each; gives it.
+
+    The recorder notices after up to 3 s that the share does not answer.
+    """
 
     def stands():
-        lines = [json.loads(line).get("values", 0) for line in recording.out[-4:]]
-        return len(lines) == 4 and len(set(lines)) == 1 and lines[0] > 0
+        lines = [json.loads(line).get("values", 0) for line in recording.out[-6:]]
+        return len(lines) == 6 and len(set(lines)) == 1 and lines[0] > 0
 
     eventually(stands, "the share is silent", 30)
     return values()
