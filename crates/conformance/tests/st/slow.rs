@@ -23,9 +23,17 @@ struct Uart {
     outward: VecDeque<(Instant, u8)>,
     /// Bytes in transit from the drive.
     inward: VecDeque<(Instant, u8)>,
+    /// How often this host pauses for 30 ms when it waits for the 15 ms between two parts of a frame.
+    pauses: usize,
 }
 
 impl Uart {
+    fn new(profile: Profile, byte_time: Micros, pauses: usize) -> Uart {
+        let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
+        let (outward, inward) = Default::default();
+        Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward, pauses }
+    }
+
     fn answer(&mut self, at: Instant, reply: Vec<u8>) {
         for byte in reply {
             let before = self.inward.back().map_or(at, |(last, _)| at.max(*last));
@@ -68,7 +76,12 @@ impl ByteLink for Uart {
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Span>) -> Result<usize, PortError> {
-        let until = self.clock.now() + timeout.expect("the kit waits for a while").into();
+        let timeout = timeout.expect("the kit waits for a while");
+        let mut until = self.clock.now() + timeout.into();
+        if self.pauses > 0 && timeout.as_millis() == 15 {
+            self.pauses -= 1;
+            until += Micros::from_millis(30);
+        }
         loop {
             let came = self.inward.front().map(|(at, _)| *at);
             if let Some(at) = came.filter(|at| *at <= until) {
@@ -101,9 +114,7 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
     ];
     for (profile, baud, skipped) in lines {
         let byte_time = Micros(10_000_000 / baud);
-        let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
-        let (outward, inward) = Default::default();
-        let uart = Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward };
+        let uart = Uart::new(profile, byte_time, 0);
         let allowed = vec![Need::Spin];
         let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
         let mut harness = Harness::new(Box::new(uart), Box::new(()), options);
@@ -114,5 +125,28 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
         );
         let slow: Vec<&str> = slow.map(|outcome| &*outcome.name).collect();
         assert_eq!(slow, skipped, "{profile:?} {baud}");
+    }
+}
+
+#[test]
+fn a_host_that_pauses_in_a_frame_tries_again() {
+    let name = "a_frame_within_25_ms_is_accepted";
+    for pauses in 0..=10 {
+        let byte_time = Micros(10_000_000 / 57_600);
+        let uart = Uart::new(Profile::Spec, byte_time, pauses);
+        let (profile, motor, allowed) = (Profile::Spec, MotorNumber::FIRST, Vec::new());
+        let options = Options { profile, motor, allowed, byte_time };
+        let mut harness = Harness::new(Box::new(uart), Box::new(()), options);
+        let cases: Vec<_> =
+            st::suite(Profile::Spec).into_iter().filter(|case| case.name == name).collect();
+        assert_eq!(cases.len(), 1);
+        let report = run(&cases, &mut harness, |_| {});
+        match &report.outcomes[0].verdict {
+            Verdict::Passed => assert!(pauses < 5, "it was always too late"),
+            Verdict::Skipped(why) => {
+                assert!(pauses >= 5 && why.contains("25 ms"), "{pauses}: {why}")
+            }
+            other => panic!("{pauses}: {other:?}"),
+        }
     }
 }
