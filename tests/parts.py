@@ -40,7 +40,7 @@ class Run:
             self.process = subprocess.Popen(
                 ["make", "--no-print-directory", part, *(["AGAIN=1"] if again else [])],
                 cwd=REPOSITORY,
-                # What cargo needs for a next build takes a seventh of the first one.
+                # What cargo keeps for a next build costs a tenth of the first one.
                 env={"CARGO_INCREMENTAL": "0", **os.environ},
                 stdin=subprocess.DEVNULL,
                 stdout=output,

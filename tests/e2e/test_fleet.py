@@ -186,17 +186,13 @@ def test_the_table_has_all_drives_and_sums_of_nodes(run, via, arms, watchers):
 
     def sorted_rows():
         """The drives by their speed, in a table that no pause of the machine has made old."""
-        tables = []
 
-        def ages():
-            return [it["age_seconds"] for it in tables[-1]]
+        def fresh():
+            table = rows("--sort", "speed")
+            ages = [it["age_seconds"] for it in table]
+            return len(ages) == 12 and None not in ages and max(ages) < 2 and table
 
-        def is_fresh():
-            tables.append(rows("--sort", "speed"))
-            return len(tables[-1]) == 12 and None not in ages() and max(ages()) < 2
-
-        eventually(is_fresh, "all drives")
-        return tables[-1]
+        return eventually(fresh, "all drives")
 
     sorted_rows()
     eventually(lambda: rows("--only", "turning"), "a motor that turns")

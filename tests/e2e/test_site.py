@@ -24,10 +24,6 @@ from siting import (
     tokens, turn,
 )
 
-#: Commands that are denied end, however busy the machine is, s.
-REFUSED = 20
-
-
 @pytest.fixture(scope="module")
 def site(motorlink, tmp_path_factory):
     """A site that all tests use."""
@@ -346,7 +342,7 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
     began = time.monotonic()
     denied = run(*st(site, "bob", "start")).ended(3)
     assert "bob may be allowed to see only" in denied.err
-    assert time.monotonic() - began < REFUSED
+    assert time.monotonic() - began < 8
     turn(site)
     began = time.monotonic()
     stopped = run("fleet", "stop-all", *via).ended(3)
@@ -355,7 +351,7 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
     assert "may still turn" in stopped.err and "confirmed" not in stopped.out
     for order in ("latch", "release"):
         assert "no answer of arm1, arm2" in run("fleet", order, *via).ended(3).err
-    assert time.monotonic() - began < REFUSED
+    assert time.monotonic() - began < 8
     assert site.direct.rpm() > 1400
     confirmed = run("fleet", "stop-all", "--via", site.file("alice"), within=60).ended(0)
     assert "arm1/st0, motor 1: it confirmed the stop" in confirmed.out

@@ -80,6 +80,8 @@ impl Reply {
 
 /// The reception timeout of a whole command (4.1).
 pub(super) const RECEPTION: Micros = Micros::from_millis(25);
+/// A frame that takes this long here may come too late there.
+pub(super) const TOO_LATE: Micros = Micros(RECEPTION.as_micros() * 9 / 10);
 /// Maximum wait for a reply. A drive has one second (4.1); the longer wait distinguishes a late
 /// reply from a missing one.
 pub(super) const PATIENCE: Micros = Micros::from_millis(2_000);
@@ -429,7 +431,7 @@ impl Harness {
     pub(super) fn in_time(&self) -> usize {
         match (self.profile(), self.options.byte_time.as_micros()) {
             (Profile::Mcsdk54, _) | (_, 0) => usize::MAX,
-            (Profile::Spec, byte) => (RECEPTION.as_micros() * 9 / 10 / byte) as usize,
+            (Profile::Spec, byte) => (TOO_LATE.as_micros() / byte) as usize,
         }
     }
 

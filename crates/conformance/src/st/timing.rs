@@ -3,7 +3,7 @@
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 use motorlink_proto::time::Micros;
 
-use super::harness::{Harness, RECEPTION, Reply};
+use super::harness::{Harness, RECEPTION, Reply, TOO_LATE};
 use crate::case::{Case, Stop};
 use crate::reading::{S11, S29};
 
@@ -180,13 +180,14 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
     for _ in 0..TRIES {
         let began = harness.clock.now();
         harness.send(&bytes[..2])?;
-        let silent = harness.silence(Micros(RECEPTION.as_micros() * 6 / 10));
-        let is_late = harness.clock.now().since(began) >= Micros(RECEPTION.as_micros() * 9 / 10);
-        if is_late && matches!(silent, Err(Stop::Failed(_))) {
-            harness.drain(WATCH)?;
-            continue;
+        match harness.silence(Micros(RECEPTION.as_micros() * 6 / 10)) {
+            // This host paused, and the timeout came.
+            Err(Stop::Failed(_)) if harness.clock.now().since(began) >= TOO_LATE => {
+                harness.drain(WATCH)?;
+                continue;
+            }
+            silent => silent?,
         }
-        silent?;
         harness.send_more(&bytes[2..])?;
         let took = harness.clock.now().since(began);
         let reply = harness.awaited()?;
@@ -194,7 +195,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
             harness.out_of_sync = false;
             return Ok(());
         }
-        if took < Micros(RECEPTION.as_micros() * 9 / 10) {
+        if took < TOO_LATE {
             outcome = Err(harness.failed("ACK, because the frame was complete after 15 ms"));
         }
         harness.drain(WATCH)?;

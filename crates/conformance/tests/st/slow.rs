@@ -27,13 +27,18 @@ struct Uart {
     pauses: usize,
 }
 
-impl Uart {
-    fn new(profile: Profile, byte_time: Micros, pauses: usize) -> Uart {
-        let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
-        let (outward, inward) = Default::default();
-        Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward, pauses }
-    }
+/// The kit at a UART.
+fn kit(profile: Profile, baud: u64, pauses: usize) -> Harness {
+    let byte_time = Micros(10_000_000 / baud);
+    let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
+    let (outward, inward) = Default::default();
+    let uart = Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward, pauses };
+    let allowed = vec![Need::Spin];
+    let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
+    Harness::new(Box::new(uart), Box::new(()), options)
+}
 
+impl Uart {
     fn answer(&mut self, at: Instant, reply: Vec<u8>) {
         for byte in reply {
             let before = self.inward.back().map_or(at, |(last, _)| at.max(*last));
@@ -113,11 +118,7 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
         (Profile::Mcsdk54, 9_600, &[]),
     ];
     for (profile, baud, skipped) in lines {
-        let byte_time = Micros(10_000_000 / baud);
-        let uart = Uart::new(profile, byte_time, 0);
-        let allowed = vec![Need::Spin];
-        let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
-        let mut harness = Harness::new(Box::new(uart), Box::new(()), options);
+        let mut harness = kit(profile, baud, 0);
         let report = run(&st::suite(profile), &mut harness, |_| {}).strict();
         assert!(report.is_clean(), "{baud}: {:#?}", report.failed().collect::<Vec<_>>());
         let slow = report.outcomes.iter().filter(
@@ -132,11 +133,7 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
 fn a_host_that_pauses_in_a_frame_tries_again() {
     let name = "a_frame_within_25_ms_is_accepted";
     for pauses in 0..=10 {
-        let byte_time = Micros(10_000_000 / 57_600);
-        let uart = Uart::new(Profile::Spec, byte_time, pauses);
-        let (profile, motor, allowed) = (Profile::Spec, MotorNumber::FIRST, Vec::new());
-        let options = Options { profile, motor, allowed, byte_time };
-        let mut harness = Harness::new(Box::new(uart), Box::new(()), options);
+        let mut harness = kit(Profile::Spec, 57_600, pauses);
         let cases: Vec<_> =
             st::suite(Profile::Spec).into_iter().filter(|case| case.name == name).collect();
         assert_eq!(cases.len(), 1);
