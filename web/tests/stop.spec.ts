@@ -50,21 +50,22 @@ test.describe('stop all', () => {
   });
 
   test('goes by HTTP while the WebSocket is down', async ({ bench, page }) => {
-    let isDown = false;
-    await page.routeWebSocket(/\/ws$/, (socket) => {
-      const server = socket.connectToServer();
-      socket.onMessage((message) => {
-        if (!isDown) server.send(message);
-      });
-      server.onMessage((message) => {
-        if (!isDown) socket.send(message);
-      });
+    // In the page: Playwright's route of a WebSocket is too slow for the samples.
+    await page.addInitScript(() => {
+      window.WebSocket = class extends WebSocket {
+        override send(data: string) {
+          if (!('isDown' in window)) super.send(data);
+        }
+        override set onmessage(hear: (event: MessageEvent) => void) {
+          this.addEventListener('message', (event) => 'isDown' in window || hear(event));
+        }
+      };
     });
     await page.goto(bench.url);
     // Started by another program: no dead-man of this page stops it.
     await bench.start();
     await expect.poll(() => bench.speed('st', 1)).toBeGreaterThan(TURNS);
-    isDown = true;
+    await page.evaluate(() => Object.assign(window, { isDown: true }));
     await page.keyboard.press('Escape');
     await expect(page.getByText(/Stopped: \d+ of \d+ motors confirmed/)).toBeVisible();
     await expect.poll(() => bench.speed('st', 1)).toBeLessThan(STILL);
@@ -76,13 +77,17 @@ test.describe('stop all', () => {
       await page.route('**/api/stop-all', (route) => route.abort());
       const failure = 'no drive confirmed it: the drive did not reply within 50 ms, and then not within 1 s';
       const motors = Array.from({ length: 30 }, (_, at) => ({ line: 'rmd9', motor: at + 1, failure }));
-      await page.routeWebSocket(/\/ws$/, (socket) => {
-        const server = socket.connectToServer();
-        server.onMessage((message) => {
-          const isAnswer = typeof message === 'string' && message.includes('"to":"stop-all"');
-          socket.send(isAnswer ? JSON.stringify({ ...(JSON.parse(message) as object), motors }) : message);
-        });
-      });
+      await page.addInitScript((motors) => {
+        window.WebSocket = class extends WebSocket {
+          override set onmessage(hear: (event: MessageEvent) => void) {
+            this.addEventListener('message', ({ data }: MessageEvent<unknown>) => {
+              const isAnswer = typeof data === 'string' && data.includes('"to":"stop-all"');
+              const heard = isAnswer ? JSON.stringify({ ...(JSON.parse(data) as object), motors }) : data;
+              hear(new MessageEvent('message', { data: heard }));
+            });
+          }
+        };
+      }, motors);
       await page.goto(bench.url);
       await expect(page.getByRole('article')).toHaveCount(6);
       await page.keyboard.press('Escape');
