@@ -104,6 +104,8 @@ pub struct Machine {
     config: MachineConfig,
     load: Load,
     locked: bool,
+    /// Whether it is known to rest, as nothing has changed since.
+    resting: bool,
     /// Length of a step, s.
     period: f32,
     /// Phase resistance now, Ω, and the resistance in series with it.
@@ -150,6 +152,7 @@ impl Machine {
             decay: Decay::new(period, config.resistance, inverse),
             load,
             locked: false,
+            resting: false,
             poles: f32::from(config.pole_pairs),
             period,
             resistance: config.resistance,
@@ -174,6 +177,7 @@ impl Machine {
     /// Sets the rotor's position (2^32 a turn) and speed (rad/s).
     pub fn place(&mut self, position: i64, speed: f32) {
         (self.position, self.speed) = (position, speed);
+        self.resting = false;
         (self.change, self.rest) = (0.0, 0.0);
         self.frame = Vector::unit(self.electrical_angle());
     }
@@ -196,13 +200,14 @@ impl Machine {
 
     /// Replaces the load.
     pub fn set_load(&mut self, load: LoadConfig) {
+        self.resting = false;
         self.load = Load::new(load, self.config.gear);
         self.shaft = Shaft::new(&self.config, &self.load, self.period);
     }
 
     /// Locks or releases the rotor.
     pub const fn lock(&mut self, locked: bool) {
-        self.locked = locked;
+        (self.locked, self.resting) = (locked, false);
     }
 
     /// Whether the rotor is locked.

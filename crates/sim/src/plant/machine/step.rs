@@ -18,7 +18,13 @@ const FASTEST: f32 = 1e5;
 
 impl Machine {
     /// Whether the state remains unchanged while no current flows.
-    pub(in crate::plant) fn rests(&self) -> bool {
+    #[inline]
+    pub(in crate::plant) fn rests(&mut self) -> bool {
+        self.resting = self.resting || self.is_balanced();
+        self.resting
+    }
+
+    fn is_balanced(&self) -> bool {
         if self.speed != 0.0 || self.flux != Vector::ZERO || self.voltage != Vector::ZERO {
             return false;
         }
@@ -28,6 +34,7 @@ impl Machine {
 
     /// Executes a step with open terminals.
     pub(in crate::plant) fn coast(&mut self, flow: &mut Flow) {
+        self.resting = false;
         self.open();
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
@@ -38,6 +45,7 @@ impl Machine {
     /// Executes a step with a voltage. Adds the energies to `flow`.
     #[inline]
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
+        self.resting = false;
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
         let emf = Vector::new(0.0, half.electrical * self.magnet);
