@@ -1,14 +1,12 @@
 //! A program that follows the motors of a share: rows, events of others, a share that ends or stops.
 
-mod drives;
-mod shared;
-
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::shared::{LIMIT, Share};
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::address::Local;
@@ -18,7 +16,6 @@ use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Signal};
-use shared::{LIMIT, Share};
 
 fn now() -> u64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
@@ -172,7 +169,7 @@ fn losses_and_missing_values_are_told() {
         ),
         (Kind::Text, encode(&Text::Closing { message: "enough".to_owned() })),
     ];
-    let path = drives::path("follow-scripted", "socket");
+    let path = crate::drives::path("follow-scripted", "socket");
     let socket = UnixListener::bind(&path).unwrap();
     let serving = std::thread::spawn(move || scripted(&socket));
     let began = now();

@@ -1,18 +1,15 @@
 //! The frames of the lines of a share, as programs get them.
 
-mod drives;
-mod shared;
-
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::Instant;
 
+use crate::shared::{LIMIT, Share};
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::dialogue::{Dialogue, Heard, Refusal};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::wire::MOST_FRAMES;
-use shared::{LIMIT, Share};
 
 struct Program {
     stream: UnixStream,

@@ -7,7 +7,7 @@ use motorlink_telemetry::share::frame::{
 use motorlink_telemetry::share::message::{Happening, Request, Text, decode, encode};
 use proptest::prelude::*;
 
-const PAGE: &str = include_str!("../../../docs/SHARE-PROTOCOL.md");
+const PAGE: &str = include_str!("../../../../docs/SHARE-PROTOCOL.md");
 
 fn stream(payloads: &[(Kind, Vec<u8>)]) -> Vec<u8> {
     let mut bytes = Vec::new();

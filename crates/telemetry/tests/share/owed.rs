@@ -1,22 +1,17 @@
 //! Stops that a motor has not taken: they are sent again until it confirms one.
 
-mod asking;
-mod drives;
-mod shared;
-mod stopping;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use asking::{Asker, close, command, open};
-use motorlink_telemetry::share::message::*;
-use shared::Share;
-use stopping::{
+use crate::asking::{Asker, close, command, open};
+use crate::shared::Share;
+use crate::stopping::{
     Cable, READ_STATUS, START, STOP, eventually, frame, heard_and_unstopped, motors, read,
     request_of, share_of_a_lost_motor, share_of_a_turning_motor, share_while, stop_all_of,
     stop_times, stops,
 };
+use motorlink_telemetry::share::message::*;
 
 fn stands(share: &Share) {
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);

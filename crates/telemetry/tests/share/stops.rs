@@ -1,20 +1,15 @@
 //! Whether a motor that does not confirm a stop may turn, or no motor is there.
 
-mod asking;
-mod drives;
-mod shared;
-mod stopping;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use asking::{Asker, command};
-use motorlink_telemetry::share::message::*;
-use shared::{LIMIT, Share};
-use stopping::{
+use crate::asking::{Asker, command};
+use crate::shared::{LIMIT, Share};
+use crate::stopping::{
     Cable, READ_STATUS, SHORT, START, eventually, heard_and_unstopped, motors,
     share_of_a_turning_motor, stop_all, stop_all_of, stops,
 };
+use motorlink_telemetry::share::message::*;
 
 /// The ID of no motor.
 const NOBODY: u8 = 20;

@@ -1,5 +1,4 @@
 //! Stops on lines that are cut, and motors that turned before the share began.
-#![allow(dead_code, reason = "each test uses a part")]
 
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;

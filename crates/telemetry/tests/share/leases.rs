@@ -1,14 +1,10 @@
 //! One program at a time changes a motor of a share that has leases.
 
-mod asking;
-mod drives;
-mod shared;
-
 use std::time::{Duration, Instant};
 
-use asking::{Asker, command};
+use crate::asking::{Asker, command};
+use crate::shared::{PATIENT, Share};
 use motorlink_telemetry::share::message::*;
-use shared::{PATIENT, Share};
 
 const RAMP: [u8; 7] = [7, 220, 5, 0, 0, 100, 0];
 const START: [u8; 2] = [3, 1];

@@ -1,14 +1,10 @@
 //! The lines of a share: what their exchanges came to, and lines that come and go.
 
-mod asking;
-mod drives;
-mod shared;
-
-use asking::{Asker, close, command, open};
-use drives::served;
+use crate::asking::{Asker, close, command, open};
+use crate::drives::served;
+use crate::shared::Share;
 use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
-use shared::Share;
 
 #[test]
 fn a_line_counts_its_exchanges_and_what_went_wrong() {

@@ -1,21 +1,18 @@
 //! A share at a Unix socket: programs that come, ask, read too slowly, and are gone.
 
-mod drives;
-mod shared;
-
 use std::io::{Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::shared::{LIMIT, PATIENT, Share};
 use motorlink::port::FaultBytes;
 use motorlink_link::fault::Faults;
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
 use motorlink_telemetry::share::message::*;
-use shared::{LIMIT, PATIENT, Share};
 
 impl Share {
     fn join(&self, name: &str) -> Program {
@@ -198,7 +195,7 @@ fn motor(line: &str, motor: u8) -> MotorName {
 
 #[test]
 fn programs_see_lines_and_signals_and_each_other() {
-    let share = Share::new("lines");
+    let share = Share::new("server-lines");
     let mode = share.path.metadata().unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o600);
     let mut first = share.join("tuner");
