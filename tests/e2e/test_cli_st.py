@@ -129,7 +129,8 @@ def test_raw_sends_any_frame(st):
 
 
 def test_trace_shows_both_directions_on_stderr(st):
-    traced = st("--trace", "get", "MIN_APP_SPEED").ended(0)
+    # A request that a busy machine answers late is sent again.
+    traced = st("--timeout", "5s", "--trace", "get", "MIN_APP_SPEED").ended(0)
     *opening, sent, received, confirmed, _ = traced.err.splitlines()
     # A line to a drive that may have been asked before is brought in sync first, and what was read is confirmed.
     questions = ["GET_BOARD_INFO", "GET_REG STATUS", "GET_REG FLAGS", "GET_BOARD_INFO"]

@@ -351,7 +351,8 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
     assert "may still turn" in stopped.err and "confirmed" not in stopped.out
     for order in ("latch", "release"):
         assert "no answer of arm1, arm2" in run("fleet", order, *via).ended(3).err
-    assert time.monotonic() - began < 8
+    # Each waits 2 or 3 s for an answer.
+    assert time.monotonic() - began < 15
     assert site.direct.rpm() > 1400
     confirmed = run("fleet", "stop-all", "--via", site.file("alice"), within=60).ended(0)
     assert "arm1/st0, motor 1: it confirmed the stop" in confirmed.out
