@@ -72,6 +72,12 @@ test('a line is opened, turned, and closed, which stops its motors', async ({ be
   expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
   const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   expect(overflow).toBeLessThanOrEqual(0);
+  const close = line(page, 'rmd0').getByRole('button', { name: 'Close rmd0' });
+  const dialog = page.getByRole('dialog');
+  // Axe keeps the page busy, maybe for longer than the deadline of a motor.
+  await close.click();
+  expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+  await dialog.getByRole('button', { name: 'Cancel' }).click();
 
   await open(page, 'Motors');
   const motor = card(page, 'rmd0/1');
@@ -79,9 +85,7 @@ test('a line is opened, turned, and closed, which stops its motors', async ({ be
   await motor.getByRole('button', { name: 'Run to target' }).click();
   await expect.poll(() => bench.speed('rmd', 1)).toBeGreaterThan(100);
   await open(page, 'Ports');
-  await line(page, 'rmd0').getByRole('button', { name: 'Close rmd0' }).click();
-  const dialog = page.getByRole('dialog');
-  expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+  await close.click();
   await dialog.getByRole('button', { name: 'Close it' }).click();
   await expect(page.getByText('rmd0 is closed. Stopped before: motor 1.')).toBeVisible();
   await expect(line(page, 'rmd0')).toHaveCount(0);
