@@ -27,7 +27,6 @@ QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promi
 FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
 WORKERS ?= 4
-THREADS ?= 8
 PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
@@ -78,7 +77,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
 unit: ## 11 min: tests in Rust
-	RUST_TEST_THREADS=$(THREADS) $(CARGO) test --workspace --all-features --locked $(T)
+	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 5 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .

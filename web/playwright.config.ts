@@ -11,7 +11,7 @@ export default defineConfig({
   timeout: 60_000,
   expect: { timeout: 15_000 },
   reporter: [['list']],
-  use: { launchOptions: chromium, trace: { mode: 'retain-on-failure', screenshots: false } },
+  use: { launchOptions: chromium, trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false } },
   projects: [
     { name: 'desktop', use: { ...devices['Desktop Chrome'], viewport: { width: 1280, height: 800 } } },
     {

@@ -105,7 +105,7 @@ def test_a_handler_stops_a_motor_during_a_wait_for_a_reply(tmp_path: Path) -> No
 
 
 CLOSE_WHILE_SILENT = """
-    bus = motorlink.st.open(sys.argv[1], timeout=0.2)
+    bus = motorlink.st.open(sys.argv[1], timeout=1.0)
     answers = False
     while not answers:
         # A loaded machine may take longer for the first reply.

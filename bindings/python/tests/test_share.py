@@ -21,7 +21,8 @@ class Share:
     def __init__(self, command: str, drives: Served, folder: Path):
         self.path = folder / "share"
         self.st, self.rmd = f"share:{self.path}/st0", f"share:{self.path}/rmd0"
-        words = [command, "share", "-p", drives.st, "-p", drives.can, "--at", f"unix:{self.path}"]
+        # The drives of a busy machine answer late.
+        words = [command, "share", "-p", drives.st, "-p", drives.can, "--timeout", "1s", "--at", f"unix:{self.path}"]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
         assert self.process.stdout
         assert self.process.stdout.readline().startswith("share at ")
