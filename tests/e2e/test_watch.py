@@ -423,7 +423,7 @@ def test_motors_that_others_started_go_on_when_it_ends_or_is_killed(bench, watch
 
 
 def test_it_ends_when_its_terminal_is_gone(bench, motorlink):
-    terminal = Terminal([motorlink, "watch", *bench.ports])
+    terminal = Terminal([motorlink, "watch", *bench.ports, "--timeout", "1s"])
     terminal.shows("can0:4")
     terminal.hang_up()
     assert terminal.wait() == 0
