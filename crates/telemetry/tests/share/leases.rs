@@ -32,6 +32,14 @@ fn turn(program: &mut Asker) {
     program.ask(command("st0", 1, &START)).unwrap();
 }
 
+/// Waits for the end of a lease, and changes the motor then.
+fn gets(program: &mut Asker, bytes: &[u8]) {
+    let end = Instant::now() + PATIENT;
+    while program.ask(command("st0", 1, bytes)).is_err() {
+        assert!(Instant::now() < end, "the lease does not end");
+    }
+}
+
 #[test]
 fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
     let share = share("one", Duration::from_millis(10));
@@ -49,10 +57,7 @@ fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
     alice.ask(command("st0", 1, &RAMP)).unwrap();
     bob.ask(command("st0", 1, &STOP)).unwrap();
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
-    let end = Instant::now() + PATIENT;
-    while bob.ask(command("st0", 1, &RAMP)).is_err() {
-        assert!(Instant::now() < end, "the lease does not end");
-    }
+    gets(&mut bob, &RAMP);
 }
 
 #[test]
@@ -67,10 +72,7 @@ fn a_lease_ends_by_itself_and_when_its_program_leaves() {
     // Another motor is free.
     alice.ask(command("st0", 2, &RAMP)).unwrap();
     drop(bob);
-    let end = Instant::now() + PATIENT;
-    while alice.ask(command("st0", 1, &GAIN)).is_err() {
-        assert!(Instant::now() < end, "the lease does not end");
-    }
+    gets(&mut alice, &GAIN);
 }
 
 #[test]

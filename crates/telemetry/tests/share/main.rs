@@ -1,16 +1,18 @@
-//! A share: its messages, its programs, what it owes them, and its lines as ports.
+//! Tests of a share: its messages and programs, its stops, and its lines as ports.
 
 #[path = "../asking/mod.rs"]
 mod asking;
 mod asks;
 #[path = "../drives/mod.rs"]
 mod drives;
+mod faulty;
 mod frames;
 mod leases;
 mod lines;
 mod messages;
 mod owed;
 mod port;
+mod scripted;
 mod server;
 #[path = "../shared/mod.rs"]
 mod shared;

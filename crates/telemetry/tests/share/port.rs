@@ -1,15 +1,16 @@
 //! A line of a share as a port: clients of both protocols, alone and beside others.
 
-use std::io::{Read, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::net::UnixListener;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::shared::{LIMIT, PATIENT, Share};
-use motorlink::port::{FaultBytes, NotDone, PortError, PortName};
+use crate::asking::Asker;
+use crate::faulty::{deaf, repeating};
+use crate::scripted::{self, Scripted};
+use crate::shared::{LIMIT, Share};
+use motorlink::port::{NotDone, PortError, PortName};
 use motorlink::st::{self, Profile, RegisterId, Status};
 use motorlink::{LinkState, rmd};
-use motorlink_link::fault::Faults;
 use motorlink_proto::rmd::{MotorId, MotorSet, ReadStatus, SetSpeed, SetTorque4, Stop};
 use motorlink_proto::st::{Command, ErrorCode, MotorNumber, Ramp, Request};
 use motorlink_proto::time::Micros;
@@ -18,11 +19,8 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{self, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
-use motorlink_telemetry::share::frame::{self, Kind, Reader};
-use motorlink_telemetry::share::message::{
-    self, Answer, Ask, Happening, Protocol, Text, decode, encode,
-};
-use motorlink_telemetry::share::{VERSION, port};
+use motorlink_telemetry::share::message::{Ask, Happening, Line, Protocol};
+use motorlink_telemetry::share::port;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 
@@ -41,59 +39,18 @@ impl Share {
     }
 }
 
-/// A program that speaks the messages of the share.
-struct Operator {
-    socket: UnixStream,
-    reader: Reader,
+/// A program that joins a share, and latches it.
+fn latched(share: &Share) -> Asker {
+    let mut operator = Asker::join(&share.path, "operator");
+    operator.ask(Ask::Latch).unwrap();
+    operator
 }
 
-impl Operator {
-    fn joined(share: &Share) -> Self {
-        let socket = UnixStream::connect(&share.path).unwrap();
-        let mut operator = Operator { socket, reader: Reader::default() };
-        operator.ask(Ask::Hello { protocol: VERSION, name: "operator".to_owned() });
-        operator
-    }
-
-    /// Joins a share, and latches it.
-    fn at(share: &Share) -> Self {
-        let mut operator = Self::joined(share);
-        operator.ask(Ask::Latch);
-        operator
-    }
-
-    /// Asks, and gives how many stops are told before the answer.
-    fn ask(&mut self, ask: Ask) -> usize {
-        let mut bytes = Vec::new();
-        frame::append(Kind::Text, &encode(&message::Request { id: 1, ask }), &mut bytes).unwrap();
-        self.socket.write_all(&bytes).unwrap();
-        let mut stops = 0;
-        loop {
-            while let Some(frame) = self.reader.take().unwrap() {
-                match decode(&frame.payload).unwrap() {
-                    Text::Event(event) if event.event == Happening::Stopping => stops += 1,
-                    Text::Answer { .. } => return stops,
-                    _ => {}
-                }
-            }
-            let mut bytes = [0; 4096];
-            let size = self.socket.read(&mut bytes).unwrap();
-            self.reader.push(&bytes[..size]);
-        }
-    }
-
-    /// The stops since the last call. Answers overtake events, so it asks twice.
-    fn stops(&mut self) -> usize {
-        self.ask(Ask::Latch) + self.ask(Ask::Lines)
-    }
-}
-
-/// A share whose ST drive receives nothing, and whose RMD motors answer soon or never.
-fn deaf(name: &str) -> Share {
-    let faults: Faults = "drop=1".parse().unwrap();
-    let faults = faults.on_serial().unwrap();
-    let around = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<_>;
-    Share::with(name, Duration::from_millis(100), around)
+/// The stops since the last call. Answers overtake events, so it asks twice.
+fn stops(witness: &mut Asker) -> usize {
+    witness.ask(Ask::Latch).unwrap();
+    witness.lines();
+    witness.events.drain(..).filter(|event| event.event == Happening::Stopping).count()
 }
 
 fn start(client: &st::Client) {
@@ -172,7 +129,7 @@ fn a_refusal_of_the_share_is_told_in_words_and_leaves_the_connection_open() {
     let share = Share::new("port-latch");
     let (mine, other) = (share.st(), share.st());
     start(&mine);
-    let mut program = Operator::at(&share);
+    let mut program = latched(&share);
     let motor = other.motor(1).unwrap();
     for _ in 0..2 {
         let (kind, why) = not_done(motor.start().unwrap_err());
@@ -185,7 +142,7 @@ fn a_refusal_of_the_share_is_told_in_words_and_leaves_the_connection_open() {
     share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
     motor.stop_until_confirmed().unwrap();
     while motor.status().unwrap() != Status::Idle {}
-    program.ask(Ask::Release);
+    program.ask(Ask::Release).unwrap();
     start(&other);
     share.reaches("st1.speed_rpm", |rpm| rpm > 1000.0);
 }
@@ -260,7 +217,7 @@ fn reading(port: &PortName) -> (Acquisition, Subscription) {
 fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
     let share = Share::new("engine");
     let (mut engine, subscription) = reading(&share.port("st0"));
-    let program = Operator::at(&share);
+    let program = latched(&share);
     let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
     let command = engine.command(&"test".into(), start, Micros::from_millis(5_000)).unwrap();
     let (mut refused, mut values) = (None, 0);
@@ -318,12 +275,7 @@ fn the_end_of_a_share_is_told_at_once() {
 
 #[test]
 fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
-    let faults: Faults = "dup=0.02".parse().unwrap();
-    let mut faults = faults.on_serial().unwrap();
-    let share = Share::with("repeats", PATIENT, move |link| {
-        faults.seed += 1;
-        Box::new(FaultBytes::new(link, &faults))
-    });
+    let share = repeating("repeats", 0.02);
     let (client, other) = (share.st(), share.st());
     let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI, RegisterId::TORQUE_KP];
     let mut confirmed = 0;
@@ -341,43 +293,11 @@ fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
     assert!(confirmed > 1, "{confirmed}");
 }
 
-/// Answers hello and the question for lines as a share does, and gives the first command.
+/// The first command that a share gets.
 fn first_command(socket: &UnixListener) -> Ask {
-    let (mut stream, _) = socket.accept().unwrap();
-    let mut reader = Reader::default();
-    loop {
-        let mut bytes = [0; 4096];
-        let size = stream.read(&mut bytes).unwrap();
-        assert!(size > 0, "the port was closed");
-        reader.push(&bytes[..size]);
-        while let Some(frame) = reader.take().unwrap() {
-            let message::Request { id, ask } = decode(&frame.payload).unwrap();
-            let answer = match ask {
-                Ask::Hello { name, .. } => {
-                    Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
-                }
-                Ask::Lines => {
-                    let line = message::Line {
-                        line: "st0".to_owned(),
-                        protocol: Protocol::St,
-                        port: "test".to_owned(),
-                        profile: Some(Profile::Spec.name().to_owned()),
-                        timeout: 1.0,
-                        t: 0.0,
-                        wall: 0.0,
-                        counts: None,
-                        heard: Vec::new(),
-                        unstopped: Vec::new(),
-                    };
-                    Answer::Lines { lines: vec![line], latched_by: None }
-                }
-                command => return command,
-            };
-            let mut out = Vec::new();
-            frame::append(Kind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
-            stream.write_all(&out).unwrap();
-        }
-    }
+    let profile = Some(Profile::Spec.name().to_owned());
+    let line = || Line { profile: profile.clone(), ..scripted::line("st0", Protocol::St) };
+    Scripted::accept(socket).asked(line).expect("the port was closed").ask
 }
 
 #[test]
@@ -424,23 +344,23 @@ fn a_start_that_waited_in_a_frozen_share_is_refused() {
 #[test]
 fn a_client_does_not_repeat_a_stop_that_the_share_has_repeated() {
     let share = deaf("once");
-    let mut witness = Operator::joined(&share);
+    let mut witness = Asker::join(&share.path, "operator");
     let bus = share.rmd();
     // No motor, but the share does not know.
     bus.ask(id(9), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap_err();
     let client = share.st();
     let failed = client.motor(1).unwrap().stop_until_confirmed().unwrap_err();
     assert!(failed.to_string().contains("no reply in time"), "{failed}");
-    assert_eq!(witness.stops(), 1);
+    assert_eq!(stops(&mut witness), 1);
     let failed = bus.motor(9).unwrap().stop_until_confirmed().unwrap_err();
     assert!(matches!(failed, rmd::Error::Timeout { .. }), "{failed}");
-    assert_eq!(witness.stops(), 1);
+    assert_eq!(stops(&mut witness), 1);
 }
 
 #[test]
 fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
     let share = deaf("engine-stops");
-    let mut witness = Operator::joined(&share);
+    let mut witness = Asker::join(&share.path, "operator");
     let st = StLine::open(&share.port("st0"), Default::default()).unwrap();
     let rmd = RmdLine::open(&share.port("rmd0"), Default::default()).unwrap();
     let client = share.rmd();
@@ -460,21 +380,21 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert!(matches!(ends[..], [Err(CommandError::Line(_))]), "{ends:?}");
-        assert_eq!(witness.stops(), 1);
+        assert_eq!(stops(&mut witness), 1);
     }
 }
 
 #[test]
 fn a_stop_of_all_ids_of_a_share_is_certain_of_the_ids_without_a_motor() {
     let share = deaf("all");
-    let mut operator = Operator::joined(&share);
+    let mut operator = Asker::join(&share.path, "operator");
     let client = share.rmd();
     let stopping = client.stop_all_until_confirmed(Default::default());
     assert!(stopping.failed.is_empty(), "{stopping:?}");
     assert!(stopping.is_silence_certain(), "{stopping:?}");
     assert_eq!(stopping.confirmed.len() + stopping.silent.len(), MotorSet::ALL.len());
     // The IDs without a motor are no alarm.
-    assert!(operator.stops() <= stopping.confirmed.len());
+    assert!(stops(&mut operator) <= stopping.confirmed.len());
 }
 
 #[test]

@@ -6,9 +6,8 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::shared::{LIMIT, PATIENT, Share};
-use motorlink::port::FaultBytes;
-use motorlink_link::fault::Faults;
+use crate::faulty::repeating;
+use crate::shared::{LIMIT, Share};
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{self, Kind, Reader};
@@ -298,12 +297,7 @@ fn rows_have_all_signals_of_a_motor_at_one_instant() {
 
 #[test]
 fn rows_of_a_line_that_repeats_replies_have_no_wrong_value() {
-    let faults: Faults = "dup=0.005".parse().unwrap();
-    let mut faults = faults.on_serial().unwrap();
-    let share = Share::with("rows-dup", PATIENT, move |link| {
-        faults.seed += 1;
-        Box::new(FaultBytes::new(link, &faults))
-    });
+    let share = repeating("rows-dup", 0.005);
     let mut viewer = share.join("viewer");
     let gain = |motor: u8| 70 + i16::from(motor);
     for motor in [1, 2] {

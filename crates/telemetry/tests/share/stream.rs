@@ -1,17 +1,17 @@
 //! A program that follows the motors of a share: rows, events of others, a share that ends or stops.
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::scripted::{Scripted, line};
 use crate::shared::{LIMIT, Share};
 use motorlink_proto::rmd::MotorId;
-use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::frame::{Kind, Reader, append};
+use motorlink_telemetry::share::frame::{Kind, append};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
 use motorlink_telemetry::share::words::Speaks;
@@ -108,46 +108,15 @@ fn events_of_the_line_and_of_the_share_are_told() {
 
 /// A share that was written for the test: it answers all that a stream asks at its begin.
 fn scripted(socket: &UnixListener) -> UnixStream {
-    let (mut stream, _) = socket.accept().unwrap();
-    let (mut dialogue, mut subscriptions) = (Reader::default(), 0);
-    while subscriptions < 2 {
-        let mut out = Vec::new();
-        let mut bytes = [0; 4096];
-        let size = stream.read(&mut bytes).unwrap();
-        dialogue.push(&bytes[..size]);
-        while let Some(request) = dialogue.take().unwrap() {
-            let Request { id, ask } = decode(&request.payload).unwrap();
-            let answer = match ask {
-                Ask::Hello { name, .. } => {
-                    Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
-                }
-                Ask::Lines => Answer::Lines { lines: vec![line()], latched_by: None },
-                Ask::Subscribe { rows: true, drop: DropRule::Newest, .. } => {
-                    subscriptions += 1;
-                    Answer::Subscribe { subscription: subscriptions }
-                }
-                other => panic!("{other:?}"),
-            };
-            append(Kind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
-        }
-        stream.write_all(&out).unwrap();
+    let mut share = Scripted::accept(socket);
+    for subscription in [1, 2] {
+        let line = || Line { t: 100.0, wall: now() as f64 / 1e9, ..line("rmd0", Protocol::Rmd) };
+        let Request { id, ask } = share.asked(line).expect("the stream was closed");
+        let is_right = matches!(ask, Ask::Subscribe { rows: true, drop: DropRule::Newest, .. });
+        assert!(is_right, "{ask:?}");
+        share.answer(id, Answer::Subscribe { subscription });
     }
-    stream
-}
-
-fn line() -> Line {
-    Line {
-        line: "rmd0".to_owned(),
-        protocol: Protocol::Rmd,
-        port: "sim:".to_owned(),
-        profile: None,
-        timeout: 1.0,
-        t: 100.0,
-        wall: now() as f64 / 1e9,
-        counts: None,
-        heard: Vec::new(),
-        unstopped: Vec::new(),
-    }
+    share.stream
 }
 
 #[test]
