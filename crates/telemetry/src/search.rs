@@ -27,7 +27,8 @@ pub fn motors(
 ) -> Result<Vec<Motor>, CommandError> {
     match protocol {
         Protocol::St => st_motors(remote, by),
-        Protocol::Rmd => rmd_motors(remote, by),
+        // On a busy machine the replies of all may be late.
+        Protocol::Rmd => rmd_motors(remote, by).or_else(|_| rmd_motors(remote, by)),
     }
 }
 
@@ -52,7 +53,7 @@ fn st_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError>
 }
 
 fn rmd_motors(remote: &Remote, by: &Arc<str>) -> Result<Vec<Motor>, CommandError> {
-    // On a busy machine one reply may be late.
+    // One reply may be late.
     let ask_once = |id: MotorId| remote.command(by, Request::rmd(id, &ReadStatus), TIME_TO_LIVE);
     let ask = |id: MotorId| ask_once(id).or_else(|_| ask_once(id));
     let answers: Vec<_> = std::thread::scope(|scope| {

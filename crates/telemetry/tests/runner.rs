@@ -2,10 +2,15 @@
 
 mod drives;
 
+use std::collections::BTreeMap;
+use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drives::served;
+use motorlink::rmd::EventClient;
+use motorlink_link::port::{CanLink, EventCan, Evented, Link, PortError};
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command, MotorId, SetSpeed, Stop};
 use motorlink_proto::st;
 use motorlink_proto::time::Micros;
@@ -15,6 +20,8 @@ use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{Reply, Request, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::Runner;
+use motorlink_telemetry::search;
+use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 use motorlink_testbench::{Bench, Serving};
@@ -205,4 +212,45 @@ fn a_remote_outlives_nothing_it_waits_for() {
     drop(runner);
     let result = waiting.join().unwrap();
     assert!(result.is_err(), "{result:?}");
+}
+
+/// A bus that carries no frame with an ID the first two times.
+struct Deaf {
+    bus: Box<dyn EventCan>,
+    asked: BTreeMap<u32, u32>,
+}
+
+impl Link for Deaf {}
+
+impl CanLink for Deaf {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let times = self.asked.entry(frame.id()).or_default();
+        *times += 1;
+        if *times > 2 { self.bus.send(frame) } else { Ok(()) }
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        self.bus.receive(timeout)
+    }
+}
+
+impl Evented for Deaf {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.bus.descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        self.bus.flush()
+    }
+}
+
+#[test]
+fn a_search_asks_all_again_if_nobody_replied() {
+    let drives = Drives::new("late");
+    let port = drives.rmd.parse().unwrap();
+    let deaf = |bus| Box::new(Deaf { bus, asked: BTreeMap::new() }) as Box<_>;
+    let client = EventClient::open_wrapped(&port, deaf, Default::default()).unwrap();
+    let runner = Runner::start("late", Acquisition::new(Box::new(RmdLine::new(client)))).unwrap();
+    let found = search::motors(runner.remote(), &by("search"), Protocol::Rmd).unwrap();
+    assert!(found.contains(&Motor::Rmd(id(1))), "{found:?}");
 }
