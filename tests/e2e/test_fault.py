@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from program import PATIENT, plain
+from program import plain
 
 ST = ("st", "-p", "sim:")
 RMD = ("rmd", "-p", "sim:")
@@ -113,7 +113,7 @@ def test_what_acts_on_the_motor_is_not_verified(run, register):
 
 def test_a_line_that_is_too_slow_is_said_and_again_if_that_changes(run):
     slow = ("--fault", "delay=20ms")
-    table = run(*ST, *slow, *PATIENT, "get", "SPEED_MEAS", "--every", "10ms", "--count", 60).ended(0)
+    table = run(*ST, *slow, "--timeout", "5s", "get", "SPEED_MEAS", "--every", "10ms", "--count", 60).ended(0)
     notes = [line for line in table.err.splitlines() if line]
     assert notes and all(line.startswith("asked 100 Hz; this line carries about ") for line in notes)
     rates = [float(line.split()[-2]) for line in notes]

@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -165,8 +166,24 @@ class Source:
             self.stream(0.1, behind, **wheel(rpm))
 
 
-def turns(direct, rpm=900):
-    eventually(lambda: abs(direct.rpm() - rpm) < 100, "the wheel at speed", within=20)
+def turns(direct, rpm=900, within=20):
+    eventually(lambda: abs(direct.rpm() - rpm) < 100, "the wheel at speed", within)
+
+
+@contextmanager
+def turning(node, direct):
+    """A publisher that turns the wheel: another one if a pause of the machine has ended its motion."""
+    for is_last in (False, False, True):
+        with Publisher(node, **wheel()) as publisher:
+            try:
+                turns(direct, within=7)
+            except AssertionError:
+                if is_last:
+                    raise
+            else:
+                yield publisher
+                return
+        quiet(direct)
 
 
 def angle(direct, motor=2):
@@ -258,8 +275,7 @@ def test_rosbags_reads_a_recording_of_the_topics(node, direct, tmp_path):
 def test_a_motor_stops_when_its_publisher_is_lost(node, direct, how):
     times, number = [], {"killed": signal.SIGKILL, "frozen": signal.SIGSTOP, "silent": signal.SIGUSR1}[how]
     for _ in range(3 * ROUNDS):
-        with Publisher(node, **wheel()) as publisher:
-            turns(direct)
+        with turning(node, direct) as publisher:
             direct.others.clear()
             began = time.time()
             publisher.process.send_signal(number)
@@ -351,8 +367,7 @@ def test_a_network_that_is_cut_stops_the_motor_and_brings_no_old_motion(node, di
     times = []
     for _ in range(ROUNDS):
         before = int(diagnostics("commands").details.get("old", 0))
-        with Cable(node) as cable, Publisher(cable, **wheel()) as publisher:
-            turns(direct)
+        with Cable(node) as cable, turning(cable, direct) as publisher:
             began = time.time()
             cable.process.send_signal(signal.SIGSTOP)
             stop = direct.until(lambda it: event("stopping", motor=1, by="ros2")(it) and it["wall"] > began)
@@ -425,8 +440,7 @@ def test_bytes_that_are_no_command_move_nothing(node, direct, diagnostics):
 def test_one_publisher_commands_at_a_time(node, direct, diagnostics):
     kept = 0
     for _ in range(3 * ROUNDS):
-        with Publisher(node, **wheel(900)):
-            turns(direct)
+        with turning(node, direct):
             with Publisher(node, **wheel(300)) as second:
                 time.sleep(1.0)
                 # Not if the first one was late on a busy machine.
@@ -454,8 +468,7 @@ def test_an_arm_does_not_jump_at_its_start(node, direct, diagnostics):
 
 def test_a_latch_holds_until_commands_begin_again(node, direct, run, diagnostics):
     for _ in range(ROUNDS):
-        with Publisher(node, **wheel()):
-            turns(direct)
+        with turning(node, direct):
             assert run("fleet", "stop-all", within=60, **via(node)).code == 0
             stands(direct)
             run("fleet", "release", **via(node)).ended(0)
@@ -464,20 +477,18 @@ def test_a_latch_holds_until_commands_begin_again(node, direct, run, diagnostics
             assert abs(direct.rpm()) < 30
             eventually(lambda: diagnostics("wheel").level == 2, "a blocked wheel", within=5)
         time.sleep(2 * LIVE)
-        with Publisher(node, **wheel()):
-            turns(direct)
+        with turning(node, direct):
+            pass
         quiet(direct)
 
 
 def test_a_latch_without_a_stop_and_a_program_that_takes_the_motor_stop_it(node, direct, run):
-    with Publisher(node, **wheel()):
-        turns(direct)
+    with turning(node, direct):
         run("fleet", "latch", **via(node)).ended(0)
         stands(direct)
         run("fleet", "release", **via(node)).ended(0)
     time.sleep(2 * LIVE)
-    with Publisher(node, **wheel()):
-        turns(direct)
+    with turning(node, direct):
         assert direct.ask("take", motor={"line": "st0", "motor": 1})["kind"] == "answer"
         stands(direct)
 
@@ -500,8 +511,7 @@ def test_a_wheel_stops_at_zero_and_starts_again(node, direct):
 
 
 def test_stop_all_stops_motors_and_says_so(node, robot, direct):
-    with Publisher(node, **wheel()):
-        turns(direct)
+    with turning(node, direct):
         response = robot.call("/arm1/stop_all")
         assert response.success and response.message == "all motors confirmed"
         stands(direct)
@@ -513,8 +523,7 @@ def test_stop_all_stops_motors_and_says_so(node, robot, direct):
 def test_a_fault_ends_a_motion_until_it_is_cleared_and_commands_begin_again(node, robot, direct, diagnostics):
     sim = node.drives
     fault = {"port": f"pty:{sim.st}", "motor": 1, "fault": "OVER_TEMP"}
-    with Publisher(node, **wheel()):
-        turns(direct)
+    with turning(node, direct):
         sim.do("fault", **fault, hold=True)
         stands(direct)
         eventually(lambda: diagnostics("wheel").level == 2, "an error", within=5)
@@ -529,8 +538,8 @@ def test_a_fault_ends_a_motion_until_it_is_cleared_and_commands_begin_again(node
         assert abs(direct.rpm()) < 30
     time.sleep(2 * LIVE)
     eventually(lambda: diagnostics("wheel").level == 0, "no error", within=5)
-    with Publisher(node, **wheel()):
-        turns(direct)
+    with turning(node, direct):
+        pass
 
 
 def test_a_motor_that_does_not_answer_is_stale_and_has_no_state(node, robot, diagnostics):
