@@ -57,7 +57,7 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --release --locked -p motorlink-cli -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 34 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
@@ -76,17 +76,17 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## 11 min: tests in Rust
+unit: ## 10 min: tests in Rust
 	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
 
-python: $(PYTHON_VENV)/ready ## 5 min: the Python package: its build, types, examples, tests
+python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 12 min: the program against independent clients
+e2e: $(VENV)/ready ## 11 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -100,7 +100,7 @@ ros2: $(VENV)/ready ## 8 min: a node and a ROS 2 machine in Rust; not in `make t
 web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size
 
-browser: web ## 7 min: the monitor in Debian's Chromium, on simulated drives
+browser: web ## 6 min: the monitor in Debian's Chromium, on simulated drives
 	$(if $(AGAIN),,rm -f web/test-results/.last-run.json)
 	-@tests/install browser
 	$(PROGRAM)
@@ -109,17 +109,17 @@ browser: web ## 7 min: the monitor in Debian's Chromium, on simulated drives
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## 3 min: proto and the C face without undefined behaviour
+miri: ## 4 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
-firmware-test: $(VENV)/ready ## 9 min: boards in QEMU against the conformance kit and hosts
+firmware-test: $(VENV)/ready ## 8 min: boards in QEMU against the conformance kit and hosts
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
-lint: ## 11 min: format, clippy, rustdoc: no warning
+lint: ## 10 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz/fuzzers && $(CARGO) fmt --check
