@@ -141,7 +141,8 @@ def nodes(start, sim, tmp_path):
         drives = simulated[name]
         path = tmp_path / f"{name}.share"
         words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", *more]
-        at = ["--connect", started[0].address] if started else ["--listen", "tcp/127.0.0.1:0"]
+        there = [it.address for it in started if it.process.poll() is None]
+        at = ["--connect", there[0]] if there else ["--listen", "tcp/127.0.0.1:0"]
         running = start("node", *words, *at, "--name", name, "--timeout", "5s", "--json")
         running.ready = ready = json.loads(running.line(0))
         assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]

@@ -164,6 +164,29 @@ def test_the_motor_of_a_program_that_takes_no_answers_stops(node, direct, asks):
     stands(direct)
 
 
+@pytest.mark.parametrize("words", [["ramp", "1500", "200"], ["set", "TORQUE_REF", "500"], ["set", "SPEED_KP", "200"]])
+def test_a_motor_that_a_command_takes_stops_at_its_end(node, direct, run, words):
+    holder = Member(node.address, "arm1", deadline=5)
+    holder.lives()
+    holder.turn()
+    turns(direct)
+    run("st", "-p", "zenoh:arm1/st0?take", *words, **via(node)).ended(0)
+    stands(direct)
+
+
+def test_a_motor_that_nobody_holds_stops_with_the_command_that_ramps_it(nodes, run):
+    first = nodes("arm1")
+    Member(first.address, "arm1", deadline=5).turn()
+    turns(Client(first.path, "looks"))
+    first.process.kill()
+    first.process.wait()
+    second = nodes("arm1")
+    direct = Client(second.path, "looks")
+    turns(direct)
+    run("st", "-p", "zenoh:arm1/st0", "ramp", "2000", "200", **via(second)).ended(0)
+    stands(direct)
+
+
 def test_a_fleet_is_listed_as_it_is_now(node, run):
     for _ in range(5):
         run("fleet", "latch", **via(node)).ended(0)

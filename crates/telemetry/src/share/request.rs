@@ -19,6 +19,8 @@ pub(super) struct Configures {
 pub(super) enum Motion {
     /// Whoever sends it is responsible for the stop.
     Starts,
+    /// It changes a motion that continues. Its sender is responsible for the stop if no program is.
+    Changes,
     Stops,
     Keeps,
 }
@@ -32,7 +34,7 @@ pub enum Kind {
     Stops,
     /// It changes something in the drive.
     Changes,
-    /// It may make a motor turn until a stop.
+    /// It may make a motor turn until a stop, or changes how it turns.
     Moves,
 }
 
@@ -43,7 +45,7 @@ impl Kind {
             Motion::Stops => Kind::Stops,
             Motion::Keeps if request.is_read() => Kind::Reads,
             Motion::Keeps => Kind::Changes,
-            Motion::Starts => Kind::Moves,
+            Motion::Starts | Motion::Changes => Kind::Moves,
         }
     }
 
@@ -57,21 +59,29 @@ impl Kind {
 impl Motion {
     pub(super) fn of(request: &Request) -> Self {
         match request {
-            Request::St(_, request) => match Effect::of(&request.request()) {
-                Effect::Starts => Motion::Starts,
-                Effect::Stops => Motion::Stops,
-                _ => Motion::Keeps,
-            },
+            Request::St(_, request) => Motion::of_effect(Effect::of(&request.request())),
             Request::Raw(motor, code, payload) => {
                 let frame = Frame { header: Frame::header(*code, *motor), payload };
-                match Effect::of_frame(&frame) {
-                    Effect::Starts => Motion::Starts,
-                    _ => Motion::Keeps,
+                match Motion::of_effect(Effect::of_frame(&frame)) {
+                    // What the drive makes of such a stop is unknown.
+                    Motion::Stops => Motion::Keeps,
+                    motion => motion,
                 }
             }
             Request::Rmd(_, [code, ..]) if Code::from(*code).ends_motion() => Motion::Stops,
             _ if may_move(request) => Motion::Starts,
             _ => Motion::Keeps,
+        }
+    }
+
+    fn of_effect(effect: Effect) -> Self {
+        match effect {
+            Effect::Starts => Motion::Starts,
+            Effect::Ramps | Effect::Supersedes => Motion::Changes,
+            Effect::Stops => Motion::Stops,
+            Effect::None | Effect::Retargets | Effect::Resets | Effect::Configures(_) => {
+                Motion::Keeps
+            }
         }
     }
 }
@@ -141,4 +151,23 @@ pub(super) fn motor(speaks: Speaks, number: u8) -> Result<Motor, String> {
 
 fn rmd_motor(id: u8) -> Result<MotorId, String> {
     MotorId::new(id).ok_or_else(|| format!("an ID is 1 to {}", MotorId::COUNT))
+}
+
+#[cfg(test)]
+mod tests {
+    use motorlink_proto::st::Profile;
+
+    use super::*;
+
+    #[test]
+    fn what_changes_a_motion_counts_as_motion() {
+        let kind = |bytes: &[u8]| Kind::of_bytes(Speaks::St(Profile::Spec), 1, bytes);
+        let torque = [1, RegisterId::TORQUE_REF.0, 100, 0];
+        for moves in [&[3, 1][..], &[7, 220, 5, 0, 0, 100, 0], &torque] {
+            assert_eq!(kind(moves), Kind::Moves, "{moves:?}");
+        }
+        assert_eq!(kind(&[1, RegisterId::SPEED_KP.0, 44, 1]), Kind::Changes);
+        assert_eq!(kind(&[2, RegisterId::SPEED_MEAS.0]), Kind::Reads);
+        assert_eq!(kind(&[3, 2]), Kind::Stops);
+    }
 }

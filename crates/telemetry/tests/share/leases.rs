@@ -7,6 +7,7 @@ use crate::shared::{PATIENT, Share};
 use motorlink_telemetry::share::message::*;
 
 const RAMP: [u8; 7] = [7, 220, 5, 0, 0, 100, 0];
+const FASTER: [u8; 7] = [7, 208, 7, 0, 0, 100, 0];
 const START: [u8; 2] = [3, 1];
 const STOP: [u8; 2] = [3, 2];
 const SPEED: [u8; 2] = [2, 30];
@@ -85,9 +86,28 @@ fn a_motor_is_taken_explicitly_and_the_log_says_so() {
     assert_eq!(taken.message, "st0, motor 1: bob takes it from alice");
     assert_eq!((taken.by.as_deref(), taken.motor), (Some("bob"), Some(1)));
     held(&mut alice, &RAMP);
-    bob.ask(command("st0", 1, &RAMP)).unwrap();
-    // Until bob starts it, it still turns for alice.
+    bob.ask(command("st0", 1, &FASTER)).unwrap();
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1900.0);
+    // It turns for bob now, who has not started it.
     drop(alice);
+    bob.event(Happening::Left);
+    bob.ask(command("st0", 1, &RAMP)).unwrap();
+    share.reaches("st1.speed_rpm", |rpm| (1400.0..1600.0).contains(&rpm));
+    drop(bob);
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+}
+
+#[test]
+fn a_taken_motor_stops_with_the_program_that_took_it() {
+    let share = share("taken", Duration::from_secs(3600));
+    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
+    turn(&mut alice);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    bob.ask(Ask::Take { motor: motor() }).unwrap();
+    drop(bob);
+    // Alice is still there.
+    let stop = alice.event(Happening::Stopped);
+    assert_eq!((stop.motor, stop.line.as_deref()), (Some(1), Some("st0")));
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
 }
 

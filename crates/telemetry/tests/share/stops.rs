@@ -16,6 +16,8 @@ const NOBODY: u8 = 20;
 
 /// Reads the state of an RMD motor.
 const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+/// SET_RAMP to 800 rpm within 100 ms.
+const RAMP: [u8; 7] = [7, 32, 3, 0, 0, 100, 0];
 /// Turns it with 10 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
 
@@ -171,4 +173,33 @@ fn a_release_ends_the_repeats_where_nothing_has_answered() {
     while program.ask(command("st0", 1, &START)).is_err() {
         assert!(std::time::Instant::now() < end, "the motor does not start");
     }
+}
+
+#[test]
+fn a_motor_without_owner_stops_with_the_program_that_changed_its_speed() {
+    let (share, _) = share_of_a_turning_motor("stops-ramped", false);
+    let mut watcher = Asker::join(&share.path, "watches");
+    let mut program = Asker::join(&share.path, "ramps");
+    program.ask(command("st0", 2, &RAMP)).unwrap();
+    drop(program);
+    let stop = watcher.event(Happening::Stopped);
+    assert_eq!((stop.motor, stop.line.as_deref()), (Some(2), Some("st0")));
+    share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
+}
+
+#[test]
+fn a_motor_stays_with_its_owner_if_another_program_changes_its_speed() {
+    let share = Share::new("stops-owned");
+    let mut owner = Asker::join(&share.path, "owns");
+    let mut program = Asker::join(&share.path, "ramps");
+    owner.ask(command("st0", 1, &RAMP)).unwrap();
+    owner.ask(command("st0", 1, &START)).unwrap();
+    program.ask(command("st0", 1, &RAMP)).unwrap();
+    drop(program);
+    owner.event(Happening::Left);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 700.0);
+    let stopped = owner.events.iter().find(|it| it.event == Happening::Stopping);
+    assert!(stopped.is_none(), "{stopped:?}");
+    drop(owner);
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
 }

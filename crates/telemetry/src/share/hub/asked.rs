@@ -334,7 +334,7 @@ impl Hub {
         let ended_with = move |result| tell(Work::Command(sent, result));
         let begun = match motion {
             Motion::Stops => held.remote().stop_then(name, request, ended_with),
-            Motion::Starts | Motion::Keeps => {
+            Motion::Starts | Motion::Changes | Motion::Keeps => {
                 held.remote().command_then(name, request, time_to_live, ended_with)
             }
         };

@@ -41,7 +41,7 @@ impl Hub {
         Ok(())
     }
 
-    /// A program takes a motor from the one that has it.
+    /// A program takes a motor from the one that has it, and is responsible for its stop from now on.
     pub(super) fn take(
         &mut self,
         session: SessionId,
@@ -57,6 +57,9 @@ impl Hub {
         let is_held = held.lease_of_another(motor, session, now).is_some();
         let lease = Lease { session, name: Arc::clone(name), until: now + length };
         let before = held.leases.insert(motor, lease);
+        if let Some(owner) = held.owners.get_mut(&motor) {
+            *owner = session;
+        }
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
             let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
@@ -67,6 +70,17 @@ impl Hub {
 }
 
 impl Held {
+    /// A program has moved a motor. Meanwhile another one may have taken it.
+    pub(super) fn own(&mut self, motor: Motor, session: SessionId) {
+        let owner = self.leases.get(&motor).map_or(session, |lease| lease.session);
+        self.owners.insert(motor, owner);
+    }
+
+    /// Whether a program is responsible for the stop of a motor.
+    pub(super) fn has_owner(&self, motor: Motor) -> bool {
+        self.owners.contains_key(&motor) || self.is_starting(motor)
+    }
+
     /// A program has left.
     pub(super) fn give_leases_back(&mut self, gone: SessionId) {
         self.leases.retain(|_, lease| lease.session != gone);

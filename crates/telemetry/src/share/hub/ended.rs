@@ -190,7 +190,7 @@ impl Hub {
             (Motion::Starts, result) => {
                 // The owner stays if the start was refused.
                 if result.as_ref().err().is_none_or(may_be_executed) {
-                    held.owners.insert(motor, session);
+                    held.own(motor, session);
                 }
                 let mut all = None;
                 if result.is_ok() {
@@ -206,7 +206,14 @@ impl Hub {
                 let name = self.sessions.get(&session).and_then(|session| session.name.clone());
                 held.not_stopped(motor, &name.unwrap_or_else(|| "share".into()), error);
             }
-            (Motion::Keeps, _) => {}
+            // A motor may turn since before this share began.
+            (Motion::Changes, result) if !held.has_owner(motor) => {
+                if result.as_ref().err().is_none_or(may_be_executed) {
+                    held.own(motor, session);
+                    self.stop_if_orphaned(line, motor, Why::Asked);
+                }
+            }
+            (Motion::Changes | Motion::Keeps, _) => {}
         }
     }
 }
