@@ -3,6 +3,8 @@
 import json
 import os
 import struct
+import subprocess
+import sys
 import threading
 import time
 
@@ -147,3 +149,39 @@ class Member:
         ramp = self.command(7, *struct.pack("<iH", rpm, 100))
         start = self.command(3, 1)
         assert {ramp["kind"], start["kind"]} == {"answer"}, (ramp, start)
+
+
+#: A cable between two addresses. SIGSTOP cuts it; what waits passes after SIGCONT.
+CABLE = """
+import socket, sys, threading
+near = socket.create_server(("127.0.0.1", 0))
+print(near.getsockname()[1], flush=True)
+
+def passes(source, target):
+    while data := source.recv(65536):
+        target.sendall(data)
+
+while True:
+    one, _ = near.accept()
+    host, port = sys.argv[1].rsplit(":", 1)
+    other = socket.create_connection((host, int(port)))
+    for ends in ((one, other), (other, one)):
+        threading.Thread(target=passes, args=ends, daemon=True).start()
+"""
+
+
+class Cable:
+    """The way to a node, which can be cut."""
+
+    def __init__(self, node):
+        words = [sys.executable, "-c", CABLE, node.address.removeprefix("tcp/")]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        self.address = f"tcp/127.0.0.1:{int(self.process.stdout.readline())}"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()

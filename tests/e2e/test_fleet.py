@@ -7,7 +7,9 @@ import struct
 import time
 
 import pytest
+from mcap.reader import make_reader
 
+from fleeting import Cable
 from monitoring import Site, is_kind, kind
 from program import eventually
 from sharing import Client, are_still, speeds
@@ -288,3 +290,67 @@ def test_one_recording_has_all_nodes_and_says_when_one_was_silent(start, run, vi
     assert not any(of.startswith("arm1") for event, of in of if event == "lost")
     about = check(run("info", file, "--json").ended(0).out)[0]
     assert about["messages"] > 1000
+
+
+@pytest.fixture
+def pair(nodes, run):
+    """Two nodes at one network, of which the second one has found its motors."""
+    pair = nodes("arm2"), nodes("arm1")
+
+    def found():
+        listed = check(run("fleet", "list", "--via", pair[0].address, "--json").ended(0).out)
+        [lines] = [it["lines"] for it in listed if it["node"] == "arm1"]
+        return [len(line.get("heard", [])) for line in lines] == [2, 4]
+
+    eventually(found, "all motors")
+    return pair
+
+
+def recorded(start, address, file):
+    words = ("--via", address, "--node", "arm1", "-o", file, "--rate", "50", "--no-settings", "--json")
+    recording = start("fleet", "record", *words)
+    recording.line(0)
+    return recording
+
+
+def last_times(file):
+    """When the last value of each motor came, by the log."""
+    times = {}
+    with open(file, "rb") as opened:
+        for _, channel, message in make_reader(opened).iter_messages():
+            if channel.topic.endswith("/signals"):
+                times[channel.topic] = message.log_time / 1e9
+    return times
+
+
+def test_the_end_of_a_recording_waits_for_what_is_late(start, pair, tmp_path):
+    file = tmp_path / "run.mcap"
+    with Cable(pair[0]) as cable:
+        recording = recorded(start, cable.address, file)
+        time.sleep(1)
+        cable.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        ends = time.time()
+        recording.interrupt()
+        time.sleep(0.5)
+        cable.process.send_signal(signal.SIGCONT)
+        assert recording.wait(20) == 0
+    times = last_times(file)
+    assert len(times) == 6 and min(times.values()) > ends - 0.2, (ends, times)
+
+
+def test_a_node_that_is_started_again_is_recorded_again_soon(start, nodes, pair, run, tmp_path):
+    file = tmp_path / "run.mcap"
+    other, node = pair
+    recording = recorded(start, other.address, file)
+    time.sleep(1)
+    node.process.kill()
+    node.process.wait()
+    nodes("arm1")
+    back = time.time()
+    time.sleep(8)
+    recording.interrupt()
+    assert recording.wait(20) == 0
+    assert min(last_times(file).values()) > back + 6
+    events = check(run("info", file, "--events", "--json").ended(0).out)
+    assert {"lost", "back"} <= {it["event"] for it in events}, events

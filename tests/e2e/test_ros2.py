@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fleeting import network
+from fleeting import Cable, network
 from program import eventually
 from sharing import Client, event
 from test_node import stands, via
@@ -325,42 +325,6 @@ def test_samples_that_waited_in_a_network_move_nothing(node, direct, diagnostics
         assert abs(direct.rpm()) < 30
         eventually(lambda: int(diagnostics("commands").details.get("old", 0)) >= before + 40, "40 old samples")
         source.zenoh.close()
-
-
-#: A cable between two addresses. SIGSTOP cuts it; what waits passes after SIGCONT.
-CABLE = """
-import socket, sys, threading
-near = socket.create_server(("127.0.0.1", 0))
-print(near.getsockname()[1], flush=True)
-
-def passes(source, target):
-    while data := source.recv(65536):
-        target.sendall(data)
-
-while True:
-    one, _ = near.accept()
-    host, port = sys.argv[1].rsplit(":", 1)
-    other = socket.create_connection((host, int(port)))
-    for ends in ((one, other), (other, one)):
-        threading.Thread(target=passes, args=ends, daemon=True).start()
-"""
-
-
-class Cable:
-    """The way to a node, which can be cut."""
-
-    def __init__(self, node):
-        words = [sys.executable, "-c", CABLE, node.address.removeprefix("tcp/")]
-        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-        self.address = f"tcp/127.0.0.1:{int(self.process.stdout.readline())}"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
 
 
 def test_a_network_that_is_cut_stops_the_motor_and_brings_no_old_motion(node, direct, diagnostics):

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::certificate::Certificate;
 
 /// What all configurations of Motorlink say: paths, and values in JSON.
-const USUAL: [(&str, &str); 6] = [
+const USUAL: [(&str, &str); 7] = [
     // Only the given addresses are used.
     ("scouting/multicast/enabled", "false"),
     ("scouting/gossip/enabled", "false"),
@@ -19,6 +19,12 @@ const USUAL: [(&str, &str); 6] = [
     (
         "qos/network",
         r#"[{"messages": ["put", "delete", "query"], "overwrite": {"congestion_control": "drop"}}]"#,
+    ),
+    // A busy computer sends late, so more may wait than usual before something is dropped: a lost question
+    // costs a second.
+    (
+        "transport/link/tx/queue/size",
+        r#"{"real_time": 16, "interactive_high": 16, "data_high": 16, "data": 16}"#,
     ),
     // A network that was cut is there again soon. What must happen in time does not depend on it.
     ("transport/link/tx/lease", "3000"),

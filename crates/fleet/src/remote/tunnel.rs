@@ -21,6 +21,7 @@ use tokio::time::{sleep, timeout};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, Reply};
+use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session as Zenoh, Wait};
 
 use crate::VERSION;
@@ -40,6 +41,8 @@ const FOUND: f64 = 1.0;
 const JOINED: f64 = 2.0;
 /// A question before the session is asked again after this time: it may be lost on a busy network.
 const ASKED: Duration = Duration::from_millis(400);
+/// How long a node may be silent whose next run has begun, in seconds: more than a pull takes.
+const RESTARTED: f64 = 1.5;
 /// The pause after an answer that did not come.
 const PAUSE: Duration = Duration::from_millis(50);
 /// A program that has ended waits so long for the node to know it.
@@ -113,6 +116,7 @@ enum Next {
     Read(io::Result<usize>),
     Answered(Answered),
     Written(io::Result<OwnedWriteHalf>),
+    Began(Option<Name>),
     Due,
 }
 
@@ -142,6 +146,10 @@ pub(super) struct Tunnel {
     heard: f64,
     /// The next sign of life, once it has commanded something.
     sign: Option<f64>,
+    /// Runs of nodes with this name that begin.
+    begun: Runs,
+    /// Whether the node has begun again, or another one has its name.
+    has_successor: bool,
     _here: LivelinessToken,
     _counted: Counted,
 }
@@ -166,14 +174,16 @@ impl Tunnel {
         let here = line.zenoh.liveliness().declare_token(here).await;
         let here = here.map_err(|error| failed(error.to_string()))?;
         let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
+        let begun = line.zenoh.liveliness().declare_subscriber(key::alive_of(&line.node)).await;
+        let begun = begun.map_err(|error| failed(error.to_string()))?;
         let join = Ask::Join { protocol: VERSION, program: own_program(), deadline, motion };
-        let begun = Boot.now();
+        let from = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
             match line.ask(scope, &join, Priority::RealTime, ASKED).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
-                None if Boot.now() > begun + JOINED => {
+                None if Boot.now() > from + JOINED => {
                     return Err(failed(line.unanswered(scope)));
                 }
                 None => sleep(PAUSE).await,
@@ -209,6 +219,8 @@ impl Tunnel {
             pull_from: now,
             heard: now,
             sign: None,
+            begun,
+            has_successor: false,
             _here: here,
             _counted: Counted::new(),
         };
@@ -227,6 +239,9 @@ impl Tunnel {
             }
             match self.next(now, &mut bytes).await {
                 Next::Due => {}
+                Next::Began(run) => {
+                    self.has_successor |= run.is_some_and(|run| run != self.line.boot);
+                }
                 Next::Read(Ok(0) | Err(_)) => break None,
                 Next::Read(Ok(size)) => {
                     self.frames.push(&bytes[..size]);
@@ -248,15 +263,21 @@ impl Tunnel {
 
     async fn next(&mut self, now: f64, bytes: &mut [u8]) -> Next {
         let pull = self.may_pull().then_some(self.pull_from);
-        let lost = Some(self.heard + self.patience);
+        let lost = Some(self.heard + self.patience());
         let due = [self.outgoing.next_due(), self.sign, pull, lost].into_iter().flatten();
         let wait = span((due.fold(f64::INFINITY, f64::min) - now).max(0.0));
         tokio::select! {
             read = self.reader.read(bytes) => Next::Read(read),
             Some(answered) = self.answered.recv() => Next::Answered(answered),
             Some(written) = self.done.recv() => Next::Written(written),
+            Ok(sample) = self.begun.recv_async() => Next::Began(run_of_sample(&sample)),
             () = sleep(wait) => Next::Due,
         }
+    }
+
+    /// How long the node may be silent. If it has begun again, its last run says nothing any more.
+    fn patience(&self) -> f64 {
+        if self.has_successor { self.patience.min(RESTARTED) } else { self.patience }
     }
 
     /// Takes the requests of the program.
@@ -398,7 +419,10 @@ impl Tunnel {
 
     /// Why the node cannot be used any more.
     fn is_lost(&self, now: f64) -> Option<String> {
-        if now > self.heard + self.patience {
+        if now > self.heard + self.patience() {
+            if self.has_successor {
+                return Some("it was started again".to_owned());
+            }
             let why = "it does not answer: it is away, or the network is cut; motors of this program \
                 stop at the node";
             return Some(format!("{why} (nothing for {:.1} s)", now - self.heard));
@@ -500,6 +524,14 @@ impl Line {
     ) -> Option<(Answer, Vec<u8>)> {
         first_of(self.send(scope, ask, priority, timeout)?).await
     }
+}
+
+type Runs = zenoh::pubsub::Subscriber<zenoh::handlers::FifoChannelHandler<Sample>>;
+
+/// The run of a node that begins with this sample.
+fn run_of_sample(sample: &Sample) -> Option<Name> {
+    let begins = sample.kind() == SampleKind::Put;
+    begins.then(|| key::run_of(sample.key_expr().as_str())).flatten().map(|(_, boot)| boot)
 }
 
 type Replies = zenoh::handlers::FifoChannelHandler<Reply>;

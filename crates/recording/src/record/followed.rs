@@ -27,7 +27,13 @@ pub(super) struct Followed {
     stream: Stream,
     /// Whether events of the share itself are recorded here. One line of each share has them.
     has_events_of_share: bool,
+    /// When it began.
+    since: Time,
 }
+
+/// The share counts values of whole seconds: before this time, in ns, also those of a second that began before
+/// the recording.
+const RATES_FROM: u64 = 2_100_000_000;
 
 /// These signals of a line of a share, which has its own name for the line.
 pub(super) fn target((share, name): Place, line: &Line, groups: &[Group], by: &str) -> Target {
@@ -48,7 +54,7 @@ pub(super) fn streams(targets: Vec<(String, Target)>) -> Result<Vec<Stream>, Rec
 
 impl Followed {
     pub(super) fn new(content: Content, stream: Stream, has_events_of_share: bool) -> Self {
-        Followed { content, stream, has_events_of_share }
+        Followed { content, stream, has_events_of_share, since: wall_now() }
     }
 
     pub(super) fn content(&self) -> &Content {
@@ -57,6 +63,14 @@ impl Followed {
 
     pub(super) fn ask_rates(&mut self, now: Time) {
         self.stream.ask_rates(now.0);
+    }
+
+    pub(super) fn ask_last(&mut self, now: Time) {
+        self.stream.ask_last(now.0);
+    }
+
+    pub(super) fn awaits_last(&self) -> bool {
+        self.stream.awaits_last()
     }
 
     /// Takes what came. `put` receives the messages.
@@ -84,6 +98,7 @@ impl Followed {
             }
             Item::Unconfirmed(rows) => self.content.unconfirmed(rows),
             Item::Lost(count) => self.content.lost(now, count, put),
+            Item::Rates(_) if now.0.saturating_sub(self.since.0) < RATES_FROM => {}
             Item::Rates(rates) => self.rates(&rates),
             Item::Event(time, event) => self.event(Time(time), event, put),
             Item::Down(why) => self.content.told(now, of_line(Happening::Lost, why), put),

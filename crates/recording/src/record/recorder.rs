@@ -32,8 +32,11 @@ pub(super) const RATES: Duration = Duration::from_millis(1_100);
 /// How long the end waits until the last values are confirmed.
 const CONFIRMATION: Duration = Duration::from_millis(500);
 
-/// How long the end waits for the last rows of a share, which it confirms within 0.1 s.
+/// How long the end waits until a share has said its last rows, which it confirms within 0.1 s.
 const OF_SHARE: Duration = Duration::from_millis(250);
+
+/// How long it waits for them besides. A share that says nothing is given up earlier.
+const LAST: Duration = Duration::from_secs(5);
 
 /// Whom losses of the recorder itself concern, in events.
 const RECORDER: &str = "recorder";
@@ -326,6 +329,13 @@ fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut L
         std::thread::park_timeout(TURN);
         turn(recorded, writer, losses);
     }
+    // A network may be late with what the shares have said.
+    recorded.iter_mut().for_each(Recorded::ask_last);
+    let asked = Instant::now();
+    while recorded.iter().any(Recorded::awaits_last) && asked.elapsed() < LAST {
+        std::thread::park_timeout(TURN);
+        turn(recorded, writer, losses);
+    }
 }
 
 impl Recorded {
@@ -387,6 +397,16 @@ impl Recorded {
                 followed.content().counts
             }
         }
+    }
+
+    fn ask_last(&mut self) {
+        if let Recorded::Share(followed) = self {
+            followed.ask_last(wall_now());
+        }
+    }
+
+    fn awaits_last(&self) -> bool {
+        matches!(self, Recorded::Share(followed) if followed.awaits_last())
     }
 
     /// Asks for the rates without waiting for them.

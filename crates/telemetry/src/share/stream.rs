@@ -103,6 +103,18 @@ impl Stream {
         }
     }
 
+    /// Asks the share for a last answer. Until it has come, [`awaits_last`](Self::awaits_last) is true.
+    pub fn ask_last(&mut self, now: u64) {
+        if let Some(connection) = &mut self.connection {
+            connection.ask_last(now);
+        }
+    }
+
+    /// Whether something that the share said before [`ask_last`](Self::ask_last) may still come.
+    pub fn awaits_last(&self) -> bool {
+        !self.is_down && self.connection.as_ref().is_some_and(Connection::awaits_last)
+    }
+
     /// What came until now.
     pub fn take(&mut self, now: u64) -> VecDeque<Item> {
         self.advance(now);

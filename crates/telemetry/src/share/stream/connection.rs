@@ -51,6 +51,7 @@ enum Asked {
     Lines,
     Subscribe(usize),
     Rates,
+    Last,
 }
 
 /// Where the values of a group go.
@@ -111,6 +112,17 @@ impl Connection {
             let _ = self.ask(Asked::Rates, rates, now);
             let _ = self.ask(Asked::Lines, Ask::Lines, now);
         }
+    }
+
+    /// Asks for something, to know when all that the share has said until now has come.
+    pub(super) fn ask_last(&mut self, now: u64) {
+        // A connection that is lost is noticed when it is read.
+        let _ = self.ask(Asked::Last, Ask::Lines, now);
+    }
+
+    /// Whether [`ask_last`](Self::ask_last) has no answer.
+    pub(super) fn awaits_last(&self) -> bool {
+        self.pending.values().any(|(asked, _)| *asked == Asked::Last)
     }
 
     /// How many of the wanted signals have a subscription.
@@ -231,7 +243,7 @@ impl Connection {
                 self.subscriptions.insert(subscription, number);
             }
             (Asked::Rates, Answer::Rates { rates }) => items.push_back(Item::Rates(rates)),
-            (Asked::Hello, Answer::Hello { .. }) => {}
+            (Asked::Hello, Answer::Hello { .. }) | (Asked::Last, Answer::Lines { .. }) => {}
             _ => return Err("nothing answers like a share".to_owned()),
         }
         Ok(())
@@ -239,7 +251,11 @@ impl Connection {
 
     /// Whether it is asked again and again.
     fn is_again(&self, asked: Asked) -> bool {
-        asked == Asked::Rates || asked == Asked::Lines && self.clock.is_some()
+        match asked {
+            Asked::Rates | Asked::Last => true,
+            Asked::Lines => self.clock.is_some(),
+            Asked::Hello | Asked::Subscribe(_) => false,
+        }
     }
 
     fn group(&mut self, group: &Group, followed: &Followed) {
