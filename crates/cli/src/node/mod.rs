@@ -142,7 +142,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// The name of the node: that in the certificate of its network, if there is one.
 fn name(given: Option<&Name>, network: &Network) -> Result<Name, Failure> {
     if let Some(role @ (Role::Operator | Role::Viewer)) = network.role() {
-        let message = format!("{network} is the file of a {}, which cannot be a node", role.word());
+        let message =
+            format!("{network} is a file of the role {}, which cannot be a node", role.word());
         return Err(
             Failure::usage(message).trying("`motorlink fleet init DIR --node NAME` makes one")
         );
