@@ -183,7 +183,8 @@ def test_a_motor_that_nobody_holds_stops_with_the_command_that_ramps_it(nodes, r
     second = nodes("arm1")
     direct = Client(second.path, "looks")
     turns(direct)
-    run("st", "-p", "zenoh:arm1/st0", "ramp", "2000", "200", **via(second)).ended(0)
+    ramp = run("st", "-p", "zenoh:arm1/st0", "ramp", "2000", "200", **via(second)).ended(0)
+    assert "if no other program turns it" in ramp.err
     stands(direct)
 
 

@@ -370,7 +370,7 @@ def test_a_program_has_the_name_of_its_certificate(site, run):
     name = run("node", "-p", "sim:", "--name", "arm7", "--network", site.file("arm1")).ended(2)
     assert "is that of arm1, not of arm7" in name.err
     role = run("node", "-p", "sim:", "--network", site.file("bob")).ended(2)
-    assert "the file of a viewer" in role.err
+    assert "a file of the role viewer" in role.err
     again = run("node", "-p", "sim:", "--network", site.file("arm1")).ended(3)
     assert "another node of this network has the name arm1" in again.err
 

@@ -170,6 +170,16 @@ pub fn tell_of_stop(port: &PortName) {
     }
 }
 
+/// Says, after a command that changes the motion of a motor, when the holder of the port stops it.
+pub fn tell_of_owner(port: &PortName) {
+    if port.is_held() {
+        note(
+            "this command ends: the share stops the motor now if it was taken with ?take, or if no other \
+             program turns it",
+        );
+    }
+}
+
 /// The name of a port in the messages of clients.
 pub fn name_in_messages(port: &str) -> Arc<str> {
     port.trim_end_matches(':').into()

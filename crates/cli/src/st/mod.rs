@@ -22,7 +22,7 @@ pub use refusal::reason_of_read;
 use session::connect;
 pub use units::StUnits;
 
-use crate::connection::{Connection, tell_of_stop};
+use crate::connection::{Connection, tell_of_owner, tell_of_stop};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::keep_error;
@@ -59,9 +59,12 @@ fn run_at(
                 _ => failure,
             };
             let session = connect().map_err(of_stop)?;
+            let changes_motion = act.can_turn();
             act::run(&session, act)?;
             if session.client.started().next().is_some() {
                 tell_of_stop(port);
+            } else if changes_motion {
+                tell_of_owner(port);
             }
             Ok(())
         }
