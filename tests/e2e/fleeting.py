@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import zenoh
 
@@ -151,6 +152,23 @@ class Member:
         assert {ramp["kind"], start["kind"]} == {"answer"}, (ramp, start)
 
 
+class Killed:
+    """A Python program that is killed at the end. Its first line is `said`."""
+
+    def __init__(self, *words):
+        words = [sys.executable, *words]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent)
+        self.said = self.process.stdout.readline()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
 #: A cable between two addresses. SIGSTOP cuts it; what waits passes after SIGCONT.
 CABLE = """
 import socket, sys, threading
@@ -170,18 +188,9 @@ while True:
 """
 
 
-class Cable:
+class Cable(Killed):
     """The way to a node, which can be cut."""
 
     def __init__(self, node):
-        words = [sys.executable, "-c", CABLE, node.address.removeprefix("tcp/")]
-        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-        self.address = f"tcp/127.0.0.1:{int(self.process.stdout.readline())}"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
+        super().__init__("-c", CABLE, node.address.removeprefix("tcp/"))
+        self.address = f"tcp/127.0.0.1:{int(self.said)}"

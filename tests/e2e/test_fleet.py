@@ -292,22 +292,8 @@ def test_one_recording_has_all_nodes_and_says_when_one_was_silent(start, run, vi
     assert about["messages"] > 1000
 
 
-@pytest.fixture
-def pair(nodes, run):
-    """Two nodes at one network, of which the second one has found its motors."""
-    pair = nodes("arm2"), nodes("arm1")
-
-    def found():
-        listed = check(run("fleet", "list", "--via", pair[0].address, "--json").ended(0).out)
-        [lines] = [it["lines"] for it in listed if it["node"] == "arm1"]
-        return [len(line.get("heard", [])) for line in lines] == [2, 4]
-
-    eventually(found, "all motors")
-    return pair
-
-
 def recorded(start, address, file):
-    words = ("--via", address, "--node", "arm1", "-o", file, "--rate", "50", "--no-settings", "--json")
+    words = ("--via", address, "--node", "arm2", "-o", file, "--rate", "50", "--no-settings", "--json")
     recording = start("fleet", "record", *words)
     recording.line(0)
     return recording
@@ -323,9 +309,9 @@ def last_times(file):
     return times
 
 
-def test_the_end_of_a_recording_waits_for_what_is_late(start, pair, tmp_path):
+def test_the_end_of_a_recording_waits_for_what_is_late(start, arms, tmp_path):
     file = tmp_path / "run.mcap"
-    with Cable(pair[0]) as cable:
+    with Cable(arms[0]) as cable:
         recording = recorded(start, cable.address, file)
         time.sleep(1)
         cable.process.send_signal(signal.SIGSTOP)
@@ -339,14 +325,14 @@ def test_the_end_of_a_recording_waits_for_what_is_late(start, pair, tmp_path):
     assert len(times) == 6 and min(times.values()) > ends - 0.2, (ends, times)
 
 
-def test_a_node_that_is_started_again_is_recorded_again_soon(start, nodes, pair, run, tmp_path):
+def test_a_node_that_is_started_again_is_recorded_again_soon(start, nodes, arms, run, tmp_path):
     file = tmp_path / "run.mcap"
-    other, node = pair
+    other, node = arms
     recording = recorded(start, other.address, file)
     time.sleep(1)
     node.process.kill()
     node.process.wait()
-    nodes("arm1")
+    nodes("arm2")
     back = time.time()
     time.sleep(8)
     recording.interrupt()

@@ -8,8 +8,6 @@ import math
 import os
 import signal
 import struct
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fleeting import Cable, network
+from fleeting import Cable, Killed, network
 from program import eventually
 from sharing import Client, event
 from test_node import stands, via
@@ -110,21 +108,12 @@ def diagnostics(robot):
     return last
 
 
-class Publisher:
+class Publisher(Killed):
     """A process that publishes commands until it is killed."""
 
     def __init__(self, node, **message):
-        words = [sys.executable, "robot.py", node.address, str(PERIOD), json.dumps(message)]
-        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent)
-        assert self.process.stdout.readline() == "ready\n"
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
+        super().__init__("robot.py", node.address, str(PERIOD), json.dumps(message))
+        assert self.said == "ready\n"
 
 
 class Source:

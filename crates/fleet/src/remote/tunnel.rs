@@ -116,7 +116,7 @@ enum Next {
     Read(io::Result<usize>),
     Answered(Answered),
     Written(io::Result<OwnedWriteHalf>),
-    Began(Option<Name>),
+    Seen(Sample),
     Due,
 }
 
@@ -146,8 +146,8 @@ pub(super) struct Tunnel {
     heard: f64,
     /// The next sign of life, once it has commanded something.
     sign: Option<f64>,
-    /// Runs of nodes with this name that begin.
-    begun: Runs,
+    /// Which runs of nodes with this name begin or go away.
+    runs: Runs,
     /// Whether the node has begun again, or another one has its name.
     has_successor: bool,
     _here: LivelinessToken,
@@ -174,16 +174,16 @@ impl Tunnel {
         let here = line.zenoh.liveliness().declare_token(here).await;
         let here = here.map_err(|error| failed(error.to_string()))?;
         let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
-        let begun = line.zenoh.liveliness().declare_subscriber(key::alive_of(&line.node)).await;
-        let begun = begun.map_err(|error| failed(error.to_string()))?;
+        let runs = line.zenoh.liveliness().declare_subscriber(key::alive_of(&line.node)).await;
+        let runs = runs.map_err(|error| failed(error.to_string()))?;
         let join = Ask::Join { protocol: VERSION, program: own_program(), deadline, motion };
-        let from = Boot.now();
+        let begun = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
             match line.ask(scope, &join, Priority::RealTime, ASKED).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
-                None if Boot.now() > from + JOINED => {
+                None if Boot.now() > begun + JOINED => {
                     return Err(failed(line.unanswered(scope)));
                 }
                 None => sleep(PAUSE).await,
@@ -219,7 +219,7 @@ impl Tunnel {
             pull_from: now,
             heard: now,
             sign: None,
-            begun,
+            runs,
             has_successor: false,
             _here: here,
             _counted: Counted::new(),
@@ -239,9 +239,7 @@ impl Tunnel {
             }
             match self.next(now, &mut bytes).await {
                 Next::Due => {}
-                Next::Began(run) => {
-                    self.has_successor |= run.is_some_and(|run| run != self.line.boot);
-                }
+                Next::Seen(sample) => self.saw(&sample),
                 Next::Read(Ok(0) | Err(_)) => break None,
                 Next::Read(Ok(size)) => {
                     self.frames.push(&bytes[..size]);
@@ -270,9 +268,16 @@ impl Tunnel {
             read = self.reader.read(bytes) => Next::Read(read),
             Some(answered) = self.answered.recv() => Next::Answered(answered),
             Some(written) = self.done.recv() => Next::Written(written),
-            Ok(sample) = self.begun.recv_async() => Next::Began(run_of_sample(&sample)),
+            Ok(sample) = self.runs.recv_async() => Next::Seen(sample),
             () = sleep(wait) => Next::Due,
         }
+    }
+
+    /// A run of a node with this name has begun or is away.
+    fn saw(&mut self, sample: &Sample) {
+        let run = key::run_of(sample.key_expr().as_str());
+        let is_other = run.is_some_and(|(_, boot)| boot != self.line.boot);
+        self.has_successor |= is_other && sample.kind() == SampleKind::Put;
     }
 
     /// How long the node may be silent. If it has begun again, its last run says nothing any more.
@@ -527,12 +532,6 @@ impl Line {
 }
 
 type Runs = zenoh::pubsub::Subscriber<zenoh::handlers::FifoChannelHandler<Sample>>;
-
-/// The run of a node that begins with this sample.
-fn run_of_sample(sample: &Sample) -> Option<Name> {
-    let begins = sample.kind() == SampleKind::Put;
-    begins.then(|| key::run_of(sample.key_expr().as_str())).flatten().map(|(_, boot)| boot)
-}
 
 type Replies = zenoh::handlers::FifoChannelHandler<Reply>;
 

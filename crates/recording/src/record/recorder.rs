@@ -325,17 +325,17 @@ fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut L
             Recorded::Share(_) => began.elapsed() < OF_SHARE,
         })
     };
-    while is_pending(recorded) && began.elapsed() < CONFIRMATION {
-        std::thread::park_timeout(TURN);
-        turn(recorded, writer, losses);
-    }
+    let mut turn_while = |recorded: &mut [Recorded], is_so: &dyn Fn(&[Recorded]) -> bool| {
+        while is_so(recorded) {
+            std::thread::park_timeout(TURN);
+            turn(recorded, writer, losses);
+        }
+    };
+    turn_while(recorded, &|it| is_pending(it) && began.elapsed() < CONFIRMATION);
     // A network may be late with what the shares have said.
     recorded.iter_mut().for_each(Recorded::ask_last);
     let asked = Instant::now();
-    while recorded.iter().any(Recorded::awaits_last) && asked.elapsed() < LAST {
-        std::thread::park_timeout(TURN);
-        turn(recorded, writer, losses);
-    }
+    turn_while(recorded, &|it| it.iter().any(Recorded::awaits_last) && asked.elapsed() < LAST);
 }
 
 impl Recorded {

@@ -33,6 +33,15 @@ fn turn(program: &mut Asker) {
     program.ask(command("st0", 1, &START)).unwrap();
 }
 
+/// A share whose motor turns for Alice, and Bob.
+fn turning_for_alice(name: &str, lease: Duration) -> (Share, Asker, Asker) {
+    let share = share(name, lease);
+    let [mut alice, bob] = ["alice", "bob"].map(|who| Asker::join(&share.path, who));
+    turn(&mut alice);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    (share, alice, bob)
+}
+
 /// Waits for the end of a lease, and changes the motor then.
 fn gets(program: &mut Asker, bytes: &[u8]) {
     let end = Instant::now() + PATIENT;
@@ -43,10 +52,7 @@ fn gets(program: &mut Asker, bytes: &[u8]) {
 
 #[test]
 fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
-    let share = share("one", Duration::from_millis(10));
-    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
-    turn(&mut alice);
-    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    let (share, mut alice, mut bob) = turning_for_alice("one", Duration::from_millis(10));
     // The lease is over; the motor turns.
     for bytes in [&RAMP[..], &START, &GAIN] {
         assert_eq!(
@@ -78,9 +84,7 @@ fn a_lease_ends_by_itself_and_when_its_program_leaves() {
 
 #[test]
 fn a_motor_is_taken_explicitly_and_the_log_says_so() {
-    let share = share("take", Duration::from_secs(3600));
-    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
-    turn(&mut alice);
+    let (share, mut alice, mut bob) = turning_for_alice("take", Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     let taken = alice.event(Happening::Taken);
     assert_eq!(taken.message, "st0, motor 1: bob takes it from alice");
@@ -99,10 +103,7 @@ fn a_motor_is_taken_explicitly_and_the_log_says_so() {
 
 #[test]
 fn a_taken_motor_stops_with_the_program_that_took_it() {
-    let share = share("taken", Duration::from_secs(3600));
-    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
-    turn(&mut alice);
-    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    let (share, mut alice, mut bob) = turning_for_alice("taken", Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     drop(bob);
     // Alice is still there.
