@@ -15,11 +15,11 @@ class RawLine:
     def __init__(self, path):
         self.end = os.open(path, os.O_RDWR | os.O_NOCTTY)
 
-    def say(self, words, answer):
-        """Writes, and reads until the answer came."""
+    def say(self, words, *answers):
+        """Writes, and reads until one of the answers came."""
         os.write(self.end, words)
         came = b""
-        while answer not in came:
+        while not any(answer in came for answer in answers):
             assert select.select([self.end], [], [], 10)[0], came
             came += os.read(self.end, 4096)
 

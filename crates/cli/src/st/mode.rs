@@ -140,7 +140,7 @@ pub fn meaning(session: &Session, frame: &Frame<'_>) -> Option<String> {
     let mut out = [0; MAX_FRAME];
     let bytes = frame.encode(&mut out)?;
     let mut text = format!("sent {}", Transcript::new(profile).note(None, true, bytes).trim());
-    if matches!(Effect::of_frame(frame), Effect::Starts | Effect::Ramps | Effect::Supersedes) {
+    if Effect::of_frame(frame).moves() {
         text += "; the motor may turn now";
     }
     Some(text)

@@ -1,4 +1,4 @@
-//! Follows what somebody else's master says to a drive: which motors it may have started.
+//! Follows what somebody else's master says to a drive: which motors it may have set in motion.
 
 use motorlink_proto::st::{
     Command, Effect, ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse,
@@ -7,8 +7,9 @@ use motorlink_proto::st::{
 
 /// Reads along on a line, from the host's bytes and the drive's.
 ///
-/// It errs to one side. A START counts wherever in the stream its bytes stand: a drive that is out
-/// of step, or that completes a frame which was cut off, may take them for one. A STOP counts only
+/// It errs to one side. A request that starts or changes a motion counts wherever in the stream its
+/// bytes stand: a drive that is out of step, or that completes a frame which was cut off, may take them
+/// for one. A STOP counts only
 /// when it was one whole request and was acknowledged, on a line that has been in sync all the time.
 /// So it is with PFC_ENABLE and PFC_DISABLE.
 #[derive(Debug, Default)]
@@ -78,7 +79,7 @@ impl Follower {
                 self.recent.remove(0);
             }
             self.recent.push(byte);
-            self.look_for_start();
+            self.look_for_motion();
         }
     }
 
@@ -139,14 +140,14 @@ impl Follower {
         self.started.forget_current();
     }
 
-    /// Whether the bytes up to the last one end in what sets something going.
-    fn look_for_start(&mut self) {
+    /// Whether the bytes up to the last one end in a request that starts or changes a motion.
+    fn look_for_motion(&mut self) {
         for begin in 0..self.recent.len() {
             let (frame, size) = match Frame::parse(&self.recent[begin..]) {
                 Parse::Frame(frame, size) if begin + size == self.recent.len() => (frame, size),
                 _ => continue,
             };
-            if Effect::of_frame(&frame) == Effect::Starts {
+            if Effect::of_frame(&frame).moves() {
                 // What is unanswered before it may change the current motor.
                 if self.out_of_sync || self.request.len() != size {
                     self.started.forget_current();

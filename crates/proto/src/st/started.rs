@@ -1,4 +1,4 @@
-//! The motors that were started and not stopped, according to requests and replies.
+//! The motors that were set in motion and not stopped, according to requests and replies.
 
 use super::{Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request};
 
@@ -21,6 +21,8 @@ pub enum Effect {
     Ramps,
     /// It may replace the speed ramp of a start by another setpoint.
     Supersedes,
+    /// It ends a ramp at the speed that the motor has.
+    EndsRamp,
     /// It may reset the drive.
     Resets,
     /// It configures this data segment.
@@ -32,32 +34,52 @@ impl Effect {
     pub fn of(request: &Request<'_>) -> Self {
         match request {
             Request::ExecuteCommand(command) => Effect::of_command(*command),
-            Request::SetRegister { register, .. } => match *register {
-                RegisterId::TARGET_MOTOR => Effect::Retargets,
-                RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
-                // A change of mode may activate the drive's own reference.
-                RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
-                    Effect::Supersedes
-                }
-                _ => Effect::None,
-            },
-            Request::SetRamp(_) => Effect::Ramps,
+            Request::SetRegister { register, .. } => Effect::of_write(*register),
             Request::ConfigureSegment { segment, .. } => Effect::Configures(*segment),
-            Request::SetCurrentReference(_)
-            | Request::SetTorqueRamp(_)
-            | Request::SetPosition(_) => Effect::Supersedes,
+            request => Effect::of_code(request.code()),
+        }
+    }
+
+    /// The effect of a frame that has neither command nor register.
+    pub const fn of_code(code: FrameCode) -> Self {
+        match code {
+            FrameCode::SetRamp => Effect::Ramps,
+            FrameCode::SetCurrentRef | FrameCode::SetTorqueRamp | FrameCode::SetPositionCmd => {
+                Effect::Supersedes
+            }
+            _ => Effect::None,
+        }
+    }
+
+    /// The effect of SET_REG.
+    pub const fn of_write(register: RegisterId) -> Self {
+        match register {
+            RegisterId::TARGET_MOTOR => Effect::Retargets,
+            RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
+            // A change of mode may activate the drive's own reference.
+            RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
+                Effect::Supersedes
+            }
             _ => Effect::None,
         }
     }
 
     /// The effect of EXECUTE_CMD.
-    const fn of_command(command: Command) -> Self {
+    pub const fn of_command(command: Command) -> Self {
         match command {
             Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
             Command::StopMotor | Command::ScStop => Effect::Stops,
+            Command::StopRamp => Effect::EndsRamp,
+            // The defaults of the drive may be any.
+            Command::IqdrefClear => Effect::Supersedes,
             Command::Reset => Effect::Resets,
             _ => Effect::None,
         }
+    }
+
+    /// Whether it may start a motion, or change one that goes on: the sender is responsible for the stop.
+    pub const fn moves(self) -> bool {
+        matches!(self, Effect::Starts | Effect::Ramps | Effect::EndsRamp | Effect::Supersedes)
     }
 
     /// Whether a request stops a motor.
@@ -88,15 +110,16 @@ impl Effect {
     }
 }
 
-/// The started motors. A motor counts as started as soon as a START is sent, because the reply may
-/// be lost. It counts until a STOP is acknowledged.
+/// The started motors. A motor counts as started as soon as a request is sent that starts or changes
+/// its motion ([`Effect::moves`]): the reply may be lost, and another program may have started it before.
+/// It counts until a STOP is acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Started {
     /// Bit n: motor n + 1.
     motors: u8,
     /// The motor that motor number 0 addresses; `None` if unknown.
     current: Option<MotorNumber>,
-    /// The motors that counted as started before a START to motor number 0. `None` after motor
+    /// The motors that counted as started before a motion of motor number 0. `None` after motor
     /// number 0 may address another motor.
     before_zero: Option<u8>,
 }
@@ -108,7 +131,7 @@ impl Started {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
         }
-        if effect == Effect::Starts {
+        if effect.moves() {
             self.presume(motor);
         }
         let addressed = self.addressed(motor);
@@ -148,13 +171,13 @@ impl Started {
         }
     }
 
-    /// Records the motors that a START anywhere in `bytes` addresses as started. Shipped firmware
+    /// Records the motors that a motion anywhere in `bytes` addresses as started. Shipped firmware
     /// reads the payload of the longest frame as frames (docs/SPEC-NOTES.md S10).
     pub(super) fn presume_within(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while let [_, behind @ ..] = rest {
             if let Parse::Frame(frame, _) = Frame::parse(rest)
-                && Effect::of_frame(&frame) == Effect::Starts
+                && Effect::of_frame(&frame).moves()
             {
                 self.presume(frame.motor());
             }

@@ -1,5 +1,6 @@
 //! Tests of simulated drives through their protocol, on virtual time.
 
+mod motion;
 mod rmd_bench;
 mod rmd_motion;
 mod rmd_plant;

@@ -12,6 +12,7 @@ pub fn with_bits(bits: u8) -> RmdConfig {
     config
 }
 
+#[derive(Clone)]
 pub struct NodeFixture {
     pub bus: RmdBus<Vec<RmdNode>>,
     pub now: Instant,

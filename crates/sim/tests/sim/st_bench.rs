@@ -12,6 +12,7 @@ use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation, Truth};
 /// The code of a NACK.
 pub type Nack = u8;
 
+#[derive(Clone)]
 pub struct NodeFixture {
     pub station: StStation<Vec<StMotor>>,
     pub now: Instant,

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use motorlink::port::{NotDone, PortError};
 use motorlink::{Clock, LinkState};
-use motorlink_proto::rmd::{Code, MotorId, ReadStatus};
+use motorlink_proto::rmd::{Code, MotorId, ReadStatus, Stop};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
 use motorlink_proto::time::Instant;
@@ -232,6 +232,17 @@ pub trait Line: Send {
 }
 
 impl Request {
+    /// Stops a motor.
+    pub fn stop(motor: Motor) -> Self {
+        match motor {
+            Motor::St(motor) => {
+                let stop = proto::Request::ExecuteCommand(proto::Command::StopMotor);
+                Request::st(motor.number(), stop)
+            }
+            Motor::Rmd(id) => Request::rmd(id, &Stop),
+        }
+    }
+
     /// The motor that it is for; `None` for the current motor of an ST drive.
     pub fn motor(&self) -> Option<Motor> {
         match self {
@@ -300,11 +311,7 @@ pub fn may_move(request: &Request) -> bool {
         Request::St(_, request) => {
             let request = request.request();
             let aligns = request == proto::Request::ExecuteCommand(proto::Command::EncoderAlign);
-            aligns
-                || matches!(
-                    Effect::of(&request),
-                    Effect::Starts | Effect::Ramps | Effect::Supersedes
-                )
+            aligns || Effect::of(&request).moves()
         }
         Request::Rmd(_, [code, ..]) => {
             let code = Code::from(*code);

@@ -77,11 +77,9 @@ impl Motion {
     fn of_effect(effect: Effect) -> Self {
         match effect {
             Effect::Starts => Motion::Starts,
-            Effect::Ramps | Effect::Supersedes => Motion::Changes,
+            effect if effect.moves() => Motion::Changes,
             Effect::Stops => Motion::Stops,
-            Effect::None | Effect::Retargets | Effect::Resets | Effect::Configures(_) => {
-                Motion::Keeps
-            }
+            _ => Motion::Keeps,
         }
     }
 }

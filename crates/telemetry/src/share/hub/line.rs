@@ -7,8 +7,6 @@ use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::port::{Place, PortName};
-use motorlink_proto::rmd::Stop;
-use motorlink_proto::st as proto;
 use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
@@ -52,6 +50,8 @@ pub struct Held {
     pub(super) words: Words,
     /// Who turned a motor last. They may have left; then its stop is not confirmed.
     pub(super) owners: BTreeMap<Motor, SessionId>,
+    /// Programs and the motors that they have moved. Another program may own these by now.
+    pub(super) movers: BTreeSet<(Motor, SessionId)>,
     /// Who may change a motor, if one program at a time may.
     pub(super) leases: BTreeMap<Motor, Lease>,
     /// Starts that the engine has not finished, and who sent them.
@@ -100,6 +100,7 @@ impl Held {
             events,
             words: Words::default(),
             owners: BTreeMap::new(),
+            movers: BTreeSet::new(),
             leases: BTreeMap::new(),
             starting: Vec::new(),
             sequences: BTreeSet::new(),
@@ -321,7 +322,7 @@ impl Held {
             let ended = ended.clone();
             let tell = move |result| drop(ended.send((motor, result)));
             // An engine that has ended has stopped its motors.
-            let _ = self.remote().stop_then(by, stop(motor), tell);
+            let _ = self.remote().stop_then(by, Request::stop(motor), tell);
         }
         drop(ended);
         let owed: Vec<(Motor, CommandResult)> = results.iter().collect();
@@ -336,16 +337,5 @@ impl Held {
             }
         }
         stopped
-    }
-}
-
-/// What stops a motor.
-pub(super) fn stop(motor: Motor) -> Request {
-    match motor {
-        Motor::St(motor) => {
-            let stop = proto::Request::ExecuteCommand(proto::Command::StopMotor);
-            Request::st(motor.number(), stop)
-        }
-        Motor::Rmd(id) => Request::rmd(id, &Stop),
     }
 }
