@@ -903,7 +903,12 @@ time_to_live: number,
  * Whether it is sent only if nothing has stopped the motor, and no other program has moved it,
  * since the program's last command to it without this.
  */
-continues?: boolean, } | { "ask": "confirm", 
+continues?: boolean, 
+/**
+ * Whether it is refused with `held` if another program has moved, taken or stopped the motor since
+ * this one moved it. For stops that nobody asked for: those of a program that ends.
+ */
+own?: boolean, } | { "ask": "confirm", 
 /**
  * The line.
  */

@@ -174,8 +174,8 @@ pub fn tell_of_stop(port: &PortName) {
 pub fn tell_of_owner(port: &PortName) {
     if port.is_held() {
         note(
-            "this command ends: the share stops the motor now if it was taken with ?take, or if no other \
-             program turns it",
+            "this command ends: the share stops the motor now if the command started it, if it was taken \
+             with ?take, or if no other program turns it",
         );
     }
 }

@@ -21,6 +21,7 @@ async fn turning(world: &World) -> (Program, Listener) {
         bytes: TURN.to_vec(),
         time_to_live: 10.0,
         continues: false,
+        own: false,
     };
     assert!(matches!(drive.ask(command).await, Ok(Answer::Command { .. })));
     world.reaches("rmd1.speed_dps", |dps| dps > 300.0).await;

@@ -17,7 +17,7 @@ const STOP: u8 = 0x81;
 
 fn turn() -> Ask {
     let (line, bytes) = ("rmd0".to_owned(), TURN.to_vec());
-    Ask::Command { line, motor: 1, bytes, time_to_live: 10.0, continues: false }
+    Ask::Command { line, motor: 1, bytes, time_to_live: 10.0, continues: false, own: false }
 }
 
 /// A link whose share has ended.

@@ -142,9 +142,10 @@ fn move_and_wait(session: &Session, target: PositionMove, wait: &Wait) -> Result
         motor,
         || motor.prepare_move(target, options),
         || Ok(motor.set_position(target)?),
-        |is_sent| match is_sent {
-            true => vec![(session.motor, motor.stop_until_confirmed())],
-            false => Vec::new(),
+        |is_sent| {
+            let client = is_sent.then_some(&session.client);
+            let stopped = client.map(|client| client.stop_on_drop().stop_now()).unwrap_or_default();
+            stopped.into_iter().map(|one| (one.motor.number(), one.result)).collect()
         },
         " and holds no load",
     )?;

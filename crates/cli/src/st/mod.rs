@@ -59,12 +59,12 @@ fn run_at(
                 _ => failure,
             };
             let session = connect().map_err(of_stop)?;
-            let changes_motion = act.can_turn();
+            let starts = matches!(act, Act::Start { .. } | Act::StartStop);
             act::run(&session, act)?;
-            if session.client.started().next().is_some() {
-                tell_of_stop(port);
-            } else if changes_motion {
-                tell_of_owner(port);
+            match session.client.started().next() {
+                Some(_) if starts => tell_of_stop(port),
+                Some(_) => tell_of_owner(port),
+                None => {}
             }
             Ok(())
         }

@@ -163,6 +163,7 @@ impl Common {
                         bytes,
                         time_to_live: SEARCH,
                         continues: false,
+                        own: false,
                     })
                     .await;
             }

@@ -1,8 +1,10 @@
 //! What a node asks of its motors through its share.
 
-use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, ReadStatus, Status as RmdStatus};
+use motorlink_proto::rmd::{
+    ClearErrors, Command as _, Payload, ReadStatus, Status as RmdStatus, Stop,
+};
 use motorlink_proto::st::{Command, Flags, MAX_PAYLOAD, RegisterId, Request, Starting, Status};
-use motorlink_telemetry::share::message::{Answer, Ask, MotorName, Reason, StoppedMotor};
+use motorlink_telemetry::share::message::{Answer, Ask, Reason, StoppedMotor};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
@@ -29,26 +31,30 @@ pub struct Sent {
 const READ: f64 = 2.0;
 
 impl Asking {
-    async fn send(&self, bytes: Vec<u8>, sent: Sent) -> Result<Vec<u8>, Refusal> {
+    async fn send(&self, bytes: Vec<u8>, sent: Sent, own: bool) -> Result<Vec<u8>, Refusal> {
         let Sent { time_to_live, continues } = sent;
         let (line, motor) = (self.line.clone(), self.motor.number());
-        match self.program.ask(Ask::Command { line, motor, bytes, time_to_live, continues }).await?
-        {
+        let ask = Ask::Command { line, motor, bytes, time_to_live, continues, own };
+        match self.program.ask(ask).await? {
             Answer::Command { bytes } => Ok(bytes),
             _ => Err(self.unfit()),
         }
     }
 
-    /// Sends a request to an ST drive; gives the payload of its acknowledge.
-    pub async fn st(&self, request: &Request<'_>, sent: Sent) -> Result<Vec<u8>, Refusal> {
+    fn bytes(&self, request: &Request<'_>) -> Result<Vec<u8>, Refusal> {
         let mut payload = [0; MAX_PAYLOAD];
         let payload = request.payload(&mut payload).ok_or_else(|| self.unfit())?;
-        self.send([&[request.code().number()], payload].concat(), sent).await
+        Ok([&[request.code().number()], payload].concat())
+    }
+
+    /// Sends a request to an ST drive; gives the payload of its acknowledge.
+    pub async fn st(&self, request: &Request<'_>, sent: Sent) -> Result<Vec<u8>, Refusal> {
+        self.send(self.bytes(request)?, sent, false).await
     }
 
     /// Sends eight bytes to an RMD motor; gives the eight of its reply.
     pub async fn rmd(&self, bytes: [u8; 8], sent: Sent) -> Result<[u8; 8], Refusal> {
-        self.send(bytes.to_vec(), sent).await?.try_into().map_err(|_| self.unfit())
+        self.send(bytes.to_vec(), sent, false).await?.try_into().map_err(|_| self.unfit())
     }
 
     /// Reads a register of an ST motor.
@@ -100,13 +106,19 @@ impl Asking {
         Ok((!errors.is_empty()).then(|| errors.to_string()))
     }
 
-    /// Stops the motor. Gives why it was not confirmed.
+    /// Stops the motor, unless another program has moved, taken or stopped it since. Gives why it was not
+    /// confirmed.
     pub async fn stop(&self) -> Option<String> {
-        let motor = MotorName { line: self.line.clone(), motor: self.motor.number() };
-        match stop(&self.program, Some(motor)).await {
-            Ok(motors) => motors.into_iter().find_map(|motor| motor.failure),
-            Err(refusal) => Some(refusal.message),
-        }
+        let bytes = match self.motor {
+            Motor::St(_) => self.bytes(&Request::ExecuteCommand(Command::StopMotor)),
+            Motor::Rmd(_) => Ok(Stop.encode().to_vec()),
+        };
+        let sent = Sent { time_to_live: 0.0, continues: false };
+        let stopped = match bytes {
+            Ok(bytes) => self.send(bytes, sent, true).await,
+            Err(why) => Err(why),
+        };
+        stopped.err().filter(|why| why.reason != Reason::Held).map(|why| why.message)
     }
 
     fn unfit(&self) -> Refusal {
@@ -119,12 +131,9 @@ pub fn refused(message: String) -> Refusal {
     Refusal::new(Reason::Refused, message)
 }
 
-/// Stops a motor, or all that the lines can have. Gives how they took it.
-pub async fn stop(
-    program: &Program,
-    motor: Option<MotorName>,
-) -> Result<Vec<StoppedMotor>, Refusal> {
-    match program.ask(Ask::Stop { motor }).await? {
+/// Stops all motors that the lines can have. Gives how they took it.
+pub async fn stop_all(program: &Program) -> Result<Vec<StoppedMotor>, Refusal> {
+    match program.ask(Ask::Stop { motor: None }).await? {
         Answer::Stop { motors } => Ok(motors),
         _ => Err(Refusal::new(Reason::Line, "the share gives another answer")),
     }

@@ -338,6 +338,11 @@ impl PortError {
         matches!(self, PortError::NotDone { kind: Latched | Held | Usage | Unsent, .. })
     }
 
+    /// Whether the program that holds the port says that another one has the motor now.
+    pub fn is_of_another(&self) -> bool {
+        matches!(self, PortError::NotDone { kind: NotDone::Held, .. })
+    }
+
     /// Whether the program that holds the port has no reply of the drive. What stops a motor it has
     /// repeated before.
     pub fn is_given_up(&self) -> bool {

@@ -63,6 +63,15 @@ pub trait Link: Send {
             within.expire_next(time_to_live);
         }
     }
+
+    /// From now on, whether requests are only for motors that no other program has moved, taken or stopped
+    /// since this one moved them. A program that holds the port refuses the others
+    /// ([`NotDone::Held`](super::NotDone::Held)).
+    fn only_own(&self, is_set: bool) {
+        if let Some(within) = self.within() {
+            within.only_own(is_set);
+        }
+    }
 }
 
 impl<L: Link + ?Sized> Link for Box<L> {
@@ -88,6 +97,10 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn expire_next(&self, time_to_live: Duration) {
         (**self).expire_next(time_to_live);
+    }
+
+    fn only_own(&self, is_set: bool) {
+        (**self).only_own(is_set);
     }
 }
 

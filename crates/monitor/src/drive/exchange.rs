@@ -26,12 +26,13 @@ pub(super) struct Exchanges<'a> {
     pub(super) target: &'a Target,
     time_to_live: f64,
     continues: bool,
+    own: bool,
 }
 
 impl<'a> Exchanges<'a> {
     /// Exchanges that move nothing.
     pub(super) fn new(program: &'a Program, target: &'a Target) -> Self {
-        Exchanges { program, target, time_to_live: TIME_TO_LIVE, continues: false }
+        Exchanges { program, target, time_to_live: TIME_TO_LIVE, continues: false, own: false }
     }
 
     /// Commands that may move the motor.
@@ -42,6 +43,11 @@ impl<'a> Exchanges<'a> {
     /// Commands that are not sent if the motor was stopped since the last one without this.
     pub(super) fn continues(self) -> Self {
         Exchanges { continues: true, ..self }
+    }
+
+    /// Stops that are not sent if another program has moved, taken or stopped the motor since.
+    pub(super) fn own(self) -> Self {
+        Exchanges { own: true, ..self }
     }
 
     /// Waits until no other request of the session waits for its confirmation.
@@ -86,8 +92,8 @@ impl<'a> Exchanges<'a> {
 
     async fn send(&self, motor: u8, bytes: Vec<u8>) -> Result<Vec<u8>, Refusal> {
         let (line, time_to_live) = (self.target.name.line.clone(), self.time_to_live);
-        let continues = self.continues;
-        let ask = Ask::Command { line, motor, bytes, time_to_live, continues };
+        let (continues, own) = (self.continues, self.own);
+        let ask = Ask::Command { line, motor, bytes, time_to_live, continues, own };
         match self.program.ask(ask).await? {
             Answer::Command { bytes } => Ok(bytes),
             _ => Err(self.unfit()),

@@ -16,7 +16,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::message::{Answer as ShareAnswer, Ask, Reason};
+use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::{Program, Refusal};
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
@@ -406,24 +406,23 @@ impl References {
     /// The motor must not keep turning at a speed in between. Gives why it was stopped, and how it took that.
     async fn stop(&self, why: &Refusal) -> String {
         self.control.stopping(&self.target);
-        let ask = Ask::Stop { motor: Some(self.target.name.clone()) };
-        let failure = match self.program.ask(ask).await {
-            Ok(ShareAnswer::Stop { motors }) => motors.into_iter().find_map(|one| one.failure),
-            Ok(_) => Some("the share gives another answer".to_owned()),
-            Err(refusal) => Some(refusal.message),
+        let stop = Request::stop(self.target.motor);
+        let exchanges = Exchanges::new(&self.program, &self.target).own();
+        let stopped = match exchanges.request(&stop).await {
+            Ok(_) => "the motor confirmed its stop".to_owned(),
+            Err(other) if other.reason == Reason::Held => other.message,
+            Err(failure) => {
+                format!("it did not confirm its stop and may keep turning: {}", failure.message)
+            }
         };
-        let stopped = failure.map_or_else(
-            || "the motor confirmed its stop".to_owned(),
-            |failure| format!("it did not confirm its stop and may keep turning: {failure}"),
-        );
         format!("{}; {stopped}", why.message)
     }
 }
 
 /// Whether a stop, another command or the end of the page ended the references. An event says so.
 fn is_ended_by_others(why: &Refusal) -> bool {
-    use Reason::{Displaced, Lapsed, Latched, Overtaken};
-    matches!(why.reason, Displaced | Lapsed | Latched | Overtaken)
+    use Reason::{Displaced, Held, Lapsed, Latched, Overtaken};
+    matches!(why.reason, Displaced | Held | Lapsed | Latched | Overtaken)
 }
 
 fn wanted<Q: Quantity>(value: f64) -> Result<Q, Refusal> {

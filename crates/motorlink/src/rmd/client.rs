@@ -263,6 +263,14 @@ impl Client {
         })
     }
 
+    /// While `act` stops motors, those that another program has moved since are left as they are.
+    pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
+        self.turns.take().only_own(true);
+        let result = act();
+        self.turns.take().only_own(false);
+        result
+    }
+
     /// Whether another program holds the port.
     pub(super) fn is_held(&self) -> bool {
         self.turns.take().session.is_held
@@ -433,6 +441,14 @@ impl<L: CanLink> Driven<L> {
         Driven { port, session, exchanges: 0 }
     }
 
+    /// See [`Link::only_own`].
+    fn only_own(&mut self, is_own: bool) {
+        self.session.is_own = is_own;
+        if let Some(link) = self.port.open_link() {
+            link.only_own(is_own);
+        }
+    }
+
     /// Makes ready for these requests.
     fn ready(&mut self, requests: impl IntoIterator<Item = [u8; 8]>) -> Result<(), Error> {
         self.abandon();
@@ -466,6 +482,7 @@ impl<L: CanLink> Driven<L> {
         let now = self.port.now();
         let (link, reopened) = self.port.link()?;
         if reopened {
+            link.only_own(self.session.is_own);
             self.session.reopened(now);
             if link.is_fresh() {
                 self.session.trust();

@@ -54,6 +54,8 @@ pub(super) struct Session {
     is_retired: bool,
     /// Whether another program holds the port.
     pub(super) is_held: bool,
+    /// Whether requests are for motors that no other program has moved since.
+    pub(super) is_own: bool,
     /// Motors of which that program has no reply, and knows that they are there.
     pub(super) missed: MotorSet,
     timeout: Duration,
@@ -118,6 +120,7 @@ impl Session {
             losses: [0; MotorId::COUNT],
             is_retired: false,
             is_held: false,
+            is_own: false,
             missed: MotorSet::EMPTY,
             timeout: options.timeout,
             not_done: Vec::new(),
@@ -155,8 +158,7 @@ impl Session {
             self.missed.insert(id);
         }
         // Who holds the motor answers for it.
-        let is_held = matches!(why, PortError::NotDone { kind: NotDone::Held, .. });
-        if is_held || why.is_unsent() && self.begun.contains(id) {
+        if why.is_of_another() || why.is_unsent() && self.begun.contains(id) {
             self.moving.remove(id);
             self.unexpected.remove(id);
         }

@@ -66,8 +66,12 @@ impl StopOnDrop<'_> {
 
     fn stop_all(&self) -> Vec<Stopped> {
         self.bus.abandon();
-        let Stopping { confirmed, failed, .. } = self.bus.stop_moved(self.action);
-        let failed = failed.into_iter().map(|(id, error)| Stopped { id, result: Err(error) });
+        let Stopping { confirmed, failed, .. } =
+            self.bus.for_own(|| self.bus.stop_moved(self.action));
+        // The other program stops a motor that it has moved since.
+        let is_own = |(_, error): &(MotorId, Error)| !matches!(error, Error::Port(error) if error.is_of_another());
+        let failed = failed.into_iter().filter(is_own);
+        let failed = failed.map(|(id, error)| Stopped { id, result: Err(error) });
         confirmed.map(|id| Stopped { id, result: Ok(()) }).chain(failed).collect()
     }
 }

@@ -183,6 +183,14 @@ impl Client {
         result
     }
 
+    /// While `act` stops motors, those that another program has moved since are left as they are.
+    pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
+        self.turns.take().only_own(true);
+        let result = act();
+        self.turns.take().only_own(false);
+        result
+    }
+
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
         self.turns.take().session.counters()
@@ -416,6 +424,14 @@ impl<L: ByteLink> Driven<L> {
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
+    /// See [`Link::only_own`].
+    fn only_own(&mut self, is_own: bool) {
+        self.session.is_own = is_own;
+        if let Some(link) = self.port.open_link() {
+            link.only_own(is_own);
+        }
+    }
+
     /// Begins an exchange with motor number `motor`.
     pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.ready_for(Effect::of(request))?;
@@ -457,6 +473,7 @@ impl<L: ByteLink> Driven<L> {
         self.abandon();
         let (link, reopened) = self.port.link()?;
         if reopened {
+            link.only_own(self.session.is_own);
             self.session.reopened();
             if link.is_fresh() {
                 self.session.trust_line();

@@ -43,6 +43,8 @@ pub(super) struct Session {
     is_retired: bool,
     /// Whether another program holds the port.
     is_held: bool,
+    /// Whether requests are for motors that no other program has moved since.
+    pub(super) is_own: bool,
     timeout: Duration,
 }
 
@@ -113,6 +115,7 @@ impl Session {
             last: LastExchange::default(),
             is_retired: false,
             is_held: false,
+            is_own: false,
             timeout: options.timeout,
         }
     }

@@ -115,7 +115,7 @@ fn divided(stopped: Vec<Stopped>) -> (Vec<Stopped>, Vec<Stopped>) {
 
 fn is_to_be_repeated(stopped: &Stopped) -> bool {
     let is_over = |error: &Error| match error {
-        Error::Port(error) => error.is_given_up(),
+        Error::Port(error) => error.is_given_up() || error.is_of_another(),
         error => error.is_refusal(),
     };
     stopped.result.as_ref().is_err_and(|error| !is_over(error))
@@ -175,14 +175,22 @@ impl StopOnDrop<'_> {
 
     fn stop_all(&self) -> Vec<Stopped> {
         self.client.abandon();
-        let mut stopped = self.client.stop_motors(self.client.started().collect());
-        for Stopped { motor, result } in &mut stopped {
+        let started = self.client.started().collect();
+        let mut stopped = self.client.for_own(|| self.client.stop_motors(started));
+        stopped.retain_mut(|Stopped { motor, result }| match result {
             // A motor that does not exist does not turn.
-            if let Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) = result {
+            Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
                 self.client.forget_motor(*motor);
                 *result = Ok(());
+                true
             }
-        }
+            // The other program stops it.
+            Err(Error::Port(error)) if error.is_of_another() => {
+                self.client.forget_motor(*motor);
+                false
+            }
+            _ => true,
+        });
         stopped
     }
 }

@@ -102,6 +102,10 @@ pub enum Ask {
         /// since the program's last command to it without this.
         #[serde(default, skip_serializing_if = "is_false")]
         continues: bool,
+        /// Whether it is refused with `held` if another program has moved, taken or stopped the motor since
+        /// this one moved it. For stops that nobody asked for: those of a program that ends.
+        #[serde(default, skip_serializing_if = "is_false")]
+        own: bool,
     },
     /// Asks whether the answers to this program's commands since the last confirmation belong to
     /// them. Replies can come twice or late on a bad line.

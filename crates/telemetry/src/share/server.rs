@@ -23,6 +23,10 @@ use crate::line::Stopped;
 const BATCH: Duration = Duration::from_millis(25);
 /// Bytes that wait for a program outside the queues of its subscriptions.
 const WAITING: usize = 1 << 16;
+/// Connections besides those of programs: they stop motors.
+const STOPS: usize = 12;
+/// How long one of them may take. A stop that is under way is awaited.
+const STOPPING: Duration = Duration::from_secs(10);
 /// How long a connection may have no name: it takes the place of another program.
 const HELLO: Duration = Duration::from_secs(5);
 /// A request that may have waited longer than this before it was read is that much older. The share
@@ -62,6 +66,8 @@ pub enum ServerError {
 /// The connection of a program.
 struct Client {
     session: SessionId,
+    /// Whether all places of programs were taken when it came.
+    only_stops: bool,
     stream: UnixStream,
     since: Instant,
     reader: Reader,
@@ -119,6 +125,10 @@ impl Server {
             client.receive(&mut self.hub, self.clock.now());
             if client.since.elapsed() > HELLO && !self.hub.is_named(client.session) {
                 self.hub.close(client.session, format!("no `hello` within {} s", HELLO.as_secs()));
+            }
+            let is_idle = !self.hub.is_waiting(client.session);
+            if client.only_stops && client.since.elapsed() > STOPPING && is_idle {
+                self.hub.close(client.session, full());
             }
         }
         self.hub.advance();
@@ -189,13 +199,21 @@ impl Server {
             if stream.set_nonblocking(true).is_err() {
                 continue;
             }
-            let session = self.hub.join();
-            if self.clients.len() >= MOST_CLIENTS {
-                let why = format!("the share has {MOST_CLIENTS} programs, which is the limit");
-                self.hub.close(session, why);
+            let programs = self.clients.iter().filter(|client| !client.only_stops).count();
+            let only_stops = programs >= MOST_CLIENTS;
+            let session = if only_stops { self.hub.join_to_stop(full()) } else { self.hub.join() };
+            if self.clients.len() >= MOST_CLIENTS + STOPS {
+                // Whoever says nothing gives way to whoever may want a stop.
+                let hub = &self.hub;
+                let mut unnamed = self.clients.iter_mut().filter(|it| !hub.is_named(it.session));
+                match unnamed.find(|client| !client.is_gone) {
+                    Some(oldest) => oldest.is_gone = true,
+                    None => self.hub.close(session, full()),
+                }
             }
             self.clients.push(Client {
                 session,
+                only_stops,
                 stream,
                 since: Instant::now(),
                 reader: Reader::new(LONGEST_REQUEST),
@@ -263,4 +281,11 @@ impl Client {
             while matches!(self.stream.read(&mut bytes), Ok(1..)) && Instant::now() < until {}
         }
     }
+}
+
+/// Why a program has no place.
+fn full() -> String {
+    format!(
+        "the share has {MOST_CLIENTS} programs, which is the limit; of others it takes only stops"
+    )
 }

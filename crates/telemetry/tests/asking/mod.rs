@@ -112,5 +112,6 @@ pub fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
         bytes: bytes.to_vec(),
         time_to_live: 10.0,
         continues: false,
+        own: false,
     }
 }

@@ -105,7 +105,8 @@ fn a_refusal_of_the_drive_is_a_nack() {
     let share = Share::new("frames-nack");
     let mut program = Program::of(&share);
     let (line, bytes) = ("st0".to_owned(), vec![3, 99]);
-    let ask = Ask::Command { line, motor: 1, bytes, time_to_live: 5.0, continues: false };
+    let ask =
+        Ask::Command { line, motor: 1, bytes, time_to_live: 5.0, continues: false, own: false };
     assert_eq!(program.ask(ask).unwrap_err().reason, Reason::Refused);
     let frames = program.frames("st0", None, None);
     let at = frames.iter().position(|frame| frame.result == WireResult::Nack).unwrap();

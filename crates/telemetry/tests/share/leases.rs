@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::asking::{Asker, command};
 use crate::shared::{PATIENT, Share};
+use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
 
 const RAMP: [u8; 7] = [7, 220, 5, 0, 0, 100, 0];
@@ -118,4 +119,30 @@ fn a_share_without_leases_refuses_to_take() {
     let mut program = Asker::join(&share.path, "alice");
     let refusal = program.ask(Ask::Take { motor: motor() }).unwrap_err();
     assert_eq!(refusal.reason, Reason::Usage);
+}
+
+fn own(bytes: &[u8]) -> Ask {
+    let Ask::Command { line, motor, bytes, time_to_live, continues, .. } = command("st0", 1, bytes)
+    else {
+        unreachable!()
+    };
+    Ask::Command { line, motor, bytes, time_to_live, continues, own: true }
+}
+
+#[test]
+fn a_program_from_which_a_motor_was_taken_does_not_stop_it_at_its_end() {
+    let (share, mut alice, mut bob) = turning_for_alice("end", PATIENT);
+    let lost = |refusal: Result<Answer, Refusal>| {
+        let Refusal { reason, message, .. } = refusal.unwrap_err();
+        assert_eq!(reason, Reason::Held);
+        assert_eq!(message, "st0: another program has moved or stopped motor 1 since");
+    };
+    bob.ask(Ask::Take { motor: motor() }).unwrap();
+    lost(alice.ask(own(&STOP)));
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    // Nobody has the motor then, and it is not what Alice has left.
+    bob.ask(own(&STOP)).unwrap();
+    lost(alice.ask(own(&STOP)));
+    // A program that has never moved it may know more: an earlier share may have been killed.
+    Asker::join(&share.path, "carol").ask(own(&STOP)).unwrap();
 }

@@ -19,7 +19,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{self, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
-use motorlink_telemetry::share::message::{Ask, Happening, Line, Protocol};
+use motorlink_telemetry::share::message::{Answer, Ask, Happening, Line, Protocol};
 use motorlink_telemetry::share::port;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -122,6 +122,48 @@ fn a_motor_turns_as_long_as_its_client_is_there() {
     share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
     drop(mine);
     share.reaches("st1.speed_rpm", |rpm| rpm < 30.0);
+}
+
+#[test]
+fn a_client_that_ends_leaves_motors_that_another_one_has_moved_since() {
+    let share = Share::new("moved-since");
+    let [(alice, alices), (bob, bobs)] = [(); 2].map(|()| (share.st(), share.rmd()));
+    start(&alice);
+    start(&bob);
+    for client in [&alices, &bobs] {
+        client.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
+    }
+    assert!(alice.stop_on_drop().stop_now().is_empty());
+    assert!(alices.stop_on_drop().stop_now().is_empty());
+    assert_eq!((alice.started().count(), alices.moving().len()), (0, 0));
+    drop((alice, alices));
+    let mut witness = Asker::join(&share.path, "witness");
+    assert_eq!(stops(&mut witness), 0);
+    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
+    share.reaches("rmd1.speed_dps", |dps| dps > 350.0);
+    // What it owns it stops.
+    assert!(bob.stop_on_drop().stop_now().iter().all(|one| one.result.is_ok()));
+    assert!(bobs.stop_on_drop().stop_now().iter().all(|one| one.result.is_ok()));
+    share.reaches("st1.speed_rpm", |rpm| rpm == 0.0);
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 1.0);
+}
+
+/// 0x80 of a program that has nothing to do with the load any more lets it fall.
+#[test]
+fn a_client_that_ends_does_not_switch_off_a_motor_that_another_one_has_stopped() {
+    let share = Share::new("holds");
+    let (alice, bob) = (share.rmd(), share.rmd());
+    for client in [&alice, &bob] {
+        client.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
+    }
+    bob.motor(1).unwrap().stop().unwrap();
+    assert!(alice.stop_on_drop().with(rmd::StopAction::Off).stop_now().is_empty());
+    let mut witness = Asker::join(&share.path, "witness");
+    let (line, from, to, after) = ("rmd0".to_owned(), Some(0.0), None, None);
+    let frames = witness.ask(Ask::Frames { line, from, to, after, most: 1000 }).unwrap();
+    let Answer::Frames { frames, .. } = frames else { panic!("{frames:?}") };
+    let of_code = |code| frames.iter().filter(|frame| frame.bytes.starts_with(code)).count();
+    assert_eq!((of_code("80"), of_code("81")), (0, 2), "{frames:?}");
 }
 
 #[test]

@@ -121,7 +121,7 @@ impl Program {
 
     fn command(&mut self, line: &str, motor: u8, bytes: &[u8]) -> Result<Answer, (Reason, String)> {
         let (line, bytes, time_to_live) = (line.to_owned(), bytes.to_vec(), 1.0);
-        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false })
+        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false, own: false })
     }
 
     fn turn(&mut self, motor: u8, dps: i32) {
@@ -435,6 +435,7 @@ fn refused_starts_take_a_motor_from_nobody() {
                 bytes,
                 time_to_live: 1.0,
                 continues: false,
+                own: false,
             })
         };
         let sent = [start(&mut one), start(&mut other)];
@@ -499,8 +500,14 @@ fn requests_that_are_not_possible_are_refused_with_words() {
     let (reason, message) = program.command("st0", 1, &[2, 0xEE]).unwrap_err();
     assert_eq!(reason, Reason::Refused, "{message}");
     let (line, bytes, time_to_live) = ("st0".to_owned(), vec![3, 2], f64::NAN);
-    let refused =
-        program.ask(Ask::Command { line, motor: 1, bytes, time_to_live, continues: false });
+    let refused = program.ask(Ask::Command {
+        line,
+        motor: 1,
+        bytes,
+        time_to_live,
+        continues: false,
+        own: false,
+    });
     assert_eq!(refused.unwrap_err().0, Reason::Usage);
     let ask = Ask::Unsubscribe { subscription: 4 };
     assert_eq!(program.ask(ask).unwrap_err().0, Reason::Usage);
@@ -632,6 +639,7 @@ fn a_share_that_was_frozen_executes_stops_and_no_old_motion() {
         bytes: bytes.to_vec(),
         time_to_live,
         continues: false,
+        own: false,
     };
     let old = program.send(command(&turn, 0.3));
     let release = program.send(Ask::Release);
@@ -665,7 +673,14 @@ fn a_stop_is_read_however_many_requests_are_under_way() {
         // No motor has this ID.
         let (line, motor, time_to_live) = ("rmd0".to_owned(), 20, 60.0);
         let bytes = vec![0x9A, 0, 0, 0, 0, 0, 0, 0];
-        program.send(Ask::Command { line, motor, bytes, time_to_live, continues: false });
+        program.send(Ask::Command {
+            line,
+            motor,
+            bytes,
+            time_to_live,
+            continues: false,
+            own: false,
+        });
     }
     let stop = program.send(Ask::Stop { motor: Some(rmd(1)) });
     program.answer(stop);
@@ -713,6 +728,7 @@ fn a_command_that_continues_is_not_sent_after_a_stop_or_a_motion_of_another_prog
         bytes: vec![0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0],
         time_to_live: 1.0,
         continues,
+        own: false,
     };
     let is_overtaken =
         |result: Result<Answer, (Reason, String)>| matches!(result, Err((Reason::Overtaken, _)));

@@ -18,6 +18,7 @@ fn command(number: u32, sent: f64, time_to_live: f64) -> Post {
         bytes: vec![3, 1],
         time_to_live,
         continues: false,
+        own: false,
     };
     post(number, sent, time_to_live, ask)
 }

@@ -109,7 +109,7 @@ impl Fleet {
 
 fn command(line: &str) -> Ask {
     let (line, bytes) = (line.to_owned(), vec![0x9C, 0, 0, 0, 0, 0, 0, 0]);
-    Ask::Command { line, motor: 1, bytes, time_to_live: 1.0, continues: false }
+    Ask::Command { line, motor: 1, bytes, time_to_live: 1.0, continues: false, own: false }
 }
 
 fn subscribe(lines: &[&str]) -> Ask {

@@ -8,7 +8,7 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::feed::Feed;
-use super::line::{self, Held};
+use super::line::Held;
 use super::owed::AGAIN;
 use super::place::SessionId;
 use super::reasons::reason;
@@ -131,6 +131,9 @@ impl Hub {
         if !may_stop {
             self.check_busy(session)?;
         }
+        if !may_stop && !matches!(ask, Ask::Lines | Ask::Confirm { .. }) {
+            self.check_place(session)?;
+        }
         match ask {
             Ask::Hello { .. } => Ok(None),
             Ask::Lines => {
@@ -153,11 +156,11 @@ impl Hub {
                 feed.end(&self.lines);
                 Ok(Some(Answer::Unsubscribe))
             }
-            Ask::Command { line, motor, bytes, time_to_live, continues } => {
+            Ask::Command { line, motor, bytes, time_to_live, continues, own } => {
                 let time_to_live = span("the time to live", time_to_live, 0.0)?;
                 let left = time_to_live.0.checked_sub(waited.0).map(Micros);
                 let motor = MotorName { line, motor };
-                self.command(session, name, id, &motor, (&bytes, continues), left)?;
+                self.command(session, name, id, &motor, (&bytes, continues, own), left)?;
                 Ok(None)
             }
             Ask::Confirm { line, motor } => {
@@ -232,6 +235,12 @@ impl Hub {
         }
     }
 
+    /// Refuses what is no part of a stop, if there was no place for more programs.
+    fn check_place(&self, session: SessionId) -> Result<(), Refused> {
+        let why = self.sessions.get(&session).and_then(|session| session.only_stops.clone());
+        why.map_or(Ok(()), |why| Err((Reason::Busy, why)))
+    }
+
     fn line(&self, name: &str) -> Result<usize, Refused> {
         let found = self.lines.iter().find(|(_, held)| held.name == name);
         found.map(|(line, _)| *line).ok_or_else(|| {
@@ -299,7 +308,7 @@ impl Hub {
         name: &Arc<str>,
         id: u32,
         motor: &MotorName,
-        (bytes, continues): (&[u8], bool),
+        (bytes, continues, own): (&[u8], bool, bool),
         time_to_live: Option<Micros>,
     ) -> Result<(), Refused> {
         let line = self.line(&motor.line)?;
@@ -319,10 +328,20 @@ impl Hub {
                 time_to_live.ok_or_else(|| refused(&CommandError::Expired))?
             }
         };
-        self.claim((session, name), line, motor, CommandKind::of(&request))?;
+        let kind = CommandKind::of(&request);
+        if matches!(kind, CommandKind::Changes | CommandKind::Moves) {
+            self.check_place(session)?;
+        }
+        self.claim((session, name), line, motor, kind)?;
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
+            if own && held.is_lost_to_others(motor, session) {
+                let (line, motor) = (&held.name, motor.number());
+                let why =
+                    format!("{line}: another program has moved or stopped motor {motor} since");
+                return Err((Reason::Held, why));
+            }
             held.follow((motor, session), motion, moves, continues)
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
@@ -399,7 +418,7 @@ impl Hub {
             } else if of_all && held.has_answered() && !held.may_turn(motor) {
                 let tell = self.teller(session, None, line);
                 let task = move |engine: &mut Acquisition| {
-                    if !engine.has_answered(&line::stop(motor)) {
+                    if !engine.has_answered(&Request::stop(motor)) {
                         tell(Work::Unheard(part, motor));
                     }
                 };

@@ -60,6 +60,7 @@ impl Hub {
         if let Some(owner) = held.owners.get_mut(&motor) {
             *owner = session;
         }
+        held.sequences.retain(|(other, program)| *other != motor || *program == session);
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
             let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
@@ -74,6 +75,17 @@ impl Held {
     pub(super) fn own(&mut self, motor: Motor, session: SessionId) {
         let owner = self.leases.get(&motor).map_or(session, |lease| lease.session);
         self.owners.insert(motor, owner);
+        self.movers.insert((motor, session));
+    }
+
+    /// Whether another program has moved, taken or stopped a motor since this one moved it. A motor that
+    /// nobody owns may turn since before this share began: a program that comes from there may stop it.
+    pub(super) fn is_lost_to_others(&self, motor: Motor, session: SessionId) -> bool {
+        match self.owners.get(&motor) {
+            _ if self.starting.contains(&(motor, session)) => false,
+            Some(owner) => *owner != session,
+            None => self.is_starting(motor) || self.movers.contains(&(motor, session)),
+        }
     }
 
     /// Whether a program is responsible for the stop of a motor.

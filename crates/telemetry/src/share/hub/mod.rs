@@ -27,7 +27,7 @@ use super::message::{self, Event, Happening};
 use super::opening::Limits;
 use super::words;
 use crate::event::CommandError;
-use crate::line::Stopped;
+use crate::line::{Request, Stopped};
 use crate::runner::Ended;
 use crate::schedule::Quiet;
 use crate::signal::Motor;
@@ -124,6 +124,16 @@ impl Hub {
         id
     }
 
+    /// A program has connected that only stops motors, as a share without a place for it takes no more. All
+    /// else is refused with `why`. What it only reads is a part of a stop.
+    pub fn join_to_stop(&mut self, why: String) -> SessionId {
+        let id = self.join();
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.only_stops = Some(why);
+        }
+        id
+    }
+
     /// A program has gone. The motors that it turned last are stopped.
     pub fn leave(&mut self, id: SessionId) {
         self.leave_because(id, None);
@@ -134,6 +144,7 @@ impl Hub {
         let Some(session) = self.sessions.remove(&id) else { return };
         for held in self.lines.values_mut() {
             held.sequences.retain(|(_, program)| *program != id);
+            held.movers.retain(|(_, program)| *program != id);
             held.give_leases_back(id);
         }
         for (_, feed) in session.feeds {
@@ -173,6 +184,11 @@ impl Hub {
     /// Whether a program may send more requests now.
     pub fn is_accepting(&self, id: SessionId) -> bool {
         self.sessions.get(&id).is_some_and(Session::is_accepting)
+    }
+
+    /// Whether a program waits for the end of a request.
+    pub fn is_waiting(&self, id: SessionId) -> bool {
+        self.sessions.get(&id).is_some_and(|session| session.pending > 0)
     }
 
     /// Whether a program has said hello.
@@ -360,8 +376,8 @@ impl Hub {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });
         };
         let begun = match quiet {
-            None => held.remote().stop_then(by, line::stop(motor), ended),
-            Some(quiet) => held.remote().stop_quietly_then(by, line::stop(motor), quiet, ended),
+            None => held.remote().stop_then(by, Request::stop(motor), ended),
+            Some(quiet) => held.remote().stop_quietly_then(by, Request::stop(motor), quiet, ended),
         };
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
@@ -378,7 +394,7 @@ impl Hub {
         let by = held.owed.get(&motor).map_or_else(|| "share".into(), |owed| Arc::clone(&owed.by));
         let ended = move |result| tell(Work::Search(motor, result));
         // If the engine has ended, the share ends.
-        let _ = held.remote().command_then(&by, line::stop(motor), LONGEST_PAUSE.into(), ended);
+        let _ = held.remote().command_then(&by, Request::stop(motor), LONGEST_PAUSE.into(), ended);
     }
 
     /// Receives the end of something in an engine's thread.

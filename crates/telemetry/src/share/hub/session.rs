@@ -27,6 +27,8 @@ const ANSWERS: usize = 256;
 pub(super) struct Session {
     /// `None` before hello.
     pub(super) name: Option<Arc<str>>,
+    /// Why it may only stop motors, if that is so.
+    pub(super) only_stops: Option<String>,
     answers: VecDeque<Text>,
     events: VecDeque<Event>,
     missed: u64,

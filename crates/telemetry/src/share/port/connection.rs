@@ -29,6 +29,8 @@ pub(super) struct Connection {
     holder: Holder,
     /// The time to live of the next request, if it is shorter.
     expires: Cell<Duration>,
+    /// Whether requests are for motors that no other program has moved since.
+    is_own: Cell<bool>,
     /// The motors that were taken from other programs.
     taken: BTreeSet<u8>,
     /// Why the share closes the connection.
@@ -45,6 +47,7 @@ impl Connection {
             dialogue: Dialogue::default(),
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
+            is_own: Cell::new(false),
             taken: BTreeSet::new(),
             closing: None,
         };
@@ -98,6 +101,11 @@ impl Connection {
         self.expires.set(time_to_live.min(TIME_TO_LIVE));
     }
 
+    /// Whether the share refuses commands to motors that another program has moved since.
+    pub(super) fn only_own(&self, is_set: bool) {
+        self.is_own.set(is_set);
+    }
+
     /// Sends a command to a motor; gives its id.
     pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
         let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
@@ -105,7 +113,8 @@ impl Connection {
         if self.port.at.takes() && self.changes(motor, &bytes) && self.taken.insert(motor) {
             self.ask(Ask::Take { motor: MotorName { line: line.clone(), motor } })?;
         }
-        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues: false })
+        let (continues, own) = (false, self.is_own.get());
+        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues, own })
     }
 
     fn changes(&self, motor: u8, bytes: &[u8]) -> bool {

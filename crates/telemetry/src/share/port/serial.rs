@@ -113,6 +113,10 @@ impl Link for ShareLine {
     fn expire_next(&self, time_to_live: Duration) {
         self.connection.expire_next(time_to_live);
     }
+
+    fn only_own(&self, is_set: bool) {
+        self.connection.only_own(is_set);
+    }
 }
 
 impl ByteLink for ShareLine {
