@@ -305,3 +305,47 @@ def test_the_folder_of_the_share_is_removed_at_the_end(monitor, site):
     monitor.interrupt()
     assert monitor.wait() == 0
     assert not os.path.exists(os.path.dirname(site.path))
+
+
+def test_strangers_whose_requests_do_not_arrive_keep_nobody_out(site):
+    """Half-open connections without a token. Pages, and the stop by HTTP, come in all the same, also a
+    stop that arrives slowly from another address."""
+    slow = socket.create_connection((site.host, site.port), 10)
+    cookie = site.operator["Cookie"]
+    words = f"POST /api/stop-all HTTP/1.1\r\nHost: {site.authority}\r\nOrigin: {site.origin}\r\nCookie: {cookie}\r\n\r\n"
+    slow.sendall(words[:40].encode())
+    with ExitStack() as strangers:
+        for _ in range(300):
+            there = ("127.0.0.2", 0)
+            strangers.enter_context(socket.create_connection((site.host, site.port), 10, there)).sendall(b"G")
+        slow.sendall(words[40:].encode())
+        assert slow.recv(12) == b"HTTP/1.1 200"
+        slow.close()
+        for _ in range(int(os.environ.get("ROUNDS", "5"))):
+            for number in range(300):
+                stranger = strangers.enter_context(socket.create_connection((site.host, site.port), 10))
+                stranger.sendall(b"POST /api/stop-all HTTP/1.1\r\n" if number % 2 else b"G")
+            assert site.post("/api/stop-all")[0] == 200
+            is_well(site)
+
+
+def test_a_flood_of_strangers_keeps_nobody_out(site):
+    """Connections that come while a stop arrives, as fast as they can."""
+    # The first one also waits for IDs without a motor.
+    assert site.post("/api/stop-all")[0] == 200
+    with ExitStack() as strangers, ThreadPoolExecutor(2) as pool:
+        ends = time.monotonic() + 1
+
+        def flood():
+            while time.monotonic() < ends:
+                stranger = strangers.enter_context(socket.create_connection((site.host, site.port), 10))
+                stranger.sendall(b"G")
+
+        floods = [pool.submit(flood) for _ in range(2)]
+        stops = 0
+        while time.monotonic() < ends:
+            assert site.post("/api/stop-all")[0] == 200
+            stops += 1
+        for one in floods:
+            one.result()
+        assert stops > 3

@@ -21,6 +21,8 @@ from sharing import Client, are_still, event, speeds
 
 #: Programs that are killed. ROUNDS=50 for more.
 ROUNDS = int(os.environ.get("ROUNDS", "5"))
+#: Stops of each kind from a shell.
+RUNS_OF_STOPS = max(2, ROUNDS // 2)
 START, STOP, RUNNING = (3, 1), (3, 2), 6
 
 #: A program that watches a motor.
@@ -200,7 +202,7 @@ def test_a_stop_while_the_port_is_gone_is_repeated_when_it_is_back(sim, run, sta
 
 
 def test_connections_that_say_nothing_lock_nobody_out(share):
-    silent = [socket.socket(socket.AF_UNIX) for _ in range(64)]
+    silent = [socket.socket(socket.AF_UNIX) for _ in range(200)]
     for connection in silent:
         connection.connect(str(share.path))
 
@@ -213,6 +215,24 @@ def test_connections_that_say_nothing_lock_nobody_out(share):
     eventually(is_let_in, "a place for a program")
     for connection in silent:
         connection.close()
+
+
+def test_a_share_with_all_its_programs_takes_stops_and_nothing_else(share, run):
+    """64 programs are the limit. A stop from a shell has a place of its own."""
+    programs = [Client(share.path, f"program {number}") for number in range(64)]
+    at, motor = ("--at", f"unix:{share.path}"), ("rmd", "-p", f"share:{share.path}/rmd0", "--id", 2)
+    for stop in RUNS_OF_STOPS * [("share", "stop", *at), (*motor, "stop")]:
+        programs[0].command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+        eventually(lambda: speeds(programs[0])[1] > 300, "a motor that turns")
+        run(*stop).ended(0)
+        eventually(lambda: abs(speeds(programs[0])[1]) < 5, "a motor at rest")
+    refused = run(*motor, "speed", 100).ended(1)
+    assert "the share has 64 programs, which is the limit; of others it takes only stops" in refused.err
+    # Programs that come to stop, and stay, do not keep the places.
+    idle = [Client(share.path, f"idle {number}") for number in range(12)]
+    eventually(lambda: run("share", "stop", *at).code == 0, "a place for a stop", within=30)
+    for connection in (*programs, *idle):
+        connection.socket.close()
 
 
 def test_a_share_that_was_frozen_starts_no_motor_and_stops_one(share):

@@ -109,8 +109,12 @@ pub fn serve(
 /// Asks a running share, and says what it did.
 fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
     let failed = |error: io::Error| {
-        Failure::link(format!("the share at {}: {error}", args.at))
-            .trying("is --at that of a running `motorlink share`?")
+        let failure = Failure::link(format!("the share at {}: {error}", args.at));
+        match error.kind() {
+            // It says why.
+            io::ErrorKind::Other => failure,
+            _ => failure.trying("is --at that of a running `motorlink share`?"),
+        }
     };
     let name = format!("motorlink {}", std::process::id());
     let mut share = Connection::open(&Local(path.to_owned()), &name).map_err(failed)?;

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::door::is_local_origin;
 use super::socket::{self, LONGEST_TEXT};
 use super::state::State;
+use super::transport::Arrival;
 use super::{recordings, site};
 use crate::alive::Lapse;
 use crate::foxglove::{self, SUBPROTOCOLS};
@@ -70,6 +71,9 @@ struct Given {
 /// Lets in who may come in, and says what browsers may do with the answer.
 async fn admit(Shared(state): Shared<Arc<State>>, mut request: Request, next: Next) -> Response {
     let mut response = match admitted(&state, &request) {
+        Ok(_) if !has_place(&request) => {
+            (StatusCode::SERVICE_UNAVAILABLE, "Too many requests are under way.\n").into_response()
+        }
         Ok(role) => {
             request.extensions_mut().insert(role);
             next.run(request).await
@@ -79,6 +83,14 @@ async fn admit(Shared(state): Shared<Arc<State>>, mut request: Request, next: Ne
     let headers = response.headers_mut();
     headers.extend(HEADERS.map(|(name, value)| (name, HeaderValue::from_static(value))));
     response
+}
+
+/// Whether there is a place for a request that may come in.
+fn has_place(request: &Request) -> bool {
+    // What stops motors has an address of its own, and no other is posted to.
+    let stops = request.method() == Method::POST;
+    let arrival = request.extensions().get::<Arc<Arrival>>();
+    arrival.is_none_or(|arrival| arrival.come_in(stops))
 }
 
 /// Lets in programs of this computer. Browsers say from which page a request is: no page of the network
