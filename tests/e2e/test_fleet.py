@@ -18,6 +18,8 @@ from test_json import check
 
 #: Programs that are killed. ROUNDS=30 for more.
 ROUNDS = int(os.environ.get("ROUNDS", "2"))
+#: Motors that are taken from a page.
+TAKES = max(5, ROUNDS)
 
 
 @pytest.fixture
@@ -173,6 +175,30 @@ def test_a_node_that_vanished_is_missed_by_programs_that_come_later(show, arms, 
     assert arm2.wait(20) == 0
     assert len(run("fleet", "list", *via, "--json").ended(0).lines) == 1, "it ended by itself"
     run("fleet", "stop-all", *via, within=60).ended(0)
+
+
+def test_a_motor_that_is_taken_from_a_page_that_streams_references_turns_for_the_taker(show, arms, watchers):
+    motor = {"line": "rmd0", "motor": 2}
+    _, _, site = show()
+    with site.page() as page:
+        page.alive()
+        for _ in range(TAKES):
+            started = {"reason": "overtaken"}
+            # While a stop is confirmed, motion is refused.
+            while started.get("reason") in ("overtaken", "expired"):
+                started = page.ask("run", line="arm1/rmd0", motor=2, mode="speed", target=360, rate=60, hold=False)
+            assert started["streams"], started
+            eventually(lambda: speeds(watchers[0])[1] > 20, "a motor that turns")
+            taker = Client(arms[0].path, "taker")
+            assert taker.ask("take", motor=motor)["kind"] == "answer"
+            assert taker.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 30000))["kind"] == "answer"
+            eventually(lambda: speeds(watchers[0])[1] > 295, "the speed of the taker")
+            # The page gives up references that are not acknowledged for 0.5 s.
+            until = time.monotonic() + 0.8
+            while time.monotonic() < until:
+                assert speeds(watchers[0])[1] > 250
+            taker.socket.close()
+            rest(watchers[:1])
 
 
 def test_a_port_of_a_node_is_shown_with_its_fleet(run):

@@ -32,7 +32,9 @@ impl Name {
 
 /// A text that cannot be a name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a name has 1 to {LONGEST} letters, digits, `-`, `_` and `.`")]
+#[error(
+    "a name has 1 to {LONGEST} letters, digits, `-`, `_` and `.`, and begins with a letter, a digit or `_`"
+)]
 pub struct BadName;
 
 impl Name {
@@ -45,7 +47,7 @@ impl Name {
     pub fn near(text: &str) -> Self {
         let known: String =
             text.chars().map(|it| if is_allowed(it) { it } else { '-' }).take(LONGEST).collect();
-        known.parse().unwrap_or_else(|_| Name("unnamed".to_owned()))
+        known.trim_start_matches(['-', '.']).parse().unwrap_or_else(|_| Name("unnamed".to_owned()))
     }
 }
 
@@ -57,7 +59,10 @@ impl FromStr for Name {
     type Err = BadName;
 
     fn from_str(text: &str) -> Result<Self, BadName> {
-        let is_name = (1..=LONGEST).contains(&text.len()) && text.chars().all(is_allowed);
+        // Names are options of commands and parts of paths, too.
+        let is_name = (1..=LONGEST).contains(&text.len())
+            && text.chars().all(is_allowed)
+            && !text.starts_with(['-', '.']);
         if is_name { Ok(Name(text.to_owned())) } else { Err(BadName) }
     }
 }
@@ -347,7 +352,22 @@ mod tests {
 
     #[test]
     fn names_have_no_character_that_means_something_in_a_key() {
-        for bad in ["", "a/b", "*", "a*", "$*", "a b", "a?", "a#", "@a", &"a".repeat(LONGEST + 1)] {
+        for bad in [
+            "",
+            "..",
+            ".",
+            "-n",
+            "--help",
+            "a/b",
+            "*",
+            "a*",
+            "$*",
+            "a b",
+            "a?",
+            "a#",
+            "@a",
+            &"a".repeat(LONGEST + 1),
+        ] {
             assert_eq!(bad.parse::<Name>(), Err(BadName), "{bad}");
             let near = Name::near(bad);
             assert_eq!(near.as_str().parse(), Ok(near.clone()), "{bad}");

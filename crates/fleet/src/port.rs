@@ -6,6 +6,7 @@ use std::time::Duration;
 use motorlink_link::port::{self, Carries, Form, Given, NameError, PortName, Scheme};
 use motorlink_telemetry::share::port::line_port;
 
+use crate::key::BadName;
 use crate::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
 use crate::network::Network;
 use crate::remote::{self, DEADLINE, Remote};
@@ -45,7 +46,7 @@ impl Scheme for Zenoh {
     ) -> Result<PortName, NameError> {
         let (node, line) = rest.split_once('/').unwrap_or((rest, ""));
         given.present(node, "the name of the node", EXAMPLE)?;
-        let what = "a name of letters, digits, `-`, `_` and `.`".to_owned();
+        let what = BadName.to_string();
         let bad_node = |_| given.bad_option("the node", node, what.clone());
         let node = node.parse().map_err(bad_node)?;
         let network = match given.take("via") {

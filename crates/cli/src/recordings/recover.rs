@@ -32,6 +32,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let input = &args.input;
     let file = File::open(&input.file).map_err(|error| input.failed(&error))?;
+    if file.metadata().is_ok_and(|it| it.is_file() && it.len() == 0) {
+        let why = "is empty: its writer ended before it had written anything";
+        return Err(Failure::lost(format!("{} {why}", input.name())));
+    }
     let mut recording = Recording::checked(file).map_err(|error| input.unreadable(&error))?;
     let is_whole = recording.losses().is_empty();
     let path = args

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::file::{MOTOR, PROFILE, SETTINGS};
+use super::file::{BEGIN, END, MOTOR, PROFILE, SETTINGS};
 use super::procedure::{Line, Procedure};
 use super::{Block, Kind, Setting, StepError, Tunable, Tuning};
 
@@ -121,14 +121,12 @@ impl Dump {
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
         let Kind { protocol, profile, motor } = self.kind;
+        writeln!(out, "{BEGIN} `motorlink {protocol} diff` compares a motor with them,")?;
         writeln!(
             out,
-            "# Settings of a motor. `motorlink {protocol} diff` compares a motor with them,"
+            "# `motorlink {protocol} restore` writes them. Settings without a line stay as they are;"
         )?;
-        writeln!(
-            out,
-            "# `motorlink {protocol} restore` writes them. Settings without a line stay as they are."
-        )?;
+        writeln!(out, "# correct the number in the last line if you remove some.")?;
         for line in &self.identity {
             writeln!(out, "# {line}")?;
         }
@@ -161,7 +159,7 @@ impl Dump {
         for names in self.absent.chunks(ABSENT_IN_A_LINE) {
             writeln!(out, "# {}", names.join(" "))?;
         }
-        Ok(())
+        writeln!(out, "\n{END}{} settings", self.values().count())
     }
 }
 

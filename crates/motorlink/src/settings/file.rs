@@ -17,6 +17,10 @@ pub(super) const PROFILE: &str = "profile";
 pub(super) const MOTOR: &str = "motor";
 /// The table with the settings.
 pub(super) const SETTINGS: &str = "settings";
+/// The first words of a dump.
+pub(super) const BEGIN: &str = "# Settings of a motor.";
+/// The last line of a dump, up to the number of settings. A file without it may be cut off.
+pub(super) const END: &str = "# End: ";
 /// The tables of the protocols.
 const PROTOCOLS: [&str; 2] = ["st", "rmd"];
 /// The likeness of a name that is suggested for another.
@@ -57,6 +61,23 @@ pub enum Problem {
     /// A number ends the text, and could have more digits.
     #[error("{0} ends the file without a line end, as if the file was cut off; complete the line")]
     CutOff(String),
+    /// The last line of a dump is missing.
+    #[error(
+        "the last line, such as `{END}57 settings`, is missing, as if the file was cut off; add it if the \
+         file is whole"
+    )]
+    NoEnd,
+    /// A dump has fewer settings than its last line says.
+    #[error(
+        "the last line says {of} settings, and there are {has}: lines are missing; correct the number if \
+         that is meant"
+    )]
+    Fewer {
+        /// The settings of the file.
+        has: usize,
+        /// The settings that its last line says.
+        of: usize,
+    },
     /// A table or a key is missing.
     #[error("`{0}` is missing")]
     Missing(String),
@@ -255,7 +276,21 @@ impl Text<'_> {
             let name = format!("{}.{SETTINGS}", kind.protocol);
             return Err(self.error(table.span(), Problem::Empty(name)));
         }
+        self.check_end(values.len())?;
         Ok(SettingsFile { values })
+    }
+
+    /// Whether a dump was cut off. A file that a person wrote may have no last line.
+    fn check_end(&self, has: usize) -> Result<(), FileError> {
+        let end = self.text.lines().rev().find_map(|line| line.strip_prefix(END));
+        let of = end.and_then(|end| end.split_whitespace().next()?.parse().ok());
+        let is_dump = self.text.trim_start_matches('\u{feff}').starts_with(BEGIN);
+        let problem = match of {
+            Some(of) if has < of => Problem::Fewer { has, of },
+            None if is_dump || end.is_some() => Problem::NoEnd,
+            _ => return Ok(()),
+        };
+        Err(self.error(self.text.len()..self.text.len(), problem))
     }
 
     /// The table of the motor's protocol.
