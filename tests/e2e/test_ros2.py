@@ -435,14 +435,18 @@ def test_a_latch_holds_until_commands_begin_again(node, direct, run, diagnostics
         quiet(direct)
 
 
-def test_a_latch_without_a_stop_and_a_program_that_takes_the_motor_stop_it(node, direct, run):
+def test_a_latch_without_a_stop_stops_the_motor_and_a_program_that_takes_it_keeps_it_turning(node, direct, run):
     with turning(node, direct):
         run("fleet", "latch", **via(node)).ended(0)
         stands(direct)
         run("fleet", "release", **via(node)).ended(0)
     time.sleep(2 * LIVE)
     with turning(node, direct):
-        assert direct.ask("take", motor={"line": "st0", "motor": 1})["kind"] == "answer"
+        taker = Client(node.path, "taker")
+        assert taker.ask("take", motor={"line": "st0", "motor": 1})["kind"] == "answer"
+        time.sleep(2 * LIVE)
+        turns(direct, 900)
+        taker.socket.close()
         stands(direct)
 
 

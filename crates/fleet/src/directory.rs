@@ -22,16 +22,24 @@ const ANSWER: Duration = Duration::from_secs(2);
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Directory {
     /// Those that are there, by name and run, and what each says of itself. `None`: it does not answer.
-    pub nodes: BTreeMap<(Name, Name), Option<Info>>,
-    /// Those that went away without an end, as others saw it, and for how long, in seconds. Their motors may
+    pub nodes: BTreeMap<Run, Option<Info>>,
+    /// Runs that went away without an end, as others saw it, and for how long, in seconds. Their motors may
     /// turn.
-    pub away: BTreeMap<Name, f64>,
+    pub away: BTreeMap<Run, f64>,
 }
+
+/// A node and its run.
+pub type Run = (Name, Name);
 
 impl Directory {
     /// Whether a node of this name is there.
     pub fn has(&self, node: &Name) -> bool {
-        self.nodes.keys().any(|(name, _)| name == node)
+        self.runs(node) > 0
+    }
+
+    /// How many nodes of this name are there.
+    pub fn runs(&self, node: &Name) -> usize {
+        self.nodes.keys().filter(|(name, _)| name == node).count()
     }
 }
 
@@ -59,7 +67,7 @@ pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
         }
     }
     let mut found = Directory { nodes, away: BTreeMap::new() };
-    found.away = away(found.nodes.values().flatten(), |node| found.has(node));
+    found.away = away(found.nodes.values().flatten(), |run| found.nodes.contains_key(run));
     Ok(found)
 }
 
@@ -73,17 +81,19 @@ pub(crate) fn ask_all(
     question.consolidation(ConsolidationMode::None).timeout(patience)
 }
 
-/// The nodes that others saw go away, and for how long at least, in seconds, without those that are there.
+/// The runs that others saw go away, and for how long at least, in seconds, without those that are there.
 pub(crate) fn away<'a>(
     infos: impl Iterator<Item = &'a Info>,
-    is_here: impl Fn(&Name) -> bool,
-) -> BTreeMap<Name, f64> {
+    is_here: impl Fn(&Run) -> bool,
+) -> BTreeMap<Run, f64> {
     let mut away = BTreeMap::new();
     for info in infos {
         for gone in &info.away {
             let Ok(node) = gone.node.parse() else { continue };
-            if !is_here(&node) && (away.len() < MOST_AWAY || away.contains_key(&node)) {
-                let longest = away.entry(node).or_insert(0.0_f64);
+            // Earlier versions do not say which run it was.
+            let run = (node, gone.boot.parse().unwrap_or_else(|_| Name::near("unknown")));
+            if !is_here(&run) && (away.len() < MOST_AWAY || away.contains_key(&run)) {
+                let longest = away.entry(run).or_insert(0.0_f64);
                 *longest = longest.max(info.t - gone.since);
             }
         }

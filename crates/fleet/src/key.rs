@@ -24,6 +24,28 @@ impl Name {
         Ok(Name(format!("{number:016x}")))
     }
 
+    /// A run of a node on this computer: 8 digits of the computer, then 8 random ones.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn run(computer: u32) -> std::io::Result<Self> {
+        let number = getrandom::u32().map_err(std::io::Error::other)?;
+        Ok(Name(format!("{computer:08x}{number:08x}")))
+    }
+
+    /// Whether two runs were on the same computer.
+    pub(crate) fn is_of_computer_of(&self, other: &Name) -> bool {
+        self.0.get(..8) == other.0.get(..8)
+    }
+
+    /// The name of one of several nodes that have this name, by its run.
+    pub(crate) fn of_run(&self, run: &Name) -> Self {
+        let (name, run) = (&self.0, &run.0);
+        let [name, run] =
+            [&name[..name.len().min(LONGEST - 9)], &run[run.len().saturating_sub(4)..]];
+        Name(format!("{name}.run-{run}"))
+    }
+
     /// In the place of a name: all of them.
     pub(crate) fn any() -> Self {
         Name("*".to_owned())

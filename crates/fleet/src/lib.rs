@@ -13,6 +13,7 @@
 
 mod certificate;
 pub mod clock;
+pub mod computer;
 mod config;
 pub mod directory;
 pub mod key;

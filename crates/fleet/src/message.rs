@@ -173,6 +173,9 @@ pub struct Info {
 pub struct Away {
     /// Its name.
     pub node: String,
+    /// Its run. Another node may have its name by now.
+    #[serde(default)]
+    pub boot: String,
     /// When that was, by the clock of the node that says it, in seconds.
     pub since: f64,
 }

@@ -3,42 +3,42 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use crate::key::Name;
+use crate::directory::Run;
 use crate::message::Away;
 
 /// Runs that have ended and nodes that went away are remembered up to this number.
 const MOST: usize = 256;
-
-/// A run of a node.
-type Run = (Name, Name);
 
 /// Who is there, who has ended, and who went away without an end.
 #[derive(Debug, Default)]
 pub(crate) struct Roll {
     here: BTreeSet<Run>,
     ended: VecDeque<Run>,
-    away: BTreeMap<Name, Gone>,
+    away: BTreeMap<Run, Gone>,
 }
 
-/// A node that went away.
+/// A run that went away.
 #[derive(Debug)]
 struct Gone {
-    boot: Name,
     since: f64,
+    /// Other runs of this name that were there at that time: none of them is the node started again.
+    twins: BTreeSet<Run>,
 }
 
 impl Roll {
-    /// A run of a node is there.
+    /// A run of a node is there. On the same computer it is the node that went away, started again.
     pub(crate) fn came(&mut self, run: Run) {
-        self.away.remove(&run.0);
+        self.away.retain(|other, gone| {
+            let is_again =
+                other.0 == run.0 && run.1.is_of_computer_of(&other.1) && !gone.twins.contains(&run);
+            *other != run && !is_again
+        });
         self.here.insert(run);
     }
 
     /// A run says that it ends: its motors have been stopped.
     pub(crate) fn ended(&mut self, run: Run) {
-        if self.away.get(&run.0).is_some_and(|gone| gone.boot == run.1) {
-            self.away.remove(&run.0);
-        }
+        self.away.remove(&run);
         if self.ended.len() >= MOST {
             self.ended.pop_front();
         }
@@ -48,24 +48,26 @@ impl Roll {
     /// A run is not there any more.
     pub(crate) fn went(&mut self, run: Run, now: f64) {
         self.here.remove(&run);
-        let is_here = self.here.iter().any(|(node, _)| *node == run.0);
-        if is_here || self.ended.contains(&run) {
+        if self.ended.contains(&run) {
             return;
         }
-        let (node, boot) = run;
-        self.away.insert(node, Gone { boot, since: now });
+        let twins = self.here.iter().filter(|(node, _)| *node == run.0).cloned().collect();
+        self.away.insert(run, Gone { since: now, twins });
         if self.away.len() > MOST {
             let oldest =
                 self.away.iter().min_by(|(_, one), (_, other)| one.since.total_cmp(&other.since));
-            let oldest = oldest.map(|(node, _)| node.clone());
-            oldest.map(|node| self.away.remove(&node));
+            let oldest = oldest.map(|(run, _)| run.clone());
+            oldest.map(|run| self.away.remove(&run));
         }
     }
 
-    /// The nodes that went away without an end, and are not back.
+    /// The runs that went away without an end, and are not back.
     pub(crate) fn away(&self) -> Vec<Away> {
-        let told =
-            |(node, gone): (&Name, &Gone)| Away { node: node.to_string(), since: gone.since };
+        let told = |((node, boot), gone): (&Run, &Gone)| Away {
+            node: node.to_string(),
+            boot: boot.to_string(),
+            since: gone.since,
+        };
         self.away.iter().map(told).collect()
     }
 }
@@ -74,8 +76,13 @@ impl Roll {
 mod tests {
     use super::*;
 
+    /// A run on a computer with this digit.
+    fn run_at(node: &str, computer: u32, boot: &str) -> Run {
+        (node.parse().unwrap(), format!("{computer:08x}{boot}").parse().unwrap())
+    }
+
     fn run(node: &str, boot: &str) -> Run {
-        (node.parse().unwrap(), boot.parse().unwrap())
+        run_at(node, 1, boot)
     }
 
     fn away(roll: &Roll) -> Vec<(String, f64)> {
@@ -125,14 +132,29 @@ mod tests {
     }
 
     #[test]
-    fn the_late_end_of_an_old_run_does_not_hide_a_new_one() {
+    fn a_node_with_the_name_of_one_that_vanished_does_not_hide_it() {
         let mut roll = Roll::default();
-        roll.came(run("arm1", "a"));
-        roll.came(run("arm1", "b"));
-        roll.went(run("arm1", "a"), 1.0);
+        // Both were there at the same time, on one computer or on two.
+        for (first, other) in [("a", run("arm1", "b")), ("e", run_at("arm1", 2, "b"))] {
+            roll.came(run("arm1", first));
+            roll.came(other.clone());
+            roll.went(run("arm1", first), 1.0);
+            // The network of the other one is cut for a moment.
+            roll.went(other.clone(), 2.0);
+            roll.came(other.clone());
+            assert_eq!(away(&roll), [("arm1".to_owned(), 1.0)], "{other:?}");
+            roll.ended(run("arm1", first));
+            roll.ended(other.clone());
+            roll.went(other, 2.0);
+        }
+        // A copy of the computer takes its place.
+        roll.came(run("arm1", "c"));
+        roll.went(run("arm1", "c"), 3.0);
+        roll.came(run_at("arm1", 2, "d"));
+        assert_eq!(away(&roll), [("arm1".to_owned(), 3.0)]);
+        // It is back, also started again.
+        roll.came(run("arm1", "f"));
         assert_eq!(away(&roll), []);
-        roll.went(run("arm1", "b"), 2.0);
-        assert_eq!(away(&roll), [("arm1".to_owned(), 2.0)]);
     }
 
     #[test]

@@ -312,7 +312,7 @@ fn nodes_remember_one_that_went_away_until_it_is_back() {
     let names = || {
         let Directory { nodes, away } = directory::nodes(&network).unwrap();
         let here: Vec<_> = nodes.into_keys().map(|(node, _)| node.to_string()).collect();
-        let away: Vec<_> = away.into_keys().map(|node| node.to_string()).collect();
+        let away: Vec<_> = away.into_keys().map(|(node, _)| node.to_string()).collect();
         (here.join(" "), away.join(" "))
     };
     let both = ("seen1 seen2".to_owned(), String::new());

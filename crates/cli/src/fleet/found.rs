@@ -70,10 +70,11 @@ pub fn found(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
 fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
     let mut found: Vec<(Name, Info)> = Vec::new();
     let directory = directory::nodes(network)?;
-    let mut missing =
-        directory.away.iter().find(|(node, _)| wanted.misses(node)).map(|(node, seconds)| {
+    let mut missing = directory.away.iter().find(|((node, _), _)| wanted.misses(node)).map(
+        |((node, _), seconds)| {
             gone(node, *seconds).trying(format!("if that is known, give `--gone {node}`"))
-        });
+        },
+    );
     let unknown = wanted.named.iter().find(|node| !directory.has(node));
     if let (None, Some(node)) = (&missing, unknown) {
         let none = Failure::link(format!("no node {node} is at this network"));
@@ -84,8 +85,7 @@ fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
             continue;
         }
         if found.iter().any(|(known, _)| *known == node) {
-            let why = format!("2 nodes have the name {node}: give each a --name of its own");
-            return Err(Failure::link(why));
+            return Err(twins(&node));
         }
         match info {
             Some(info) => found.push((node, info)),
@@ -101,6 +101,11 @@ fn there(network: &Network, wanted: &Nodes) -> Result<Found, Failure> {
 /// A node is there, but does not say anything.
 pub fn silent(node: &Name) -> Failure {
     Failure::link(format!("node {node} does not answer"))
+}
+
+/// Several nodes have one name.
+pub fn twins(node: &Name) -> Failure {
+    Failure::link(format!("2 nodes have the name {node}: give each a --name of its own"))
 }
 
 /// A node went away this many seconds ago.

@@ -7,18 +7,19 @@ use motorlink_telemetry::share::message::Line;
 use serde_json::{Value, json};
 
 use super::args::At;
-use super::found::{gone, silent};
+use super::found::{gone, silent, twins};
 use crate::failure::Failure;
 use crate::output::{Printer, print_line};
 
 pub fn run(at: &At) -> Result<(), Failure> {
     let network = at.via.network();
-    let Directory { nodes, away } = directory::nodes(&network)?;
+    let directory = directory::nodes(&network)?;
+    let Directory { nodes, away } = &directory;
     if nodes.is_empty() && !at.json {
         let limit = network.name().map_or_else(String::new, |name| format!(" that {name} may see"));
         print_line(&format!("No node is at this network{limit}."))?;
     }
-    let names = nodes.keys().map(|(name, _)| name).chain(away.keys());
+    let names = nodes.keys().chain(away.keys()).map(|(name, _)| name);
     let width = names.map(|name| name.as_str().len()).max().unwrap_or(0).max("node".len());
     if !nodes.is_empty() && !at.json {
         print_line(&format!(
@@ -27,7 +28,7 @@ pub fn run(at: &At) -> Result<(), Failure> {
         ))?;
     }
     let printer = Printer { json: at.json };
-    for ((name, _), info) in &nodes {
+    for ((name, _), info) in nodes {
         match info {
             Some(info) => printer.result(text(name, info, width), object(name, info))?,
             None => printer.result(
@@ -36,16 +37,23 @@ pub fn run(at: &At) -> Result<(), Failure> {
             )?,
         }
     }
-    for (name, seconds) in &away {
+    for ((name, boot), seconds) in away {
+        // It is not the one that is there.
+        let other = if directory.has(name) { ", another node of this name" } else { "" };
         printer.result(
-            format!("{name:<width$}  away for {seconds:.0} s", name = name.as_str()),
-            json!({"node": name.as_str(), "answers": false, "away_seconds": seconds}),
+            format!("{name:<width$}  away for {seconds:.0} s{other}", name = name.as_str()),
+            json!({
+                "node": name.as_str(), "answers": false, "boot": boot.as_str(), "away_seconds": seconds,
+            }),
         )?;
+    }
+    if let Some(((name, _), _)) = nodes.iter().find(|((name, _), _)| directory.runs(name) > 1) {
+        return Err(twins(name));
     }
     if let Some(((name, _), _)) = nodes.iter().find(|(_, info)| info.is_none()) {
         return Err(silent(name));
     }
-    away.iter().next().map_or(Ok(()), |(name, seconds)| Err(gone(name, *seconds)))
+    away.iter().next().map_or(Ok(()), |((name, _), seconds)| Err(gone(name, *seconds)))
 }
 
 fn text(name: &Name, info: &Info, width: usize) -> String {

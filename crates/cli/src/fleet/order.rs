@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use motorlink_fleet::directory::{self, Directory};
+use motorlink_fleet::directory;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::remote::Remote;
@@ -31,12 +31,15 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
         interrupt::complete_stop("motors of the fleet");
         keep_error();
     }
-    let Directory { nodes: found, away } = directory::nodes(&network)?;
+    let directory = directory::nodes(&network)?;
     let mut nodes: Vec<(Name, Option<Name>)> =
-        found.into_keys().map(|(name, boot)| (name, Some(boot))).collect();
-    // Those that went away may be back just now.
-    let missed = away.keys().filter(|node| args.nodes.misses(node));
-    for name in missed.chain(&args.nodes.named) {
+        directory.nodes.keys().map(|(name, boot)| (name.clone(), Some(boot.clone()))).collect();
+    // Those that went away may be back just now. By its name another node would be asked.
+    let missed: Vec<_> =
+        directory.away.iter().filter(|((node, _), _)| args.nodes.misses(node)).collect();
+    let (others, missed): (Vec<_>, Vec<_>) =
+        missed.into_iter().partition(|((node, _), _)| directory.has(node));
+    for name in missed.into_iter().map(|((node, _), _)| node).chain(&args.nodes.named) {
         if nodes.iter().all(|(found, _)| found != name) {
             nodes.push((name.clone(), None));
         }
@@ -54,10 +57,19 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
             (name, thread.spawn(move || tell(&node, boot, network, order)))
         })
         .collect();
-    let (mut is_done, mut away) = (true, Vec::new());
-    for (name, told) in told {
+    let told = told.into_iter().map(|(name, told)| {
         let told = told.map(|it| it.join().unwrap_or_else(|_| Err("it failed".to_owned())));
-        match told.unwrap_or_else(|error| Err(format!("it could not be asked: {error}"))) {
+        (name, told.unwrap_or_else(|error| Err(format!("it could not be asked: {error}"))))
+    });
+    let others = others.into_iter().map(|((node, _), seconds)| {
+        (
+            node.clone(),
+            Err(format!("another node of this name went away {seconds:.0} s ago without an end")),
+        )
+    });
+    let (mut is_done, mut away) = (true, Vec::new());
+    for (name, told) in told.chain(others) {
+        match told {
             Ok(motors) => is_done &= say(args, order, &name, motors)?,
             Err(why) => {
                 let message = format!("node {name}: {why}");

@@ -61,7 +61,7 @@ that end a program stop the motors first. Exit code 0, or 3 if a motor did not c
 pub struct Args {
     #[command(flatten)]
     lines: Lines,
-    /// The name of the node: letters, digits, `-`, `_`, `.` [default: that in the certificate of --network, or that of this computer]
+    /// The name of the node: letters, digits, `-`, `_`, `.`; the first one is a letter, a digit or `_` [default: that in the certificate of --network, or that of this computer]
     #[arg(long, value_name = "NAME")]
     name: Option<Name>,
     /// Where programs of this computer connect: unix:PATH. Only you can connect [default: a new folder]
@@ -155,7 +155,7 @@ fn name(given: Option<&Name>, network: &Network) -> Result<Name, Failure> {
         .trying("leave --name out")),
         (Some(name), _) => Ok(name.clone()),
         (None, Some(name)) => Ok(name),
-        (None, None) => Ok(motorlink_fleet::remote::computer()),
+        (None, None) => Ok(motorlink_fleet::computer::name()),
     }
 }
 

@@ -26,7 +26,8 @@ pub struct Connection {
 impl Connection {
     /// Connects to a share, with this name for its log.
     pub fn open(share: &dyn Address, by: &str) -> io::Result<Self> {
-        let socket = share.connect().map_err(io::Error::other)?;
+        let socket = share.connect();
+        let socket = socket.map_err(|error| io::Error::new(io::ErrorKind::NotConnected, error))?;
         socket.set_read_timeout(Some(ANSWER))?;
         socket.set_write_timeout(Some(ANSWER))?;
         let (ended, closing) = (BTreeMap::new(), None);

@@ -22,6 +22,7 @@ use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
 
 use crate::clock::Clock;
+use crate::computer;
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
@@ -101,7 +102,7 @@ impl Node {
         if zenoh.liveliness().get(key::alive_of(&name)).wait().map_err(failed)?.recv().is_ok() {
             return Err(NodeError::NameTaken(name));
         }
-        let boot = Name::random()?;
+        let boot = Name::run(computer::mark())?;
         let (state, sessions, roll) = (RwLock::default(), Mutex::default(), Mutex::default());
         let own = OnceLock::new();
         let common = Arc::new(Common {

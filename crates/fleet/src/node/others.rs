@@ -28,7 +28,7 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
     let follower = Arc::clone(common);
     let seen = move |sample: Sample| {
         let run = key::run_of(sample.key_expr().as_str());
-        let Some(run) = run.filter(|(node, _)| *node != follower.name) else { return };
+        let Some(run) = run.filter(|(_, boot)| *boot != follower.boot) else { return };
         match sample.kind() {
             SampleKind::Put => follower.roll().came(run),
             SampleKind::Delete => follower.roll().went(run, follower.clock.now()),

@@ -16,6 +16,7 @@ use motorlink_telemetry::share::address::{Address, Unreachable};
 use tokio::runtime::Runtime;
 use zenoh::Session as Zenoh;
 
+use crate::computer;
 use crate::key::Name;
 use crate::network::{Network, NetworkError};
 use tunnel::{Tunnel, Whom};
@@ -147,12 +148,7 @@ pub fn own_name(network: &Network) -> Name {
         return name;
     }
     let user = std::env::var("USER").unwrap_or_else(|_| "somebody".to_owned());
-    Name::near(&format!("{user}-{}", computer()))
-}
-
-/// The name of this computer.
-pub fn computer() -> Name {
-    Name::near(&rustix::system::uname().nodename().to_string_lossy())
+    Name::near(&format!("{user}-{}", computer::name()))
 }
 
 /// Waits for a moment until the nodes know that the programs of this process have left. Call it before

@@ -475,8 +475,10 @@ async fn run_of(zenoh: &Zenoh, node: &Name) -> Result<Name, Unreachable> {
         match runs.pop_first() {
             Some(boot) if count == 1 => return Ok(boot),
             Some(_) => {
-                let why =
-                    format!("{count} nodes have the name {node}: give each a --name of its own");
+                let why = format!(
+                    "{count} nodes have the name {node}: give each a --name of its own; \
+                         `motorlink fleet stop-all --node {node}` stops the motors of all of them"
+                );
                 return Err(Unreachable::Failed(why));
             }
             // The nodes of a network that was just joined may not be known yet.

@@ -2,18 +2,18 @@
 
 mod picture;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::message::Group;
 use zenoh::pubsub::Subscriber;
-use zenoh::sample::Sample;
+use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::{Boot, Clock};
-use crate::directory;
+use crate::directory::{self, Run};
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::remote;
@@ -32,7 +32,7 @@ type Hear = fn(&Arc<Shared>, &Sample);
 pub struct View {
     shared: Arc<Shared>,
     /// The nodes that were there at the begin, and did not answer.
-    silent: Vec<Name>,
+    silent: Vec<Run>,
     _subscribers: Vec<Subscriber<()>>,
 }
 
@@ -65,12 +65,18 @@ impl View {
             let subscriber = zenoh.declare_subscriber(key).callback(heard).wait();
             subscribers.push(subscriber.map_err(failed)?);
         }
+        let follower = Arc::clone(&shared);
+        let seen = move |sample: Sample| follower.saw(&sample);
+        let seen = zenoh.liveliness().declare_subscriber(key::all_alive()).callback(seen).wait();
+        subscribers.push(seen.map_err(failed)?);
         let now = Boot.now();
         let mut silent = Vec::new();
-        for ((node, _), info) in directory::nodes(network)?.nodes {
+        let nodes = directory::nodes(network)?.nodes;
+        nodes.keys().for_each(|run| shared.picture().came(run.clone()));
+        for (run, info) in nodes {
             match info {
-                Some(info) => shared.picture().state(node, info, now),
-                None => silent.push(node),
+                Some(info) => shared.picture().state(run.0, info, now),
+                None => silent.push(run),
             }
         }
         shared.ask_columns();
@@ -84,14 +90,16 @@ impl View {
 
     /// The nodes that are there, and have said nothing yet.
     pub fn silent(&self) -> Vec<&Name> {
-        let nodes = self.shared.picture().nodes();
-        self.silent.iter().filter(|node| !nodes.contains_key(node)).collect()
+        let picture = self.shared.picture();
+        let is_silent = |run: &&Run| picture.runs().all(|it| it != *run);
+        self.silent.iter().filter(is_silent).map(|(node, _)| node).collect()
     }
 
     /// The nodes that went away without an end and that were not seen here, and for how long, in seconds.
-    pub fn away(&self) -> BTreeMap<Name, f64> {
+    pub fn away(&self) -> BTreeMap<Run, f64> {
         let nodes = self.nodes();
-        directory::away(nodes.values().map(|node| &node.info), |node| nodes.contains_key(node))
+        let runs: BTreeSet<Run> = self.shared.picture().runs().cloned().collect();
+        directory::away(nodes.values().map(|node| &node.info), |run| runs.contains(run))
     }
 
     /// The motors that have answered.
@@ -114,6 +122,15 @@ impl Shared {
         let info = serde_json::from_slice(&sample.payload().to_bytes()).ok();
         if let (Some(node), Some(info)) = (key::node_of(sample.key_expr().as_str()), info) {
             self.picture().state(node, info, Boot.now());
+        }
+    }
+
+    /// A node came or went.
+    fn saw(&self, sample: &Sample) {
+        let Some(run) = key::run_of(sample.key_expr().as_str()) else { return };
+        match sample.kind() {
+            SampleKind::Put => self.picture().came(run),
+            SampleKind::Delete => self.picture().went(&run),
         }
     }
 

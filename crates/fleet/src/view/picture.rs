@@ -1,12 +1,13 @@
 //! The last values of all motors of all nodes. It reads no clock: times come from the caller, in seconds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_telemetry::share::data::{Data, TIMES};
 use motorlink_telemetry::share::message::Group;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
+use crate::directory::Run;
 use crate::key::Name;
 use crate::message::Info;
 
@@ -39,21 +40,49 @@ type Values = (BTreeMap<String, f64>, f64);
 
 #[derive(Debug, Default)]
 pub(super) struct Picture {
-    nodes: BTreeMap<Name, Node>,
+    /// The runs that are there, as the network says.
+    here: BTreeSet<Run>,
+    nodes: BTreeMap<Run, Node>,
     columns: BTreeMap<(Name, u32), Vec<String>>,
     values: BTreeMap<(Name, String, u8), Values>,
 }
 
 impl Picture {
+    /// A run of a node is there.
+    pub(super) fn came(&mut self, run: Run) {
+        self.here.insert(run);
+    }
+
+    /// A run of a node is not there any more.
+    pub(super) fn went(&mut self, run: &Run) {
+        self.here.remove(run);
+    }
+
+    /// Whether several nodes have this name. What they publish of their motors cannot be told apart.
+    fn has_twins(&self, node: &Name) -> bool {
+        self.here.iter().filter(|(name, _)| name == node).count() > 1
+    }
+
+    /// The name under which a run is shown.
+    fn shown(&self, (node, boot): &Run) -> Name {
+        match self.has_twins(node) {
+            true => node.of_run(boot),
+            false => node.clone(),
+        }
+    }
+
     /// What a node says of itself.
     pub(super) fn state(&mut self, node: Name, info: Info, now: f64) {
-        let is_new = self.nodes.get(&node).is_none_or(|known| known.info.boot != info.boot);
-        if is_new {
+        let Ok(boot) = info.boot.parse() else { return };
+        let run = (node.clone(), boot);
+        if !self.nodes.contains_key(&run) || self.has_twins(&node) {
             // Groups are counted anew.
             self.columns.retain(|(of, _), _| *of != node);
             self.values.retain(|(of, ..), _| *of != node);
         }
-        self.nodes.insert(node, Node { info, at: now });
+        let here = &self.here;
+        self.nodes.retain(|other, _| other.0 != node || here.contains(other));
+        self.nodes.insert(run, Node { info, at: now });
     }
 
     pub(super) fn columns(&mut self, node: Name, group: Group) {
@@ -70,6 +99,9 @@ impl Picture {
         data: &Data,
         now: f64,
     ) -> bool {
+        if self.has_twins(&node) {
+            return true;
+        }
         let Some(names) = self.columns.get(&(node.clone(), data.group)) else { return false };
         let (values, at) = self.values.entry((node, line.to_owned(), motor)).or_default();
         *at = now;
@@ -82,24 +114,32 @@ impl Picture {
         true
     }
 
+    /// The nodes, by the names under which they are shown.
     pub(super) fn nodes(&self) -> BTreeMap<Name, Node> {
-        self.nodes.clone()
+        self.nodes.iter().map(|(run, node)| (self.shown(run), node.clone())).collect()
+    }
+
+    /// The runs of the nodes.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
+        self.nodes.keys()
     }
 
     /// The motors that have answered, in the order of nodes and lines.
     pub(super) fn drives(&self) -> Vec<Drive> {
         let mut drives = Vec::new();
-        for (node, Node { info, .. }) in &self.nodes {
+        for (run, Node { info, .. }) in &self.nodes {
+            let node = &run.0;
             for line in &info.lines {
                 let Some(speaks) = Speaks::of(line) else { continue };
                 for motor in line.heard.iter().filter_map(|number| speaks.motor(*number)) {
                     let key = (node.clone(), line.line.clone(), motor.number());
-                    let (values, at) = match self.values.get(&key) {
+                    let values = self.values.get(&key).filter(|_| !self.has_twins(node));
+                    let (values, at) = match values {
                         Some((values, at)) => (values.clone(), Some(*at)),
                         None => (BTreeMap::new(), None),
                     };
                     drives.push(Drive {
-                        node: node.clone(),
+                        node: self.shown(run),
                         line: line.line.clone(),
                         motor,
                         values,
@@ -173,6 +213,27 @@ mod tests {
         assert_eq!((drives.len(), drives[0].at, drives[1].at), (2, Some(3.0), None));
         assert_eq!(drives[0].values["speed_dps"], 3.0);
         assert_eq!(drives[0].values["voltage_volts"], 24.0);
+    }
+
+    #[test]
+    fn nodes_with_one_name_are_shown_both_and_no_value_is_that_of_another() {
+        let mut picture = Picture::default();
+        let run = |boot: &str| (node(), boot.parse().unwrap());
+        for boot in ["a-1111", "b-2222"] {
+            picture.came(run(boot));
+            picture.state(node(), info(boot, &[1]), 1.0);
+        }
+        picture.columns(node(), group(7));
+        assert!(picture.samples(node(), "rmd0", 1, &data(7, &[1.0], &[24.0]), 1.0));
+        let shown: Vec<_> = picture.drives().into_iter().map(|it| (it.node, it.at)).collect();
+        let both = ["arm1.run-1111", "arm1.run-2222"].map(|name| (name.parse().unwrap(), None));
+        assert_eq!(shown, both);
+        picture.went(&run("a-1111"));
+        picture.state(node(), info("b-2222", &[1]), 2.0);
+        picture.columns(node(), group(7));
+        assert!(picture.samples(node(), "rmd0", 1, &data(7, &[1.0], &[24.0]), 2.0));
+        let shown: Vec<_> = picture.drives().into_iter().map(|it| (it.node, it.at)).collect();
+        assert_eq!(shown, [(node(), Some(2.0))]);
     }
 
     #[test]

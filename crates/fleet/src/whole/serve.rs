@@ -1,6 +1,6 @@
 //! The sockets of one program and of all nodes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +21,7 @@ use zenoh::sample::{Sample, SampleKind};
 
 use super::merge::{Merge, Out};
 use crate::clock::{Boot, Clock};
-use crate::directory;
+use crate::directory::{self, Run};
 use crate::key::{self, Name};
 use crate::message::Info;
 use crate::remote::{PATIENCE, Remote};
@@ -55,6 +55,10 @@ enum What {
 
 /// A node that was seen.
 struct Link {
+    /// Its name in the network. Several nodes may have it.
+    node: Name,
+    /// Its run, if that is known.
+    boot: Option<Name>,
     run: u64,
     /// Its requests, while it is connected.
     requests: Option<UnboundedSender<Vec<u8>>>,
@@ -68,6 +72,9 @@ pub(super) struct Serving {
     /// What a node is, besides its name.
     pattern: Remote,
     is_meant: Box<dyn Fn(&Name) -> bool + Send + Sync>,
+    /// The runs that are there.
+    here: BTreeSet<Run>,
+    /// The nodes by their names in the fleet.
     links: BTreeMap<Name, Link>,
     reader: OwnedReadHalf,
     frames: Reader,
@@ -83,8 +90,15 @@ pub(super) struct Serving {
     zenoh: Arc<Zenoh>,
 }
 
-/// The lines of nodes that went away, for programs that come later.
-pub(super) type Known = Arc<Mutex<BTreeMap<Name, Vec<Line>>>>;
+/// Nodes that went away, by their names in the fleet, for programs that come later.
+pub(super) type Known = Arc<Mutex<BTreeMap<Name, Absent>>>;
+
+/// A node that went away.
+#[derive(Debug, Clone)]
+pub(super) struct Absent {
+    run: Run,
+    lines: Vec<Line>,
+}
 
 impl Serving {
     /// Looks for nodes, and serves the socket from then on. `known` has nodes that were there before.
@@ -108,6 +122,7 @@ impl Serving {
             merge: Merge::new(pattern.who.to_string()),
             pattern,
             is_meant: Box::new(is_meant),
+            here: BTreeSet::new(),
             links: BTreeMap::new(),
             reader,
             frames: Reader::new(LONGEST),
@@ -214,30 +229,53 @@ impl Serving {
 
     /// A node came or went. One that went ends its connection itself, sooner or later.
     fn saw(&mut self, sample: &Sample) {
+        let Some((node, boot)) = key::run_of(sample.key_expr().as_str()) else { return };
+        let run = (node, boot);
         if sample.kind() != SampleKind::Put {
+            self.here.remove(&run);
             return;
         }
-        let Some((node, _)) = key::run_of(sample.key_expr().as_str()) else { return };
-        if !(self.is_meant)(&node) {
+        if !(self.is_meant)(&run.0) {
             return;
         }
-        self.merge.coming(node.clone());
-        let now = Instant::now();
-        let link = self.links.entry(node);
-        let link = link.or_insert(Link { run: 0, requests: None, next: Some(now) });
+        let name = self.name_of(&run);
+        self.here.insert(run.clone());
+        self.merge.coming(name.clone());
+        let (now, (node, boot)) = (Instant::now(), run);
+        let new = Link { node, boot: None, run: 0, requests: None, next: Some(now) };
+        let link = self.links.entry(name).or_insert(new);
+        link.boot = Some(boot);
         link.next = link.next.map(|_| now);
+    }
+
+    /// The name of a run in the fleet: that of its node, unless another one that is there has it.
+    fn name_of(&self, run: &Run) -> Name {
+        let (node, boot) = run;
+        let is_own = |link: &Link| link.node == *node && link.boot.as_ref() == Some(boot);
+        if let Some((name, _)) = self.links.iter().find(|(_, link)| is_own(link)) {
+            return name.clone();
+        }
+        let other = self.links.get(node).and_then(|link| link.boot.clone());
+        match other.is_some_and(|other| self.here.contains(&(node.clone(), other))) {
+            true => node.of_run(boot),
+            false => node.clone(),
+        }
     }
 
     /// A node says which others went away before this program came.
     fn told_away(&mut self, sample: &Sample) {
         let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
-        let away = directory::away(info.iter(), |node| self.links.contains_key(node));
+        let is_known = |(node, boot): &Run| {
+            self.links.values().any(|it| it.node == *node && it.boot.as_ref() == Some(boot))
+        };
+        let away = directory::away(info.iter(), is_known);
         if away.is_empty() {
             return;
         }
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        for node in away.into_keys().filter(|node| (self.is_meant)(node)) {
-            known.entry(node).or_default();
+        for run in away.into_keys().filter(|(node, _)| (self.is_meant)(node)) {
+            let lines = Vec::new();
+            known.entry(self.name_of(&run)).or_insert(Absent { run, lines });
         }
         drop(known);
         self.remember();
@@ -246,11 +284,12 @@ impl Serving {
     /// Nodes that were there before keep their lines.
     fn remember(&mut self) {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        for (node, lines) in known {
-            if !self.links.contains_key(&node) {
+        for (name, Absent { run: (node, boot), lines }) in known {
+            if !self.links.contains_key(&name) {
                 let next = Some(Instant::now() + AGAIN);
-                self.links.insert(node.clone(), Link { run: 0, requests: None, next });
-                self.merge.remember(node, lines);
+                let link = Link { node, boot: Some(boot), run: 0, requests: None, next };
+                self.links.insert(name.clone(), link);
+                self.merge.remember(name, lines);
             }
         }
     }
@@ -258,15 +297,23 @@ impl Serving {
     /// Connects to nodes, if it is time.
     fn connect(&mut self) {
         let now = Instant::now();
-        for (node, link) in &mut self.links {
+        for (name, link) in &mut self.links {
             if link.next.is_none_or(|next| next > now) {
+                continue;
+            }
+            let runs = self.here.iter().filter(|(node, _)| *node == link.node);
+            let boots: Vec<_> = runs.map(|(_, boot)| boot).collect();
+            let boot = link.boot.clone().filter(|boot| boots.contains(&boot));
+            // By its name another node would be reached.
+            if boot.is_none() && (!boots.is_empty() || *name != link.node) {
+                link.next = Some(now + AGAIN);
                 continue;
             }
             link.next = None;
             link.run += 1;
-            let remote = Remote { node: node.clone(), ..self.pattern.clone() };
+            let remote = Remote { node: link.node.clone(), boot, ..self.pattern.clone() };
             let (zenoh, told) = (Arc::clone(&self.zenoh), self.told.clone());
-            let (node, run) = (node.clone(), link.run);
+            let (node, run) = (name.clone(), link.run);
             tokio::spawn(async move {
                 let connected = remote.open(zenoh, PATIENCE).await;
                 // The program may have ended.
@@ -294,9 +341,11 @@ impl Serving {
             link.next = Some(Instant::now() + AGAIN);
         }
         self.merge.gone(&node, &lost);
-        if let Some(lines) = self.merge.lines_of(&node).filter(|lines| !lines.is_empty()) {
+        let lines = self.merge.lines_of(&node).filter(|lines| !lines.is_empty());
+        let run = self.links.get(&node).and_then(|it| Some((it.node.clone(), it.boot.clone()?)));
+        if let Some((lines, run)) = lines.zip(run) {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-            known.insert(node, lines.to_vec());
+            known.insert(node, Absent { run, lines: lines.to_vec() });
         }
     }
 

@@ -124,9 +124,8 @@ impl Dump {
         writeln!(out, "{BEGIN} `motorlink {protocol} diff` compares a motor with them,")?;
         writeln!(
             out,
-            "# `motorlink {protocol} restore` writes them. Settings without a line stay as they are;"
+            "# `motorlink {protocol} restore` writes them. Settings without a line stay as they are."
         )?;
-        writeln!(out, "# correct the number in the last line if you remove some.")?;
         for line in &self.identity {
             writeln!(out, "# {line}")?;
         }
@@ -159,7 +158,11 @@ impl Dump {
         for names in self.absent.chunks(ABSENT_IN_A_LINE) {
             writeln!(out, "# {}", names.join(" "))?;
         }
-        writeln!(out, "\n{END}{} settings", self.values().count())
+        writeln!(
+            out,
+            "\n{END}{} settings; correct the number if you remove some",
+            self.values().count()
+        )
     }
 }
 

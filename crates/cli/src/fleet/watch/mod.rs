@@ -74,7 +74,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     let away = view.away();
-    let missing: BTreeSet<_> = view.silent().into_iter().chain(away.keys()).collect();
+    let away = away.keys().map(|(node, _)| node);
+    let missing: BTreeSet<_> = view.silent().into_iter().chain(away).collect();
     if missing.is_empty() {
         return Ok(());
     }

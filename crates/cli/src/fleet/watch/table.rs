@@ -349,7 +349,7 @@ impl Shown {
         let (drives, now) = (view.drives(), View::now());
         let rows = rows(&drives, now, sort, only, name);
         let mut sums = sums(&view.nodes(), &drives, now);
-        sums.extend(view.away().into_iter().map(|(node, age)| Sum::away(node, age)));
+        sums.extend(view.away().into_iter().map(|((node, _), age)| Sum::away(node, age)));
         Shown { rows, sums }
     }
 
