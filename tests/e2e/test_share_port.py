@@ -130,6 +130,20 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     eventually(lambda: abs(direct.rpm()) < 30 and abs(direct.dps(3)) < 5, "motors that stop")
 
 
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_move_that_waits_leaves_a_motor_that_another_program_has_moved_since(share, start, direct, sent):
+    for _ in range(max(3, ROUNDS)):
+        waits = start("rmd", "-p", share.rmd, "--id", 2, "position", 720000, "--max-speed", 100, "--wait")
+        eventually(lambda: direct.dps(2) > 50, "a motor that turns")
+        assert direct.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 30000))["kind"] == "answer"
+        waits.process.send_signal(sent)
+        assert waits.wait() != 0
+        eventually(lambda: direct.dps(2) > 290, "the speed of the other program")
+        assert not any("was stopped" in line for line in waits.err), waits.err
+        assert direct.ask("stop", motor={"line": "rmd0", "motor": 2})["kind"] == "answer"
+        eventually(lambda: abs(direct.dps(2)) < 5, "a motor at rest")
+
+
 def test_a_command_latches_stops_and_releases(share, run, direct):
     at = ["--at", f"unix:{share.path}"]
     direct.command("st0", 1, 3, 1)

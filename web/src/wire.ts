@@ -391,6 +391,8 @@ rate: number, };
 
 export type Mode = "speed" | "torque" | "position";
 
+export type MotionEnding = "stop" | "off" | "nothing";
+
 export type MotorName = { 
 /**
  * The line.
@@ -906,7 +908,7 @@ time_to_live: number,
 continues?: boolean, 
 /**
  * Whether it is refused with `held` if another program has moved, taken or stopped the motor since
- * this one moved it. For stops that nobody asked for: those of a program that ends.
+ * this one moved it. For automatic stops, such as those at the end of a program.
  */
 own?: boolean, } | { "ask": "confirm", 
 /**
@@ -920,7 +922,11 @@ motor: number, } | { "ask": "stop",
 /**
  * The motor; all motors that the lines can have, without it.
  */
-motor?: MotorName | null, } | { "ask": "take", 
+motor?: MotorName | null, } | { "ask": "ending", 
+/**
+ * What is done.
+ */
+motion: MotionEnding, } | { "ask": "take", 
 /**
  * The motor.
  */
@@ -1030,7 +1036,7 @@ bytes: Array<number>, } | { "to": "confirm" } | { "to": "stop",
 /**
  * The motors and how they took it.
  */
-motors: Array<StoppedMotor>, } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
+motors: Array<StoppedMotor>, } | { "to": "ending" } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
 /**
  * Those of the signals that are read.
  */

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::thread::{self, ThreadId};
 use std::time::Duration;
 
+use motorlink::port::Ending;
 use pyo3::prelude::*;
 
 use crate::error::{closed, elsewhere};
@@ -165,5 +166,14 @@ impl Drop for Entered<'_> {
             let place = threads.iter().position(|thread| *thread == here);
             place.map(|place| threads.swap_remove(place));
         });
+    }
+}
+
+/// What a program that holds the port does when a client leaves: the arguments of `close`.
+pub(crate) fn ending(stop: bool, off: bool) -> Ending {
+    match (stop, off) {
+        (false, _) => Ending::Nothing,
+        (true, true) => Ending::Off,
+        (true, false) => Ending::Stop,
     }
 }

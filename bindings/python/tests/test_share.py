@@ -55,6 +55,15 @@ signal.pause()
 """
 
 
+MOVES = """
+import signal, sys, motorlink
+bus = motorlink.rmd.open(sys.argv[1], on_close=sys.argv[2])
+bus.motor(4).set_speed(100)
+print("moving", flush=True)
+signal.pause()
+"""
+
+
 def test_two_programs_use_one_drive_and_each_motor_stops_with_its_program(
     share: Share, served: Served
 ) -> None:
@@ -126,6 +135,34 @@ def test_lines_of_a_share_are_sampled(share: Share) -> None:
         assert len(others) > 1 and set(others["voltage_volts_4"]) == {24}
 
     asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_the_end_of_a_program_is_that_of_the_motors_that_it_has(share: Share, served: Served) -> None:
+    def mode(motor: int) -> str:
+        return str(served.motor("rmd", motor)["mode"])
+
+    # Another program moves motor 1 meanwhile, and holds a load with it. It also moves motor 2.
+    with motorlink.rmd.open(share.rmd) as other:
+        with motorlink.rmd.open(share.rmd, on_close="off") as bus:
+            for motor in (1, 2, 3):
+                bus.motor(motor).set_speed(100)
+            for motor in (1, 2):
+                other.motor(motor).set_speed(200)
+            other.motor(1).stop()
+        eventually(lambda: mode(3) == "off", "the end of motor 3")
+        assert (mode(1), mode(2)) == ("stopped", "speed")
+    assert mode(2) == "stopped"
+    # What a program has declared holds if it is killed, too.
+    for on_close, ends in (("off", "off"), ("stop", "stopped"), ("nothing", "speed")):
+        words = [sys.executable, "-c", MOVES, share.rmd, on_close]
+        moves = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        assert moves.stdout and moves.stdout.readline() == "moving\n"
+        moves.kill()
+        moves.communicate()
+        if on_close == "nothing":
+            with motorlink.rmd.open(share.rmd) as other:
+                other.motor(4).status()
+        eventually(lambda ends=ends: mode(4) == ends, f"{on_close}: {ends}")  # type: ignore[misc]
 
 
 def test_the_end_of_a_share_is_told(share: Share) -> None:

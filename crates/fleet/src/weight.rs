@@ -26,7 +26,8 @@ impl Lines {
                 None => Kind::Moves,
             },
             Ask::Stop { .. } | Ask::Latch => Kind::Stops,
-            Ask::Take { .. }
+            Ask::Ending { .. }
+            | Ask::Take { .. }
             | Ask::Release
             | Ask::Scan { .. }
             | Ask::Open { .. }

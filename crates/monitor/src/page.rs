@@ -197,6 +197,7 @@ impl Page {
             Ask::Hello { .. }
             | Ask::Command { .. }
             | Ask::Confirm { .. }
+            | Ask::Ending { .. }
             | Ask::Take { .. }
             | Ask::Leave { .. } => {
                 return Err(Refusal::new(Reason::Forbidden, "a page may not send this request"));

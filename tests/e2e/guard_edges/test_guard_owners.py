@@ -67,7 +67,7 @@ class Drive:
         self.drives = drives
 
     def turns(self):
-        """It turns, in speed control, for a program that nobody knows."""
+        """It turns, in speed control, for a program that has ended."""
         eventually(lambda: self.drives.motor(1)["status"] == "IDLE", "the motor rests", within=20)
         with RawLine(self.drives.st) as line:
             line.say(frame(header(SET_RAMP, 1), struct.pack("<iH", 1000, 0)), b"\xf0")

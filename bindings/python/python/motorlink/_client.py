@@ -154,6 +154,7 @@ class AnyClient:
     def __init__(self, core: Any, *, on_close: str, stop_on_signals: bool):
         ends = self._ends(on_close)
         self._core = core
+        core.end_with(**ends)
         self._close: Close = functools.partial(core.close, **ends)
         self._name: str = core.port
         #: Motors whose settings are being restored.

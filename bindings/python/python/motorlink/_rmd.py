@@ -102,7 +102,9 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
             counts, and of angles in messages of errors. ``set_single_turn_position`` is refused.
         ``on_close``
             What the end of ``with`` and ``close()`` do with the motors that this client moved. ``stop``: they
-            hold still (0x81). ``off``: they are switched off (0x80). ``nothing``: they continue.
+            hold still (0x81). ``off``: they are switched off (0x80). ``nothing``: they continue. On a share or
+            a node this also holds if the program is killed, and motors that another program has moved since
+            are left as they are.
         ``stop_on_signals``
             SIGTERM and SIGHUP stop motors as ``close()`` does. Then they end the program as usual. The
             handlers are installed if this is called in the main thread, and only over the default action.

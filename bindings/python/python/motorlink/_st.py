@@ -93,8 +93,9 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
             How the line is resynchronised before the next exchange. ``drain``: wait for silence. ``pad``: send
             padding first, for 5.x drives that wait for the rest of a cut-off frame. ``none``: do nothing.
         ``on_close``
-            ``stop``: the end of ``with`` and ``close()`` stop the motors that this client started.
-            ``nothing``: the motors continue.
+            ``stop``: the end of ``with`` and ``close()`` stop the motors that this client started, or whose
+            motion it changed. ``nothing``: the motors continue. On a share or a node this also holds if the
+            program is killed, and motors that another program has moved since are left as they are.
         ``stop_on_signals``
             SIGTERM and SIGHUP stop motors as ``close()`` does. Then they end the program as usual. The
             handlers are installed if this is called in the main thread, and only over the default action.

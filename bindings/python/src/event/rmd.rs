@@ -18,6 +18,7 @@ use crate::rmd::{
     motor_ids, not_stopped, scan_result,
 };
 use crate::sampling::Plan;
+use crate::shared::ending;
 
 /// A CAN bus with one exchange per motor at a time. Call `ask`. Then call `advance` when the
 /// descriptor is readable and when the returned time has passed.
@@ -293,6 +294,12 @@ impl RmdEventClient {
     fn moving(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.driven
             .detached(py, |motors| motors.bus.moving().map(|id| id.number().into()).collect())
+    }
+
+    /// What a share or a node does with the motors when this client leaves: the arguments of `close`.
+    #[pyo3(signature = (*, stop, off))]
+    fn end_with(&self, py: Python<'_>, stop: bool, off: bool) -> PyResult<()> {
+        self.driven.detached(py, |motors| motors.bus.end_with(ending(stop, off)))
     }
 
     /// Closes the port, which may wait. `stop` first stops the moving motors, `off` switches them

@@ -11,6 +11,7 @@ use pyo3::types::PyBytes;
 use super::{Driven, fileno, outcome, seconds};
 use crate::error::{invalid_value, st_error};
 use crate::sampling::Plan;
+use crate::shared::ending;
 use crate::st::{
     Answer, StOptions, StRequest, StSampling, StWanted, frame_code, motor_number, not_stopped,
 };
@@ -224,6 +225,12 @@ impl StEventClient {
     fn moving(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.driven
             .detached(py, |line| line.client.started().map(|motor| motor.number().into()).collect())
+    }
+
+    /// What a share or a node does with the motors when this client leaves: the arguments of `close`.
+    #[pyo3(signature = (*, stop))]
+    fn end_with(&self, py: Python<'_>, stop: bool) -> PyResult<()> {
+        self.driven.detached(py, |line| line.client.end_with(ending(stop, false)))
     }
 
     /// Closes the port, which may wait. `stop` first stops the started motors. Returns the motors

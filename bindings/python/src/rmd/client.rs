@@ -24,7 +24,7 @@ use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
 use crate::recording::RecordedClient;
 use crate::sampling::{self, Plan, seconds};
-use crate::shared::Shared;
+use crate::shared::{Shared, ending};
 use crate::signals::{Deafness, without_python};
 use crate::sim::{Port, SimPort};
 use crate::values;
@@ -238,6 +238,14 @@ impl RmdClient {
         let bus = self.bus.get(py)?;
         let numbers: Vec<u8> = py.detach(|| bus.moving().map(MotorId::number).collect());
         PyList::new(py, numbers)
+    }
+
+    /// What a share or a node does with the motors when this client leaves: the arguments of `close`.
+    #[pyo3(signature = (*, stop, off))]
+    fn end_with(&self, py: Python<'_>, stop: bool, off: bool) -> PyResult<()> {
+        let bus = self.bus.get(py)?;
+        py.detach(|| bus.end_with(ending(stop, off)));
+        Ok(())
     }
 
     /// Closes the port after the exchanges under way. `stop` first stops the moving motors, `off`

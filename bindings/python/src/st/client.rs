@@ -18,7 +18,7 @@ use super::sample::{StSampling, Wanted};
 use crate::error::{invalid_value, st_error};
 use crate::recording::RecordedClient;
 use crate::sampling::{self, Plan, seconds};
-use crate::shared::Shared;
+use crate::shared::{Shared, ending};
 use crate::signals::{Deafness, without_python};
 use crate::sim::{Port, SimPort};
 
@@ -177,6 +177,14 @@ impl StClient {
         let client = self.client.get(py)?;
         let numbers: Vec<u8> = py.detach(|| client.started().map(MotorNumber::number).collect());
         PyList::new(py, numbers)
+    }
+
+    /// What a share or a node does with the motors when this client leaves: the arguments of `close`.
+    #[pyo3(signature = (*, stop))]
+    fn end_with(&self, py: Python<'_>, stop: bool) -> PyResult<()> {
+        let client = self.client.get(py)?;
+        py.detach(|| client.end_with(ending(stop, false)));
+        Ok(())
     }
 
     /// Closes the port after the exchanges under way. `stop` first stops the started motors.

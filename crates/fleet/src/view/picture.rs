@@ -58,7 +58,7 @@ impl Picture {
         self.here.remove(run);
     }
 
-    /// Whether several nodes have this name. What they publish of their motors cannot be told apart.
+    /// Whether several nodes have this name. Their samples have the same keys.
     fn has_twins(&self, node: &Name) -> bool {
         self.here.iter().filter(|(name, _)| name == node).count() > 1
     }

@@ -19,6 +19,18 @@ pub struct Holder {
     pub profile: Option<Profile>,
 }
 
+/// What a program that holds a port does with the motors of a client that leaves, however it leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ending {
+    /// It stops them.
+    #[default]
+    Stop,
+    /// It switches RMD motors off, and stops ST motors.
+    Off,
+    /// It leaves them as they are. They belong to no program then.
+    Nothing,
+}
+
 /// The common functions of serial lines and CAN buses. A wrapper implements
 /// [`within`](Self::within); the other functions then forward to the wrapped link.
 pub trait Link: Send {
@@ -72,6 +84,13 @@ pub trait Link: Send {
             within.only_own(is_set);
         }
     }
+
+    /// From now on, what a program that holds the port does with the motors of this client when it leaves.
+    fn end_with(&self, ending: Ending) {
+        if let Some(within) = self.within() {
+            within.end_with(ending);
+        }
+    }
 }
 
 impl<L: Link + ?Sized> Link for Box<L> {
@@ -101,6 +120,10 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn only_own(&self, is_set: bool) {
         (**self).only_own(is_set);
+    }
+
+    fn end_with(&self, ending: Ending) {
+        (**self).end_with(ending);
     }
 }
 

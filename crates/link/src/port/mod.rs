@@ -34,7 +34,7 @@ pub use error::{NotDone, PortError};
 pub use event::{EventBytes, EventCan, Evented};
 pub use faulty::{FaultBytes, FaultCan};
 pub use fd::FdLink;
-pub use link::{ByteLink, CanLink, Holder, Link};
+pub use link::{ByteLink, CanLink, Ending, Holder, Link};
 pub use name::{Given, NameError};
 pub use place::Place;
 pub use registry::{register, schemes};

@@ -1,7 +1,8 @@
 //! Connections: how many, and how long they may take.
 //!
-//! A connection arrives until its request has shown that it may come in. Those that arrive have places of
-//! their own, and the oldest gives way to a new one: strangers keep nobody out. Stops need no other place.
+//! A connection arrives until its request has shown a token. Connections that arrive have places of their
+//! own, and the oldest is closed for a new one, so they never block other requests. A stop needs no further
+//! place.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Link, PortError, PortName};
+use motorlink_link::port::{CanLink, Ending, Link, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
@@ -263,6 +263,13 @@ impl Client {
         })
     }
 
+    /// Declares what a program that holds the port, such as a share, does with the motors of this client
+    /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
+    /// ports do nothing then.
+    pub fn end_with(&self, ending: Ending) {
+        self.turns.take().end_with(ending);
+    }
+
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
         self.turns.take().only_own(true);
@@ -441,6 +448,14 @@ impl<L: CanLink> Driven<L> {
         Driven { port, session, exchanges: 0 }
     }
 
+    /// See [`Client::end_with`].
+    pub(super) fn end_with(&mut self, ending: Ending) {
+        self.session.ending = ending;
+        if let Some(link) = self.port.open_link() {
+            link.end_with(ending);
+        }
+    }
+
     /// See [`Link::only_own`].
     fn only_own(&mut self, is_own: bool) {
         self.session.is_own = is_own;
@@ -483,6 +498,7 @@ impl<L: CanLink> Driven<L> {
         let (link, reopened) = self.port.link()?;
         if reopened {
             link.only_own(self.session.is_own);
+            link.end_with(self.session.ending);
             self.session.reopened(now);
             if link.is_fresh() {
                 self.session.trust();

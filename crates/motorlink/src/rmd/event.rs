@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
+use motorlink_link::port::{CanLink, Ending, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
@@ -109,6 +109,11 @@ impl EventClient {
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
         self.driven.session.counters()
+    }
+
+    /// See [`Client::end_with`].
+    pub fn end_with(&mut self, ending: Ending) {
+        self.driven.end_with(ending);
     }
 
     /// The next request to any motor must not be sent later than this, if another program holds the port.

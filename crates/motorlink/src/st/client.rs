@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
-use motorlink_link::port::{ByteLink, Link, PortError, PortName};
+use motorlink_link::port::{ByteLink, Ending, Link, PortError, PortName};
 use motorlink_link::printable;
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::st as proto;
@@ -181,6 +181,13 @@ impl Client {
         let result = act();
         self.turns.take().session.set_recovery(before);
         result
+    }
+
+    /// Declares what a program that holds the port, such as a share, does with the motors of this client
+    /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
+    /// ports do nothing then.
+    pub fn end_with(&self, ending: Ending) {
+        self.turns.take().end_with(ending);
     }
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
@@ -424,6 +431,14 @@ impl<L: ByteLink> Driven<L> {
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
+    /// See [`Client::end_with`].
+    pub(super) fn end_with(&mut self, ending: Ending) {
+        self.session.ending = ending;
+        if let Some(link) = self.port.open_link() {
+            link.end_with(ending);
+        }
+    }
+
     /// See [`Link::only_own`].
     fn only_own(&mut self, is_own: bool) {
         self.session.is_own = is_own;
@@ -474,6 +489,7 @@ impl<L: ByteLink> Driven<L> {
         let (link, reopened) = self.port.link()?;
         if reopened {
             link.only_own(self.session.is_own);
+            link.end_with(self.session.ending);
             self.session.reopened();
             if link.is_fresh() {
                 self.session.trust_line();

@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{ByteLink, EventBytes, PortError, PortName};
+use motorlink_link::port::{ByteLink, Ending, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::st::{
     Confirmation, Counters, MotorNumber, Output, Profile, Request, SyncState,
@@ -103,6 +103,11 @@ impl EventClient {
     /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
         self.driven.session.sync_state()
+    }
+
+    /// See [`Client::end_with`].
+    pub fn end_with(&mut self, ending: Ending) {
+        self.driven.end_with(ending);
     }
 
     /// The next request must not be sent later than this, if another program holds the port.

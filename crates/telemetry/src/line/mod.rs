@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use motorlink::port::{NotDone, PortError};
 use motorlink::{Clock, LinkState};
-use motorlink_proto::rmd::{Code, MotorId, ReadStatus, Stop};
+use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, Stop};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
 use motorlink_proto::time::Instant;
@@ -240,6 +240,14 @@ impl Request {
                 Request::st(motor.number(), stop)
             }
             Motor::Rmd(id) => Request::rmd(id, &Stop),
+        }
+    }
+
+    /// Switches an RMD motor off; stops an ST motor.
+    pub fn off(motor: Motor) -> Self {
+        match motor {
+            Motor::St(_) => Request::stop(motor),
+            Motor::Rmd(id) => Request::rmd(id, &Off),
         }
     }
 

@@ -15,7 +15,7 @@ pub use frames::{WireFrame, WireLoad, WireResult, WireWay};
 pub use json::{MessageError, decode, encode};
 pub use lines::{Finding, FoundPort, Line, LineCounts, Protocol};
 pub use motors::{
-    ANY_MOTOR, Column, DropRule, Group, MotorName, SignalName, SignalRate, StoppedMotor,
+    ANY_MOTOR, Column, DropRule, Ending, Group, MotorName, SignalName, SignalRate, StoppedMotor,
 };
 
 /// The most lines of a share that programs open. Those of its start do not count.
@@ -103,7 +103,7 @@ pub enum Ask {
         #[serde(default, skip_serializing_if = "is_false")]
         continues: bool,
         /// Whether it is refused with `held` if another program has moved, taken or stopped the motor since
-        /// this one moved it. For stops that nobody asked for: those of a program that ends.
+        /// this one moved it. For automatic stops, such as those at the end of a program.
         #[serde(default, skip_serializing_if = "is_false")]
         own: bool,
     },
@@ -120,6 +120,12 @@ pub enum Ask {
         /// The motor; all motors that the lines can have, without it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motor: Option<MotorName>,
+    },
+    /// What becomes of the motors that this program moves from now on, when it leaves. They are stopped
+    /// without it.
+    Ending {
+        /// What is done.
+        motion: Ending,
     },
     /// Takes a motor from the program that may change it. It keeps turning.
     Take {
@@ -296,6 +302,8 @@ pub enum Answer {
         /// The motors and how they took it.
         motors: Vec<StoppedMotor>,
     },
+    /// To ending.
+    Ending,
     /// To take.
     Take,
     /// To latch.

@@ -203,7 +203,7 @@ impl Server {
             let only_stops = programs >= MOST_CLIENTS;
             let session = if only_stops { self.hub.join_to_stop(full()) } else { self.hub.join() };
             if self.clients.len() >= MOST_CLIENTS + STOPS {
-                // Whoever says nothing gives way to whoever may want a stop.
+                // The oldest connection without a name is closed for one that may be a stop.
                 let hub = &self.hub;
                 let mut unnamed = self.clients.iter_mut().filter(|it| !hub.is_named(it.session));
                 match unnamed.find(|client| !client.is_gone) {

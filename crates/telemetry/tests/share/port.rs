@@ -8,7 +8,7 @@ use crate::asking::Asker;
 use crate::faulty::{deaf, repeating};
 use crate::scripted::{self, Scripted};
 use crate::shared::{LIMIT, Share};
-use motorlink::port::{NotDone, PortError, PortName};
+use motorlink::port::{Ending, NotDone, PortError, PortName};
 use motorlink::st::{self, Profile, RegisterId, Status};
 use motorlink::{LinkState, rmd};
 use motorlink_proto::rmd::{MotorId, MotorSet, ReadStatus, SetSpeed, SetTorque4, Stop};
@@ -164,6 +164,34 @@ fn a_client_that_ends_does_not_switch_off_a_motor_that_another_one_has_stopped()
     let Answer::Frames { frames, .. } = frames else { panic!("{frames:?}") };
     let of_code = |code| frames.iter().filter(|frame| frame.bytes.starts_with(code)).count();
     assert_eq!((of_code("80"), of_code("81")), (0, 2), "{frames:?}");
+}
+
+#[test]
+fn a_share_ends_the_motion_of_a_client_as_the_client_has_declared() {
+    let share = Share::new("declared");
+    let mut witness = Asker::join(&share.path, "witness");
+    for (ending, code) in [(Ending::Stop, "81"), (Ending::Off, "80"), (Ending::Nothing, "a2")] {
+        let client = share.rmd();
+        client.end_with(ending);
+        client.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
+        share.reaches("rmd1.speed_dps", |dps| dps > 350.0);
+        // As if it was killed.
+        drop(client);
+        witness.event(Happening::Left);
+        match ending {
+            Ending::Nothing => share.reaches("rmd1.speed_dps", |dps| dps > 350.0),
+            _ => share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0),
+        }
+        let (line, from, to, after) = ("rmd0".to_owned(), Some(0.0), None, None);
+        let frames = witness.ask(Ask::Frames { line, from, to, after, most: 1000 }).unwrap();
+        let Answer::Frames { frames, .. } = frames else { panic!("{frames:?}") };
+        assert!(frames.last().unwrap().bytes.starts_with(code), "{ending:?} {frames:?}");
+    }
+    // It has no owner. The next program that moves it owns it.
+    let next = share.rmd();
+    next.motor(1).unwrap().set_speed(CentiDps(18_000)).unwrap();
+    drop(next);
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
 }
 
 #[test]

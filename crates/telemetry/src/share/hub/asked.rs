@@ -171,6 +171,12 @@ impl Hub {
                 self.stop_asked(session, name, id, motor.as_ref())?;
                 Ok(None)
             }
+            Ask::Ending { motion } => {
+                if let Some(session) = self.sessions.get_mut(&session) {
+                    session.ending = motion;
+                }
+                Ok(Some(Answer::Ending))
+            }
             Ask::Take { motor } => self.take(session, name, &motor),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
@@ -235,7 +241,7 @@ impl Hub {
         }
     }
 
-    /// Refuses what is no part of a stop, if there was no place for more programs.
+    /// Refuses all but stops and reads for a session beyond the limit of programs.
     fn check_place(&self, session: SessionId) -> Result<(), Refused> {
         let why = self.sessions.get(&session).and_then(|session| session.only_stops.clone());
         why.map_or(Ok(()), |why| Err((Reason::Busy, why)))

@@ -78,8 +78,8 @@ impl Held {
         self.movers.insert((motor, session));
     }
 
-    /// Whether another program has moved, taken or stopped a motor since this one moved it. A motor that
-    /// nobody owns may turn since before this share began: a program that comes from there may stop it.
+    /// Whether another program has moved, taken or stopped a motor since this one moved it. A motor
+    /// without an owner may turn since before this share began: then the program may stop it.
     pub(super) fn is_lost_to_others(&self, motor: Motor, session: SessionId) -> bool {
         match self.owners.get(&motor) {
             _ if self.starting.contains(&(motor, session)) => false,

@@ -23,7 +23,7 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
 
 use super::frame::Frame;
-use super::message::{self, Event, Happening};
+use super::message::{self, Ending, Event, Happening};
 use super::opening::Limits;
 use super::words;
 use crate::event::CommandError;
@@ -156,7 +156,16 @@ impl Hub {
         let by = words::after(&name);
         for line in self.numbers() {
             for motor in self.orphans(line, id) {
-                if let Some((why, held)) = why.zip(self.lines.get_mut(&line)) {
+                let Some(held) = self.lines.get_mut(&line) else { continue };
+                match session.ending {
+                    Ending::Nothing => {
+                        held.owners.remove(&motor);
+                        continue;
+                    }
+                    Ending::Off => held.owe_off(motor, &by),
+                    Ending::Stop => {}
+                }
+                if let Some(why) = why {
                     held.words.explain(motor, &by, why);
                 }
                 self.stop(Why::Asked, line, motor, id, None, &by);
@@ -371,13 +380,14 @@ impl Hub {
             Why::Asked | Why::OfAll => None,
         };
         let is_precaution = quiet == Some(Quiet::Precaution);
+        let request = held.stop_of(motor);
         let asker = Arc::clone(by);
         let ended = move |result| {
             tell(Work::Stop { part, motor, by: asker, is_precaution, result });
         };
         let begun = match quiet {
-            None => held.remote().stop_then(by, Request::stop(motor), ended),
-            Some(quiet) => held.remote().stop_quietly_then(by, Request::stop(motor), quiet, ended),
+            None => held.remote().stop_then(by, request, ended),
+            Some(quiet) => held.remote().stop_quietly_then(by, request, quiet, ended),
         };
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));

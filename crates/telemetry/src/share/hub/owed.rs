@@ -14,6 +14,8 @@ pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 /// A stop that a motor has not confirmed.
 pub(super) struct Owed {
     pub(super) by: Arc<str>,
+    /// Whether it switches an RMD motor off.
+    pub(super) is_off: bool,
     next: Next,
     /// The pause before the next search.
     pause: Duration,
@@ -30,7 +32,12 @@ enum Next {
 impl Owed {
     /// It is asked for now.
     pub(super) fn new(by: &Arc<str>) -> Self {
-        Owed { by: Arc::clone(by), next: Next::Answer, pause: AGAIN }
+        Owed { by: Arc::clone(by), is_off: false, next: Next::Answer, pause: AGAIN }
+    }
+
+    /// Whether it switches an RMD motor off.
+    pub(super) fn off(self, is_off: bool) -> Self {
+        Owed { is_off, ..self }
     }
 
     pub(super) fn await_answer(&mut self) {

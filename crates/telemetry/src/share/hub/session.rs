@@ -9,7 +9,7 @@ use super::feed::Feed;
 use super::line::Lines;
 use crate::share::frame::Frame;
 use crate::share::message::{
-    self, ANY_MOTOR, Answer, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
+    self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
 };
 use crate::signal::Motor;
 
@@ -29,6 +29,8 @@ pub(super) struct Session {
     pub(super) name: Option<Arc<str>>,
     /// Why it may only stop motors, if that is so.
     pub(super) only_stops: Option<String>,
+    /// What becomes of its motors when it leaves.
+    pub(super) ending: Ending,
     answers: VecDeque<Text>,
     events: VecDeque<Event>,
     missed: u64,

@@ -7,6 +7,7 @@ use super::line::Held;
 use super::owed::{AGAIN, Owed, UnansweredStop};
 use super::reasons::reason;
 use crate::event::CommandError;
+use crate::line::Request;
 use crate::runner::CommandResult;
 use crate::share::message::Reason;
 use crate::signal::Motor;
@@ -22,9 +23,23 @@ pub(super) enum Address {
 }
 
 impl Held {
-    /// A stop is asked for.
+    /// A stop is asked for. One that switches the motor off for the same program stays so.
     pub(super) fn owe(&mut self, motor: Motor, by: &Arc<str>) {
-        self.owed.insert(motor, Owed::new(by));
+        let is_off = self.owed.get(&motor).is_some_and(|owed| owed.is_off && owed.by == *by);
+        self.owed.insert(motor, Owed::new(by).off(is_off));
+    }
+
+    /// The stop of a motor switches it off.
+    pub(super) fn owe_off(&mut self, motor: Motor, by: &Arc<str>) {
+        self.owed.insert(motor, Owed::new(by).off(true));
+    }
+
+    /// What stops a motor now.
+    pub(super) fn stop_of(&self, motor: Motor) -> Request {
+        match self.owed.get(&motor) {
+            Some(Owed { is_off: true, .. }) => Request::off(motor),
+            _ => Request::stop(motor),
+        }
     }
 
     /// A motor has confirmed a stop: no program owns it any more.

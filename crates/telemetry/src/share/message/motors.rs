@@ -29,6 +29,20 @@ pub struct SignalName {
     pub name: String,
 }
 
+/// What becomes of the motors of a program that leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "MotionEnding"))]
+pub enum Ending {
+    /// They are stopped.
+    #[default]
+    Stop,
+    /// RMD motors are switched off, ST motors stopped.
+    Off,
+    /// They are left as they are, and belong to no program.
+    Nothing,
+}
+
 /// What a full queue loses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

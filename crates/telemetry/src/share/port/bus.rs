@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{CanLink, Evented, Holder, Link, PortError};
+use motorlink::port::{CanLink, Ending, Evented, Holder, Link, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Command, MotorId, MotorSet, Payload, SetTorque, SetTorque4, TORQUE4_ID,
@@ -95,6 +95,10 @@ impl Link for ShareBus {
 
     fn only_own(&self, is_set: bool) {
         self.connection.only_own(is_set);
+    }
+
+    fn end_with(&self, ending: Ending) {
+        self.connection.end_with(ending);
     }
 }
 

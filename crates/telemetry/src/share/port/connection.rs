@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, FdLink, Holder, PortError};
+use motorlink::port::{self, ByteLink, FdLink, Holder, PortError};
 use motorlink::st::Profile;
 
 use super::place::Place;
 use crate::share::VERSION;
 use crate::share::dialogue::{Dialogue, DialogueError, Ended, Heard};
-use crate::share::message::{Answer, Ask, LONGEST_NAME, Line, MotorName, Protocol, Text};
+use crate::share::message::{Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Text};
 use crate::share::request::Kind;
 use crate::share::words::Speaks;
 
@@ -31,6 +31,9 @@ pub(super) struct Connection {
     expires: Cell<Duration>,
     /// Whether requests are for motors that no other program has moved since.
     is_own: Cell<bool>,
+    /// What the share does with the motors of this program when it leaves, and what it knows of that.
+    ending: Cell<Ending>,
+    declared: Ending,
     /// The motors that were taken from other programs.
     taken: BTreeSet<u8>,
     /// Why the share closes the connection.
@@ -48,6 +51,8 @@ impl Connection {
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
             is_own: Cell::new(false),
+            ending: Cell::default(),
+            declared: Ending::default(),
             taken: BTreeSet::new(),
             closing: None,
         };
@@ -106,10 +111,24 @@ impl Connection {
         self.is_own.set(is_set);
     }
 
+    /// What the share does with the motors of this program when it leaves.
+    pub(super) fn end_with(&self, ending: port::Ending) {
+        self.ending.set(match ending {
+            port::Ending::Stop => Ending::Stop,
+            port::Ending::Off => Ending::Off,
+            port::Ending::Nothing => Ending::Nothing,
+        });
+    }
+
     /// Sends a command to a motor; gives its id.
     pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
         let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
         let line = self.port.line.clone();
+        let motion = self.ending.get();
+        if motion != self.declared && self.changes(motor, &bytes) {
+            self.declared = motion;
+            self.ask(Ask::Ending { motion })?;
+        }
         if self.port.at.takes() && self.changes(motor, &bytes) && self.taken.insert(motor) {
             self.ask(Ask::Take { motor: MotorName { line: line.clone(), motor } })?;
         }

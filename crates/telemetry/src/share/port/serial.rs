@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, Evented, Holder, Link, PortError};
+use motorlink::port::{ByteLink, Ending, Evented, Holder, Link, PortError};
 use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Parse};
 
 use super::connection::Connection;
@@ -116,6 +116,10 @@ impl Link for ShareLine {
 
     fn only_own(&self, is_set: bool) {
         self.connection.only_own(is_set);
+    }
+
+    fn end_with(&self, ending: Ending) {
+        self.connection.end_with(ending);
     }
 }
 
