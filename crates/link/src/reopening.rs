@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use motorlink_proto::time::Instant as Moment;
 
 use crate::clock::Clock;
-use crate::port::PortError;
+use crate::port::{Ending, Link, PortError};
 
 /// Opens the port. May be called repeatedly.
 pub type Opener<L> = Box<dyn FnMut() -> Result<L, PortError> + Send>;
@@ -85,6 +85,9 @@ pub struct Reopening<L> {
     trouble: String,
     clock: Clock,
     sign: LinkSign,
+    /// What a program that holds the port knows of this client: see [`Link::only_own`] and
+    /// [`Link::end_with`].
+    told: (bool, Ending),
 }
 
 impl<L> Reopening<L> {
@@ -109,6 +112,7 @@ impl<L> Reopening<L> {
             trouble: String::new(),
             clock: Clock::default(),
             sign: LinkSign(Arc::new(Mutex::new(Shown::Open))),
+            told: (false, Ending::default()),
         }
     }
 
@@ -145,35 +149,6 @@ impl<L> Reopening<L> {
         self.link.as_mut()
     }
 
-    /// The open link, and whether this call opened it.
-    pub fn link(&mut self) -> Result<(&mut L, bool), PortError> {
-        let mut reopened = false;
-        if self.link.is_none() {
-            let closed = || PortError::Closed { port: self.name.to_string() };
-            let open = self.open.as_mut().ok_or_else(closed)?;
-            if Instant::now() < self.not_before {
-                let (port, why) = (self.name.to_string(), self.trouble.clone());
-                return Err(PortError::Away { port, why });
-            }
-            match open() {
-                Ok(link) => {
-                    self.link = Some(link);
-                    self.reopened = Some(Instant::now());
-                    self.sign.show(Shown::Open);
-                }
-                Err(error) => {
-                    self.postpone(&error);
-                    return Err(error);
-                }
-            }
-            self.wait = Duration::ZERO;
-            reopened = true;
-        }
-        let name = &self.name;
-        let link = self.link.as_mut();
-        Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
-    }
-
     /// Closes the link. The next call may open it at once, unless it was opened again just before: a
     /// busy device server accepts each connection and closes it.
     pub fn close(&mut self) {
@@ -197,6 +172,56 @@ impl<L> Reopening<L> {
     }
 }
 
+impl<L: Link> Reopening<L> {
+    /// The open link, and whether this call opened it.
+    pub fn link(&mut self) -> Result<(&mut L, bool), PortError> {
+        let mut reopened = false;
+        if self.link.is_none() {
+            let closed = || PortError::Closed { port: self.name.to_string() };
+            let open = self.open.as_mut().ok_or_else(closed)?;
+            if Instant::now() < self.not_before {
+                let (port, why) = (self.name.to_string(), self.trouble.clone());
+                return Err(PortError::Away { port, why });
+            }
+            match open() {
+                Ok(link) => {
+                    let (is_own, ending) = self.told;
+                    link.only_own(is_own);
+                    link.end_with(ending);
+                    self.link = Some(link);
+                    self.reopened = Some(Instant::now());
+                    self.sign.show(Shown::Open);
+                }
+                Err(error) => {
+                    self.postpone(&error);
+                    return Err(error);
+                }
+            }
+            self.wait = Duration::ZERO;
+            reopened = true;
+        }
+        let name = &self.name;
+        let link = self.link.as_mut();
+        Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
+    }
+
+    /// [`Link::only_own`], also after the port was opened again.
+    pub fn only_own(&mut self, is_own: bool) {
+        self.told.0 = is_own;
+        if let Some(link) = &self.link {
+            link.only_own(is_own);
+        }
+    }
+
+    /// [`Link::end_with`], also after the port was opened again.
+    pub fn end_with(&mut self, ending: Ending) {
+        self.told.1 = ending;
+        if let Some(link) = &self.link {
+            link.end_with(ending);
+        }
+    }
+}
+
 impl<L: 'static> Reopening<L> {
     /// The same port, with another type of link.
     pub fn map<M: 'static>(self, form: fn(L) -> M) -> Reopening<M> {
@@ -211,10 +236,23 @@ impl<L: 'static> Reopening<L> {
             trouble,
             clock,
             sign,
+            told,
         } = self;
         let link = link.map(form);
         let open = open.map(|mut open| -> Opener<M> { Box::new(move || open().map(form)) });
-        Reopening { name, link, open, back_off, wait, not_before, reopened, trouble, clock, sign }
+        Reopening {
+            name,
+            link,
+            open,
+            back_off,
+            wait,
+            not_before,
+            reopened,
+            trouble,
+            clock,
+            sign,
+            told,
+        }
     }
 }
 
@@ -222,13 +260,18 @@ impl<L: 'static> Reopening<L> {
 mod tests {
     use super::*;
 
+    #[derive(Debug)]
+    struct Wire;
+
+    impl Link for Wire {}
+
     #[test]
     fn until_the_next_attempt_the_last_error_is_returned() {
         let mut attempts = 0;
-        let open: Opener<()> = Box::new(move || {
+        let open: Opener<Wire> = Box::new(move || {
             attempts += 1;
             let port = "can0".to_owned();
-            if attempts == 1 { Ok(()) } else { Err(PortError::NoSuchInterface { port }) }
+            if attempts == 1 { Ok(Wire) } else { Err(PortError::NoSuchInterface { port }) }
         });
         let hour = Duration::from_secs(3600);
         let mut port = Reopening::open("socketcan:can0", open, BackOff { first: hour, cap: hour })
@@ -244,9 +287,9 @@ mod tests {
     fn a_port_that_closes_as_soon_as_it_is_open_is_not_opened_again_and_again() {
         let attempts = Arc::new(Mutex::new(0));
         let counted = Arc::clone(&attempts);
-        let open: Opener<()> = Box::new(move || {
+        let open: Opener<Wire> = Box::new(move || {
             *counted.lock().unwrap() += 1;
-            Ok(())
+            Ok(Wire)
         });
         let hour = Duration::from_secs(3600);
         let mut port = Reopening::open("tcp:drive", open, BackOff { first: hour, cap: hour })

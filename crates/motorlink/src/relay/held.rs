@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use motorlink_link::port::{Evented, PortError};
+use motorlink_link::port::{Evented, Link, PortError};
 use motorlink_link::reopening::FULL;
 use motorlink_proto::time::Instant;
 
@@ -20,7 +20,7 @@ pub(super) struct Held<L, T> {
     is_full: bool,
 }
 
-impl<L: Evented + 'static, T> Held<L, T> {
+impl<L: Link + Evented + 'static, T> Held<L, T> {
     pub(super) fn new(port: Port<L>, pace: Pace) -> Self {
         Held { port, lane: Rc::default(), pace, is_full: false }
     }

@@ -21,7 +21,7 @@ impl<L> Clone for Port<L> {
     }
 }
 
-impl<L: Evented + 'static> Port<L> {
+impl<L: Link + Evented + 'static> Port<L> {
     pub(super) fn open(name: &PortName, open: Opener<L>) -> Result<Self, PortError> {
         let back_off = BackOff { cap: Duration::from_millis(500), ..BackOff::default() };
         Ok(Port(Arc::new(Mutex::new(Reopening::open(&name.to_string(), open, back_off)?))))

@@ -267,14 +267,14 @@ impl Client {
     /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
     /// ports do nothing then.
     pub fn end_with(&self, ending: Ending) {
-        self.turns.take().end_with(ending);
+        self.turns.take().port.end_with(ending);
     }
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().only_own(true);
+        self.turns.take().port.only_own(true);
         let result = act();
-        self.turns.take().only_own(false);
+        self.turns.take().port.only_own(false);
         result
     }
 
@@ -448,22 +448,6 @@ impl<L: CanLink> Driven<L> {
         Driven { port, session, exchanges: 0 }
     }
 
-    /// See [`Client::end_with`].
-    pub(super) fn end_with(&mut self, ending: Ending) {
-        self.session.ending = ending;
-        if let Some(link) = self.port.open_link() {
-            link.end_with(ending);
-        }
-    }
-
-    /// See [`Link::only_own`].
-    fn only_own(&mut self, is_own: bool) {
-        self.session.is_own = is_own;
-        if let Some(link) = self.port.open_link() {
-            link.only_own(is_own);
-        }
-    }
-
     /// Makes ready for these requests.
     fn ready(&mut self, requests: impl IntoIterator<Item = [u8; 8]>) -> Result<(), Error> {
         self.abandon();
@@ -497,8 +481,6 @@ impl<L: CanLink> Driven<L> {
         let now = self.port.now();
         let (link, reopened) = self.port.link()?;
         if reopened {
-            link.only_own(self.session.is_own);
-            link.end_with(self.session.ending);
             self.session.reopened(now);
             if link.is_fresh() {
                 self.session.trust();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{Ending, Holder, NotDone, PortError};
+use motorlink_link::port::{Holder, NotDone, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
@@ -54,10 +54,6 @@ pub(super) struct Session {
     is_retired: bool,
     /// Whether another program holds the port.
     pub(super) is_held: bool,
-    /// Whether requests are for motors that no other program has moved since.
-    pub(super) is_own: bool,
-    /// What a program that holds the port does when this client leaves.
-    pub(super) ending: Ending,
     /// Motors of which that program has no reply, and knows that they are there.
     pub(super) missed: MotorSet,
     timeout: Duration,
@@ -122,8 +118,6 @@ impl Session {
             losses: [0; MotorId::COUNT],
             is_retired: false,
             is_held: false,
-            is_own: false,
-            ending: Ending::default(),
             missed: MotorSet::EMPTY,
             timeout: options.timeout,
             not_done: Vec::new(),

@@ -187,14 +187,14 @@ impl Client {
     /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
     /// ports do nothing then.
     pub fn end_with(&self, ending: Ending) {
-        self.turns.take().end_with(ending);
+        self.turns.take().port.end_with(ending);
     }
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().only_own(true);
+        self.turns.take().port.only_own(true);
         let result = act();
-        self.turns.take().only_own(false);
+        self.turns.take().port.only_own(false);
         result
     }
 
@@ -431,22 +431,6 @@ impl<L: ByteLink> Driven<L> {
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
-    /// See [`Client::end_with`].
-    pub(super) fn end_with(&mut self, ending: Ending) {
-        self.session.ending = ending;
-        if let Some(link) = self.port.open_link() {
-            link.end_with(ending);
-        }
-    }
-
-    /// See [`Link::only_own`].
-    fn only_own(&mut self, is_own: bool) {
-        self.session.is_own = is_own;
-        if let Some(link) = self.port.open_link() {
-            link.only_own(is_own);
-        }
-    }
-
     /// Begins an exchange with motor number `motor`.
     pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.ready_for(Effect::of(request))?;
@@ -488,8 +472,6 @@ impl<L: ByteLink> Driven<L> {
         self.abandon();
         let (link, reopened) = self.port.link()?;
         if reopened {
-            link.only_own(self.session.is_own);
-            link.end_with(self.session.ending);
             self.session.reopened();
             if link.is_fresh() {
                 self.session.trust_line();

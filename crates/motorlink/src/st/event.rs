@@ -107,7 +107,7 @@ impl EventClient {
 
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
-        self.driven.end_with(ending);
+        self.driven.port.end_with(ending);
     }
 
     /// The next request must not be sent later than this, if another program holds the port.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{Ending, Holder, NotDone, PortError};
+use motorlink_link::port::{Holder, NotDone, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_FRAME,
@@ -43,10 +43,6 @@ pub(super) struct Session {
     is_retired: bool,
     /// Whether another program holds the port.
     is_held: bool,
-    /// Whether requests are for motors that no other program has moved since.
-    pub(super) is_own: bool,
-    /// What a program that holds the port does when this client leaves.
-    pub(super) ending: Ending,
     timeout: Duration,
 }
 
@@ -117,8 +113,6 @@ impl Session {
             last: LastExchange::default(),
             is_retired: false,
             is_held: false,
-            is_own: false,
-            ending: Ending::default(),
             timeout: options.timeout,
         }
     }

@@ -150,22 +150,3 @@ pub(super) fn motor(speaks: Speaks, number: u8) -> Result<Motor, String> {
 fn rmd_motor(id: u8) -> Result<MotorId, String> {
     MotorId::new(id).ok_or_else(|| format!("an ID is 1 to {}", MotorId::COUNT))
 }
-
-#[cfg(test)]
-mod tests {
-    use motorlink_proto::st::Profile;
-
-    use super::*;
-
-    #[test]
-    fn what_changes_a_motion_counts_as_motion() {
-        let kind = |bytes: &[u8]| Kind::of_bytes(Speaks::St(Profile::Spec), 1, bytes);
-        let torque = [1, RegisterId::TORQUE_REF.0, 100, 0];
-        for moves in [&[3, 1][..], &[7, 220, 5, 0, 0, 100, 0], &torque] {
-            assert_eq!(kind(moves), Kind::Moves, "{moves:?}");
-        }
-        assert_eq!(kind(&[1, RegisterId::SPEED_KP.0, 44, 1]), Kind::Changes);
-        assert_eq!(kind(&[2, RegisterId::SPEED_MEAS.0]), Kind::Reads);
-        assert_eq!(kind(&[3, 2]), Kind::Stops);
-    }
-}
