@@ -64,8 +64,8 @@ def twins(nodes, sim, start, run, tmp_path):
 def test_nodes_with_one_name_are_stopped_both_and_one_that_vanishes_is_not_forgotten(twins, run, start):
     via, first, second = twins
     found = run("fleet", "list", *via).ended(3)
-    assert found.out.count("\narm1 ") == 2 and "2 nodes have the name arm1" in found.err, found
-    shown = run("fleet", "watch", "--once", *via)
+    assert found.out.count("\narm1.run-") == 2 and "2 nodes have the name arm1" in found.err, found
+    shown = run("fleet", "watch", "--once", *via).ended(3)
     assert shown.out.count("arm1.run-") >= 12, shown
     # By its name no motor is moved, and the motors of both are stopped.
     moved = run("rmd", "-p", "zenoh:arm1/rmd0", "--id", "2", "speed", "100", MOTORLINK_NETWORK=via[1]).ended(3)

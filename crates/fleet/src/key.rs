@@ -39,7 +39,7 @@ impl Name {
     }
 
     /// The name of one of several nodes that have this name, by its run.
-    pub(crate) fn of_run(&self, run: &Name) -> Self {
+    pub fn of_run(&self, run: &Name) -> Self {
         let (name, run) = (&self.0, &run.0);
         let [name, run] =
             [&name[..name.len().min(LONGEST - 9)], &run[run.len().saturating_sub(4)..]];

@@ -19,7 +19,7 @@ pub fn run(at: &At) -> Result<(), Failure> {
         let limit = network.name().map_or_else(String::new, |name| format!(" that {name} may see"));
         print_line(&format!("No node is at this network{limit}."))?;
     }
-    let names = nodes.keys().chain(away.keys()).map(|(name, _)| name);
+    let names = nodes.keys().chain(away.keys()).map(|(name, boot)| shown(&directory, name, boot));
     let width = names.map(|name| name.as_str().len()).max().unwrap_or(0).max("node".len());
     if !nodes.is_empty() && !at.json {
         print_line(&format!(
@@ -28,11 +28,12 @@ pub fn run(at: &At) -> Result<(), Failure> {
         ))?;
     }
     let printer = Printer { json: at.json };
-    for ((name, _), info) in nodes {
+    for ((name, boot), info) in nodes {
+        let shown = shown(&directory, name, boot);
         match info {
-            Some(info) => printer.result(text(name, info, width), object(name, info))?,
+            Some(info) => printer.result(text(&shown, info, width), object(name, info))?,
             None => printer.result(
-                format!("{name:<width$}  does not answer", name = name.as_str()),
+                format!("{shown:<width$}  does not answer", shown = shown.as_str()),
                 json!({"node": name.as_str(), "answers": false}),
             )?,
         }
@@ -54,6 +55,14 @@ pub fn run(at: &At) -> Result<(), Failure> {
         return Err(silent(name));
     }
     away.iter().next().map_or(Ok(()), |((name, _), seconds)| Err(gone(name, *seconds)))
+}
+
+/// The name of a node, by its run if several have the name.
+fn shown(directory: &Directory, name: &Name, boot: &Name) -> Name {
+    match directory.runs(name) {
+        0 | 1 => name.clone(),
+        _ => name.of_run(boot),
+    }
 }
 
 fn text(name: &Name, info: &Info, width: usize) -> String {

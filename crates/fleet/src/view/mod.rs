@@ -102,6 +102,11 @@ impl View {
         directory::away(nodes.values().map(|node| &node.info), |run| runs.contains(run))
     }
 
+    /// A name that several nodes have. The values of their motors are not known.
+    pub fn twins(&self) -> Option<Name> {
+        self.shared.picture().twins()
+    }
+
     /// The motors that have answered.
     pub fn drives(&self) -> Vec<Drive> {
         self.shared.picture().drives()

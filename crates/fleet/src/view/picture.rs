@@ -119,6 +119,11 @@ impl Picture {
         self.nodes.iter().map(|(run, node)| (self.shown(run), node.clone())).collect()
     }
 
+    /// A name that several nodes have.
+    pub(super) fn twins(&self) -> Option<Name> {
+        self.here.iter().map(|(node, _)| node).find(|node| self.has_twins(node)).cloned()
+    }
+
     /// The runs of the nodes.
     pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
         self.nodes.keys()

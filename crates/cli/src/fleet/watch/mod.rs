@@ -10,6 +10,7 @@ use motorlink_fleet::key::Name;
 use motorlink_fleet::view::View;
 
 use super::args::Via;
+use super::found::twins;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Printer, print_line};
@@ -72,6 +73,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             Some(every) if interrupt::wait(every) => {}
             _ => break,
         }
+    }
+    if let Some(node) = view.twins() {
+        return Err(twins(&node));
     }
     let away = view.away();
     let away = away.keys().map(|(node, _)| node);
