@@ -195,6 +195,24 @@ def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start, run, dr
     reads.wait()
 
 
+def test_a_program_that_ends_when_its_share_is_just_back_stops_its_motor(start, drives, tmp_path):
+    """The pause before a lost port is opened again does not hold for stops."""
+    path = tmp_path / "share"
+    words = ["-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "2s", "--json"]
+    share = start("share", *words)
+    share.line(0)
+    for _ in range(ROUNDS):
+        waits = start("rmd", "-p", f"share:{path}/rmd0", "--id", 2, "position", 720000, "--max-speed", 100, "--wait")
+        eventually(lambda: Client(path, "looks").dps(2) > 50, "a motor that turns")
+        share.kill()
+        share = start("share", *words)
+        share.line(0)
+        waits.interrupt()
+        waits.wait()
+        direct = Client(path, "looks")
+        eventually(lambda direct=direct: abs(direct.dps(2)) < 5, "a motor at rest")
+
+
 def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path):
     words = ["-p", drives.st, "--at", f"unix:{tmp_path}/share", "--timeout", "100ms"]
     share = start("share", *words)

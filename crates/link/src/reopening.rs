@@ -160,6 +160,14 @@ impl<L> Reopening<L> {
         self.closed_until(now.max(earliest));
     }
 
+    /// The next call may open a closed port at once, whatever failed before: for stops.
+    pub fn retry_now(&mut self) {
+        if self.link.is_none() {
+            self.wait = Duration::ZERO;
+            self.closed_until(Instant::now());
+        }
+    }
+
     fn postpone(&mut self, error: &PortError) {
         self.trouble = error.to_string();
         self.wait = (self.wait * 2).clamp(self.back_off.first, self.back_off.cap);

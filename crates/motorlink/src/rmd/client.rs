@@ -270,6 +270,11 @@ impl Client {
         self.turns.take().port.end_with(ending);
     }
 
+    /// The next call opens a closed port at once.
+    pub(super) fn retry_now(&self) {
+        self.turns.take().port.retry_now();
+    }
+
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
         self.turns.take().port.only_own(true);

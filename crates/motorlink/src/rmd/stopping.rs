@@ -111,6 +111,7 @@ impl Client {
             sent: 0,
             lost: 0,
         };
+        self.retry_now();
         let clock = self.clock();
         let give_up = clock.now() + STOP_TIME;
         let mut left = ids;
@@ -157,8 +158,6 @@ impl Stopping {
         probe: bool,
     ) -> Result<(), Error> {
         let before = self.attempts;
-        // A program that holds the port repeats them itself.
-        self.attempts += if bus.is_held() { STOP_ATTEMPTS } else { 1 };
         self.failed.retain(|(id, _)| !left.contains(*id));
         let probed = if probe { self.confirmed } else { MotorSet::EMPTY };
         let stops = left.map(|id| (id, action.request()));
@@ -181,6 +180,8 @@ impl Stopping {
                 Err(error) => self.failed.push((id, error)),
             }
         });
+        // A program that holds the port repeats them itself, unless the connection to it failed.
+        self.attempts += if bus.is_held() && port.is_ok() { STOP_ATTEMPTS } else { 1 };
         if let Err(error) = &port {
             self.failed.extend(unheard.map(|id| (id, error.clone())));
         }

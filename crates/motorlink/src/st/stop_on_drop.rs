@@ -24,6 +24,7 @@ impl Client {
     /// Stops these motors, each with at most [`STOP_ATTEMPTS`] commands whose reply is waited for. The
     /// first one is sent without padding: padded questions do not detect an echo.
     fn stop_motors(&self, motors: Vec<MotorNumber>) -> Vec<Stopped> {
+        self.retry_now();
         let (mut failed, mut stopped) = divided(self.stop_once(&motors));
         let echo = failed.iter().find_map(echo_of);
         for _ in 1..STOP_ATTEMPTS {

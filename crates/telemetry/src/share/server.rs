@@ -203,10 +203,13 @@ impl Server {
             let only_stops = programs >= MOST_CLIENTS;
             let session = if only_stops { self.hub.join_to_stop(full()) } else { self.hub.join() };
             if self.clients.len() >= MOST_CLIENTS + STOPS {
-                // The oldest connection without a name is closed for one that may be a stop.
+                // The oldest connection that waits for nothing is closed for one that may be a stop.
                 let hub = &self.hub;
-                let mut unnamed = self.clients.iter_mut().filter(|it| !hub.is_named(it.session));
-                match unnamed.find(|client| !client.is_gone) {
+                let is_idle = |it: &Client| {
+                    let only_stops = it.only_stops && !hub.is_waiting(it.session);
+                    !it.is_gone && (only_stops || !hub.is_named(it.session))
+                };
+                match self.clients.iter_mut().find(|client| is_idle(client)) {
                     Some(oldest) => oldest.is_gone = true,
                     None => self.hub.close(session, full()),
                 }
