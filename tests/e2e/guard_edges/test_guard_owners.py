@@ -109,7 +109,7 @@ def test_a_signal_to_a_guard_stops_a_motor_whose_motion_its_program_changed(driv
 
 @pytest.mark.parametrize("profile", ["spec", "mcsdk-5.4"])
 def test_a_share_stops_a_motor_whose_motion_its_program_changed(motorlink, drive, start, tmp_path, profile):
-    turning, refused = drive(profile), 0
+    turning, answered = drive(profile), 0
     for name, code, payload in RUNS * list(st_requests(motorlink, profile)):
         turning.turns()
         share = start("share", "-p", turning.drives.st, "--profile", profile, "--at", f"unix:{tmp_path}/share", "--json")
@@ -117,14 +117,14 @@ def test_a_share_stops_a_motor_whose_motion_its_program_changed(motorlink, drive
         program = Client(tmp_path / "share", "program")
         answer = program.command("st0", 1, code, *payload)
         program.socket.close()
-        # What the drive refuses changes nothing.
-        if answer["kind"] == "refusal":
-            refused += 1
+        answered += answer["kind"] == "answer"
+        # What the drive refuses, or does not get on a busy machine, changes nothing.
+        if answer.get("reason") in ("refused", "expired"):
             other = Client(tmp_path / "share", "other")
             assert other.ask("stop")["kind"] == "answer"
         turning.stops(name)
         share.end()
-    assert refused <= 2 * RUNS
+    assert answered >= 8 * RUNS
 
 
 @pytest.mark.parametrize("path", ["guard", "share"])
@@ -139,15 +139,19 @@ def test_rmd_motors_whose_motion_a_program_changed_stop(motorlink, sim, start, t
     else:
         start("share", "-p", port, "--at", f"unix:{tmp_path}/share", "--json").line(0)
     for name, identifier, data in RUNS * list(rmd_requests(motorlink)):
-        other.sendall(b"t1418A2000000A08C0000\r")
-        eventually(lambda: drives.motor(1)["mode"] == "speed", "the motor turns")
+
+        def turns():
+            # The stop of the program before may be repeated until it is confirmed.
+            other.sendall(b"t1418A2000000A08C0000\r")
+            return drives.motor(1)["mode"] == "speed"
+
+        eventually(turns, "the motor turns")
         if path == "guard":
             with RawLine(tmp_path / "held") as line:
                 line.say(b"\rC\rS8\rO\r", b"\r")
                 line.say(f"t{identifier:03X}8{data.hex().upper()}\r".encode(), b"t1418")
         elif identifier != 0x280:
             program = Client(tmp_path / "share", "program")
-            # The stop of the program before may be repeated until it is confirmed.
             sent = lambda: program.command("rmd0", 1, *data)  # noqa: E731
             eventually(lambda: sent()["kind"] == "answer", f"the answer to {name}")
             program.socket.close()
