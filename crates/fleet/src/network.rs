@@ -18,6 +18,8 @@ use crate::site::{self, Role};
 pub const USUAL: &str = "tcp/127.0.0.1:7447";
 /// The variable of the environment with the network: addresses, or a file.
 pub const VARIABLE: &str = "MOTORLINK_NETWORK";
+/// How often a free port is chosen.
+const ATTEMPTS: u32 = 5;
 
 /// How a program or a node gets to the others.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,9 +112,17 @@ impl Network {
                 Ok((session, addresses.clone()))
             }
             Network::Route { listen, connect } => {
-                let addresses: Vec<_> = listen.iter().map(|it| with_port(it)).collect();
-                let config = configured("router", &addresses, connect).map_err(failed)?;
-                Ok((zenoh::open(config).wait().map_err(failed)?, addresses))
+                let mut attempts = 1;
+                loop {
+                    let addresses: Vec<_> = listen.iter().map(|it| with_port(it)).collect();
+                    let config = configured("router", &addresses, connect).map_err(failed)?;
+                    match zenoh::open(config).wait() {
+                        Ok(session) => return Ok((session, addresses)),
+                        // Another program may have taken the free port.
+                        Err(_) if addresses != *listen && attempts < ATTEMPTS => attempts += 1,
+                        Err(error) => return Err(failed(error)),
+                    }
+                }
             }
             Network::File(path) => open_file(path),
         }
