@@ -77,7 +77,7 @@ impl Effect {
         }
     }
 
-    /// Whether it may start a motion, or change one that goes on: the sender is responsible for the stop.
+    /// Whether it may start a motion or change one. The sender then owns the motor and has to stop it.
     pub const fn moves(self) -> bool {
         matches!(self, Effect::Starts | Effect::Ramps | Effect::EndsRamp | Effect::Supersedes)
     }
