@@ -12,6 +12,7 @@ pub const LIST_REGISTERS: &str = "`motorlink st registers` lists them";
 pub const STOP_AGAIN: &str = "repeat the stop; end other programs that use the port; if the motor \
                               still turns, use the emergency stop";
 /// After a stop that a node did not answer, or did not confirm.
+#[cfg(feature = "fleet")]
 pub const STOP_NODES_AGAIN: &str =
     "repeat the stop; if a motor still turns, use the emergency stop";
 /// After a raw STOP_MOTOR that failed.
