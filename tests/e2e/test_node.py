@@ -196,6 +196,28 @@ def test_a_fleet_is_listed_as_it_is_now(node, run):
         assert run("fleet", "list", "--json", **via(node)).ended(0).json["latched_by"] is None
 
 
+def test_a_node_finds_drives_that_are_late_and_a_whole_bus_of_them(start, sim, run, tmp_path):
+    bus = tmp_path / "bus.toml"
+    bus.write_text("".join(f"[[rmd.motor]]\nid = {id}\n" for id in range(1, 33)))
+    drives = sim(bus)
+    drives.process.send_signal(signal.SIGSTOP)
+    ports = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{tmp_path}/node.share"]
+    node = start("node", *ports, "--listen", "tcp/127.0.0.1:0", "--name", "arm1", "--json")
+    node.address = json.loads(node.line(0))["addresses"][0]
+
+    def listed():
+        return [line.get("heard") for line in run("fleet", "list", "--json", **via(node)).ended(0).json["lines"]]
+
+    def shown():
+        watched = run("fleet", "watch", "--once", "--json", **via(node)).ended(0).lines
+        return [(it["line"], it["motor"]) for it in watched if it["state"] in ("IDLE", "at rest")]
+
+    assert listed() == [None, None]
+    drives.process.send_signal(signal.SIGCONT)
+    drives = [("st0", 1), ("st0", 2), *(("rmd0", id) for id in range(1, 33))]
+    eventually(lambda: shown() == drives, "all drives", within=60)
+
+
 def test_a_frozen_node_carries_out_no_old_motion(node, direct):
     member = Member(node.address, "arm1", deadline=10)
     member.command(*RAMP)

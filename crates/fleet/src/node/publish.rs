@@ -19,7 +19,7 @@ use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::task::block_in_place;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
@@ -40,6 +40,8 @@ const LINES: Duration = Duration::from_secs(5);
 const QUEUE: u32 = 1000;
 /// The time to live of a question whether a motor is there, in seconds.
 const SEARCH: f64 = 5.0;
+/// The pause until a line without a motor is searched again: a drive may be switched on after its node.
+const SEARCH_AGAIN: Duration = Duration::from_secs(5);
 
 /// Follows the share from now on, once its lines are known.
 pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<()> {
@@ -137,37 +139,41 @@ impl Common {
                     Arc::clone(&self).search(&program, &line);
                 }
                 for motor in &line.heard {
-                    if subscribed.insert((line.line.clone(), *motor)) {
-                        subscribe(&program, &line, *motor, period).await;
+                    let name = (line.line.clone(), *motor);
+                    if !subscribed.contains(&name)
+                        && subscribe(&program, &line, *motor, period).await
+                    {
+                        subscribed.insert(name);
                     }
                 }
             }
         }
     }
 
-    /// Reads something of each motor that a line can have. The share remembers those that answer.
+    /// Reads something of each motor that a line can have, until one answers. The share remembers those
+    /// that do.
     fn search(self: Arc<Self>, program: &Program, line: &Line) {
         let Some(speaks) = Speaks::of(line) else { return };
         let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
         let (program, name) = (program.clone(), line.line.clone());
         self.state_mut().searching.insert(name.clone());
         tokio::spawn(async move {
-            for motor in motors {
-                let bytes = question(motor);
-                let (line, motor) = (name.clone(), motor.number());
-                // Those that are there answer.
-                let _ = program
-                    .ask(Ask::Command {
-                        line,
-                        motor,
-                        bytes,
+            while self.known_lines().iter().any(|line| line.line == name && line.heard.is_empty()) {
+                for motor in &motors {
+                    let ask = Ask::Command {
+                        line: name.clone(),
+                        motor: motor.number(),
+                        bytes: question(*motor),
                         time_to_live: SEARCH,
                         continues: false,
                         own: false,
-                    })
-                    .await;
+                    };
+                    // Those that are there answer.
+                    let _ = program.ask(ask).await;
+                }
+                self.state_mut().searching.remove(&name);
+                sleep(SEARCH_AGAIN).await;
             }
-            self.state_mut().searching.remove(&name);
         });
     }
 
@@ -267,9 +273,9 @@ fn question(motor: Motor) -> Vec<u8> {
     }
 }
 
-/// Subscribes to the main values of a motor.
-async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) {
-    let Some(motor) = Speaks::of(line).and_then(|speaks| speaks.motor(motor)) else { return };
+/// Subscribes to the main values of a motor. Gives whether the share has taken it.
+async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) -> bool {
+    let Some(motor) = Speaks::of(line).and_then(|speaks| speaks.motor(motor)) else { return false };
     let main = Overview::of(motor);
     let sources = main.fast().chain(main.slow()).chain(main.angle);
     let signals = sources
@@ -281,6 +287,5 @@ async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) 
         .collect();
     let period = period.as_secs_f64();
     let (queue, drop) = (QUEUE, DropRule::Oldest);
-    // The share refuses it if it has none of the signals.
-    let _ = program.ask(Ask::Subscribe { signals, period, queue, drop, rows: true }).await;
+    program.ask(Ask::Subscribe { signals, period, queue, drop, rows: true }).await.is_ok()
 }

@@ -34,8 +34,8 @@ pub const LONGEST_WHY: usize = 200;
 pub const LONGEST_QUEUE: u32 = 100_000;
 /// The most signals of one subscription.
 pub const MOST_SIGNALS: usize = 1024;
-/// The most subscriptions of a program.
-pub const MOST_SUBSCRIPTIONS: usize = 16;
+/// The most subscriptions of a program: a node has one for each motor of its buses.
+pub const MOST_SUBSCRIPTIONS: usize = 256;
 /// The longest time to live of a command and the longest period, in seconds.
 pub const LONGEST_TIME: f64 = 3600.0;
 
