@@ -50,12 +50,12 @@ help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
 
 demo: toolchain ## 1 min: simulated drives, driven through real ports
-	$(CARGO) run --release --locked -p motorlink-cli --no-default-features --features monitor -- demo
+	$(CARGO) run --locked -p motorlink-cli --no-default-features -- demo
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 monitor: toolchain web ## simulated drives in a browser
-	$(CARGO) run --release --locked -p motorlink-cli -- monitor --open
+	$(CARGO) run --locked -p motorlink-cli --no-default-features --features monitor -- monitor --open
 
 test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
@@ -63,7 +63,8 @@ test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e
 
 # Zenoh takes minutes to build.
 WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python --exclude motorlink-bench \
-	--no-default-features --features motorlink-cli/monitor,motorlink-monitor/typescript
+	--no-default-features --features motorlink-monitor/typescript \
+	--features motorlink-cli/conformance,motorlink-cli/monitor,motorlink-cli/record,motorlink-cli/watch
 check: toolchain ## 1 min: format, clippy and the quick tests, while you work; not the network of nodes
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(WITHOUT_NETWORK) --all-targets --locked -- -D warnings
@@ -122,6 +123,7 @@ firmware-test: $(VENV)/ready ## 8 min: boards in QEMU against the conformance ki
 lint: ## 10 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
+	$(CARGO) clippy -p motorlink-cli --no-default-features --locked -- -D warnings
 	cd fuzz/fuzzers && $(CARGO) fmt --check
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
@@ -224,23 +226,23 @@ header: ## crates/ffi/include/motorlink.h
 # RUNS=50 MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md.
 deadman: web ## how long motors turn on after their page is gone
 	-@tests/install browser
-	$(CARGO) build --release --locked -p motorlink-cli
-	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure tests/deadman
+	$(CARGO) build --profile dist --locked -p motorlink-cli
+	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(DEBUG)/../dist/motorlink npm run --silent measure tests/deadman
 
 # MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md. MINUTES=0: without the soak.
 view: web ## how old and how smooth what the page draws is, and its memory
 	-@tests/install browser
-	$(CARGO) build --release --locked -p motorlink-cli
-	cd web && MOTORLINK_BIN=$(DEBUG)/../release/motorlink npm run --silent measure tests/view
+	$(CARGO) build --profile dist --locked -p motorlink-cli
+	cd web && MOTORLINK_BIN=$(DEBUG)/../dist/motorlink npm run --silent measure tests/view
 
 # SECONDS=60 of each size. MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md.
 fleet-scale: $(VENV)/ready ## 10 to 1000 simulated drives in nodes: losses, latency, CPU
-	$(CARGO) build --release --locked -p motorlink-cli
+	$(CARGO) build --profile dist --locked -p motorlink-cli
 	cd benchmarks/fleet && SECONDS=$(SECONDS) $(VENV)/bin/python scale.py
 
 # ROUNDS=30 of each fault. T="router cut" runs some of them. flood takes 10 min.
 fleet-faults: $(VENV)/ready ## 30 min: what stops and what is lost when parts of a fleet fail
-	$(CARGO) build --release --locked -p motorlink-cli
+	$(CARGO) build --profile dist --locked -p motorlink-cli
 	cd benchmarks/fleet && $(VENV)/bin/python faults.py $(T)
 
 pictures: web $(VENV)/ready ## draws scenarios (docs/pictures) and screens of the program (docs/*.svg)
@@ -248,10 +250,9 @@ pictures: web $(VENV)/ready ## draws scenarios (docs/pictures) and screens of th
 	$(PROGRAM)
 	MOTORLINK_BIN=$(DEBUG)/motorlink $(VENV)/bin/python tests/e2e/pictures.py docs
 	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent measure tests/pictures
-	$(CARGO) run --release --locked --quiet -p motorlink-cli -- demo --picture docs/demo.svg
+	$(DEBUG)/motorlink demo --picture docs/demo.svg
 	@for scenario in scenarios/*.toml; do \
-		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \
-			sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \
+		$(DEBUG)/motorlink sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \
 	done
 
 PREFIX ?= /usr/local
@@ -261,7 +262,7 @@ install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGE
 	CARGO="$(CARGO)" crates/ffi/packaging/install "$(PREFIX)" "$(DESTDIR)" $(TARGET)
 
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
-	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
+	$(PYTHON_VENV)/bin/python -m maturin build --quiet --profile dist --out target/wheels
 # Checks the version in rust-version.
 oldest: ## compiles the workspace with the oldest Rust that is meant to work
 	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \

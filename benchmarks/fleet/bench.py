@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests/e2e"))
 
 #: The program that is measured.
-MOTORLINK = os.environ.get("MOTORLINK_BIN", ROOT / "target/release/motorlink")
+MOTORLINK = os.environ.get("MOTORLINK_BIN", ROOT / "target/dist/motorlink")
 TICK = os.sysconf("SC_CLK_TCK")
 
 

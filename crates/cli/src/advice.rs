@@ -6,6 +6,8 @@ use motorlink::relay::RelayError;
 use motorlink::st::{ErrorCode, Failure, Profile, Unverifiable};
 use motorlink::{rmd, st};
 
+use crate::help::left_out;
+
 /// After any error about a register's name.
 pub const LIST_REGISTERS: &str = "`motorlink st registers` lists them";
 /// After a stop that failed.
@@ -77,6 +79,9 @@ pub fn port_kind(error: &PortError) -> Option<String> {
 /// A name that is not the name of a port.
 pub fn port_name(error: &NameError) -> Option<&'static str> {
     match error {
+        NameError::UnknownForm { name, .. } if is_of_node(name) && left_out("node").is_some() => {
+            left_out("node")
+        }
         NameError::UnknownForm { .. } | NameError::Windows { .. } => {
             Some("`motorlink ports` lists what is connected")
         }

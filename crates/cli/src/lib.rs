@@ -1,13 +1,21 @@
 //! `motorlink`: command, watch and simulate motor drives from the shell. A library so that another
 //! program can be the same command.
 
+// Some helpers serve only subcommands that a build may leave out.
+#![cfg_attr(
+    not(all(feature = "conformance", feature = "fleet", feature = "monitor")),
+    allow(dead_code, unused_imports)
+)]
+
 mod advice;
 mod angle;
 mod arrival;
 mod columns;
+#[cfg(feature = "conformance")]
 mod conformance;
 mod connection;
 mod csv;
+#[cfg(feature = "record")]
 mod decode;
 mod demo;
 mod failure;
@@ -30,9 +38,12 @@ mod output;
 mod outputs;
 mod palette;
 mod pasteable;
+#[cfg(feature = "record")]
 mod plot;
 mod ports;
+#[cfg(feature = "record")]
 mod record;
+#[cfg(feature = "record")]
 mod recordings;
 mod repeat;
 mod rmd;
@@ -46,6 +57,7 @@ mod terminal;
 mod text;
 mod trace;
 mod voice;
+#[cfg(feature = "watch")]
 mod watch;
 
 use std::ffi::OsString;
@@ -93,22 +105,31 @@ enum Command {
     Rmd(rmd::Args),
     /// Watch motors in the terminal: values, registers, stop
     #[command(after_help = help::watch_ports())]
+    #[cfg(feature = "watch")]
     Watch(watch::Args),
     /// Record motors into an MCAP file: signals, frames, events, settings
+    #[cfg(feature = "record")]
     Record(record::Args),
     /// Decode captures: recordings, candump, asc, pcapng, hexadecimal text
+    #[cfg(feature = "record")]
     Decode(decode::Args),
     /// Show what a recording contains: drives, signals, events, losses
+    #[cfg(feature = "record")]
     Info(recordings::info::Args),
     /// Check a recording, and write what can be read of a broken one into a new file
+    #[cfg(feature = "record")]
     Recover(recordings::recover::Args),
     /// Write a recording in another format
+    #[cfg(feature = "record")]
     Convert(recordings::convert::Args),
     /// Draw signals of a recording
+    #[cfg(feature = "record")]
     Plot(recordings::plot::Args),
     /// Serve the drives of a recording, which answer as they did
+    #[cfg(feature = "record")]
     Replay(recordings::replay::Args),
     /// Check a drive, or your own program, against the documents of the protocols
+    #[cfg(feature = "conformance")]
     Conformance(conformance::Args),
     /// Write the tables of the protocols for other programs: DBC, Wireshark, JSON, Markdown
     Spec(spec::Args),
@@ -171,14 +192,23 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),
+        #[cfg(feature = "watch")]
         Command::Watch(args) => watch::run(args),
+        #[cfg(feature = "record")]
         Command::Record(args) => record::run(&args),
+        #[cfg(feature = "record")]
         Command::Decode(args) => decode::run(args),
+        #[cfg(feature = "record")]
         Command::Info(args) => recordings::info::run(&args),
+        #[cfg(feature = "record")]
         Command::Recover(args) => recordings::recover::run(&args),
+        #[cfg(feature = "record")]
         Command::Convert(args) => recordings::convert::run(&args),
+        #[cfg(feature = "record")]
         Command::Plot(args) => recordings::plot::run(&args),
+        #[cfg(feature = "record")]
         Command::Replay(args) => recordings::replay::run(args),
+        #[cfg(feature = "conformance")]
         Command::Conformance(args) => conformance::run(args),
         Command::Spec(args) => spec::run(args),
         Command::Completions { shell } => {

@@ -3,6 +3,7 @@
 mod examples;
 mod fish;
 mod manual;
+mod parts;
 mod suggestions;
 mod tips;
 
@@ -11,6 +12,7 @@ use motorlink::port::{Carries, schemes};
 
 pub use fish::positionals as fish_positionals;
 pub use manual::write_manual;
+pub use parts::left_out;
 pub use suggestions::without_motion;
 pub use tips::with_tip;
 

@@ -1,8 +1,11 @@
 //! `motorlink sim`: serves simulated drives and executes commands from stdin, or plays a scenario.
 
+#[cfg(feature = "record")]
 mod figure;
+#[cfg(feature = "record")]
 mod mcap;
 mod presets;
+#[cfg(feature = "record")]
 mod run;
 
 use std::io::{ErrorKind, Read};
@@ -19,6 +22,7 @@ use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
 use crate::failure::Failure;
+use crate::help::left_out;
 use crate::hint;
 use crate::interrupt::{self, interrupted};
 use crate::output;
@@ -63,6 +67,7 @@ pub struct Args {
 #[derive(clap::Subcommand)]
 enum Command {
     /// Play a scenario on virtual time, check its expectations, write a plot or a CSV file
+    #[cfg(feature = "record")]
     Run(run::Args),
     /// Print the presets of motors with all values
     Presets(presets::Args),
@@ -70,6 +75,7 @@ enum Command {
 
 pub fn run(args: Args) -> Result<(), Failure> {
     match &args.command {
+        #[cfg(feature = "record")]
         Some(Command::Run(args)) => return run::run(args),
         Some(Command::Presets(args)) => return presets::run(args),
         None => {}
@@ -100,15 +106,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
 fn wrong_config(path: &Path, error: ConfigError) -> Failure {
     let play = format!("`motorlink sim run {}` plays a scenario", path.display());
     let is_scenario = Scenario::read(path).is_ok();
-    let advice = match &error {
-        ConfigError::Unreadable { .. } if is_subcommand(path) => {
+    let advice = match (&error, left_out(&path.to_string_lossy())) {
+        (ConfigError::Unreadable { .. }, Some(advice)) => advice.to_owned(),
+        (ConfigError::Unreadable { .. }, _) if is_subcommand(path) => {
             let command = path.display();
             format!("write the command before its options: `motorlink sim {command} ..`")
         }
-        ConfigError::Unreadable { .. } if path.extension().is_none() => {
+        (ConfigError::Unreadable { .. }, _) if path.extension().is_none() => {
             "`motorlink sim --help` lists the commands".to_owned()
         }
-        ConfigError::Unreadable { .. } => {
+        (ConfigError::Unreadable { .. }, _) => {
             format!("`sim` takes a file that describes drives; {play}")
         }
         _ if is_scenario => format!("the file is a scenario; {play}"),
