@@ -8,6 +8,7 @@ impl<'a> Frame<'a> {
     /// Writes the frame of `request` for motor number `motor` into `out` and returns its bytes. The
     /// number is 0 to 7; 0 is the current motor. `None` if the request does not fit into a frame or
     /// into `out`.
+    #[inline]
     pub fn command<'o>(motor: u8, request: &Request<'_>, out: &'o mut [u8]) -> Option<&'o [u8]> {
         let size = request.payload(frame::room(out)?)?.len();
         frame::seal(out, Frame::header(request.code().number(), motor), size)
@@ -15,6 +16,7 @@ impl<'a> Frame<'a> {
 
     /// The message of a command frame. The error is the code with which a slave of `profile`
     /// refuses it.
+    #[inline]
     pub fn request(&self, profile: Profile) -> Result<Request<'a>, ErrorCode> {
         Request::decode(profile, self.code(), self.payload)
     }

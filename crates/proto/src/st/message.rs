@@ -2,8 +2,8 @@
 //! message into a frame.
 
 use super::payload::Payload;
-use super::register::{RegisterId, Shape};
-use super::{Command, ErrorCode, Features, FrameCode, Profile};
+use super::register::RegisterId;
+use super::{Command, ErrorCode, FrameCode, Profile};
 
 /// Phases of the rev-up (4.10).
 pub const REVUP_PHASES: u8 = 5;
@@ -152,6 +152,28 @@ impl ReplySize {
     }
 }
 
+/// What the acknowledge of a request carries.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Answer {
+    Register(RegisterId),
+    Exactly(u8),
+    Any,
+}
+
+impl Answer {
+    /// See [`Request::reply_size`].
+    pub(super) fn size(self, profile: Profile) -> ReplySize {
+        match self {
+            Answer::Register(register) => {
+                let size = register.row().and_then(|row| row.most_read_size(profile));
+                size.map_or(ReplySize::Value, |size| ReplySize::Exactly(size.get()))
+            }
+            Answer::Exactly(size) => ReplySize::Exactly(size),
+            Answer::Any => ReplySize::Any,
+        }
+    }
+}
+
 impl<'a> Request<'a> {
     /// The frame code of the message.
     pub const fn code(&self) -> FrameCode {
@@ -175,6 +197,7 @@ impl<'a> Request<'a> {
 
     /// Writes the payload into `out` and returns its bytes; `None` if `out` is too short.
     /// [`Frame::command`](super::Frame::command) writes the whole frame.
+    #[inline]
     pub fn payload<'o>(&self, out: &'o mut [u8]) -> Option<&'o [u8]> {
         let mut payload = Payload::new(&mut *out);
         match *self {
@@ -208,6 +231,7 @@ impl<'a> Request<'a> {
 
     /// Decodes the message with this frame code as a slave of `profile` does. Surplus bytes are
     /// ignored. A message that is too short is refused with the returned code (SPEC-NOTES S18).
+    #[inline]
     pub fn decode(profile: Profile, code: u8, payload: &'a [u8]) -> Result<Self, ErrorCode> {
         let code = FrameCode::from_number(code, profile).ok_or(ErrorCode::BadFrameId)?;
         let too_short = match code {
@@ -218,6 +242,7 @@ impl<'a> Request<'a> {
         Self::fields(code, payload).ok_or(too_short)
     }
 
+    #[inline]
     fn fields(code: FrameCode, payload: &'a [u8]) -> Option<Self> {
         Some(match (code, payload) {
             (FrameCode::SetReg, [id, value @ ..]) => {
@@ -265,18 +290,17 @@ impl<'a> Request<'a> {
     /// The payload size of the acknowledge of a drive of `profile` (4.4 to 4.12, and SPEC-NOTES
     /// S17).
     pub fn reply_size(&self, profile: Profile) -> ReplySize {
+        self.answer().size(profile)
+    }
+
+    pub(super) const fn answer(&self) -> Answer {
         match self {
-            Request::GetRegister(register) => {
-                let shape = register.shape();
-                let read =
-                    |shape: Shape| shape.read_size(profile, Features::NONE.with(shape.feature));
-                shape.and_then(read).map_or(ReplySize::Value, ReplySize::Exactly)
-            }
-            Request::GetRevupData(_) => ReplySize::Exactly(RevupPhase::SIZE as u8),
+            Request::GetRegister(register) => Answer::Register(*register),
+            Request::GetRevupData(_) => Answer::Exactly(RevupPhase::SIZE as u8),
             Request::GetBoardInfo
             | Request::GetFirmwareVersion
             | Request::GetSegment(_)
-            | Request::GetProfilerInfo(_) => ReplySize::Any,
+            | Request::GetProfilerInfo(_) => Answer::Any,
             Request::SetRegister { .. }
             | Request::ExecuteCommand(_)
             | Request::SetRamp(_)
@@ -284,7 +308,7 @@ impl<'a> Request<'a> {
             | Request::SetCurrentReference(_)
             | Request::ConfigureSegment { .. }
             | Request::SetTorqueRamp(_)
-            | Request::SetPosition(_) => ReplySize::Exactly(0),
+            | Request::SetPosition(_) => Answer::Exactly(0),
         }
     }
 

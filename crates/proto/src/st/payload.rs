@@ -12,7 +12,7 @@ impl<'o> Payload<'o> {
     }
 
     // A function call takes less flash than the inlined code, and replies are short.
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
         if let Some(slot) = self.room.get_mut(self.len) {
             *slot = byte;
@@ -21,7 +21,7 @@ impl<'o> Payload<'o> {
         self
     }
 
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         let room = self.room.get_mut(self.len..).unwrap_or(&mut []);
         for (slot, byte) in room.iter_mut().zip(bytes) {
@@ -32,7 +32,7 @@ impl<'o> Payload<'o> {
     }
 
     /// The low `size` bytes of a register's value.
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn value(&mut self, bits: i32, size: u8) -> &mut Self {
         let bytes = bits.to_le_bytes();
         self.bytes(bytes.get(..usize::from(size)).unwrap_or(&bytes))

@@ -16,6 +16,10 @@ pub const SEGMENTS: usize = 4;
 /// Maximum number of registers in a data segment. Their values always fit into a reply.
 pub const SEGMENT_REGISTERS: usize = 32;
 
+/// In place of a number of bytes: a length over 128 was received. All bytes are dropped until the line
+/// was silent.
+const SKIPPING: u8 = u8::MAX;
+
 /// The slave's side of the protocol. It collects a command, checks checksum, motor and frame code
 /// in this order (4.1), calls the [`MotorControl`], and replies.
 ///
@@ -31,9 +35,8 @@ pub struct Slave {
     profile: Profile,
     motors: u8,
     current: MotorNumber,
+    /// Bytes of the command so far, or [`SKIPPING`].
     received: u8,
-    /// A length over 128 was received. All bytes are dropped until the line was silent.
-    skipping: bool,
     /// The command so far, then the reply to it.
     buffer: [u8; MAX_FRAME],
     segments: [Segment; SEGMENTS],
@@ -48,7 +51,6 @@ impl Slave {
             current: MotorNumber::FIRST,
             buffer: [0; MAX_FRAME],
             received: 0,
-            skipping: false,
             deadline: Instant(0),
             segments: Segment::NONE,
         }
@@ -72,12 +74,12 @@ impl Slave {
     /// When to call [`poll`](Self::poll). `None` between frames, and always in profile `mcsdk-5.4`,
     /// whose firmware has no reception timeout (SPEC-NOTES S11).
     pub fn deadline(&self) -> Option<Instant> {
-        let timed = self.profile == Profile::Spec && (self.is_receiving() || self.skipping);
+        let timed = self.profile == Profile::Spec && self.is_receiving();
         timed.then_some(self.deadline)
     }
 
     /// Returns the NACK TIMEOUT for a command that was not complete in time (4.1).
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn poll(&mut self, now: Instant) -> Option<&[u8]> {
         if !self.deadline()?.is_over(RECEPTION_TIMEOUT, now) {
             return None;
@@ -99,10 +101,16 @@ impl Slave {
         if expired {
             return Some(&TIMEOUT_REPLY);
         }
-        let command = self.buffer;
-        let (&received, body) = command.get(..size?)?.split_last()?;
-        let &[header, _, ref payload @ ..] = body else { return None };
+        self.answer(size?, drive)
+    }
+
+    /// Executes the command of this size, and returns the reply.
+    #[cfg_attr(not(target_os = "none"), inline(never))]
+    fn answer(&mut self, size: usize, drive: &mut impl MotorControl) -> Option<&[u8]> {
+        let (&received, body) = self.buffer.get(..size)?.split_last()?;
         let answer = if checksum(body) == received {
+            let [header, length, payload @ .., _] = self.buffer;
+            let payload = payload.get(..usize::from(length))?;
             self.process(&Frame { header, payload }, drive)
         } else {
             Err(ErrorCode::BadCrc.into())
@@ -118,42 +126,35 @@ impl Slave {
         self.reply(Err(ErrorCode::Overrun.into()))
     }
 
-    /// Stores a byte. Returns the command's size when it is complete.
-    #[inline(never)]
+    /// Takes a byte. Returns the command's size when it is complete.
     fn take(&mut self, now: Instant, byte: u8) -> Option<usize> {
-        let timed = self.profile == Profile::Spec;
-        if self.received == 0 || self.skipping {
-            self.wait(now);
+        let begins = self.received == 0;
+        let size = self.store(byte);
+        if begins || self.received == SKIPPING {
+            self.deadline = now + RECEPTION_TIMEOUT;
         }
-        if self.skipping {
-            return None;
-        }
+        size
+    }
+
+    fn store(&mut self, byte: u8) -> Option<usize> {
+        // There is no room while bytes are skipped.
         *self.buffer.get_mut(usize::from(self.received))? = byte;
         self.received = self.received.saturating_add(1);
         let [_, length, ..] = self.buffer;
+        let timed = self.profile == Profile::Spec;
         // Shipped firmware accepts at most 127 bytes; it then expects the next header at once.
         let most = MAX_PAYLOAD - usize::from(!timed);
         if self.received == 2 && usize::from(length) > most {
-            if timed {
-                self.skipping = true;
-                self.wait(now);
-            } else {
-                self.received = 0;
-            }
+            self.received = if timed { SKIPPING } else { 0 };
             return None;
         }
+        // Before there is a length, fewer bytes were received than any command has.
         let size = usize::from(length) + super::OVERHEAD;
-        (self.received >= 2 && usize::from(self.received) == size).then_some(size)
-    }
-
-    #[inline(never)]
-    fn wait(&mut self, now: Instant) {
-        self.deadline = now + RECEPTION_TIMEOUT;
+        (usize::from(self.received) == size).then_some(size)
     }
 
     fn restart(&mut self) {
         self.received = 0;
-        self.skipping = false;
     }
 
     /// Checks motor and frame code, then executes, in this order (4.1). Returns the size of the

@@ -1,8 +1,9 @@
 //! One request and its reply, as bytes.
 
+use crate::st::message::Answer;
 use crate::st::{
     ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile,
-    Reply, ReplySize, Request,
+    Reply, Request,
 };
 
 /// The request until it is sent; then the received bytes of the reply.
@@ -10,8 +11,9 @@ use crate::st::{
 pub(super) struct Exchange {
     buffer: [u8; MAX_FRAME],
     filled: u8,
-    /// The size of the reply, in the profile of the drive and in the other profile.
-    sizes: [ReplySize; 2],
+    /// The profile of the drive, and what its acknowledge carries.
+    profile: Profile,
+    answer: Answer,
 }
 
 /// The received message.
@@ -24,7 +26,7 @@ pub(super) enum Received {
 
 impl Exchange {
     pub(super) const NONE: Exchange =
-        Exchange { buffer: [0; MAX_FRAME], filled: 0, sizes: [ReplySize::Any; 2] };
+        Exchange { buffer: [0; MAX_FRAME], filled: 0, profile: Profile::Spec, answer: Answer::Any };
 
     /// Stores the frame to send; `None` if the request does not fit into a frame.
     pub(super) fn store(
@@ -34,14 +36,14 @@ impl Exchange {
         profile: Profile,
     ) -> Option<()> {
         self.filled = Frame::command(motor, request, &mut self.buffer)?.len() as u8;
-        self.sizes = [request.reply_size(profile), request.reply_size(profile.other())];
+        (self.profile, self.answer) = (profile, request.answer());
         Some(())
     }
 
     /// Stores any frame to send; `None` if its payload is too long.
     pub(super) fn store_raw(&mut self, frame: &Frame<'_>) -> Option<()> {
         self.filled = frame.encode(&mut self.buffer)?.len() as u8;
-        self.sizes = [ReplySize::Any; 2];
+        self.answer = Answer::Any;
         Some(())
     }
 
@@ -66,7 +68,7 @@ impl Exchange {
     }
 
     /// Parses the stored bytes; `None` while the reply is incomplete.
-    pub(super) fn next(&mut self, profile: Profile) -> Option<Received> {
+    pub(super) fn next(&mut self) -> Option<Received> {
         let received = self.buffer.get(..usize::from(self.filled))?;
         let header = *received.first()?;
         let (failure, surplus) = match Frame::parse(received) {
@@ -82,20 +84,21 @@ impl Exchange {
                     self.skip(size, surplus);
                     return Some(Received::Identification);
                 }
-                let failure = match (reply, self.sizes) {
+                let failure = match reply {
                     _ if contradicts(&frame, received.get(size..)?) => Failure::Ambiguous,
                     // The drive did not understand the frame. It may parse the rest of the frame as
                     // another one, and answer that too.
-                    (Reply::Refused(code), _) if code.is_damage() => Failure::NotUnderstood(code),
-                    (Reply::Refused(code), _) => {
+                    Reply::Refused(code) if code.is_damage() => Failure::NotUnderstood(code),
+                    Reply::Refused(code) => {
                         return Some(Received::End(Err(ExchangeError::Refused(code)), surplus));
                     }
-                    (_, [own, other]) => {
+                    _ => {
                         let received = frame.payload.len() as u8;
-                        if own.takes(received) {
+                        if self.answer.size(self.profile).takes(received) {
                             return Some(Received::End(Ok(received), surplus));
                         }
-                        let fits = other.takes(received).then(|| profile.other());
+                        let other = self.profile.other();
+                        let fits = self.answer.size(other).takes(received).then_some(other);
                         Failure::Size { received, fits }
                     }
                 };

@@ -120,7 +120,7 @@ impl Master {
     /// A request that stops a motor ([`Effect::Stops`]) is sent at once, also on a lost line. After
     /// the recovery it is sent again, and only the reply to that counts.
     pub fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), RequestError> {
-        if self.state != State::Idle {
+        if !matches!(self.state, State::Idle) {
             return Err(RequestError::Busy);
         }
         let stored = self.exchange.store(motor, request, self.config.profile);
@@ -131,7 +131,7 @@ impl Master {
 
     /// Like [`request`](Self::request), with any header and payload, also unknown ones.
     pub fn request_raw(&mut self, header: u8, payload: &[u8]) -> Result<(), RequestError> {
-        if self.state != State::Idle {
+        if !matches!(self.state, State::Idle) {
             return Err(RequestError::Busy);
         }
         let frame = Frame { header, payload };
@@ -147,7 +147,7 @@ impl Master {
     }
 
     // Inlining this into both kinds of request takes more flash, as for `lose`.
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     fn begin(&mut self, request: Summary, stops: bool) {
         self.request = request;
         self.state = match (self.sync_state(), Stage::first(self.config.recovery)) {
@@ -160,7 +160,7 @@ impl Master {
 
     /// Cancels the open exchange. Its reply may still come, so the line is lost.
     pub fn abandon(&mut self) {
-        if self.state != State::Idle {
+        if !matches!(self.state, State::Idle) {
             self.lost();
         }
     }
@@ -205,18 +205,7 @@ impl Master {
         }
         match &mut self.state {
             State::Idle => Output::Wait(None),
-            State::Recovering(stage) => match self.resync.poll(stage, now, &self.config) {
-                Step::Transmit(bytes) => Output::Transmit(bytes),
-                Step::Wait(until) => Output::Wait(Some(until)),
-                Step::Done => {
-                    self.state = State::Sent;
-                    Output::Transmit(self.exchange.send())
-                }
-                Step::Failed(failure) => {
-                    self.state = State::Idle;
-                    Output::Done(Err(ExchangeError::Failed(failure)))
-                }
-            },
+            State::Recovering(_) => self.recover(now),
             State::Send => {
                 self.state = State::Sent;
                 Output::Transmit(self.exchange.send())
@@ -243,6 +232,23 @@ impl Master {
         }
     }
 
+    #[cold]
+    fn recover(&mut self, now: Instant) -> Output<'_> {
+        let State::Recovering(stage) = &mut self.state else { return Output::Wait(None) };
+        match self.resync.poll(stage, now, &self.config) {
+            Step::Transmit(bytes) => Output::Transmit(bytes),
+            Step::Wait(until) => Output::Wait(Some(until)),
+            Step::Done => {
+                self.state = State::Sent;
+                Output::Transmit(self.exchange.send())
+            }
+            Step::Failed(failure) => {
+                self.state = State::Idle;
+                Output::Done(Err(ExchangeError::Failed(failure)))
+            }
+        }
+    }
+
     /// Takes bytes received at `now`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
         if bytes.is_empty() {
@@ -264,7 +270,7 @@ impl Master {
     fn reply(&mut self, bytes: &[u8]) {
         let surplus = self.exchange.receive(bytes);
         self.count_unasked(surplus);
-        while let Some(received) = self.exchange.next(self.config.profile) {
+        while let Some(received) = self.exchange.next() {
             match received {
                 Received::Identification => {
                     self.counters.identifications = self.counters.identifications.wrapping_add(1);

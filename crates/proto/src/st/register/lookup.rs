@@ -23,7 +23,7 @@ impl RegisterId {
     }
 
     // One function for all calls takes less flash.
-    #[inline(never)]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub(in crate::st) fn row(self) -> Option<Row> {
         ROWS.get(self.place()?)
     }
@@ -64,8 +64,9 @@ impl RegisterId {
     /// Decodes the value in a reply. The reply determines its size (SPEC-NOTES S17). The type in
     /// the drive's profile determines its sign; an unknown register is unsigned. `None` unless the
     /// payload has 1, 2 or 4 bytes.
+    #[inline]
     pub fn decode(self, profile: Profile, payload: &[u8]) -> Option<i32> {
-        let signed = self.shape().is_some_and(|shape| shape.ty(profile).signed());
+        let signed = self.row().is_some_and(|row| row.ty(profile).signed());
         match *payload {
             [a] if signed => Some(i32::from(a as i8)),
             [a] => Some(i32::from(a)),

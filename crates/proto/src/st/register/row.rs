@@ -95,6 +95,7 @@ impl Row {
     }
 
     /// See [`Shape::ty`](super::Shape::ty).
+    #[inline]
     pub(super) const fn ty(self, profile: Profile) -> Type {
         let ty = self.table_type();
         match profile {
@@ -111,18 +112,24 @@ impl Row {
     }
 
     /// See [`Shape::read_size`](super::Shape::read_size).
+    #[inline]
     pub(in crate::st) const fn read_size(
         self,
         profile: Profile,
         features: Features,
     ) -> Option<NonZeroU8> {
-        let size = match profile {
+        if self.is_there(features) { self.most_read_size(profile) } else { None }
+    }
+
+    /// The same for a drive with the register's feature.
+    #[inline]
+    pub(in crate::st) const fn most_read_size(self, profile: Profile) -> Option<NonZeroU8> {
+        NonZeroU8::new(match profile {
             Profile::Spec if matches!(self.origin(), Origin::Firmware) => 0,
             Profile::Spec if self.access().reads() => self.table_type().size(),
             Profile::Spec => 0,
             Profile::Mcsdk54 => self.mcsdk_reads(),
-        };
-        if self.is_there(features) { NonZeroU8::new(size) } else { None }
+        })
     }
 
     /// See [`Shape::writing`](super::Shape::writing).
