@@ -81,7 +81,20 @@ impl Regulator {
 /// `value` limited to a range. Unlike `clamp` it accepts any limits.
 #[inline]
 pub fn within(value: f32, least: f32, most: f32) -> f32 {
-    value.max(least).min(most)
+    at_most(at_least(value, least), most)
+}
+
+/// `value`, or `least` if it is less or not a number. `f32::max` would take five instructions, because it
+/// also accepts a `least` that is not a number.
+#[inline]
+pub fn at_least(value: f32, least: f32) -> f32 {
+    if value > least { value } else { least }
+}
+
+/// `value`, or `most` if it is more or not a number.
+#[inline]
+pub fn at_most(value: f32, most: f32) -> f32 {
+    if value < most { value } else { most }
 }
 
 /// Limits a voltage to a circle of radius `most`. d, which controls the flux, has priority up to

@@ -30,6 +30,7 @@ use sensing::Sensor;
 use supply::{Currents, Supply};
 
 use crate::angle;
+use crate::control::at_least;
 use crate::vector::{INVERSE_SQRT_3, Vector};
 
 /// The configuration of a plant.
@@ -231,7 +232,8 @@ impl Plant {
         if !idle {
             self.move_on(bridge);
         } else if self.fed != 0.0 || self.board != 0.0 || !self.supply.rests() {
-            self.feed_bus(0.0);
+            let currents = self.currents(0.0);
+            self.supply.rest(self.period, currents, &mut self.bus);
         }
         self.since_slow += u32::from(self.config.period_us);
         if self.since_slow >= SLOW_US {
@@ -266,14 +268,14 @@ impl Plant {
             machine.open();
         }
         self.switching += switching * bus * self.period;
-        let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
-        self.feed_bus(taken + switching);
+        let taken = (self.flow.electrical - before) / (self.period * at_least(bus, 1e-3));
+        let currents = self.currents(taken + switching);
+        self.supply.step(self.period, currents, &mut self.bus);
     }
 
-    /// A step of the bus. `bridge` is the bridge's current, A.
-    fn feed_bus(&mut self, bridge: f32) {
-        let currents = Currents { bridge, board: self.board, fed: self.fed };
-        self.supply.step(self.period, currents, &mut self.bus);
+    /// The currents of the bus. `bridge` is the bridge's current, A.
+    fn currents(&self, bridge: f32) -> Currents {
+        Currents { bridge, board: self.board, fed: self.fed }
     }
 
     /// The tasks of each millisecond: heat, and the account of energy.

@@ -9,6 +9,8 @@
 
 use core::ops::AddAssign;
 
+use crate::control::{at_least, at_most};
+
 /// The configuration of the supply.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
@@ -185,11 +187,19 @@ impl Supply {
     /// Applies currents for `dt` (s). Adds the energies to `flow`.
     #[inline]
     pub(super) fn step(&mut self, dt: f32, currents: Currents, flow: &mut Flow) {
+        let step;
+        (self.state, step) = self.integrated(dt, currents);
+        *flow += step;
+    }
+
+    /// The same for a motor at rest. Its bus repeats the last two steps.
+    pub(super) fn rest(&mut self, dt: f32, currents: Currents, flow: &mut Flow) {
         let same = |it: &&Step| it.dt == dt && it.currents == currents && it.from == self.state;
         let step = match self.last.iter().flatten().find(same) {
             Some(step) => *step,
             None => {
-                let step = self.integrated(dt, currents);
+                let (to, flow) = self.integrated(dt, currents);
+                let step = Step { dt, currents, from: self.state, to, flow };
                 self.last = [Some(step), self.last[0]];
                 step
             }
@@ -198,7 +208,8 @@ impl Supply {
         *flow += step.flow;
     }
 
-    fn integrated(&self, dt: f32, currents: Currents) -> Step {
+    #[inline]
+    fn integrated(&self, dt: f32, currents: Currents) -> (State, Flow) {
         let Currents { bridge, board, fed } = currents;
         let State { sag, chopping, .. } = self.state;
         let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
@@ -217,23 +228,19 @@ impl Supply {
         let share = 1.0 / (1.0 + gain * (conductance + brake));
         // The bridge takes constant power: its current falls if the bus voltage rose since the
         // start of the step.
-        let ratio = (self.voltage() / (source - pulled * share).max(1e-3)).clamp(0.5, 2.0);
+        let ratio = (self.voltage() / at_least(source - pulled * share, 1e-3)).clamp(0.5, 2.0);
         let middle = (pulled + gain * bridge * (ratio - 1.0)) * share;
-        let middle = middle.min(source);
+        let middle = at_most(middle, source);
         let drawn = middle * conductance;
         let voltage = source - middle;
-        Step {
-            dt,
-            currents,
-            from: self.state,
-            to: State { sag: (2.0 * middle - sag).min(source), chopping, drawn },
-            flow: Flow {
-                source: (source * drawn + voltage * fed) * dt,
-                lost: drawn * middle * dt,
-                board: voltage * board * dt,
-                braked: voltage * voltage * brake * dt,
-            },
-        }
+        let state = State { sag: at_most(2.0 * middle - sag, source), chopping, drawn };
+        let flow = Flow {
+            source: (source * drawn + voltage * fed) * dt,
+            lost: drawn * middle * dt,
+            board: voltage * board * dt,
+            braked: voltage * voltage * brake * dt,
+        };
+        (state, flow)
     }
 }
 
@@ -257,8 +264,7 @@ mod tests {
             let board = if step < 3000 { 0.1 } else { 0.2 };
             let currents = Currents { bridge, board, fed: 0.0 };
             let before = supply.last;
-            supply.step(DT, currents, &mut flow);
-            computed.last = [None; 2];
+            supply.rest(DT, currents, &mut flow);
             computed.step(DT, currents, &mut other);
             assert_eq!((supply.state, flow), (computed.state, other), "step {step}");
             known += u32::from(supply.last == before);

@@ -117,6 +117,8 @@ pub struct Machine {
     shaft: Shaft,
     /// Pairs of poles.
     poles: f32,
+    /// Stiction beyond the Coulomb friction, Nm.
+    extra_stiction: f32,
     /// One over the speed of the Stribeck effect, s/rad.
     inverse_stribeck: f32,
     /// One over the inductances, 1/H.
@@ -158,6 +160,7 @@ impl Machine {
             resistance: config.resistance,
             series: 0.0,
             magnet: config.flux_linkage,
+            extra_stiction: (config.stiction - config.coulomb_friction).max(0.0),
             inverse_stribeck: 1.0 / config.stribeck_speed,
             inverse,
             flux: Vector::ZERO,

@@ -187,9 +187,9 @@ impl Machine {
 
     /// Torque that brakes the rotor in each direction, at a speed, Nm.
     fn dry(&self, speed: f32) -> f32 {
-        let MachineConfig { coulomb_friction, stiction, iron_hysteresis, .. } = self.config;
+        let MachineConfig { coulomb_friction, iron_hysteresis, .. } = self.config;
         let relative = speed * self.inverse_stribeck;
-        let extra = (stiction - coulomb_friction).max(0.0) / (1.0 + relative * relative);
+        let extra = self.extra_stiction / (1.0 + relative * relative);
         coulomb_friction + extra + iron_hysteresis
     }
 }
