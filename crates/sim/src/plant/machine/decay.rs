@@ -15,6 +15,8 @@ pub(super) struct Decay {
     pub(super) inner: Vector,
     /// Whether the axes differ.
     pub(super) salient: bool,
+    /// Heat of the windings per sum of Simpson's squares of the current, J/A².
+    pub(super) heating: f32,
 }
 
 impl Decay {
@@ -34,6 +36,7 @@ impl Decay {
             outer: change(1.0 / 6.0),
             inner: change(1.0 / 3.0),
             salient: beyond != 0.0,
+            heating: 1.5 * resistance * (period * (1.0 / 6.0)),
         }
     }
 }

@@ -77,7 +77,7 @@ impl Machine {
         let power = v1.dot(i1) + 4.0 * v2.dot(i2) + v3.dot(i3);
         flow.electrical += 1.5 * sixth * power;
         let square = i1.square() + 4.0 * i2.square() + i3.square();
-        flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
+        flow.copper += self.decay.heating * square;
         let current = i1 + i2 * 4.0 + i3;
         self.voltage = (v1 + v2 * 4.0 + v3 - current * self.series) * (1.0 / 6.0);
         let mut product = self.magnet * current.y;
