@@ -35,7 +35,7 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
-ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test probe determinism test-socketcan deny
+ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test probe determinism cost test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python browser pages firmware-test ffi-test test-socketcan
@@ -62,7 +62,7 @@ test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
 
 # Zenoh takes minutes to build.
-WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python --exclude motorlink-bench \
+WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python \
 	--no-default-features --features motorlink-monitor/typescript \
 	--features motorlink-cli/conformance,motorlink-cli/monitor,motorlink-cli/record,motorlink-cli/watch
 check: toolchain ## 1 min: format, clippy and the quick tests, while you work; not the network of nodes
@@ -164,6 +164,11 @@ determinism: ## 1 min: simulated drives, optimised or not, to the last digit
 	cmp target/fingerprint target/fingerprint.release
 	cmp target/fingerprint target/fingerprint.plain
 
+# Other times and other programs do not change the counts.
+cost: ## 1 min: instructions of exchanges and simulated drives; UPDATE=1 writes their table
+	-@tests/install cost
+	$(CARGO) run --profile dist --locked -p motorlink-kernels $(if $(UPDATE),-- --update)
+
 deny: ## 4 min: licences, known holes; 0 if nothing changed; FORCE=1
 	CARGO="$(CARGO)" tests/deny $(if $(FORCE),force)
 
@@ -181,10 +186,13 @@ soak: ## a million exchanges with a thousand reconnects
 reliability: ## 100 million exchanges on bad lines, docs/RELIABILITY.md
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
 
+# UPDATE=1 writes them into docs/BENCHMARKS.md, with the engine for SECONDS=60.
 bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in docs/BENCHMARKS.md
 	tests/install valgrind || \
 		echo "valgrind cannot be installed: instructions are not counted"
-	$(CARGO) run --release --locked -p motorlink-bench -- all
+	$(CARGO) build --profile dist --locked -p motorlink-cli
+	$(CARGO) run --profile dist --locked -p motorlink-bench -- all \
+		$(if $(UPDATE),--seconds $(SECONDS) --update docs/BENCHMARKS.md)
 
 # Installs the Python package and its competitors. If this fails, the benchmark continues without
 # them.
@@ -304,7 +312,7 @@ packages:
 	$(WHOLE)
 	-@$(if $(filter e2e python pages firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
 		tests/install python3-venv)
-	-@tests/install $(filter e2e browser ffi-test firmware-test test-socketcan,$(PARTS))
+	-@tests/install $(filter e2e browser ffi-test firmware-test cost test-socketcan,$(PARTS))
 
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(BOARD) || rustup target add $(BOARD)

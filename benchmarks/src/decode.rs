@@ -10,7 +10,7 @@ use std::time::Instant;
 use motorlink_proto::rmd::{Direction, MotorId};
 
 use crate::report::{Goal, Section};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// Frames of the log.
 const FRAMES: u32 = 1_000_000;
@@ -30,10 +30,14 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let (log, truth) = (folder.file("can0.log"), folder.file("truth.txt"));
     let count = write_log(&log, &truth)?;
     let decoded = folder.file("decoded.txt");
+    let program = current_exe()?.with_file_name("motorlink");
+    if !program.exists() {
+        return Err("build the program first: cargo build --profile dist -p motorlink-cli".into());
+    }
     let mut times = Vec::new();
     for _ in 0..ROUNDS {
-        let mut command = Command::new(current_exe()?);
-        command.args(["decode-log".as_ref(), log.as_os_str()]);
+        let mut command = Command::new(&program);
+        command.args(["decode", "rmd"]).arg(&log);
         times.push(timed(&mut command, Stdio::null(), &decoded)?);
     }
     times.sort_by(f64::total_cmp);
@@ -81,15 +85,6 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
         },
     ];
     Ok((vec![section], goals))
-}
-
-/// Decodes a log, as the program does.
-pub fn decode(log: &Path) -> Result<()> {
-    let words = ["motorlink".into(), "decode".into(), "rmd".into(), log.into()];
-    match motorlink_cli::run(&[], words) {
-        0 => Ok(()),
-        code => Err(format!("`motorlink decode` ended with {code}").into()),
-    }
 }
 
 /// A folder that is removed at the end.

@@ -2,36 +2,19 @@
 
 use std::env::args;
 use std::fs::read_to_string;
-use std::process::Command;
 
-use crate::report::Style;
+use motorlink_kernels::compiler;
 
-/// The first lines of docs/BENCHMARKS.md.
-const HEAD: &str = "\
-# Benchmarks
-
-This page is for users who need to know the cost of an exchange or of a simulated drive, and for
-contributors who make them faster. It has figures of one machine. Measure yours with `make bench`.
-The goals of the project are in the last table.
-";
-
-/// Prints the head of the report.
-pub fn describe(style: Style) {
+/// The command and the machine, as in the head of docs/BENCHMARKS.md.
+pub fn lines() -> [(&'static str, String); 4] {
     let options: Vec<String> = args().skip(1).collect();
-    let command = format!("cargo run --release -p motorlink-bench -- {}", options.join(" "));
-    let rows = [
+    let command = format!("cargo run --profile dist -p motorlink-bench -- {}", options.join(" "));
+    [
         ("command", command),
         ("processor", processor()),
         ("kernel", kernel()),
         ("compiler", compiler()),
-    ];
-    match style {
-        Style::Plain => rows.iter().for_each(|(name, value)| println!("{name:<9}  {value}")),
-        Style::Markdown => {
-            println!("{HEAD}");
-            rows.iter().for_each(|(name, value)| println!("- {name}: `{value}`"));
-        }
-    }
+    ]
 }
 
 fn processor() -> String {
@@ -45,10 +28,4 @@ fn processor() -> String {
 fn kernel() -> String {
     let release = read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
     format!("Linux {}", release.trim())
-}
-
-fn compiler() -> String {
-    let output = Command::new("rustc").arg("--version").output();
-    let version = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
-    version.unwrap_or_else(|_| "unknown".to_owned())
 }

@@ -6,19 +6,21 @@ mod codec;
 mod decode;
 mod engine;
 mod exchange;
-mod kernel;
 mod line;
 mod machine;
 mod python;
 mod report;
-mod result;
 mod share;
 mod simulation;
 
+use std::fs;
+use std::path::PathBuf;
+
 use clap::{Parser, Subcommand};
 
-use report::{Goal, Section, Style};
-use result::Result;
+use motorlink_kernels::kernel::Kernel;
+use motorlink_kernels::result::Result;
+use report::{Goal, Section};
 
 /// Measures Motorlink on this machine. Reports missed goals; the exit code is 0 nevertheless.
 #[derive(Parser)]
@@ -26,15 +28,19 @@ use result::Result;
 struct Args {
     #[command(subcommand)]
     what: What,
-    /// Print Markdown, with the command and the machine, for docs/BENCHMARKS.md
-    #[arg(long, global = true)]
-    markdown: bool,
 }
 
 #[derive(Subcommand)]
 enum What {
     /// Everything below
-    All,
+    All {
+        /// How long to read the motors of the engine, s
+        #[arg(long, default_value_t = ENGINE_SECONDS)]
+        seconds: u32,
+        /// Write the command, the machine and all tables into this page: docs/BENCHMARKS.md
+        #[arg(long)]
+        update: Option<PathBuf>,
+    },
     /// Time and instructions to encode and decode each message
     Codec,
     /// Exchanges per second through real lines, against a raw loop
@@ -66,9 +72,6 @@ enum What {
     /// Replies on this number of ptys until the end of standard input
     #[command(hide = true)]
     Respond { count: u32 },
-    /// Decodes a log as `motorlink decode rmd` does
-    #[command(hide = true)]
-    DecodeLog { log: std::path::PathBuf },
     /// Serves the drives of the engine until the end of standard input
     #[command(hide = true)]
     Drives,
@@ -82,14 +85,14 @@ type Part<'a> = &'a dyn Fn() -> Result<(Vec<Section>, Vec<Goal>)>;
 
 fn main() -> Result<()> {
     let args = Args::parse();
-    let style = if args.markdown { Style::Markdown } else { Style::Plain };
-    let seconds = match args.what {
-        What::Engine { seconds } => seconds,
-        _ => ENGINE_SECONDS,
+    let (seconds, page) = match &args.what {
+        What::All { seconds, update } => (*seconds, update.clone()),
+        What::Engine { seconds } => (*seconds, None),
+        _ => (ENGINE_SECONDS, None),
     };
     let engine = || engine::measure(seconds);
     let parts: &[Part<'_>] = match args.what {
-        What::All => &[
+        What::All { .. } => &[
             &codec::measure,
             &line::measure,
             &python::measure,
@@ -105,32 +108,39 @@ fn main() -> Result<()> {
         What::Can => &[&can::measure],
         What::Engine { .. } => &[&engine],
         What::Decode => &[&decode::measure],
-        What::DecodeLog { log } => return decode::decode(&log),
         What::Exchange => &[&exchange::measure],
         What::Share => &[&share::measure],
         What::Python => &[&python::measure],
         What::Simulation => &[&simulation::measure],
-        What::Kernel { name, count } => return repeat(&name, count),
+        What::Kernel { name, count } => {
+            kernel(&name).ok_or_else(|| format!("no kernel is called {name}"))?.repeat(count);
+            return Ok(());
+        }
         What::Sitting { line } => return line::sitting(&line),
         What::Respond { count } => return line::respond(count),
         What::Drives => return engine::serve(),
     };
-    machine::describe(style);
-    let mut goals = Vec::new();
+    let machine = machine::lines();
+    machine.iter().for_each(|(name, value)| println!("{name:<9}  {value}"));
+    let (mut sections, mut goals) = (Vec::new(), Vec::new());
     for part in parts {
-        let (sections, outcomes) = part()?;
-        sections.iter().for_each(|section| section.print(style));
+        let (measured, outcomes) = part()?;
+        measured.iter().for_each(Section::print);
+        sections.extend(measured);
         goals.extend(outcomes);
     }
-    report::goals(&goals).print(style);
+    let goals = report::goals(&goals);
+    goals.print();
+    sections.push(goals);
+    if let Some(page) = page {
+        let text = report::updated(fs::read_to_string(&page)?, &machine, &sections);
+        fs::write(&page, text)?;
+    }
     Ok(())
 }
 
-/// Runs under the instruction counter, see [`kernel::Counter`].
-fn repeat(name: &str, count: u32) -> Result<()> {
-    let kernels = codec::kernels().chain(exchange::kernels()).chain(share::kernels());
-    let kernels = kernels.chain(simulation::kernels());
-    let mut found = kernels.into_iter().filter(|kernel| kernel.name == name);
-    found.next().ok_or_else(|| format!("no kernel is called {name}"))?.repeat(count);
-    Ok(())
+/// The kernel that runs under the instruction counter, see `Counter`.
+fn kernel(name: &str) -> Option<Kernel> {
+    let mut kernels = codec::kernels().chain(share::kernels());
+    kernels.find(|kernel| kernel.name == name).or_else(|| motorlink_kernels::named(name))
 }

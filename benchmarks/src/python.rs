@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::line::Spread;
 use crate::report::{Goal, Section};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// Rounds of every contestant in turn.
 const ROUNDS: u32 = 400;

@@ -2,7 +2,7 @@
 
 /// How a report is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Style {
+enum Style {
     /// Aligned columns.
     Plain,
     /// Markdown.
@@ -19,8 +19,8 @@ pub struct Section {
 }
 
 impl Section {
-    pub fn print(&self, style: Style) {
-        print!("\n{}", self.text(style));
+    pub fn print(&self) {
+        print!("\n{}", self.text(Style::Plain));
     }
 
     fn text(&self, style: Style) -> String {
@@ -89,6 +89,34 @@ pub fn goals(goals: &[Goal]) -> Section {
     }
 }
 
+/// A page with these lines of its head and these sections in place of those that it has. It keeps its
+/// other text, and the tables of other commands.
+pub fn updated(mut page: String, head: &[(&str, String)], sections: &[Section]) -> String {
+    for (name, value) in head {
+        replace(&mut page, &format!("- {name}: "), "\n", format!("- {name}: `{value}`"));
+    }
+    for section in sections {
+        replace(
+            &mut page,
+            &format!("## {}\n", section.title),
+            "\n\n## ",
+            section.text(Style::Markdown),
+        );
+    }
+    page
+}
+
+/// Replaces what begins with `begin` at the start of a line, up to `end`; appends it if nothing does.
+fn replace(page: &mut String, begin: &str, end: &str, text: String) {
+    let text = text.trim_end();
+    let Some(at) = page.find(&format!("\n{begin}")) else {
+        page.push_str(&format!("\n{text}\n"));
+        return;
+    };
+    let behind = page[at + 1..].find(end).map_or(page.trim_end().len(), |size| at + 1 + size);
+    page.replace_range(at + 1..behind, text);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,5 +153,17 @@ mod tests {
         assert!(text.starts_with("## Goals\n\n"));
         assert!(text.contains("| ------------ | ------: | -------: | -----------: |\n"));
         assert!(text.contains("| ratio        | >= 0.90 |     0.95 |          met |\n"));
+    }
+
+    #[test]
+    fn a_page_gets_the_new_sections_and_keeps_the_rest() {
+        let page = "# Page\n\n- kernel: `old`\n\n## Goals\n\nold\n\n## Others\n\nkept\n".to_owned();
+        let page = updated(page, &[("kernel", "new".to_owned())], &[example()]);
+        assert!(page.starts_with("# Page\n\n- kernel: `new`\n\n## Goals\n\nThe goals"), "{page}");
+        assert!(page.ends_with("not measured |\n\n## Others\n\nkept\n"), "{page}");
+        let again = updated(page.clone(), &[], &[example()]);
+        assert_eq!(again, page);
+        let last = updated("# Page\n\n## Goals\n\nold\n".to_owned(), &[], &[example()]);
+        assert!(last.ends_with("not measured |\n") && !last.contains("old"), "{last}");
     }
 }

@@ -16,11 +16,11 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
 use motorlink_telemetry::share::wire::Tap;
 
-use crate::exchange::{Memory, slave};
-use crate::kernel::{Counter, Kernel, NOT_COUNTED};
 use crate::line::Spread;
 use crate::report::{Goal, Section};
-use crate::result::Result;
+use motorlink_kernels::exchange::{Memory, slave};
+use motorlink_kernels::kernel::{Counter, Kernel, NOT_COUNTED};
+use motorlink_kernels::result::Result;
 
 /// Pairs of rounds.
 const ROUNDS: usize = 200;

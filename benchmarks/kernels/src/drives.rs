@@ -12,13 +12,13 @@ use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 use motorlink_sim::vector::Vector;
 use motorlink_sim::{angle, preset};
-use serde_json::{Value, json};
 
 use crate::kernel::Kernel;
 
 /// A period of the pulse width modulation.
 const PERIOD: Micros = Micros(50);
-pub(super) const PERIOD_S: f64 = 50e-6;
+/// The same, s.
+pub const PERIOD_S: f64 = 50e-6;
 
 /// Time to reach the speed.
 const SETTLED: Instant = Instant(6_000_000);
@@ -28,23 +28,26 @@ const RPM: i32 = 1_500;
 const DPS: i32 = 720;
 
 /// A drive and its operation.
-pub(super) struct Rig {
-    pub(super) name: &'static str,
+pub struct Rig {
+    /// Its name in tables.
+    pub name: &'static str,
     /// Whether there is a goal for its speed.
-    pub(super) is_required: bool,
+    pub is_required: bool,
     build: fn(&'static str) -> Kernel,
 }
 
 impl Rig {
     /// The drive after it reached its speed.
-    pub(super) fn kernel(&self) -> Kernel {
+    pub fn kernel(&self) -> Kernel {
         (self.build)(self.name)
     }
 }
 
-pub(super) const ENCODER: Rig =
+/// An ST drive with an encoder.
+pub const ENCODER: Rig =
     Rig { name: "ST with encoder", is_required: true, build: |name| st(name, encoder(), RPM) };
-pub(super) const SENSORLESS: Rig = Rig {
+/// An ST drive without a position sensor.
+pub const SENSORLESS: Rig = Rig {
     name: "ST sensorless",
     is_required: true,
     build: |name| st(name, MotorConfig::shinano(), RPM),
@@ -58,16 +61,19 @@ const RMD: Rig = Rig { name: "RMD", is_required: true, build: |name| rmd(name, D
 const IDLE: Rig =
     Rig { name: "ST with encoder, idle", is_required: false, build: |name| st(name, encoder(), 0) };
 
-pub(super) const PLANT: Rig = Rig { name: "plant alone", is_required: false, build: plant };
+/// The motor with its supply and power stage, without firmware.
+pub const PLANT: Rig = Rig { name: "plant alone", is_required: false, build: plant };
 
-pub(super) const RIGS: [Rig; 6] = [ENCODER, SENSORLESS, RMD, OBSERVED, IDLE, PLANT];
+/// All of them.
+pub const RIGS: [Rig; 6] = [ENCODER, SENSORLESS, RMD, OBSERVED, IDLE, PLANT];
 
-/// Speed (rad/s) and torque current (A) of the plant alone, and of the other simulators.
-pub(super) const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
-const IQ: f32 = 2.0;
+/// Speed of the plant alone, and of the other simulators, rad/s.
+pub const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
+/// Their torque current, A.
+pub const IQ: f32 = 2.0;
 
 /// The motor of all drives except the RMD motor, with a load that takes its torque.
-fn motor() -> PlantConfig {
+pub fn motor() -> PlantConfig {
     let motor = preset::shinano();
     let machine = motor.machine;
     let dry = machine.coulomb_friction + machine.iron_hysteresis;
@@ -75,22 +81,6 @@ fn motor() -> PlantConfig {
     let own = machine.viscous_friction + machine.iron_eddy;
     let load = LoadConfig { viscous: torque / SPEED - own, ..motor.load };
     PlantConfig { load, ..motor }
-}
-
-/// The motor as an argument of bench/peers.py.
-pub(super) fn machine() -> Value {
-    let PlantConfig { machine, supply, .. } = motor();
-    json!({
-        "pole_pairs": machine.pole_pairs,
-        "resistance_ohm": machine.resistance,
-        "ld_henry": machine.inductance_d,
-        "lq_henry": machine.inductance_q,
-        "flux_weber": machine.flux_linkage,
-        "inertia_kg_m2": machine.inertia,
-        "bus_volts": supply.voltage,
-        "speed_rad_s": SPEED,
-        "iq_amps": IQ,
-    })
 }
 
 /// A plant whose voltages turn with the rotor.

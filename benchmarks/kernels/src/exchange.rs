@@ -10,43 +10,12 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::StDrive;
 
-use crate::kernel::{Counter, Kernel};
-use crate::report::{Goal, Section};
-use crate::result::Result;
+use crate::kernel::Kernel;
 
-/// Maximum number of instructions of an exchange.
-const MOST: f64 = 1_500.0;
 /// Time between two exchanges, for the simulated drive.
 const PERIOD: Micros = Micros(100);
 
-pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
-    let counter = Counter::find();
-    let mut rows = Vec::new();
-    let mut counts = Vec::new();
-    for kernel in kernels() {
-        let name = kernel.name.clone();
-        let cost = kernel.cost(counter.as_ref())?;
-        rows.push([name].into_iter().chain(cost.show()).collect());
-        counts.push(cost.instructions);
-    }
-    let goal = Goal {
-        what: "instructions of a GET_REG exchange, master and slave".to_owned(),
-        wanted: format!("< {MOST}"),
-        reached: counts[0].map(|count| (format!("{count:.0}"), count < MOST)),
-    };
-    let section = Section {
-        title: "A GET_REG exchange, master and slave",
-        note: "\
-- One operation: SPEED_MEAS from request to value, in user space, without I/O.
-- *memory*: the drive only stores registers.
-- *simulation*: the drive is simulated. Its motors turn for 0.1 ms between exchanges."
-            .to_owned(),
-        columns: vec!["drive", "ns, least", "median", "instructions"],
-        rows,
-    };
-    Ok((vec![section], vec![goal]))
-}
-
+/// With a drive that only stores registers, and with a simulated one.
 pub fn kernels() -> [Kernel; 2] {
     let (mut master, mut slave) = (master(), slave(MotorNumber::FIRST));
     let mut memory = Memory { registers: [1_500; 256] };
@@ -73,6 +42,7 @@ fn master() -> Master {
     master
 }
 
+/// A slave of a drive with motors 1 to `last`.
 pub fn slave(last: MotorNumber) -> Slave {
     Slave::new(Profile::Spec, last)
 }
@@ -102,6 +72,7 @@ fn exchange(
 
 /// A drive that only stores registers.
 pub struct Memory {
+    /// The registers by their numbers.
     pub registers: [i32; 256],
 }
 
@@ -120,7 +91,7 @@ impl MotorControl for Memory {
         _: MotorNumber,
         register: RegisterId,
         value: i32,
-    ) -> std::result::Result<(), ErrorCode> {
+    ) -> Result<(), ErrorCode> {
         self.registers[usize::from(register.0)] = value;
         Ok(())
     }

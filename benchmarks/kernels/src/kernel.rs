@@ -18,16 +18,19 @@ pub const NOT_COUNTED: &str = "not measured: install valgrind";
 
 /// Work that can be repeated.
 pub struct Kernel {
+    /// Its name in tables.
     pub name: String,
     run: Box<dyn FnMut(u32)>,
 }
 
 impl Kernel {
+    /// A kernel whose repetition is `work`.
     pub fn new(name: impl Into<String>, mut work: impl FnMut() + 'static) -> Self {
         let run = move |count| (0..count).for_each(|_| work());
         Kernel { name: name.into(), run: Box::new(run) }
     }
 
+    /// Repeats the work.
     pub fn repeat(&mut self, count: u32) {
         (self.run)(black_box(count));
     }
@@ -52,6 +55,7 @@ impl Kernel {
 pub struct Cost {
     least_ns: f64,
     median_ns: f64,
+    /// `None` without a counter.
     pub instructions: Option<f64>,
 }
 

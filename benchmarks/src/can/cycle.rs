@@ -8,7 +8,7 @@ use motorlink_proto::units::{CentiDps, IqCommand};
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 
 use super::wire::{Sender, Transfer, Wire};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// The requests of a cycle to motors 1 to 4.
 #[derive(Debug, Clone, Copy)]

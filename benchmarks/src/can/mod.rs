@@ -7,8 +7,8 @@ mod wire;
 use motorlink_proto::time::Micros;
 
 use crate::report::{Goal, Section};
-use crate::result::Result;
 use cycle::{Cycle, Outcome};
+use motorlink_kernels::result::Result;
 
 const CYCLES: u32 = 2_000;
 /// Typical turnaround of real motors.

@@ -1,6 +1,6 @@
 //! A kind of message, as a kernel that can be counted.
 
-use crate::kernel::Kernel;
+use motorlink_kernels::kernel::Kernel;
 
 /// A request and its reply, each as a kernel that encodes and decodes it.
 pub(super) struct Kind {

@@ -4,10 +4,10 @@ mod kind;
 mod rmd;
 mod st;
 
-use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
-use crate::result::Result;
 use kind::Kind;
+use motorlink_kernels::kernel::{Counter, Kernel};
+use motorlink_kernels::result::Result;
 
 pub fn kernels() -> impl Iterator<Item = Kernel> {
     let kinds = st::kinds().into_iter().chain(rmd::kinds());

@@ -10,7 +10,7 @@ use std::time::Duration;
 use motorlink_testbench::{BenchConfig, SimServer};
 
 use super::motors::{BUSES, MOTORS_OF_BUS, ST_LINES};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// How long the drives wait for a request before they look at their clock.
 const TURN: Duration = Duration::from_millis(100);

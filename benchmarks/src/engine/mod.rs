@@ -14,8 +14,8 @@ use rustix::time::{ClockId, clock_gettime};
 
 use crate::line::Spread;
 use crate::report::{Goal, Section};
-use crate::result::Result;
 use drives::Drives;
+use motorlink_kernels::result::Result;
 use motors::{BUSES, MOTORS_OF_BUS, MOTORS_OF_LINE, REGISTERS, ST_LINES};
 use port::{Counted, Port, Stopped, count};
 use sleeper::Sleeper;

@@ -19,7 +19,7 @@ use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 
 use super::motors::{BUSES, MOTORS_OF_BUS, MOTORS_OF_LINE, QUANTITIES, REGISTERS};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// Records that wait until they are counted.
 const QUEUE: usize = 100_000;

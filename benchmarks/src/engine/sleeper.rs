@@ -6,7 +6,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// The thread. It ends when this is dropped.
 pub(super) struct Sleeper {

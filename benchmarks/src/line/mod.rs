@@ -12,7 +12,7 @@ use std::thread;
 use rustix::termios::ttyname;
 
 use crate::report::{Goal, Section};
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 use raw::{Far, Functions};
 use sitting::{Rates, sit, yielding};
 use transport::Transport;

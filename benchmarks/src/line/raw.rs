@@ -7,7 +7,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{self, Errno};
 
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// GET_REG SPEED_MEAS to motor 1, and a speed of 0.
 const REQUEST: &[u8] = &[0x22, 0x01, 0x1E, 0x41];

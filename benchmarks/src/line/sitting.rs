@@ -21,7 +21,7 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 use super::raw::{Far, Functions, Inlined, Near};
 use super::transport::Transport;
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// Exchanges per second in three rounds, one after the other.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@ use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use crate::result::Result;
+use motorlink_kernels::result::Result;
 
 /// A kind of line.
 #[derive(Debug, Clone, Copy)]

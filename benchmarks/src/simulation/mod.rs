@@ -1,15 +1,14 @@
 //! Simulated drives: speed relative to real time and to other simulators.
 
-mod drives;
 mod peers;
 
+use motorlink_kernels::drives;
+use motorlink_kernels::kernel::{Counter, Kernel};
+use motorlink_kernels::result::Result;
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
-use crate::result::Result;
 
-use drives::Rig;
 use peers::{Peer, Peers};
 
 /// Number of turns of the drives and the other simulators.
@@ -41,11 +40,6 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let (others, comparisons) = beside_others()?;
     goals.extend(comparisons);
     Ok((vec![own, others], goals))
-}
-
-/// Each is built on demand, because it must reach its speed first.
-pub fn kernels() -> impl Iterator<Item = Kernel> {
-    drives::RIGS.iter().map(Rig::kernel)
 }
 
 fn own(counter: Option<&Counter>) -> Result<(Section, Vec<Goal>)> {

@@ -4,10 +4,10 @@ use std::io::{BufRead, BufReader, Lines, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use serde_json::Value;
-
-use super::drives::{self, ENCODER, PLANT, Rig, SENSORLESS};
-use crate::result::Result;
+use motorlink_kernels::drives::{self, ENCODER, PLANT, Rig, SENSORLESS};
+use motorlink_kernels::result::Result;
+use motorlink_sim::plant::PlantConfig;
+use serde_json::{Value, json};
 
 const GEM: &str = "gym-electric-motor";
 const MOTULATOR: &str = "motulator";
@@ -55,6 +55,22 @@ pub(super) const PEERS: [Peer; 8] = [
     ),
 ];
 
+/// The motor as an argument of bench/peers.py.
+fn machine() -> Value {
+    let PlantConfig { machine, supply, .. } = drives::motor();
+    json!({
+        "pole_pairs": machine.pole_pairs,
+        "resistance_ohm": machine.resistance,
+        "ld_henry": machine.inductance_d,
+        "lq_henry": machine.inductance_q,
+        "flux_weber": machine.flux_linkage,
+        "inertia_kg_m2": machine.inertia,
+        "bus_volts": supply.voltage,
+        "speed_rad_s": drives::SPEED,
+        "iq_amps": drives::IQ,
+    })
+}
+
 /// The process that runs the packages.
 pub(super) struct Peers {
     child: Child,
@@ -77,7 +93,7 @@ impl Peers {
         }
         let mut child = Command::new(python)
             .arg(folder.join("peers.py"))
-            .arg(drives::machine().to_string())
+            .arg(machine().to_string())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()?;
