@@ -232,6 +232,8 @@ impl Master {
         }
     }
 
+    /// The next action of a recovery.
+    // Cold, so that an exchange in sync does not prepare the stack for it.
     #[cold]
     fn recover(&mut self, now: Instant) -> Output<'_> {
         let State::Recovering(stage) = &mut self.state else { return Output::Wait(None) };
