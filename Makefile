@@ -33,6 +33,9 @@ PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 # The program with the features of the whole workspace: built once for all parts.
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --example rmd_frames --example wireshark_frames --locked
 
+# The Python package with the same features, so that it shares that build.
+AS_TESTED := --config-settings 'build-args=--profile=dev --features=typescript'
+
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
 ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test probe determinism cost test-socketcan deny
@@ -81,7 +84,7 @@ unit: ## 10 min: tests in Rust
 	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
-	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
+	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
@@ -128,7 +131,7 @@ lint: ## 10 min: format, clippy, rustdoc: no warning
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
 pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
-	$(PAGES_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
+	$(PAGES_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
 	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 # Whether the header is up to date is tested in unit.
@@ -222,7 +225,7 @@ python-table: ## the RMD commands of the Python package: _rmd_table.py
 	MOTORLINK_UPDATE_PYTHON=1 $(CARGO) test -p motorlink-python --test table --locked
 
 python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
-	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
+	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
 	$(PYTHON_VENV)/bin/python bindings/python/tests/reference.py
 
 web-types: ## the types of messages in the page: web/src/wire.ts

@@ -148,7 +148,7 @@ edition = "2024"
 [lints.rust]
 warnings = "deny"
 [dependencies]
-ctrlc = { version = "3", features = ["termination"] }
+signal-hook = "0.4"
 """
 
 

@@ -12,6 +12,8 @@ use motorlink::port::{CanLink, Link};
 use motorlink::rmd;
 use motorlink::st::{self, Error, Options};
 use rustix::process::{Pid, Signal, kill_process};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 
 /// The port of the program that the test starts.
 const PORT: &str = "MOTORLINK_SIGNALS_TEST_PORT";
@@ -26,11 +28,13 @@ fn program() {
     let Ok(port) = std::env::var(PORT) else { return };
     let client = Arc::new(st::Client::open(&port.parse().unwrap(), Options::default()).unwrap());
     let at_signal = Arc::clone(&client);
-    ctrlc::set_handler(move || {
-        at_signal.retire();
-        process::exit(130)
-    })
-    .unwrap();
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).unwrap();
+    thread::spawn(move || {
+        if signals.forever().next().is_some() {
+            at_signal.retire();
+            process::exit(130);
+        }
+    });
     let motor = client.motor(1).unwrap();
     while !matches!(motor.start(), Err(Error::Port(PortError::Retired { .. }))) {}
     loop {

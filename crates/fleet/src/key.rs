@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use rustix::rand::{GetRandomFlags, getrandom};
+
 /// The beginning of all keys.
 pub const ROOT: &str = "motorlink/v1";
 /// In the place of a line's name: what is about the whole node.
@@ -14,14 +16,20 @@ pub const LONGEST: usize = 40;
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Name(String);
 
+/// Random bytes.
+fn random<const N: usize>() -> std::io::Result<[u8; N]> {
+    let mut bytes = [0; N];
+    getrandom(&mut bytes, GetRandomFlags::empty())?;
+    Ok(bytes)
+}
+
 impl Name {
     /// 16 random hexadecimal digits.
     ///
     /// # Errors
     /// The system has no random numbers.
     pub fn random() -> std::io::Result<Self> {
-        let number = getrandom::u64().map_err(std::io::Error::other)?;
-        Ok(Name(format!("{number:016x}")))
+        Ok(Name(format!("{:016x}", u64::from_ne_bytes(random()?))))
     }
 
     /// A run of a node on this computer: 8 digits of the computer, then 8 random ones.
@@ -29,8 +37,7 @@ impl Name {
     /// # Errors
     /// The system has no random numbers.
     pub fn run(computer: u32) -> std::io::Result<Self> {
-        let number = getrandom::u32().map_err(std::io::Error::other)?;
-        Ok(Name(format!("{computer:08x}{number:08x}")))
+        Ok(Name(format!("{computer:08x}{:08x}", u32::from_ne_bytes(random()?))))
     }
 
     /// Whether two runs were on the same computer.

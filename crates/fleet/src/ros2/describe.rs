@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use sha2::{Digest, Sha256};
+use ring::digest::{SHA256, digest};
 
 /// A type with fields.
 #[derive(Debug)]
@@ -80,7 +80,7 @@ impl Message {
             nested.join(", ")
         );
         let mut hash = "RIHS01_".to_owned();
-        for byte in Sha256::digest(text) {
+        for byte in digest(&SHA256, text.as_bytes()).as_ref() {
             let _ = write!(hash, "{byte:02x}");
         }
         hash

@@ -1,6 +1,6 @@
 //! Names, keys and attachments of `rmw_zenoh`, from version 0.2.4 on.
 
-use sha2::{Digest, Sha256};
+use ring::digest::{SHA256, digest};
 
 use super::describe::Message;
 
@@ -136,7 +136,7 @@ impl Graph {
             "@ros2_lv/{domain}/{session}/{NODE}/{number}/{word}/%/%/{node}/{mangled}/{dds}/{hash}/{qos}"
         );
         let mut gid = Gid::default();
-        gid.copy_from_slice(&Sha256::digest(&token)[..size_of::<Gid>()]);
+        gid.copy_from_slice(&digest(&SHA256, token.as_bytes()).as_ref()[..size_of::<Gid>()]);
         Endpoint { name: name.to_owned(), key, token, gid }
     }
 }

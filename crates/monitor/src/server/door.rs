@@ -5,6 +5,7 @@ use std::net::IpAddr;
 use axum::http::header::{COOKIE, HOST, ORIGIN};
 use axum::http::uri::{Authority, Scheme};
 use axum::http::{HeaderMap, HeaderName, Uri};
+use rustix::rand::{GetRandomFlags, getrandom};
 
 use crate::message::Role;
 
@@ -14,7 +15,7 @@ use crate::message::Role;
 /// The system has no random numbers.
 pub fn random_word() -> std::io::Result<String> {
     let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
+    getrandom(&mut bytes, GetRandomFlags::empty())?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 

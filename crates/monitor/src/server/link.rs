@@ -39,6 +39,8 @@ pub struct Link {
     is_latched: AtomicBool,
     /// One connection at a time sends it. The others wait: none can move a motor before it.
     sending: AsyncMutex<()>,
+    /// How long a stop waits for a share that is lost.
+    stop_waits: Duration,
     /// `None` until the first attempt to connect has ended.
     joined: watch::Sender<Option<Result<Joined, String>>>,
 }
@@ -68,8 +70,14 @@ impl Link {
             pending: Mutex::default(),
             is_latched: AtomicBool::new(false),
             sending: AsyncMutex::default(),
+            stop_waits: PENDING,
             joined: watch::Sender::new(None),
         }
+    }
+
+    /// With another time for which a stop waits for a share that is lost.
+    pub fn with_stops_waiting(self, stop_waits: Duration) -> Self {
+        Link { stop_waits, ..self }
     }
 
     /// The stops of all pages.
@@ -107,7 +115,7 @@ impl Link {
     async fn send_pending(&self) -> io::Result<()> {
         let _sending = self.sending.lock().await;
         let wanted = *self.pending();
-        let stop = wanted.stop.filter(|asked| asked.elapsed() < PENDING);
+        let stop = wanted.stop.filter(|asked| asked.elapsed() < self.stop_waits);
         if stop.is_none() && !wanted.latch {
             return Ok(());
         }

@@ -4,12 +4,9 @@ use axum::body::Body;
 use axum::http::header::{ACCEPT_ENCODING, CONTENT_ENCODING, CONTENT_TYPE};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use rust_embed::RustEmbed;
 
-#[derive(RustEmbed)]
-#[folder = "../../web/dist"]
-#[allow_missing = true]
-struct Site;
+/// Names and contents. Without the page there are none.
+const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
 /// The page itself.
 const PAGE: &str = "index.html";
@@ -19,15 +16,19 @@ const MISSING: &str = "This build of motorlink has no page. In a copy of the sou
 
 /// The page.
 pub fn page(headers: &HeaderMap) -> Response {
-    match Site::get(PAGE) {
+    match content(PAGE) {
         Some(_) => file(PAGE, headers),
         None => (StatusCode::NOT_FOUND, MISSING).into_response(),
     }
 }
 
+fn content(path: &str) -> Option<&'static [u8]> {
+    FILES.iter().find(|(name, _)| *name == path).map(|(_, content)| *content)
+}
+
 /// A file of the page, compressed if the browser takes that.
 pub fn file(path: &str, headers: &HeaderMap) -> Response {
-    let Some(file) = Site::get(path) else {
+    let Some(content) = content(path) else {
         return (StatusCode::NOT_FOUND, "There is no such file.\n").into_response();
     };
     let kind = [(CONTENT_TYPE, kind_of(path))];
@@ -36,9 +37,9 @@ pub fn file(path: &str, headers: &HeaderMap) -> Response {
         names.any(|name| name.trim().eq_ignore_ascii_case("gzip"))
     });
     if !takes_gzip {
-        return (kind, Body::from(file.data.into_owned())).into_response();
+        return (kind, Body::from(content)).into_response();
     }
-    (kind, [(CONTENT_ENCODING, "gzip")], compressed(&file.data)).into_response()
+    (kind, [(CONTENT_ENCODING, "gzip")], compressed(content)).into_response()
 }
 
 fn compressed(data: &[u8]) -> Vec<u8> {
