@@ -38,7 +38,7 @@ AS_TESTED := --config-settings 'build-args=--profile=dev --features=typescript'
 
 # The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
 # other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
-ALL_PARTS := firmware-test miri lint web-test unit python e2e browser pages ffi-test probe determinism cost test-socketcan deny
+ALL_PARTS := firmware-test miri lint rustdoc web-test unit python e2e browser pages ffi-test probe determinism cost test-socketcan deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python browser pages firmware-test ffi-test test-socketcan
@@ -46,7 +46,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
+.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
 .PHONY: ros2 fleet-scale fleet-faults install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -62,7 +62,10 @@ monitor: toolchain web ## simulated drives in a browser
 
 test: toolchain $(if $(SUDO),packages) ## 30 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
+	@$(PYTHON) tests/parts.py $(if $(FORCE),--force) $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
+
+verify: FORCE = 1
+verify: test ## the same, also parts that read nothing that has changed since they passed
 
 # Zenoh takes minutes to build.
 WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python \
@@ -123,11 +126,13 @@ firmware-test: $(VENV)/ready ## 8 min: boards in QEMU against the conformance ki
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
-lint: ## 10 min: format, clippy, rustdoc: no warning
+lint: ## 3 min: format, clippy: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	$(CARGO) clippy -p motorlink-cli --no-default-features --locked -- -D warnings
 	cd fuzz/fuzzers && $(CARGO) fmt --check
+
+rustdoc: ## 1 min: rustdoc: no warning
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
 pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
@@ -172,8 +177,8 @@ cost: ## 1 min: instructions of exchanges and simulated drives; UPDATE=1 writes 
 	-@tests/install cost
 	$(CARGO) run --profile dist --locked -p motorlink-kernels $(if $(UPDATE),-- --update)
 
-deny: ## 4 min: licences, known holes; 0 if nothing changed; FORCE=1
-	CARGO="$(CARGO)" tests/deny $(if $(FORCE),force)
+deny: ## 4 min: licences, known holes
+	CARGO="$(CARGO)" tests/deny
 
 # ---- Campaigns and figures ----
 

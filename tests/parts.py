@@ -5,7 +5,8 @@ A part is a target of the Makefile. Its output goes to target/parts/PART.log and
 part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
 the end. A part of --again that fails runs a second time, alone, when the others are over, with the
 tests that failed where its runner can do that (AGAIN=1): if it passes then, a pause of the machine made
-it fail, or a defect that is rare. It is reported as flaky.
+it fail, or a defect that is rare. It is reported as flaky. Parts that need not run (unchanged.py) are
+named with the revision at which they passed.
 """
 
 import argparse
@@ -20,6 +21,8 @@ import threading
 import time
 from collections import deque
 from pathlib import Path
+
+from unchanged import Unchanged
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 LOGS = REPOSITORY / "target/parts"
@@ -85,7 +88,8 @@ class Run:
 class Runner:
     """Parts that wait, parts that run, and runs that are over."""
 
-    def __init__(self, labels):
+    def __init__(self, labels, unchanged):
+        self.unchanged = unchanged
         self.waiting = deque(labels)
         self.count = len(self.waiting)
         self.running, self.over = set(), []
@@ -105,7 +109,9 @@ class Runner:
                 if self.stopped:
                     return
                 self.over.append(run)
-                if not run.passed:
+                if run.passed:
+                    self.unchanged.passed(run.part, run.skipped)
+                else:
                     print(f"\n---- {run.log}\n{run.output}\n----", flush=True)
                 print(run, flush=True)
 
@@ -146,6 +152,7 @@ def main():
     arguments.add_argument("--runs", type=number, default=1, help="runs of each part (default 1)")
     arguments.add_argument("--load", type=int, default=0, help="processes that compute beside them")
     arguments.add_argument("--strict", action="store_true", help="a skipped check is a failure")
+    arguments.add_argument("--force", action="store_true", help="also parts that read nothing new")
     arguments.add_argument("--again", default="", help="parts that run again, alone, if they fail")
     arguments.add_argument("parts", nargs="+", metavar="PART")
     given = arguments.parse_args()
@@ -159,9 +166,17 @@ def main():
     except BlockingIOError:
         sys.exit(f"parts of this folder run already ({LOGS}): wait for their end")
 
+    unchanged = Unchanged(parts)
+    kept = {}
+    if not given.force and given.runs == 1:
+        kept = {part: entry for part in parts if (entry := unchanged.entry(part))}
+        parts = [part for part in parts if part not in kept]
+    for part, entry in kept.items():
+        print(f"{part:18} unchanged since {entry['revision']}", flush=True)
     numbers = range(1, given.runs + 1)
     label = "{part}" if given.runs == 1 else "{part}-{run}"
-    runner = Runner((part, label.format(part=part, run=run)) for run in numbers for part in parts)
+    labels = ((part, label.format(part=part, run=run)) for run in numbers for part in parts)
+    runner = Runner(labels, unchanged)
     workers = [threading.Thread(target=runner.work) for _ in range(given.jobs)]
     begun = time.monotonic()
     for ending in (signal.SIGTERM, signal.SIGHUP):
@@ -181,8 +196,8 @@ def main():
             hogs.terminate()
             hogs.wait()
 
-    for run in runner.over:
-        for line in run.skipped:
+    for lines in (*(it["skipped"] for it in kept.values()), *(it.skipped for it in runner.over)):
+        for line in lines:
             print(line)
     for part in flaky:
         print(f"FLAKY: {part} failed, and passed when it ran again alone: see {part}.log")
@@ -194,8 +209,10 @@ def main():
     failed = runner.count - passed - skipped
     print(f"{time.monotonic() - begun:.0f} s in all; logs are in {LOGS.relative_to(REPOSITORY)}")
     tail = f", {skipped} skipped" if skipped else ""
+    tail += f", {len(kept)} unchanged" if kept else ""
     print(f"{passed} passed, {failed} failed{tail}")
-    sys.exit(bool(failed or not passed or idle or given.strict and skipped))
+    skipped += sum(bool(it["skipped"]) for it in kept.values())
+    sys.exit(bool(failed or not (passed or kept) or idle or given.strict and skipped))
 
 
 if __name__ == "__main__":
