@@ -6,6 +6,7 @@ mod rates;
 mod tally;
 mod telling;
 
+use litemap::LiteMap as Map;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Deref, DerefMut};
 use std::os::fd::BorrowedFd;
@@ -56,14 +57,14 @@ pub struct Acquisition {
     line: StopsAtEnd,
     clock: Clock,
     schedule: Schedule<Arc<Command>>,
-    polls: BTreeMap<PollId, Arc<Poll>>,
+    polls: Map<PollId, Arc<Poll>>,
     derivations: Vec<Derivation>,
     last_poll: u32,
-    consumers: BTreeMap<ConsumerId, Consumer>,
+    consumers: Map<ConsumerId, Consumer>,
     /// Events that are told once the stops that they are about have gone out.
     untold: Vec<Arc<Event>>,
     /// The quiet stops that no drive has confirmed. They are told once a drive confirms them.
-    untold_stops: BTreeMap<CommandId, (Arc<str>, Request)>,
+    untold_stops: Map<CommandId, (Arc<str>, Request)>,
     /// The motors that were read since an exchange of their lane had no answer.
     answering: BTreeSet<Motor>,
     last_consumer: u64,
@@ -74,16 +75,16 @@ pub struct Acquisition {
     /// The instant of the poll that a lane has under way.
     instants: BTreeMap<Lane, Instant>,
     /// Until when the values of a lane are confirmed.
-    confirmed: BTreeMap<Lane, Instant>,
+    confirmed: Map<Lane, Instant>,
     /// Lanes whose values are confirmed at each instant, and until when.
-    careful: BTreeMap<Lane, Instant>,
+    careful: Map<Lane, Instant>,
     /// Signals without values: the drive refused their poll, or their values are not plausible.
-    refused: BTreeMap<PollId, Vec<Signal>>,
+    refused: Map<PollId, Vec<Signal>>,
     /// Registers that have their size in the other profile. Each read of one loses the line, so they are
     /// not read again until the port is opened again, or until somebody else wants them.
     unfit: BTreeSet<Signal>,
     /// Failures in a row of each lane.
-    failures: BTreeMap<Lane, u32>,
+    failures: Map<Lane, u32>,
     /// The shortest time between two confirmations on a good line.
     confirmation: Micros,
 }
@@ -138,23 +139,23 @@ impl Acquisition {
             clock: line.clock(),
             schedule: Schedule::new(line.rules()),
             line: StopsAtEnd(Some(line)),
-            polls: BTreeMap::new(),
+            polls: Map::new(),
             derivations: Vec::new(),
             last_poll: 0,
-            consumers: BTreeMap::new(),
+            consumers: Map::new(),
             untold: Vec::new(),
-            untold_stops: BTreeMap::new(),
+            untold_stops: Map::new(),
             answering: BTreeSet::new(),
             last_consumer: 0,
             tally: Tally::default(),
             latch: None,
             is_open: true,
             instants: BTreeMap::new(),
-            confirmed: BTreeMap::new(),
-            careful: BTreeMap::new(),
-            refused: BTreeMap::new(),
+            confirmed: Map::new(),
+            careful: Map::new(),
+            refused: Map::new(),
             unfit: BTreeSet::new(),
-            failures: BTreeMap::new(),
+            failures: Map::new(),
             confirmation: CONFIRMATION,
         }
     }

@@ -1,5 +1,6 @@
 //! From the signals that are wanted to the fewest exchanges.
 
+use litemap::LiteMap as Map;
 use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_proto::rmd::{Code, MotorId};
@@ -46,7 +47,7 @@ pub enum Read {
 /// `segments`. The shortest periods come first. Registers that only a data segment can have always take
 /// one. Registers in `alone` share none. Each other register is one exchange.
 pub fn st_polls(wants: &Wants, segments: &[u8], alone: &BTreeSet<RegisterId>) -> Vec<Poll> {
-    let mut groups: BTreeMap<(Micros, MotorNumber), Vec<RegisterId>> = BTreeMap::new();
+    let mut groups: Map<(Micros, MotorNumber), Vec<RegisterId>> = Map::new();
     for (signal, period) in wants {
         if let (Motor::St(motor), Source::Register(register)) = (signal.motor, signal.source) {
             groups.entry((*period, motor)).or_default().push(register);
@@ -106,7 +107,7 @@ fn chunks(mut registers: &[RegisterId]) -> impl Iterator<Item = &[RegisterId]> {
 /// The sources of derived values are read, too. They are read with the same period, the shortest of
 /// all, so that they always come from the same instants.
 pub fn rmd_polls(wants: &Wants) -> Vec<Poll> {
-    let mut motors: BTreeMap<MotorId, Wanted> = BTreeMap::new();
+    let mut motors: Map<MotorId, Wanted> = Map::new();
     for (signal, period) in wants {
         let Motor::Rmd(id) = signal.motor else { continue };
         match signal.source {
@@ -127,7 +128,7 @@ pub fn rmd_polls(wants: &Wants) -> Vec<Poll> {
 /// What is wanted of a motor.
 #[derive(Default)]
 struct Wanted {
-    quantities: BTreeMap<Quantity, Micros>,
+    quantities: Map<Quantity, Micros>,
     /// The sources of derived values.
     together: BTreeSet<Quantity>,
 }

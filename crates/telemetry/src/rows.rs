@@ -2,7 +2,8 @@
 
 mod motors;
 
-use std::collections::{BTreeMap, VecDeque};
+use litemap::LiteMap as Map;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use motorlink_proto::st::Implausible;
@@ -28,7 +29,7 @@ pub struct Row {
     /// The values, in the order of the signals.
     pub values: Vec<Result<Sample, Absent>>,
     /// When the last value of each motor came.
-    replied: BTreeMap<Motor, Instant>,
+    replied: Map<Motor, Instant>,
 }
 
 /// Why there is no value.
@@ -83,8 +84,8 @@ pub struct Rows {
     partial: Option<Partial>,
     /// The instant of the last row.
     last: Option<Instant>,
-    refused: BTreeMap<Signal, Arc<LineError>>,
-    confirmed: BTreeMap<Motor, Instant>,
+    refused: Map<Signal, Arc<LineError>>,
+    confirmed: Map<Motor, Instant>,
     items: VecDeque<Item>,
 }
 
@@ -93,8 +94,8 @@ pub struct Rows {
 struct Partial {
     instant: Instant,
     began: Instant,
-    values: BTreeMap<Signal, Result<Sample, Absent>>,
-    replied: BTreeMap<Motor, Instant>,
+    values: Map<Signal, Result<Sample, Absent>>,
+    replied: Map<Motor, Instant>,
 }
 
 impl Rows {
@@ -104,8 +105,8 @@ impl Rows {
             signals,
             partial: None,
             last: None,
-            refused: BTreeMap::new(),
-            confirmed: BTreeMap::new(),
+            refused: Map::new(),
+            confirmed: Map::new(),
             items: VecDeque::new(),
         }
     }
@@ -134,8 +135,8 @@ impl Rows {
             self.partial = Some(Partial {
                 instant: values.instant,
                 began: values.requested,
-                values: BTreeMap::new(),
-                replied: BTreeMap::new(),
+                values: Map::new(),
+                replied: Map::new(),
             });
         }
         let Some(partial) = self.partial.as_mut().filter(|it| it.instant == values.instant) else {
@@ -222,7 +223,7 @@ impl Rows {
         let refused = |signal| Some(Err(Absent::Refused(Arc::clone(self.refused.get(signal)?))));
         if let Some(values) = self.signals.iter().map(refused).collect() {
             let (instant, requested) = (time, time);
-            let replied = BTreeMap::new();
+            let replied = Map::new();
             self.items.push_back(Item::Row(Row { instant, requested, time, values, replied }));
         }
     }

@@ -1,6 +1,7 @@
 //! What a consumer wants, and the bounded queue from which it takes what came.
 
-use std::collections::{BTreeMap, VecDeque};
+use litemap::LiteMap as Map;
+use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -135,12 +136,12 @@ pub(crate) struct Consumer {
     pub(crate) subscription: Subscription,
     pub(crate) wants: Wants,
     /// The last instant of this consumer for which the values of a poll came.
-    last: BTreeMap<PollId, Instant>,
+    last: Map<PollId, Instant>,
 }
 
 impl Consumer {
     pub(crate) fn new(subscription: Subscription, wants: Wants) -> Self {
-        Consumer { subscription, wants, last: BTreeMap::new() }
+        Consumer { subscription, wants, last: Map::new() }
     }
 
     /// Passes the values of a poll on, if they are wanted now. A poll may be more frequent than this

@@ -1,6 +1,6 @@
 //! The polls of the engine: what they are, and what becomes of their replies.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 use std::sync::Arc;
 
 use motorlink_proto::time::{Instant, Micros};
@@ -177,7 +177,7 @@ impl Acquisition {
 
     /// A confirmation for each lane, at the rate of its fastest poll, but not too often on a good line.
     fn confirmations(&self, polls: &[Poll]) -> Vec<Poll> {
-        let mut lanes: BTreeMap<Lane, Poll> = BTreeMap::new();
+        let mut lanes: Map<Lane, Poll> = Map::new();
         for poll in polls {
             let lane = self.line.lane(&poll.request());
             let period = match self.careful.contains_key(&lane) {
@@ -192,18 +192,21 @@ impl Acquisition {
             });
             confirmation.period = confirmation.period.min(period);
         }
-        lanes.into_values().collect()
+        lanes.into_iter().map(|(_, value)| value).collect()
     }
 }
 
 /// Passes values to the consumers that want them.
 fn pass(
-    consumers: &mut BTreeMap<ConsumerId, Consumer>,
+    consumers: &mut Map<ConsumerId, Consumer>,
     anchor: Instant,
     id: PollId,
     values: &Arc<Values>,
 ) {
-    consumers.values_mut().for_each(|consumer| consumer.values(anchor, id, values));
+    consumers
+        .iter_mut()
+        .map(|(_, value)| value)
+        .for_each(|consumer| consumer.values(anchor, id, values));
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.

@@ -1,6 +1,6 @@
 //! Carries out the exchanges of relayed lines, for the owners of their clients.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::rmd::{Asked, Client, Error, MotorId};
@@ -20,7 +20,7 @@ pub const RETRY: Micros = Micros::from_millis(1);
 /// client wait for the end of its quarantine, too.
 pub struct RmdOwner {
     relay: RmdRelay,
-    resting: Mutex<BTreeMap<MotorId, Rest>>,
+    resting: Mutex<Map<MotorId, Rest>>,
     clock: Clock,
 }
 
@@ -98,7 +98,7 @@ impl RmdOwner {
     /// # Errors
     /// The port's. What is not over stays pending: see [`fail_pending`](Self::fail_pending).
     pub fn carry_out(&self, client: &Client, mut doubt: impl FnMut(&Error)) -> Result<(), Error> {
-        let ready: BTreeMap<_, _> = self.ready().collect();
+        let ready: Map<_, _> = self.ready().collect();
         let asked: Vec<_> = ready.iter().map(|(id, asked)| (*id, *asked)).collect();
         let mut results = Vec::with_capacity(asked.len());
         let cycle = client.ask_each(&asked, |id, result, sent| results.push((id, result, sent)));
@@ -144,7 +144,7 @@ impl RmdOwner {
         now.since(rest.since) < PATIENCE
     }
 
-    fn resting(&self) -> MutexGuard<'_, BTreeMap<MotorId, Rest>> {
+    fn resting(&self) -> MutexGuard<'_, Map<MotorId, Rest>> {
         self.resting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

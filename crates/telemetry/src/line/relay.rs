@@ -3,7 +3,7 @@
 //! The other users are threads or tasks of the same program. They can lose the line between two
 //! exchanges of the engine, so the owner passes on what its client counts.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -57,8 +57,8 @@ pub struct RmdOver {
 
 #[derive(Debug)]
 struct Exchanges<K, S, E> {
-    pending: BTreeMap<K, S>,
-    over: BTreeMap<K, E>,
+    pending: Map<K, S>,
+    over: Map<K, E>,
     is_closed: bool,
 }
 
@@ -70,7 +70,7 @@ impl<K, S, E> Clone for Relay<K, S, E> {
 
 impl<K, S, E> Default for Relay<K, S, E> {
     fn default() -> Self {
-        let (pending, over) = (BTreeMap::new(), BTreeMap::new());
+        let (pending, over) = (Map::new(), Map::new());
         let exchanges = Mutex::new(Exchanges { pending, over, is_closed: false });
         Relay(Arc::new(Shared { exchanges, begun: Condvar::new() }))
     }
@@ -116,7 +116,7 @@ impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
         exchanges.over.remove(&key);
     }
 
-    fn take_over(&self) -> BTreeMap<K, E> {
+    fn take_over(&self) -> Map<K, E> {
         std::mem::take(&mut self.lock().over)
     }
 
@@ -148,7 +148,7 @@ pub(super) struct Drive {
 /// The exchanges with RMD motors.
 pub(super) struct Motors {
     relay: RmdRelay,
-    seen: BTreeMap<MotorId, Seen>,
+    seen: Map<MotorId, Seen>,
 }
 
 /// The last exchange with a motor.
@@ -275,7 +275,7 @@ impl StDriver for RelayedSt {
 
 impl RelayedRmd {
     pub(super) fn new(relay: RmdRelay, port: Arc<str>, clock: Clock) -> Self {
-        Relayed { port, clock, exchanges: Motors { relay, seen: BTreeMap::new() } }
+        Relayed { port, clock, exchanges: Motors { relay, seen: Map::new() } }
     }
 }
 

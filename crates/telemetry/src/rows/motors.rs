@@ -1,6 +1,6 @@
 //! Rows of several motors.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 
 use motorlink_proto::time::Instant;
 
@@ -12,13 +12,13 @@ use crate::subscription::Record;
 /// As [`Rows`], with rows of its own for each motor of a line.
 #[derive(Debug, Default)]
 pub struct MotorRows {
-    motors: BTreeMap<Motor, Rows>,
+    motors: Map<Motor, Rows>,
 }
 
 impl MotorRows {
     /// Rows of these signals. Those of a row are in the order of this list.
     pub fn new(signals: impl IntoIterator<Item = Signal>) -> Self {
-        let mut of: BTreeMap<Motor, Vec<Signal>> = BTreeMap::new();
+        let mut of: Map<Motor, Vec<Signal>> = Map::new();
         for signal in signals {
             of.entry(signal.motor).or_default().push(signal);
         }
@@ -35,7 +35,7 @@ impl MotorRows {
         };
         match concerned {
             Some(motor) => self.motors.get_mut(&motor).into_iter().for_each(|it| it.take(record)),
-            None => self.motors.values_mut().for_each(|it| it.take(record)),
+            None => self.motors.iter_mut().map(|(_, value)| value).for_each(|it| it.take(record)),
         }
     }
 

@@ -1,6 +1,6 @@
 //! How long exchanges take, and what a line carries.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 
 use motorlink_proto::time::{Instant, Micros};
 
@@ -67,7 +67,7 @@ struct Cost {
 /// [`stretch`](Self::stretch).
 #[derive(Debug)]
 pub struct Load {
-    costs: BTreeMap<PollId, Cost>,
+    costs: Map<PollId, Cost>,
     stretch: f64,
     demand: f64,
     is_decided: bool,
@@ -87,7 +87,7 @@ pub struct Load {
 impl Default for Load {
     fn default() -> Self {
         Load {
-            costs: BTreeMap::new(),
+            costs: Map::new(),
             stretch: 1.0,
             demand: 0.0,
             is_decided: false,
@@ -240,7 +240,7 @@ impl Load {
         }
         self.overlap = self.overlap();
         self.commands = self.of_commands as f64 / self.overlap / span.0 as f64;
-        for cost in self.costs.values_mut() {
+        for cost in self.costs.iter_mut().map(|(_, value)| value) {
             cost.pace.close_window(now);
         }
         (self.window, self.busy, self.filled, self.of_commands) = (Some(now), 0, 0, 0);

@@ -35,6 +35,8 @@ mod stops;
 
 use std::collections::BTreeMap;
 
+use litemap::LiteMap as Map;
+
 use motorlink_proto::time::{Instant, Micros};
 
 pub use exchange::{CommandId, Displaced, Lane, Outcome, PollId, Verdict};
@@ -110,7 +112,7 @@ struct Group {
 #[derive(Debug)]
 pub struct Schedule<C> {
     rules: LineRules,
-    lanes: BTreeMap<Lane, LaneState<C>>,
+    lanes: Map<Lane, LaneState<C>>,
     groups: Vec<Group>,
     openers: BTreeMap<Lane, PollId>,
     load: Load,
@@ -128,7 +130,7 @@ impl<C: Clone> Schedule<C> {
     pub fn new(rules: LineRules) -> Self {
         Schedule {
             rules,
-            lanes: BTreeMap::new(),
+            lanes: Map::new(),
             groups: Vec::new(),
             openers: BTreeMap::new(),
             load: Load::default(),
@@ -153,7 +155,7 @@ impl<C: Clone> Schedule<C> {
         openers: BTreeMap<Lane, PollId>,
     ) {
         let anchor = *self.anchor.get_or_insert(now);
-        let mut groups: BTreeMap<(Lane, Micros, bool), Group> = BTreeMap::new();
+        let mut groups: Map<(Lane, Micros, bool), Group> = Map::new();
         for &(poll, lane, period) in polls {
             let period = period.max(Micros(1));
             let is_opener = openers.get(&lane) == Some(&poll);
@@ -170,7 +172,7 @@ impl<C: Clone> Schedule<C> {
             group.polls.push(poll);
             self.lanes.entry(lane).or_default();
         }
-        let mut groups: Vec<_> = groups.into_values().collect();
+        let mut groups: Vec<_> = groups.into_iter().map(|(_, value)| value).collect();
         for at in 0..groups.len() {
             if groups[at].is_opener {
                 let of_lane = groups.iter().filter(|it| it.lane == groups[at].lane);
@@ -258,14 +260,22 @@ impl<C: Clone> Schedule<C> {
 
     /// Takes out the commands that wait and do not pass `keep`: they are not sent any more.
     pub fn withdraw(&mut self, keep: impl Fn(&C) -> bool) -> Vec<(CommandId, C)> {
-        self.lanes.values_mut().flat_map(|lane| lane.overtake(&keep)).collect()
+        self.lanes
+            .iter_mut()
+            .map(|(_, value)| value)
+            .flat_map(|lane| lane.overtake(&keep))
+            .collect()
     }
 
     /// What to do now. Call again until it is [`Next::Wait`].
     pub fn next(&mut self, now: Instant) -> Next<C> {
         self.update_load(now);
         let is_open = self.is_open;
-        let expired = self.lanes.values_mut().find_map(|lane| lane.take_expired(now, is_open));
+        let expired = self
+            .lanes
+            .iter_mut()
+            .map(|(_, value)| value)
+            .find_map(|lane| lane.take_expired(now, is_open));
         if let Some((id, command)) = expired {
             return Next::Expired(id, command);
         }
@@ -434,7 +444,7 @@ impl<C: Clone> Schedule<C> {
     /// The line is open again.
     pub fn reopened(&mut self, now: Instant) {
         self.is_open = true;
-        self.lanes.values_mut().for_each(LaneState::reopened);
+        self.lanes.iter_mut().map(|(_, value)| value).for_each(LaneState::reopened);
         let anchor = self.anchor.unwrap_or(now);
         for group in &mut self.groups {
             group.due = group.due.max(last_on_grid(anchor, group.rhythm.period, now));

@@ -1,6 +1,6 @@
 //! A program at a share, without blocking.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,7 +34,7 @@ struct Shared {
     /// The same socket. It can be closed while somebody writes.
     socket: OwnedFd,
     pending: Mutex<Pending>,
-    lanes: Mutex<BTreeMap<Lane, Arc<AsyncMutex<()>>>>,
+    lanes: Mutex<Map<Lane, Arc<AsyncMutex<()>>>>,
     share: Arc<dyn Address>,
     name: String,
 }
@@ -47,7 +47,7 @@ struct Pending {
     last: u32,
     /// Why requests get no answer any more.
     ended: Option<Refusal>,
-    answers: BTreeMap<u32, oneshot::Sender<Result<Answer, Refusal>>>,
+    answers: Map<u32, oneshot::Sender<Result<Answer, Refusal>>>,
 }
 
 /// What a share sends, besides the answers to [`Program::ask`].

@@ -1,6 +1,7 @@
 //! What programs ask for.
 
-use std::collections::{BTreeMap, BTreeSet};
+use litemap::LiteMap as Map;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time;
 
@@ -180,7 +181,7 @@ impl Hub {
             Ask::Take { motor } => self.take(session, name, &motor),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
-                for held in self.lines.values_mut() {
+                for held in self.lines.iter_mut().map(|(_, value)| value) {
                     held.sequences.clear();
                     held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
@@ -190,7 +191,7 @@ impl Hub {
             Ask::Release if waited > RELEASE => Err(refused(&CommandError::Expired)),
             Ask::Release => {
                 self.latch = None;
-                for held in self.lines.values_mut() {
+                for held in self.lines.iter_mut().map(|(_, value)| value) {
                     held.release();
                     let by = Arc::clone(name);
                     held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;
@@ -274,7 +275,7 @@ impl Hub {
         (queue, drop): (u32, DropRule),
         rows: bool,
     ) -> Result<u32, Refused> {
-        let mut wanted: BTreeMap<usize, BTreeSet<Signal>> = BTreeMap::new();
+        let mut wanted: Map<usize, BTreeSet<Signal>> = Map::new();
         if signals.is_empty() || signals.len() > MOST_SIGNALS {
             return Err(usage(format!("a subscription has 1 to {MOST_SIGNALS} signals")));
         }
@@ -391,7 +392,12 @@ impl Hub {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
                 let again = time::Instant::now() + AGAIN;
-                for held in self.lines.values_mut().filter(|held| !held.has_answered()) {
+                for held in self
+                    .lines
+                    .iter_mut()
+                    .map(|(_, value)| value)
+                    .filter(|held| !held.has_answered())
+                {
                     held.owe_stop(name, again);
                 }
                 let lines = self.lines.iter();

@@ -160,7 +160,7 @@ impl Hub {
         if let Some(by) = held.owed_stop() {
             self.owed.add(held.places(), &by);
         }
-        self.sessions.values_mut().for_each(|session| session.forget(line));
+        self.sessions.iter_mut().for_each(|(_, session)| session.forget(line));
         let place = held.places();
         self.begin(session, by, id, Some((place.clone(), Does::Closes)), move || {
             let (name, port) = (held.name.clone(), held.port.clone());

@@ -169,7 +169,7 @@ impl Hub {
     }
 
     pub(super) fn doubt(&mut self, line: usize, motor: Option<Motor>) {
-        self.sessions.values_mut().for_each(|session| session.doubt(line, motor));
+        self.sessions.iter_mut().for_each(|(_, session)| session.doubt(line, motor));
     }
 
     /// Whose the motor is after a command.

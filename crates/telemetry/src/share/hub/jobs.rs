@@ -1,7 +1,7 @@
 //! What takes longer than the hub may wait: ports that are listed, scanned, opened and closed, in
 //! threads.
 
-use std::collections::BTreeMap;
+use litemap::LiteMap as Map;
 use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -28,7 +28,7 @@ pub(super) struct JobId(u64);
 #[derive(Default)]
 pub(super) struct Jobs {
     last: u64,
-    under_way: BTreeMap<JobId, Job>,
+    under_way: Map<JobId, Job>,
 }
 
 /// Who asked for a job.
@@ -91,7 +91,8 @@ impl<F: FnMut()> Drop for AtEnd<F> {
 impl Jobs {
     /// Waits for the lines that are being closed, and gives their motors.
     pub(super) fn end(self) -> Vec<(String, Vec<Stopped>)> {
-        let closing = self.under_way.into_values().filter(|job| job.does(Does::Closes));
+        let closing =
+            self.under_way.into_iter().map(|(_, value)| value).filter(|job| job.does(Does::Closes));
         closing
             .filter_map(|job| match job.thread.join() {
                 Ok(End::Closed(Closed { name, stopped, .. })) => Some((name, stopped)),

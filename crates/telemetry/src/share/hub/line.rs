@@ -1,6 +1,7 @@
 //! A line that a share holds, and whose motors are whose.
 
-use std::collections::{BTreeMap, BTreeSet};
+use litemap::LiteMap as Map;
+use std::collections::BTreeSet;
 use std::io;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -31,7 +32,7 @@ use crate::subscription::{Full, Record, Subscription};
 const EVENTS: usize = 10_000;
 
 /// Lines by numbers that are never used again.
-pub(super) type Lines = BTreeMap<usize, Held>;
+pub(super) type Lines = Map<usize, Held>;
 
 /// A line that a share holds.
 pub struct Held {
@@ -49,11 +50,11 @@ pub struct Held {
     events: Subscription,
     pub(super) words: Words,
     /// Who turned a motor last. They may have left; then its stop is not confirmed.
-    pub(super) owners: BTreeMap<Motor, SessionId>,
+    pub(super) owners: Map<Motor, SessionId>,
     /// Programs and the motors that they have moved. Another program may own these by now.
     pub(super) movers: BTreeSet<(Motor, SessionId)>,
     /// Who may change a motor, if one program at a time may.
-    pub(super) leases: BTreeMap<Motor, Lease>,
+    pub(super) leases: Map<Motor, Lease>,
     /// Starts that the engine has not finished, and who sent them.
     pub(super) starting: Vec<(Motor, SessionId)>,
     /// Programs whose commands to a motor nothing has interrupted: no stop, and no motion of another program.
@@ -67,11 +68,11 @@ pub struct Held {
     /// Numbers for which the drive says that it has no such motor.
     pub(super) absent: BTreeSet<Motor>,
     /// How many stops of a motor are under way.
-    pub(super) stops: BTreeMap<Motor, usize>,
+    pub(super) stops: Map<Motor, usize>,
     /// A stop of all motors that is repeated until something on the line answers.
     pub(super) unanswered_stop: Option<UnansweredStop>,
     /// The stops that motors have not confirmed: they are under way, or are repeated.
-    pub(super) owed: BTreeMap<Motor, Owed>,
+    pub(super) owed: Map<Motor, Owed>,
     /// A number that may have no motor, and that a stop is sent to now.
     pub(super) searched: Option<Motor>,
 }
@@ -99,18 +100,18 @@ impl Held {
             tally: acquisition.tally().clone(),
             events,
             words: Words::default(),
-            owners: BTreeMap::new(),
+            owners: Map::new(),
             movers: BTreeSet::new(),
-            leases: BTreeMap::new(),
+            leases: Map::new(),
             starting: Vec::new(),
             sequences: BTreeSet::new(),
             known: BTreeSet::new(),
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
             absent: BTreeSet::new(),
-            stops: BTreeMap::new(),
+            stops: Map::new(),
             unanswered_stop: None,
-            owed: BTreeMap::new(),
+            owed: Map::new(),
             searched: None,
             runner: Runner::start(name, acquisition)?,
         })

@@ -17,7 +17,8 @@ mod session;
 mod stopping;
 mod work;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use litemap::LiteMap as Map;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
@@ -57,7 +58,7 @@ pub struct Hub {
     /// All names that lines have had. No name is used again: programs may still mean the earlier line.
     names: BTreeSet<String>,
     jobs: Jobs,
-    sessions: BTreeMap<SessionId, Session>,
+    sessions: Map<SessionId, Session>,
     last_session: u64,
     latch: Option<Arc<str>>,
     /// How long a motor stays with the program that changed it. `None`: others may change it at any time.
@@ -93,7 +94,7 @@ impl Hub {
             names: lines.iter().map(|held| held.name.clone()).collect(),
             lines: (1..).zip(lines).collect(),
             jobs: Jobs::default(),
-            sessions: BTreeMap::new(),
+            sessions: Map::new(),
             last_session: 0,
             latch: None,
             lease: None,
@@ -142,7 +143,7 @@ impl Hub {
     /// As [`leave`](Self::leave), with the reason that the program gave.
     fn leave_because(&mut self, id: SessionId, why: Option<&str>) {
         let Some(session) = self.sessions.remove(&id) else { return };
-        for held in self.lines.values_mut() {
+        for held in self.lines.iter_mut().map(|(_, value)| value) {
             held.sequences.retain(|(_, program)| *program != id);
             held.movers.retain(|(_, program)| *program != id);
             held.give_leases_back(id);
@@ -232,7 +233,7 @@ impl Hub {
     /// # Errors
     /// An engine has ended.
     pub fn collect(&mut self) -> Result<(), LineEnded> {
-        self.sessions.values_mut().for_each(Session::collect);
+        self.sessions.iter_mut().map(|(_, value)| value).for_each(Session::collect);
         self.repeat_stops();
         self.collect_events()
     }
@@ -303,7 +304,8 @@ impl Hub {
         let Hub { lines, jobs, .. } = self;
         // All lines stop at the same time.
         let ends: Vec<_> = lines
-            .into_values()
+            .into_iter()
+            .map(|(_, value)| value)
             .map(|held| (held.name.clone(), std::thread::spawn(move || held.end())))
             .collect();
         let stopped = ends.into_iter().map(|(name, end)| (name, end.join().unwrap_or_default()));
@@ -314,7 +316,7 @@ impl Hub {
     }
 
     fn publish(&mut self, event: Event) {
-        self.sessions.values_mut().for_each(|session| session.tell(&event));
+        self.sessions.iter_mut().map(|(_, value)| value).for_each(|session| session.tell(&event));
         self.log.push_back(event);
     }
 

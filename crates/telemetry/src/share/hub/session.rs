@@ -1,6 +1,7 @@
 //! A program at a share: what it asked for, and what waits for it.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use litemap::LiteMap as Map;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use motorlink_proto::st::RegisterId;
@@ -36,14 +37,14 @@ pub(super) struct Session {
     missed: u64,
     /// Requests without an answer.
     pub(super) pending: usize,
-    gathering: BTreeMap<Part, Gathering>,
+    gathering: Map<Part, Gathering>,
     last_part: Part,
-    pub(super) feeds: BTreeMap<u32, Feed>,
+    pub(super) feeds: Map<u32, Feed>,
     pub(super) last_feed: u32,
     /// Motors that have answered since their last confirmation, and whether the answers are doubtful.
-    unconfirmed: BTreeMap<(usize, Motor), bool>,
+    unconfirmed: Map<(usize, Motor), bool>,
     /// The registers of the data segments of a line that it configured.
-    pub(super) segments: BTreeMap<(usize, u8), Vec<RegisterId>>,
+    pub(super) segments: Map<(usize, u8), Vec<RegisterId>>,
     last_group: u32,
     /// The feeds whose values are collected next.
     due: VecDeque<u32>,
@@ -71,7 +72,7 @@ struct Gathering {
     missing: usize,
     stopped: Vec<StoppedMotor>,
     /// Motors whose part is missing and that may not exist, and why.
-    unheard: BTreeMap<MotorName, &'static str>,
+    unheard: Map<MotorName, &'static str>,
     /// Lines on which nothing has ever answered.
     unanswered: BTreeSet<String>,
     rates: Option<Vec<SignalRate>>,
@@ -136,7 +137,7 @@ impl Session {
 
     /// A line is gone.
     pub(super) fn forget(&mut self, line: usize) {
-        self.feeds.values_mut().for_each(|feed| feed.forget(line));
+        self.feeds.iter_mut().map(|(_, value)| value).for_each(|feed| feed.forget(line));
         self.unconfirmed.retain(|(of, _), _| *of != line);
         self.segments.retain(|(of, _), _| *of != line);
     }

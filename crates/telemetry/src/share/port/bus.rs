@@ -1,7 +1,7 @@
 //! The bus of RMD motors at a share, as frames.
 
+use litemap::LiteMap as Map;
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
@@ -21,7 +21,7 @@ pub(super) struct ShareBus {
     port: Place,
     connection: Connection,
     /// The last request to each motor.
-    pending: BTreeMap<MotorId, Pending>,
+    pending: Map<MotorId, Pending>,
     /// Motors whose next request is a confirmation.
     confirms: Cell<MotorSet>,
 }
@@ -38,7 +38,7 @@ impl ShareBus {
         Ok(ShareBus {
             port: place.clone(),
             connection: Connection::open(place)?,
-            pending: BTreeMap::new(),
+            pending: Map::new(),
             confirms: Cell::new(MotorSet::EMPTY),
         })
     }

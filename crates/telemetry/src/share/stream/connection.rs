@@ -1,6 +1,7 @@
 //! The connection of a program that follows signals of a line.
 
-use std::collections::{BTreeMap, VecDeque};
+use litemap::LiteMap as Map;
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 
@@ -28,7 +29,7 @@ pub(super) struct Connection {
     socket: UnixStream,
     dialogue: Dialogue,
     /// Requests without an answer, and when they were sent.
-    pending: BTreeMap<u32, (Asked, u64)>,
+    pending: Map<u32, (Asked, u64)>,
     /// When bytes came, or when it was connected.
     heard: u64,
     clock: Option<Clock>,
@@ -39,8 +40,8 @@ pub(super) struct Connection {
     /// When it fell silent, until what waited has come.
     silent: Option<u64>,
     /// Which of the wanted signals each subscription has.
-    subscriptions: BTreeMap<u32, usize>,
-    groups: BTreeMap<u32, Columns>,
+    subscriptions: Map<u32, usize>,
+    groups: Map<u32, Columns>,
     /// Why the share closes it.
     closing: Option<String>,
 }
@@ -66,7 +67,7 @@ struct Columns {
 impl Connection {
     /// Asks for everything at once.
     pub(super) fn begin(socket: UnixStream, followed: &Followed, now: u64) -> Result<Self, String> {
-        let (pending, subscriptions, groups) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let (pending, subscriptions, groups) = (Map::new(), Map::new(), Map::new());
         let dialogue = Dialogue::default();
         let (clock, told, silent, closing) = (None, None, None, None);
         let mut begun = Connection {
