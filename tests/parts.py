@@ -211,8 +211,9 @@ def main():
     tail = f", {skipped} skipped" if skipped else ""
     tail += f", {len(kept)} unchanged" if kept else ""
     print(f"{passed} passed, {failed} failed{tail}")
-    skipped += sum(bool(it["skipped"]) for it in kept.values())
-    sys.exit(bool(failed or not (passed or kept) or idle or given.strict and skipped))
+    skips = [bool(it["skipped"]) for it in kept.values()]
+    skipped += sum(skips)
+    sys.exit(bool(failed or not passed and all(skips) or idle or given.strict and skipped))
 
 
 if __name__ == "__main__":
