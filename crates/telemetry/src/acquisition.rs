@@ -6,13 +6,13 @@ mod rates;
 mod tally;
 mod telling;
 
-use litemap::LiteMap as Map;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Deref, DerefMut};
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
+use litemap::LiteMap as Map;
 use motorlink::{Clock, LinkState};
 use motorlink_proto::time::{Instant, Micros};
 

@@ -1,8 +1,8 @@
 //! From the signals that are wanted to the fewest exchanges.
 
-use litemap::LiteMap as Map;
 use std::collections::{BTreeMap, BTreeSet};
 
+use litemap::LiteMap as Map;
 use motorlink_proto::rmd::{Code, MotorId};
 use motorlink_proto::st::register::Access;
 use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, RegisterId, SEGMENT_REGISTERS};

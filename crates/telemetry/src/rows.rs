@@ -2,10 +2,10 @@
 
 mod motors;
 
-use litemap::LiteMap as Map;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::st::Implausible;
 use motorlink_proto::time::Instant;
 

@@ -1,10 +1,10 @@
 //! What a consumer wants, and the bounded queue from which it takes what came.
 
-use litemap::LiteMap as Map;
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::time::Instant;
 
 use crate::event::Event;

@@ -1,8 +1,8 @@
 //! The polls of the engine: what they are, and what becomes of their replies.
 
-use litemap::LiteMap as Map;
 use std::sync::Arc;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::derivation::Derivation;
@@ -203,10 +203,7 @@ fn pass(
     id: PollId,
     values: &Arc<Values>,
 ) {
-    consumers
-        .iter_mut()
-        .map(|(_, value)| value)
-        .for_each(|consumer| consumer.values(anchor, id, values));
+    consumers.iter_mut().for_each(|(_, consumer)| consumer.values(anchor, id, values));
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.

@@ -1,8 +1,8 @@
 //! Carries out the exchanges of relayed lines, for the owners of their clients.
 
-use litemap::LiteMap as Map;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use litemap::LiteMap as Map;
 use motorlink::rmd::{Asked, Client, Error, MotorId};
 use motorlink::{Clock, st};
 use motorlink_proto::st::Request;

@@ -3,11 +3,11 @@
 //! The other users are threads or tasks of the same program. They can lose the line between two
 //! exchanges of the engine, so the owner passes on what its client counts.
 
-use litemap::LiteMap as Map;
 use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use litemap::LiteMap as Map;
 use motorlink::st::{Counters, Exchanged, Profile, Progress};
 use motorlink::{Clock, LinkState, rmd, st};
 use motorlink_proto::rmd::MotorId;

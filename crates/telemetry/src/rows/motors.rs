@@ -1,7 +1,6 @@
 //! Rows of several motors.
 
 use litemap::LiteMap as Map;
-
 use motorlink_proto::time::Instant;
 
 use super::{Item, Rows};
@@ -35,7 +34,7 @@ impl MotorRows {
         };
         match concerned {
             Some(motor) => self.motors.get_mut(&motor).into_iter().for_each(|it| it.take(record)),
-            None => self.motors.iter_mut().map(|(_, value)| value).for_each(|it| it.take(record)),
+            None => self.motors.iter_mut().for_each(|(_, it)| it.take(record)),
         }
     }
 

@@ -1,7 +1,6 @@
 //! How long exchanges take, and what a line carries.
 
 use litemap::LiteMap as Map;
-
 use motorlink_proto::time::{Instant, Micros};
 
 use super::exchange::{Kind, Outcome, PollId, UnderWay};
@@ -240,7 +239,7 @@ impl Load {
         }
         self.overlap = self.overlap();
         self.commands = self.of_commands as f64 / self.overlap / span.0 as f64;
-        for cost in self.costs.iter_mut().map(|(_, value)| value) {
+        for (_, cost) in self.costs.iter_mut() {
             cost.pace.close_window(now);
         }
         (self.window, self.busy, self.filled, self.of_commands) = (Some(now), 0, 0, 0);

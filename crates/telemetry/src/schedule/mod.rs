@@ -36,7 +36,6 @@ mod stops;
 use std::collections::BTreeMap;
 
 use litemap::LiteMap as Map;
-
 use motorlink_proto::time::{Instant, Micros};
 
 pub use exchange::{CommandId, Displaced, Lane, Outcome, PollId, Verdict};
@@ -444,7 +443,7 @@ impl<C: Clone> Schedule<C> {
     /// The line is open again.
     pub fn reopened(&mut self, now: Instant) {
         self.is_open = true;
-        self.lanes.iter_mut().map(|(_, value)| value).for_each(LaneState::reopened);
+        self.lanes.iter_mut().for_each(|(_, lane)| lane.reopened());
         let anchor = self.anchor.unwrap_or(now);
         for group in &mut self.groups {
             group.due = group.due.max(last_on_grid(anchor, group.rhythm.period, now));

@@ -1,10 +1,10 @@
 //! A program at a share, without blocking.
 
-use litemap::LiteMap as Map;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use litemap::LiteMap as Map;
 use rustix::net::{Shutdown, shutdown};
 use serde::Deserialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

@@ -1,10 +1,10 @@
 //! What programs ask for.
 
-use litemap::LiteMap as Map;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
@@ -181,7 +181,7 @@ impl Hub {
             Ask::Take { motor } => self.take(session, name, &motor),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
-                for held in self.lines.iter_mut().map(|(_, value)| value) {
+                for (_, held) in self.lines.iter_mut() {
                     held.sequences.clear();
                     held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
@@ -191,7 +191,7 @@ impl Hub {
             Ask::Release if waited > RELEASE => Err(refused(&CommandError::Expired)),
             Ask::Release => {
                 self.latch = None;
-                for held in self.lines.iter_mut().map(|(_, value)| value) {
+                for (_, held) in self.lines.iter_mut() {
                     held.release();
                     let by = Arc::clone(name);
                     held.remote().post(move |engine| engine.release(&by)).map_err(ended)?;

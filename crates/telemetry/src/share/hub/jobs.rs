@@ -1,11 +1,11 @@
 //! What takes longer than the hub may wait: ports that are listed, scanned, opened and closed, in
 //! threads.
 
-use litemap::LiteMap as Map;
 use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
+use litemap::LiteMap as Map;
 use motorlink::port::{Carries, Place, PortName};
 use motorlink_link::list;
 

@@ -1,11 +1,11 @@
 //! A line that a share holds, and whose motors are whose.
 
-use litemap::LiteMap as Map;
 use std::collections::BTreeSet;
 use std::io;
 use std::sync::mpsc;
 use std::time::Duration;
 
+use litemap::LiteMap as Map;
 use motorlink::Clock;
 use motorlink::port::{Place, PortName};
 use motorlink_proto::st::RegisterId;

@@ -17,11 +17,12 @@ mod session;
 mod stopping;
 mod work;
 
-use litemap::LiteMap as Map;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
+
+use litemap::LiteMap as Map;
 
 use super::frame::Frame;
 use super::message::{self, Ending, Event, Happening};
@@ -143,7 +144,7 @@ impl Hub {
     /// As [`leave`](Self::leave), with the reason that the program gave.
     fn leave_because(&mut self, id: SessionId, why: Option<&str>) {
         let Some(session) = self.sessions.remove(&id) else { return };
-        for held in self.lines.iter_mut().map(|(_, value)| value) {
+        for (_, held) in self.lines.iter_mut() {
             held.sequences.retain(|(_, program)| *program != id);
             held.movers.retain(|(_, program)| *program != id);
             held.give_leases_back(id);
@@ -233,7 +234,7 @@ impl Hub {
     /// # Errors
     /// An engine has ended.
     pub fn collect(&mut self) -> Result<(), LineEnded> {
-        self.sessions.iter_mut().map(|(_, value)| value).for_each(Session::collect);
+        self.sessions.iter_mut().for_each(|(_, session)| session.collect());
         self.repeat_stops();
         self.collect_events()
     }
@@ -316,7 +317,7 @@ impl Hub {
     }
 
     fn publish(&mut self, event: Event) {
-        self.sessions.iter_mut().map(|(_, value)| value).for_each(|session| session.tell(&event));
+        self.sessions.iter_mut().for_each(|(_, session)| session.tell(&event));
         self.log.push_back(event);
     }
 

@@ -1,9 +1,9 @@
 //! A program at a share: what it asked for, and what waits for it.
 
-use litemap::LiteMap as Map;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::st::RegisterId;
 
 use super::feed::Feed;
@@ -137,7 +137,7 @@ impl Session {
 
     /// A line is gone.
     pub(super) fn forget(&mut self, line: usize) {
-        self.feeds.iter_mut().map(|(_, value)| value).for_each(|feed| feed.forget(line));
+        self.feeds.iter_mut().for_each(|(_, feed)| feed.forget(line));
         self.unconfirmed.retain(|(of, _), _| *of != line);
         self.segments.retain(|(of, _), _| *of != line);
     }

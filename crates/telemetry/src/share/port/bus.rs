@@ -1,10 +1,10 @@
 //! The bus of RMD motors at a share, as frames.
 
-use litemap::LiteMap as Map;
 use std::cell::Cell;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
+use litemap::LiteMap as Map;
 use motorlink::port::{CanLink, Ending, Evented, Holder, Link, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{

@@ -1,10 +1,10 @@
 //! The connection of a program that follows signals of a line.
 
-use litemap::LiteMap as Map;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 
+use litemap::LiteMap as Map;
 use motorlink_proto::st::Profile;
 
 use super::target::{Followed, Item, Wanted};
