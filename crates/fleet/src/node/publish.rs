@@ -150,16 +150,17 @@ impl Common {
         }
     }
 
-    /// Reads something of each motor that a line can have, until one answers. The share remembers those
-    /// that do.
+    /// Reads something of each motor that a line can have. The share remembers those that answer. A line
+    /// that was silent at the first question is searched again: its drives may be switched on in between.
     fn search(self: Arc<Self>, program: &Program, line: &Line) {
         let Some(speaks) = Speaks::of(line) else { return };
         let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
         let (program, name) = (program.clone(), line.line.clone());
         self.state_mut().searching.insert(name.clone());
         tokio::spawn(async move {
-            while self.known_lines().iter().any(|line| line.line == name && line.heard.is_empty()) {
-                for motor in &motors {
+            loop {
+                let Ok(heard) = self.heard(&program, &name).await else { return };
+                for motor in motors.iter().filter(|motor| !heard.contains(&motor.number())) {
                     let ask = Ask::Command {
                         line: name.clone(),
                         motor: motor.number(),
@@ -172,9 +173,20 @@ impl Common {
                     let _ = program.ask(ask).await;
                 }
                 self.state_mut().searching.remove(&name);
-                sleep(SEARCH_AGAIN).await;
+                match self.heard(&program, &name).await {
+                    // The first question is that for motor 1.
+                    Ok(now) if heard.is_empty() && !now.contains(&1) => sleep(SEARCH_AGAIN).await,
+                    _ => return,
+                }
             }
         });
+    }
+
+    /// The motors of a line that have answered.
+    async fn heard(&self, program: &Program, name: &str) -> io::Result<BTreeSet<u8>> {
+        self.learn(program).await?;
+        let of = self.known_lines().into_iter().find(|line| line.line == name);
+        Ok(of.into_iter().flat_map(|line| line.heard).collect())
     }
 
     fn state_mut(&self) -> RwLockWriteGuard<'_, State> {
