@@ -44,6 +44,11 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> TapBytes<B, F> {
     pub fn new(link: B, observer: F) -> Self {
         TapBytes { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
     }
+
+    /// Wraps `link`, which has this clock from now on. Times are those since the clock's 0.
+    pub fn by(clock: Clock, link: B, observer: F) -> Self {
+        TapBytes { time: Stopwatch(clock, Instant(0)), link, observer }
+    }
 }
 
 impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
@@ -51,11 +56,20 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
     pub fn new(link: C, observer: F) -> Self {
         TapCan { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
     }
+
+    /// Wraps `link`, which has this clock from now on. Times are those since the clock's 0.
+    pub fn by(clock: Clock, link: C, observer: F) -> Self {
+        TapCan { time: Stopwatch(clock, Instant(0)), link, observer }
+    }
 }
 
 impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> Link for TapBytes<B, F> {
     fn within(&self) -> Option<&dyn Link> {
         Some(&self.link)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.time.0.clone())
     }
 }
 
@@ -79,6 +93,10 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapB
 impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> Link for TapCan<C, F> {
     fn within(&self) -> Option<&dyn Link> {
         Some(&self.link)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.time.0.clone())
     }
 }
 

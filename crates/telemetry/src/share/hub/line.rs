@@ -85,7 +85,6 @@ impl Held {
     pub fn start(name: &str, opened: Opened) -> io::Result<Self> {
         let Opened { port, speaks, engine: mut acquisition, tap } = opened;
         let clock = acquisition.clock().clone();
-        tap.follow(&clock);
         let events = Subscription::new(EVENTS, Full::DropOldest);
         acquisition.subscribe(events.clone(), Wants::new());
         Ok(Held {

@@ -32,7 +32,6 @@ pub struct Tap(Arc<Shared>);
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// That of the line. Nothing is kept before it is known.
     clock: OnceLock<Clock>,
     memory: Mutex<Memory>,
 }
@@ -40,52 +39,32 @@ struct Shared {
 impl Tap {
     /// Around a serial line.
     pub fn around_line(&self, link: Box<dyn EventBytes>) -> Box<dyn EventBytes> {
-        let mut keeper = Keeper { tap: self.clone(), began: None };
-        let keep = move |way, at, bytes: &[u8]| keeper.keep(way, at, What::Bytes(bytes));
-        Box::new(TapBytes::new(link, keep))
+        let (tap, clock) = (self.clone(), self.clock(link.clock()));
+        let keep = move |way, at, bytes: &[u8]| tap.keep(at, way, What::Bytes(bytes));
+        Box::new(TapBytes::by(clock, link, keep))
     }
 
     /// Around a CAN bus.
     pub fn around_bus(&self, link: Box<dyn EventCan>) -> Box<dyn EventCan> {
-        let mut keeper = Keeper { tap: self.clone(), began: None };
-        let keep = move |way, at, frame: &CanFrame| keeper.keep(way, at, What::Can(*frame));
-        Box::new(TapCan::new(link, keep))
+        let (tap, clock) = (self.clone(), self.clock(link.clock()));
+        let keep = move |way, at, frame: &CanFrame| tap.keep(at, way, What::Can(*frame));
+        Box::new(TapCan::by(clock, link, keep))
     }
 
-    /// Begins to keep, with times of this clock.
-    pub fn follow(&self, clock: &Clock) {
-        self.0.clock.get_or_init(|| clock.clone());
+    /// That of the line, which takes it from the port. A port that is opened again has the same one.
+    fn clock(&self, of_port: Option<Clock>) -> Clock {
+        self.0.clock.get_or_init(|| of_port.unwrap_or_default()).clone()
     }
 
-    fn keep(&self, at: Instant, way: Way, what: What<'_>) {
+    fn keep(&self, at: Duration, way: Way, what: What<'_>) {
         let direction = match way {
             Way::Sent => Direction::Sent,
             Way::Received => Direction::Received,
         };
-        self.memory().keep(at, direction, what);
+        self.memory().keep(Instant(0) + Micros::from(at), direction, what);
     }
 
     fn memory(&self) -> MutexGuard<'_, Memory> {
         self.0.memory.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// What is around an open port.
-struct Keeper {
-    tap: Tap,
-    /// When its stopwatch began, by the clock of the line.
-    began: Option<Instant>,
-}
-
-impl Keeper {
-    /// `at` is the time of the stopwatch: of what is sent, before it is sent.
-    fn keep(&mut self, way: Way, at: Duration, what: What<'_>) {
-        let Some(clock) = self.tap.0.clock.get() else { return };
-        // It is never too early, and the less too late the less time has passed since `at`.
-        let at = Micros::from(at);
-        let began = Instant(clock.now().0.saturating_sub(at.0));
-        let began = self.began.map_or(began, |earlier| earlier.min(began));
-        self.began = Some(began);
-        self.tap.keep(began + at, way, what);
     }
 }

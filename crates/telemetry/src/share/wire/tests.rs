@@ -30,9 +30,7 @@ struct Got {
 
 impl Line {
     fn new(speaks: Speaks) -> Self {
-        let (tap, clock) = (Tap::default(), Clock::virtual_time());
-        tap.follow(&clock);
-        Line { tap, clock, speaks }
+        Line { tap: Tap::default(), clock: Clock::virtual_time(), speaks }
     }
 
     fn st() -> Self {
@@ -44,19 +42,23 @@ impl Line {
         self
     }
 
+    fn now(&self) -> Duration {
+        self.clock.now().since(Instant(0)).into()
+    }
+
     fn sent(&self, bytes: &[u8]) -> &Self {
-        self.tap.keep(self.clock.now(), Way::Sent, What::Bytes(bytes));
+        self.tap.keep(self.now(), Way::Sent, What::Bytes(bytes));
         self
     }
 
     fn came(&self, bytes: &[u8]) -> &Self {
-        self.tap.keep(self.clock.now(), Way::Received, What::Bytes(bytes));
+        self.tap.keep(self.now(), Way::Received, What::Bytes(bytes));
         self
     }
 
     fn can(&self, way: Way, motor: u8, data: [u8; 8]) -> &Self {
         let id = MotorId::new(motor).unwrap().can_id();
-        self.tap.keep(self.clock.now(), way, What::Can(CanFrame::new(id, data)));
+        self.tap.keep(self.now(), way, What::Can(CanFrame::new(id, data)));
         self
     }
 
@@ -198,7 +200,7 @@ fn motors_of_a_bus_answer_on_their_own() {
     line.at(1).can(Way::Received, 2, status);
     line.at(60).can(Way::Sent, 1, read);
     line.at(61).can(Way::Received, 1, status).at(120);
-    line.tap.keep(line.clock.now(), Way::Received, What::Can(CanFrame::new(0x7FF, [0; 8])));
+    line.tap.keep(line.now(), Way::Received, What::Can(CanFrame::new(0x7FF, [0; 8])));
     let got = line.read(ALL);
     let told: Vec<_> = got.frames.iter().map(|it| (it.motor, it.unanswered, it.retry)).collect();
     let expected = [
