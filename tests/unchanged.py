@@ -4,6 +4,7 @@ While all of that is as it was when the part passed, `make test` does not run th
 tests/unchanged.json is the record. `make verify` and FORCE=1 run all parts.
 """
 
+import functools
 import hashlib
 import json
 import platform
@@ -43,10 +44,16 @@ def output(*command):
     return done.stdout
 
 
+#: The same during a whole run: while a file that they come from is not committed, no state is known.
+metadata = functools.cache(
+    lambda: output("cargo", "metadata", "--format-version=1", "--no-deps", "--locked")
+)
+tools = functools.cache(lambda: output("rustc", "--version", "--verbose"))
+
+
 def folders(packages):
     """The folders of packages and of all crates of this repository that they depend on."""
-    metadata = json.loads(output("cargo", "metadata", "--format-version=1", "--no-deps", "--locked"))
-    found = {it["name"]: it for it in metadata["packages"]}
+    found = {it["name"]: it for it in json.loads(metadata())["packages"]}
     wanted, folders = list(found) if packages == ["*"] else list(packages), set()
     while wanted:
         package = found[wanted.pop()]
@@ -65,12 +72,11 @@ def state(part):
         if output("git", "status", "--porcelain", "--untracked-files=all", "--", *paths):
             return None
         files = output("git", "ls-files", "--stage", "--", *paths)
-        tools = output("rustc", "--version", "--verbose")
         # A release of Debian has one version of each other tool.
         system = Path("/etc/debian_version").read_text()
+        parts = files, tools(), system, platform.python_version()
     except (OSError, subprocess.CalledProcessError):
         return None
-    parts = files, tools, system, platform.python_version()
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
