@@ -101,9 +101,6 @@ impl Kind {
         let tap = keeps.then(Tap::default);
         let line = (self.line)(tap.as_ref()).expect("memory can be opened");
         let mut engine = Acquisition::new(line);
-        if let Some(tap) = &tap {
-            tap.follow(engine.clock());
-        }
         let (by, request) = ("bench".into(), (self.request)());
         Kernel::new(name, move || {
             engine.command(&by, request.clone(), TIME_TO_LIVE).expect("nothing else waits");
