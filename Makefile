@@ -207,7 +207,7 @@ bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in 
 bench-python:
 	rm -f $(BENCH_VENV)/motorlink
 	{ test -x $(BENCH_VENV)/bin/python || $(PYTHON) -m venv $(BENCH_VENV); } && \
-		$(BENCH_VENV)/bin/python -m pip install --quiet . pyserial==3.5 && touch $(BENCH_VENV)/motorlink || \
+		$(BENCH_VENV)/bin/python -m pip install --quiet --config-settings 'build-args=--profile=dist' . pyserial==3.5 && touch $(BENCH_VENV)/motorlink || \
 		echo "PYTHON IS NOT MEASURED: the package cannot be installed into $(BENCH_VENV)" >&2
 
 # Installs the other simulators for comparison. If this fails, the benchmark continues without them.

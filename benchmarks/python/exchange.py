@@ -86,8 +86,9 @@ class PlainPython:
         return rest[:-1]
 
 
+# recovery="none": the responder answers one request only, not the questions on a line that was just opened.
 def blocking(path):
-    motor = motorlink.st.open(path).motor(1)
+    motor = motorlink.st.open(path, recovery="none").motor(1)
 
     def run(exchanges):
         for _ in range(exchanges):
@@ -136,7 +137,7 @@ def awaited(*paths):
     loop = asyncio.new_event_loop()
 
     async def opened():
-        return [(await motorlink.aio.st.open(path)).motor(1) for path in paths]
+        return [(await motorlink.aio.st.open(path, recovery="none")).motor(1) for path in paths]
 
     motors = loop.run_until_complete(opened())
 
