@@ -109,9 +109,7 @@ class Runner:
                 if self.stopped:
                     return
                 self.over.append(run)
-                if run.passed:
-                    self.unchanged.passed(run.part, run.skipped)
-                else:
+                if not run.passed:
                     print(f"\n---- {run.log}\n{run.output}\n----", flush=True)
                 print(run, flush=True)
 
@@ -122,7 +120,17 @@ class Runner:
         others = len(self.over)
         self.waiting.extend((run.part, f"{run.label}-again", True) for run in failed)
         self.work()
+        # The second run has a part of the tests only.
+        for run, again in zip(failed, self.over[others:]):
+            again.skipped = list(dict.fromkeys(run.skipped + again.skipped))
         return [run.part for run in self.over[others:] if run.passed]
+
+    def record(self, flaky):
+        """Records the parts that came to their end; those that failed once did not pass."""
+        for part in dict.fromkeys(run.part for run in self.over):
+            runs = [run for run in self.over if run.part == part]
+            skipped = list(dict.fromkeys(line for run in runs for line in run.skipped))
+            self.unchanged.ran(part, part not in flaky and all(run.passed for run in runs), skipped)
 
     def stop(self):
         with self.lock:
@@ -170,6 +178,8 @@ def main():
     kept = {}
     if not given.force and given.runs == 1:
         kept = {part: entry for part in parts if (entry := unchanged.entry(part))}
+        if given.strict:
+            kept = {part: entry for part, entry in kept.items() if not entry["skipped"]}
         parts = [part for part in parts if part not in kept]
     for part, entry in kept.items():
         print(f"{part:18} unchanged since {entry['revision']}", flush=True)
@@ -189,6 +199,7 @@ def main():
         for worker in workers:
             worker.join()
         flaky = runner.again(given.again.split())
+        runner.record(flaky)
     finally:
         runner.stop()
         if hogs:

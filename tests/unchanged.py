@@ -1,42 +1,51 @@
 """Parts of `make test` that cost much, and what they read.
 
 While all of that is as it was when the part passed, `make test` does not run the part again.
-tests/unchanged.json is the record. `make verify` and FORCE=1 run all parts.
+tests/unchanged.json is the record. `make verify` and FORCE=1 run all parts. Security updates change
+tools without a trace here; so the public CI runs all parts each night.
 """
 
 import functools
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RECORD = REPOSITORY / "tests/unchanged.json"
-#: What every part reads.
+#: What every part reads: files in the root but pages, all features and versions of packages.
 COMMON = [
-    ".cargo", "Cargo.lock", "Cargo.toml", "Makefile", "rust-toolchain.toml", "rustfmt.toml",
+    ":(glob)*", ":(exclude,glob)*.md", "*Cargo.toml", "*Cargo.lock", ".cargo", "*.gitattributes",
     "tests/install", "tests/parts.py", "tests/unchanged.py",
 ]
+#: What crates/ffi/packaging installs.
+INSTALLED = ["docs/C.md", "docs/SIZES.md", "docs/SPEC-NOTES.md"]
 #: The packages that a part compiles, with all crates of this repository that they depend on; other paths.
 PARTS = {
     "cost": (["motorlink-kernels"], []),
-    "deny": ([], ["*Cargo.toml", "*Cargo.lock", "deny.toml", "tests/deny"]),
+    "deny": ([], ["tests/deny"]),
     "determinism": (["motorlink-sim"], []),
     "firmware-test": (
         ["motorlink-cli", "motorlink-embedded", "motorlink-ffi"],
-        ["firmware", "tests/firmware", "tests/e2e", "scenarios"],
+        ["firmware", "tests/*.py", "tests/firmware", "tests/e2e", "scenarios", *INSTALLED],
     ),
     "miri": (["motorlink-ffi", "motorlink-proto"], ["vectors"]),
     "probe": (
         ["motorlink-embedded", "motorlink-ffi", "motorlink-proto", "motorlink-sim"],
-        ["docs/SIZES.md", "firmware", "probe"],
+        ["firmware", "probe", *INSTALLED],
     ),
-    "rustdoc": (["*"], ["README.md"]),
+    "rustdoc": (["*"], []),
     "test-socketcan": (["motorlink-cli"], ["tests/socketcan"]),
 }
 #: What may be skipped in a run that is recorded: the list of vulnerabilities is not there everywhere.
 MAY_SKIP = "SKIPPED: advisories"
+#: Variables that change what is built or tested, but for those that say where things are or what is printed.
+OF_BUILDS = ("CARGO", "RUST", "MIRI", "VALGRIND", "PROPTEST", "GLIBC")
+HARMLESS = ("CARGO_HOME", "CARGO_TARGET_DIR", "CARGO_TERM", "RUSTUP_HOME", "RUST_BACKTRACE", "RUST_LOG")
+#: Variables of make that choose parts.
+OF_CHOICE = ("PARTS=", "FORCE=", "STRICT=")
 
 
 def output(*command):
@@ -44,16 +53,37 @@ def output(*command):
     return done.stdout
 
 
-#: The same during a whole run: while a file that they come from is not committed, no state is known.
-metadata = functools.cache(
-    lambda: output("cargo", "metadata", "--format-version=1", "--no-deps", "--locked")
-)
-tools = functools.cache(lambda: output("rustc", "--version", "--verbose"))
+def settings():
+    """What was set in the environment, for make, and for cargo outside of this folder."""
+    set_here = [f"{name}={value}" for name, value in os.environ.items() if name.startswith(OF_BUILDS)]
+    given = os.environ.get("MAKEFLAGS", "").partition("-- ")[2].split()
+    homes = [Path(os.environ.get("CARGO_HOME", Path.home() / ".cargo"))]
+    homes += [folder / ".cargo" for folder in REPOSITORY.parents]
+    files = [home / name for home in homes for name in ("config", "config.toml")]
+    return sorted(
+        [it for it in set_here if not it.startswith(HARMLESS)]
+        + [it for it in given if not it.startswith(OF_CHOICE)]
+        + [file.read_text() for file in files if file.exists()]
+    )
+
+
+# The same during a whole run: while a file that they come from is not committed, no state is known.
+@functools.cache
+def crates():
+    found = json.loads(output("cargo", "metadata", "--format-version=1", "--no-deps", "--locked"))
+    return {it["name"]: it for it in found["packages"]}
+
+
+@functools.cache
+def tools():
+    # A release of Debian has about one version of each other tool.
+    system = Path("/etc/debian_version").read_text()
+    return [output("rustc", "--version", "--verbose"), system, platform.python_version()]
 
 
 def folders(packages):
     """The folders of packages and of all crates of this repository that they depend on."""
-    found = {it["name"]: it for it in json.loads(metadata())["packages"]}
+    found = crates()
     wanted, folders = list(found) if packages == ["*"] else list(packages), set()
     while wanted:
         package = found[wanted.pop()]
@@ -68,23 +98,27 @@ def state(part):
     """What a part reads, as one number, and the tools. None: it is not known, or not committed."""
     packages, paths = PARTS[part]
     try:
-        paths = sorted({*COMMON, *paths, *(folders(packages) if packages else ())})
+        paths = [*COMMON, *paths, *sorted(folders(packages) if packages else ())]
         if output("git", "status", "--porcelain", "--untracked-files=all", "--", *paths):
             return None
         files = output("git", "ls-files", "--stage", "--", *paths)
-        # A release of Debian has one version of each other tool.
-        system = Path("/etc/debian_version").read_text()
-        parts = files, tools(), system, platform.python_version()
+        parts = files, *tools(), *settings()
     except (OSError, subprocess.CalledProcessError):
         return None
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest() if files else None
 
 
 class Unchanged:
     """The record, and what parts read now."""
 
     def __init__(self, parts):
-        self.record = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+        try:
+            self.record = dict(json.loads(RECORD.read_text()))
+        except FileNotFoundError:
+            self.record = {}
+        except ValueError as error:
+            print(f"{RECORD} cannot be read, so all parts run: {error}")
+            self.record = {}
         self.states = {part: state(part) for part in parts if part in PARTS}
 
     def entry(self, part):
@@ -92,12 +126,18 @@ class Unchanged:
         entry, now = self.record.get(part), self.states.get(part)
         return entry if entry and now and entry["state"] == now else None
 
-    def passed(self, part, skipped):
-        """Records that a part passed. What it reads may have changed meanwhile."""
+    def ran(self, part, passed, skipped):
+        """Records whether a part passed. What it reads may have changed meanwhile."""
         now = self.states.get(part)
-        may = all(line.startswith(MAY_SKIP) for line in skipped)
-        if now is None or self.entry(part) or not may or now != state(part):
+        if now is None or now != state(part):
             return
-        revision = output("git", "rev-parse", "--short=8", "HEAD").strip()
-        self.record[part] = {"revision": revision, "state": now, "skipped": skipped}
-        RECORD.write_text(json.dumps(self.record, indent=1, sort_keys=True) + "\n")
+        was = self.record.pop(part, None)
+        if passed and all(line.startswith(MAY_SKIP) for line in skipped):
+            revision = output("git", "rev-parse", "--short=8", "HEAD").strip()
+            entry = {"revision": revision, "state": now, "skipped": skipped}
+            # The revision stays the first one.
+            is_same = was and {**was, "revision": revision} == entry
+            self.record[part] = was if is_same else entry
+        whole = RECORD.with_suffix(".new")
+        whole.write_text(json.dumps(self.record, indent=1, sort_keys=True) + "\n")
+        whole.replace(RECORD)

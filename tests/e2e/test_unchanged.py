@@ -17,11 +17,13 @@ import unchanged  # noqa: E402
 def repository(tmp_path, monkeypatch):
     """A repository with one part, which reads the folder `read`."""
     monkeypatch.setattr(unchanged, "REPOSITORY", tmp_path)
-    monkeypatch.setattr(unchanged, "RECORD", tmp_path / "record.json")
+    monkeypatch.setattr(unchanged, "RECORD", tmp_path / "docs/record.json")
     monkeypatch.setattr(unchanged, "PARTS", {"part": ([], ["read"])})
-    (tmp_path / "read").mkdir()
+    monkeypatch.delenv("MAKEFLAGS", raising=False)
+    for folder in ("read", "docs"):
+        (tmp_path / folder).mkdir()
     git(tmp_path, "init", "--quiet")
-    write(tmp_path, "read/file", "other", "Makefile")
+    write(tmp_path, "read/file", "docs/other", "Makefile")
     return tmp_path
 
 
@@ -43,7 +45,7 @@ def entry():
 
 
 def passes(*skipped):
-    unchanged.Unchanged(["part"]).passed("part", list(skipped))
+    unchanged.Unchanged(["part"]).ran("part", True, list(skipped))
 
 
 def test_a_part_runs_again_when_something_that_it_reads_has_changed(repository):
@@ -51,11 +53,11 @@ def test_a_part_runs_again_when_something_that_it_reads_has_changed(repository):
     passes()
     revision = subprocess.check_output(["git", "rev-parse", "HEAD"], cwd=repository, text=True)
     assert revision.startswith(entry()["revision"])
-    write(repository, "other")
+    write(repository, "docs/other")
     # The record keeps the revision at which the part passed.
     passes()
     assert revision.startswith(entry()["revision"])
-    for path in ("read/file", "read/new", "Makefile"):
+    for path in ("read/file", "read/new", "Makefile", "clippy.toml"):
         write(repository, path)
         assert entry() is None, path
         passes()
@@ -71,12 +73,40 @@ def test_runs_that_skip_or_that_were_overtaken_are_not_recorded(repository, monk
     assert entry() is None
     run = unchanged.Unchanged(["part"])
     write(repository, "read/file")
-    run.passed("part", [])
+    run.ran("part", True, [])
     assert entry() is None
     passes("SKIPPED: advisories: no network")
     assert entry()["skipped"] == ["SKIPPED: advisories: no network"]
+    passes()
+    assert entry()["skipped"] == []
+    unchanged.tools.cache_clear()
     monkeypatch.setattr(unchanged, "output", lambda *_: "another compiler")
     assert entry() is None
+
+
+def test_a_run_that_fails_takes_the_entry_away(repository):
+    passes()
+    unchanged.Unchanged(["part"]).ran("part", False, [])
+    assert entry() is None
+
+
+@pytest.mark.parametrize("name, value", [("RUSTFLAGS", "-O"), ("MAKEFLAGS", "w -- CARGO=false PARTS=part")])
+def test_other_settings_are_another_state(repository, monkeypatch, name, value):
+    passes()
+    monkeypatch.setenv("MAKEFLAGS", "w -- PARTS=part STRICT=1")
+    assert entry()
+    monkeypatch.setenv(name, value)
+    assert entry() is None
+
+
+def test_a_record_that_was_cut_is_no_record(repository, capsys):
+    passes()
+    text = unchanged.RECORD.read_text()
+    unchanged.RECORD.write_text(text[:20])
+    assert entry() is None
+    assert "all parts run" in capsys.readouterr().out
+    passes()
+    assert unchanged.RECORD.read_text() == text
 
 
 def test_parts_exist_and_read_something():

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::num::NonZeroU32;
 
 use motorlink_kernels::compiler;
 use motorlink_kernels::kernel::Counter;
@@ -54,12 +55,16 @@ impl Table {
 
     fn parse(text: &str) -> Result<Self> {
         let (compiler, rows) = text.split_once('\n').ok_or("the table is empty")?;
-        let row = |line: &str| {
-            let (count, name) = line.trim_start().split_once(' ').ok_or("a row has no name")?;
-            Ok((name.to_owned(), count.parse()?))
-        };
-        let rows = rows.lines().map(row).collect::<Result<_>>()?;
-        Ok(Table { compiler: compiler.to_owned(), rows })
+        let mut table = Table { compiler: compiler.trim_end().to_owned(), rows: Vec::new() };
+        for line in rows.lines() {
+            let (count, name) = line.trim().split_once(' ').ok_or("a row has no name")?;
+            let count: NonZeroU32 = count.parse().map_err(|error| format!("{line}: {error}"))?;
+            if table.rows.iter().any(|(known, _)| known == name) {
+                return Err(format!("{name}: two rows").into());
+            }
+            table.rows.push((name.to_owned(), count.get().into()));
+        }
+        Ok(table)
     }
 
     /// A line for each kernel, and whether the table is kept.
@@ -110,6 +115,10 @@ mod tests {
     fn a_table_is_read_as_it_was_written() {
         let written = table(&[("exchange with memory", 964.0), ("RMD", 12_350.0)]);
         assert_eq!(Table::parse(&written.text()).unwrap(), written);
+        assert_eq!(Table::parse(&written.text().replace('\n', "\r\n")).unwrap(), written);
+        for rows in ["1 a\n2 a", "NaN a", "inf a", "-5 a", "0 a", "5"] {
+            assert!(Table::parse(&format!("rustc 1\n{rows}\n")).is_err(), "{rows}");
+        }
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub fn kernels() -> [Kernel; 2] {
     let (mut master, mut slave) = (master(), slave(MotorNumber::FIRST));
     let mut memory = Memory { registers: [1_500; 256] };
     let with_memory = Kernel::new("exchange with memory", move || {
-        black_box(exchange(Instant(0), &mut master, &mut slave, &mut memory));
+        black_box(exchange(Instant(0), &mut master, &mut slave, &mut memory).expect("a value"));
     });
 
     let mut simulated = StDrive::demo(Instant(0));
@@ -30,7 +30,7 @@ pub fn kernels() -> [Kernel; 2] {
     let with_simulation = Kernel::new("exchange with simulation", move || {
         now += PERIOD;
         simulated.advance_to(now);
-        black_box(exchange(now, &mut master, &mut slave, &mut simulated));
+        black_box(exchange(now, &mut master, &mut slave, &mut simulated).expect("a value"));
     });
     [with_memory, with_simulation]
 }

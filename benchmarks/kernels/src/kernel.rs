@@ -91,12 +91,17 @@ impl Counter {
         let once = Self::spawn(kernel, COUNTED)?;
         let twice = Self::spawn(kernel, 2 * COUNTED)?;
         let (once, twice) = (collected(once)?, collected(twice)?);
-        Ok((twice as f64 - once as f64) / f64::from(COUNTED))
+        let count = (twice as f64 - once as f64) / f64::from(COUNTED);
+        if count >= 1.0 {
+            Ok(count)
+        } else {
+            Err(format!("{kernel}: callgrind counts nothing").into())
+        }
     }
 
     fn spawn(kernel: &str, count: u32) -> Result<Child> {
         let child = Command::new("valgrind")
-            .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+            .args(["--command-line-only=yes", "--tool=callgrind", "--callgrind-out-file=/dev/null"])
             .arg(current_exe()?)
             .args(["kernel", kernel, &count.to_string()])
             .stdin(Stdio::null())
@@ -110,7 +115,8 @@ impl Counter {
 fn collected(run: Child) -> Result<u64> {
     let output = run.wait_with_output()?;
     let log = String::from_utf8_lossy(&output.stderr);
-    total(&log).ok_or_else(|| format!("callgrind gave no count:\n{log}").into())
+    let count = total(&log).filter(|_| output.status.success());
+    count.ok_or_else(|| format!("callgrind gave no count:\n{log}").into())
 }
 
 /// The count in callgrind's last output: `==PID== Collected : 126651`.

@@ -6,7 +6,7 @@ use motorlink::relay::RelayError;
 use motorlink::st::{ErrorCode, Failure, Profile, Unverifiable};
 use motorlink::{rmd, st};
 
-use crate::help::left_out;
+use crate::help::WHOLE_PROGRAM;
 
 /// After any error about a register's name.
 pub const LIST_REGISTERS: &str = "`motorlink st registers` lists them";
@@ -77,13 +77,13 @@ pub fn port_kind(error: &PortError) -> Option<String> {
 }
 
 /// A name that is not the name of a port.
-pub fn port_name(error: &NameError) -> Option<&'static str> {
+pub fn port_name(error: &NameError) -> Option<String> {
     match error {
-        NameError::UnknownForm { name, .. } if is_of_node(name) && left_out("node").is_some() => {
-            left_out("node")
+        NameError::UnknownForm { name, .. } if is_of_node(name) && !cfg!(feature = "fleet") => {
+            Some(format!("this program was built without ports of nodes: {WHOLE_PROGRAM}"))
         }
         NameError::UnknownForm { .. } | NameError::Windows { .. } => {
-            Some("`motorlink ports` lists what is connected")
+            Some("`motorlink ports` lists what is connected".to_owned())
         }
         _ => None,
     }

@@ -464,7 +464,7 @@ usage!(FaultError, st::ValueError);
 
 impl From<NameError> for Failure {
     fn from(error: NameError) -> Self {
-        Problem::of(Kind::Usage, &error, advice::port_name(&error)).into()
+        Problem::of(Kind::Usage, &error, advice::port_name(&error).as_deref()).into()
     }
 }
 

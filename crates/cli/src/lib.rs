@@ -62,6 +62,7 @@ mod watch;
 
 use std::ffi::OsString;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use motorlink_link::is_printable;
 
@@ -238,10 +239,14 @@ fn command() -> clap::Command {
 }
 
 fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
-    let mut command = command();
+    let mut command = help::with_left_out(command());
     let matches = command
         .try_get_matches_from_mut(&words)
         .map_err(|error| help::with_tip(help::without_motion(error), &command, &words))?;
+    if let Some(name) = help::left_out(&matches) {
+        let text = format!("this program was built without `{name}`: {}", help::WHOLE_PROGRAM);
+        return Err(command.error(ErrorKind::InvalidSubcommand, text));
+    }
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 

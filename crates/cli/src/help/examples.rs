@@ -73,6 +73,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("monitor", "monitor"),
     ("monitor", "monitor -p ./st0 -p slcan:./can0"),
     ("monitor", "monitor --share unix:./share"),
+    #[cfg(feature = "fleet")]
     ("monitor", "monitor --fleet"),
     ("ports", "ports"),
     ("ports", "ports --json"),

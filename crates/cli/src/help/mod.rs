@@ -12,7 +12,7 @@ use motorlink::port::{Carries, schemes};
 
 pub use fish::positionals as fish_positionals;
 pub use manual::write_manual;
-pub use parts::left_out;
+pub use parts::{WHOLE_PROGRAM, left_out, with_left_out};
 pub use suggestions::without_motion;
 pub use tips::with_tip;
 

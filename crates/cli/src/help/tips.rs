@@ -9,7 +9,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, Error};
 use motorlink::port::PortName;
 
-use super::parts::left_out;
+use super::parts::WHOLE_PROGRAM;
 
 /// Options of other programs for the rate of a port.
 const RATES: [&str; 5] = ["--baud", "--baudrate", "--baud-rate", "--bitrate", "-b"];
@@ -40,10 +40,6 @@ fn tip(error: &Error, root: &Command, words: &[&str]) -> Option<String> {
             let parent = Place::before(word, root, words);
             let is_suggested = error.get(ContextKind::SuggestedSubcommand).is_some();
             parent.of_value(word).or_else(|| parent.of_command(word, root, is_suggested))
-        }
-        // Without the subcommand its name is a configuration.
-        ErrorKind::ArgumentConflict => {
-            words.strip_prefix(&["sim"]).and_then(|rest| left_out(rest.first()?)).map(str::to_owned)
         }
         ErrorKind::UnknownArgument => {
             let word = text(ContextKind::InvalidArg)?;
@@ -109,7 +105,6 @@ impl<'a> Place<'a> {
                 .is_some()
         };
         match self.path[..] {
-            [] if left_out(word).is_some() => left_out(word).map(str::to_owned),
             [] if is_of("st") || is_of("rmd") => Some(
                 "write the protocol first: `motorlink st --help` lists the commands of ST drives, \
                  `motorlink rmd --help` those of RMD motors"
@@ -136,6 +131,11 @@ impl<'a> Place<'a> {
             return Some(format!("the rate is a part of the port: -p '{port}'"));
         }
         match self.path[..] {
+            ["monitor"]
+                if !cfg!(feature = "fleet") && ["--fleet", "--node", "--via"].contains(&name) =>
+            {
+                Some(format!("this program was built without fleets: {WHOLE_PROGRAM}"))
+            }
             ["guard", ..] if name == "--profile" => Some(
                 "a guard needs no profile: it stops the motors of drives of both profiles"
                     .to_owned(),

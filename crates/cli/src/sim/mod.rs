@@ -22,7 +22,6 @@ use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
 use crate::failure::Failure;
-use crate::help::left_out;
 use crate::hint;
 use crate::interrupt::{self, interrupted};
 use crate::output;
@@ -106,16 +105,15 @@ pub fn run(args: Args) -> Result<(), Failure> {
 fn wrong_config(path: &Path, error: ConfigError) -> Failure {
     let play = format!("`motorlink sim run {}` plays a scenario", path.display());
     let is_scenario = Scenario::read(path).is_ok();
-    let advice = match (&error, left_out(&path.to_string_lossy())) {
-        (ConfigError::Unreadable { .. }, Some(advice)) => advice.to_owned(),
-        (ConfigError::Unreadable { .. }, _) if is_subcommand(path) => {
+    let advice = match &error {
+        ConfigError::Unreadable { .. } if is_subcommand(path) => {
             let command = path.display();
             format!("write the command before its options: `motorlink sim {command} ..`")
         }
-        (ConfigError::Unreadable { .. }, _) if path.extension().is_none() => {
+        ConfigError::Unreadable { .. } if path.extension().is_none() => {
             "`motorlink sim --help` lists the commands".to_owned()
         }
-        (ConfigError::Unreadable { .. }, _) => {
+        ConfigError::Unreadable { .. } => {
             format!("`sim` takes a file that describes drives; {play}")
         }
         _ if is_scenario => format!("the file is a scenario; {play}"),
