@@ -26,7 +26,8 @@ QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promi
 # AGAIN=1: the tests of pytest and Playwright that failed in the last run, or all if that did not come so far.
 FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
-WORKERS ?= 4
+WORKERS ?= 8
+export RUST_TEST_THREADS ?= 16
 PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
@@ -90,7 +91,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
 unit: ## 10 min: tests in Rust
-	RUST_TEST_THREADS=$(WORKERS) $(CARGO) test --workspace --all-features --locked $(T)
+	$(CARGO) test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
