@@ -85,7 +85,7 @@ class Shell:
 
     def __init__(self, folder, **variables):
         # Simulated motors answer late on a loaded machine.
-        own = {"MOTORLINK_RMD_TIMEOUT": "200ms"}
+        own = {"MOTORLINK_RMD_TIMEOUT": "1s"}
         # Shells that run at the same time have networks of their own.
         own["MOTORLINK_NETWORK"] = f"tcp/127.0.0.1:{free_port()}"
         self.folder, self.variables = folder, {**own, **variables}

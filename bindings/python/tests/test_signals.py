@@ -58,7 +58,7 @@ def port(served: Served, kind: str) -> str:
 
 
 BLOCKING = """
-    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2])
+    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2], timeout=2.0)
     start(bus)
     ready()
     time.sleep(600)
@@ -99,7 +99,7 @@ def test_a_signal_stops_the_motors_and_ends_the_program(
 # As if the signal came just before the wait: the handler of Python's C code has run, and nothing ends
 # the wait.
 JUST_BEFORE_A_WAIT = """
-    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2])
+    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2], timeout=2.0)
     start(bus)
     ready()
     def signal_this_thread():
