@@ -26,7 +26,7 @@ QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promi
 # AGAIN=1: the tests of pytest and Playwright that failed in the last run, or all if that did not come so far.
 FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
-WORKERS ?= 8
+WORKERS ?= 4
 export RUST_TEST_THREADS ?= 16
 PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
