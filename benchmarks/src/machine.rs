@@ -8,7 +8,7 @@ use motorlink_kernels::compiler;
 /// The command and the machine, as in the head of docs/BENCHMARKS.md.
 pub fn lines() -> [(&'static str, String); 4] {
     let options: Vec<String> = args().skip(1).collect();
-    let command = format!("cargo run --profile dist -p motorlink-bench -- {}", options.join(" "));
+    let command = format!("motorlink-bench {}", options.join(" "));
     [
         ("command", command),
         ("processor", processor()),
