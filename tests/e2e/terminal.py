@@ -56,8 +56,9 @@ class Terminal:
             except OSError:
                 return
             with self._lock:
-                self.raw += said
+                # In this order: who waits for the last bytes reads the screen next.
                 self._stream.feed(said)
+                self.raw += said
 
     def _set_size(self, columns, lines):
         fcntl.ioctl(self.ours, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
