@@ -129,16 +129,14 @@ def second(command, text):
 
 def make(tree, mutant):
     """Changes the file."""
+    path = tree.path / mutant["file"]
     if "diff" in mutant:
-        path = tree.path / mutant["file"]
-        done = subprocess.run(["patch", "--quiet", str(path)], input=mutant["diff"], text=True)
-        done.check_returncode()
-    else:
-        path = tree.path / mutant["file"]
-        text = path.read_text()
-        if text.count(mutant["find"]) != 1:
-            raise SystemExit(f"tests/mutants/by_hand.toml: {mutant['name']}: `find` must stand once in {mutant['file']}")
-        path.write_text(text.replace(mutant["find"], mutant["replace"]))
+        subprocess.run(["patch", "--quiet", str(path)], input=mutant["diff"], text=True, check=True)
+        return
+    text = path.read_text()
+    if text.count(mutant["find"]) != 1:
+        raise SystemExit(f"{mutant['name']}: {mutant['file']} does not have the text of `find` exactly once")
+    path.write_text(text.replace(mutant["find"], mutant["replace"]))
 
 
 def noticed(tree, mutant, above, before):
