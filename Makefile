@@ -28,7 +28,7 @@ FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
 WORKERS ?= 4
 export RUST_TEST_THREADS ?= 16
-PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
+PYTEST_FLAGS = -q -rfEs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # For all that the tests build, clippy is the compiler: so it needs no build of its own. It tells warnings again
@@ -53,7 +53,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
+.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel mutants fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
 .PHONY: ros2 fleet-scale fleet-faults install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -69,16 +69,17 @@ monitor: toolchain web ## simulated drives in a browser
 
 test: toolchain $(if $(SUDO),packages) ## 30 min: parts unit .. deny but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py $(if $(FORCE),--force) $(if $(STRICT),--strict,--again "$(TIMED)") $(PARTS)
+	@$(PYTHON) tests/parts.py $(if $(FORCE),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
 
 verify: FORCE = 1
-verify: test ## 30 min: all parts, also unchanged ones
+verify: ONCE = 1
+verify: test ## 30 min: all parts, also unchanged ones, without a second chance
 
 # Zenoh takes minutes to build.
 WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python \
 	--no-default-features --features motorlink-monitor/typescript \
 	--features motorlink-cli/conformance,motorlink-cli/monitor,motorlink-cli/record,motorlink-cli/watch
-check: toolchain ## 1 min: format, clippy and the quick tests, while you work; not the network of nodes
+check: toolchain ## 3 min: format, clippy and the quick tests, while you work; not the network of nodes
 	$(CARGO) fmt --all --check
 	$(call LINT,$(WITHOUT_NETWORK))
 	$(CARGO) test $(WITHOUT_NETWORK) --locked --quiet --lib --bins --tests -- $(QUICK)
@@ -90,17 +91,17 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## 10 min: tests in Rust
+unit: ## 5 min: tests in Rust
 	$(CARGO) test --workspace --all-features --locked $(T)
 
-python: $(PYTHON_VENV)/ready ## 4 min: the Python package: its build, types, examples, tests
+python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 11 min: the program against independent clients
+e2e: $(VENV)/ready ## 12 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -123,23 +124,23 @@ browser: web ## 6 min: the monitor in Debian's Chromium, on simulated drives
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## 4 min: proto and the C face without undefined behaviour
+miri: ## 3 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
-firmware-test: $(VENV)/ready ## 8 min: boards in QEMU against the conformance kit and hosts
+firmware-test: $(VENV)/ready ## 7 min: boards in QEMU against the conformance kit and hosts
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
-lint: ## 3 min: format, clippy: no warning
+lint: ## 6 min: format, clippy: no warning; compiles all tests
 	$(CARGO) fmt --all --check
 	cd fuzz/fuzzers && $(CARGO) fmt --check
 	$(call LINT,--workspace --all-features)
 	$(CARGO) clippy -p motorlink-cli --no-default-features --locked -- -D warnings
 
-rustdoc: ## 1 min: rustdoc: no warning
+rustdoc: ## 2 min: rustdoc: no warning
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(WITHOUT_NETWORK) --no-deps --locked
 
 pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
@@ -147,7 +148,7 @@ pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
 	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 # Whether the header is up to date is tested in unit.
-ffi-test: ## 2 min: the C face: sanitizers, valgrind, C against the program
+ffi-test: ## 1 min: the C face: sanitizers, valgrind, C against the program
 	$(PROGRAM)
 	CARGO="$(CARGO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
 
@@ -184,10 +185,17 @@ cost: ## 1 min: instructions of exchanges and simulated drives; UPDATE=1 writes 
 	-@tests/install cost
 	$(CARGO) run --profile dist --locked -p motorlink-kernels $(if $(UPDATE),-- --update)
 
-deny: ## 4 min: licences, known holes
+deny: ## 3 min: licences, known holes
 	CARGO="$(CARGO)" tests/deny
 
 # ---- Campaigns and figures ----
+
+# A whole run takes hours. It goes on where it was ended. AGAIN=1: also those that have a result.
+SEED ?= 1
+COUNT ?= 120
+mutants: $(VENV)/ready $(PYTHON_VENV)/ready ## which single faults in the code no test notices: SEED=1 COUNT=120
+	command -v cargo-mutants >/dev/null || $(CARGO) install --locked cargo-mutants
+	$(PYTHON) tests/mutants/run.py --seed $(SEED) --count $(COUNT) $(if $(AGAIN),--again)
 
 fuzz: nightly ## every fuzz target for SECONDS=60 each
 	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz

@@ -5,8 +5,8 @@ A part is a target of the Makefile. Its output goes to target/parts/PART.log and
 part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
 the end. A part of --again that fails runs a second time, alone, when the others are over, with the
 tests that failed where its runner can do that (AGAIN=1): if it passes then, a pause of the machine made
-it fail, or a defect that is rare. It is reported as flaky. Parts that need not run (unchanged.py) are
-named with the revision at which they passed.
+it fail, or a defect that is rare. It is reported as flaky, with the tests that failed. Parts that need not
+run (unchanged.py) are named with the revision at which they passed.
 """
 
 import argparse
@@ -28,6 +28,8 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 LOGS = REPOSITORY / "target/parts"
 #: A part that takes longer than this hangs, s.
 LIMIT = 3600
+#: How pytest, cargo and Playwright name a test that failed.
+FAILED = re.compile(r"^(?:FAILED|ERROR) (\S.*?)(?: - .*)?$|^test (\S+) .*\.\.\. FAILED$|^  +\d+\) (.+?)[ ─]*$", re.M)
 
 
 class Run:
@@ -62,6 +64,7 @@ class Run:
         if self.hung:
             self.output += f"\nended after {LIMIT} s"
         self.tests = sum(map(int, re.findall(r"\b(\d+) passed", self.output)))
+        self.failed_tests = list(dict.fromkeys("".join(it) for it in FAILED.findall(self.output)))
         # As cargo says it.
         compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
         self.compiled = sum(60 * int(m or 0) + float(s) for m, s in compiled)
@@ -114,7 +117,7 @@ class Runner:
                 print(run, flush=True)
 
     def again(self, parts):
-        """Runs a second time those of the parts that failed. Gives those that pass now."""
+        """Runs a second time those of the parts that failed. Gives the first runs of those that pass now."""
         failed = [run for run in self.over if not (run.passed or run.hung) and run.part in parts]
         self.over = [run for run in self.over if run not in failed]
         others = len(self.over)
@@ -123,7 +126,7 @@ class Runner:
         # The second run has a part of the tests only.
         for run, again in zip(failed, self.over[others:]):
             again.skipped = list(dict.fromkeys(run.skipped + again.skipped))
-        return [run.part for run in self.over[others:] if run.passed]
+        return {run.part: run for run, again in zip(failed, self.over[others:]) if again.passed}
 
     def record(self, flaky):
         """Records the parts that came to their end; those that failed once did not pass."""
@@ -210,8 +213,6 @@ def main():
     for lines in (*(it["skipped"] for it in kept.values()), *(it.skipped for it in runner.over)):
         for line in lines:
             print(line)
-    for part in flaky:
-        print(f"FLAKY: {part} failed, and passed when it ran again alone: see {part}.log")
     if idle:
         print("the load ended before the parts")
     skipped = sum(run.passed and bool(run.skipped) for run in runner.over)
@@ -222,6 +223,10 @@ def main():
     tail = f", {skipped} skipped" if skipped else ""
     tail += f", {len(kept)} unchanged" if kept else ""
     print(f"{passed} passed, {failed} failed{tail}")
+    for run in flaky.values():
+        print(f"FLAKY: {run.part} failed, and passed when it ran again alone: see {run.log.relative_to(REPOSITORY)}")
+        for test in run.failed_tests:
+            print(f"FLAKY: {run.part}: {test}")
     skips = [bool(it["skipped"]) for it in kept.values()]
     skipped += sum(skips)
     sys.exit(bool(failed or not passed and all(skips) or idle or given.strict and skipped))

@@ -29,7 +29,7 @@ PARTS = {
     "determinism": (["motorlink-sim"], []),
     "firmware-test": (
         ["motorlink-cli", "motorlink-embedded", "motorlink-ffi"],
-        ["firmware", "tests/*.py", "tests/firmware", "tests/e2e", "scenarios", *INSTALLED],
+        ["firmware", ":(glob)tests/*.py", "tests/firmware", "tests/e2e", "scenarios", *INSTALLED],
     ),
     "miri": (["motorlink-ffi", "motorlink-proto"], ["vectors"]),
     "probe": (
@@ -43,7 +43,9 @@ PARTS = {
 MAY_SKIP = "SKIPPED: advisories"
 #: Variables that change what is built or tested, but for those that say where things are or what is printed.
 OF_BUILDS = ("CARGO", "RUST", "MIRI", "VALGRIND", "PROPTEST", "GLIBC")
-HARMLESS = ("CARGO_HOME", "CARGO_TARGET_DIR", "CARGO_TERM", "RUSTUP_HOME", "RUST_BACKTRACE", "RUST_LOG")
+HARMLESS = (
+    "CARGO_HOME", "CARGO_TARGET_DIR", "CARGO_TERM", "RUSTUP_", "RUST_BACKTRACE", "RUST_LOG", "RUST_TEST_THREADS",
+)  # fmt: skip
 #: Variables of make that choose parts.
 OF_CHOICE = ("PARTS=", "FORCE=", "STRICT=")
 
