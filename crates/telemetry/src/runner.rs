@@ -1,11 +1,13 @@
-//! The engine of a line in a thread of its own, for programs without an event loop.
+//! The engine of a line in a thread of its own, for programs without an event loop. On virtual time its
+//! owner advances it instead.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::io::{self, Read, Write};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
-use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -27,13 +29,16 @@ pub type CommandResult = Result<Reply, CommandError>;
 type Task = Box<dyn FnOnce(&mut Engine) + Send>;
 type Ending = Box<dyn FnOnce(CommandResult) + Send>;
 
-/// The engine in its thread, with the commands whose end is awaited.
+/// How long an engine that its owner advances waits for its line, if it has nothing else to do.
+const STEP: Micros = Micros(100);
+
+/// An engine with the commands whose end is awaited.
 struct Engine {
     acquisition: Acquisition,
     waiting: HashMap<CommandId, Ending>,
 }
 
-/// An engine in a thread. When it is dropped, the motors that were started through it are stopped.
+/// An engine that runs. When it is dropped, the motors that were started through it are stopped.
 #[derive(Debug)]
 pub struct Runner {
     remote: Remote,
@@ -43,10 +48,20 @@ pub struct Runner {
 /// Uses the engine of a [`Runner`] from any thread. It fails once the runner is gone.
 #[derive(Debug, Clone)]
 pub struct Remote {
-    tasks: Sender<Task>,
     /// Commands may wait for the engine: it opens a port, or this process does not run.
     clock: Clock,
-    wake: Arc<UnixStream>,
+    place: Place,
+}
+
+/// Where an engine runs.
+#[derive(Debug, Clone)]
+enum Place {
+    Thread {
+        tasks: Sender<Task>,
+        wake: Arc<UnixStream>,
+    },
+    /// `None` after its end.
+    Here(Arc<Mutex<Option<Engine>>>),
 }
 
 /// The engine has ended.
@@ -67,8 +82,17 @@ impl Runner {
         let engine = Engine { acquisition, waiting: HashMap::new() };
         let thread = std::thread::Builder::new().name(name.to_owned());
         let thread = thread.spawn(move || engine.run(&inbox, woken))?;
-        let remote = Remote { tasks, clock: Clock::running(), wake: Arc::new(wake) };
-        Ok(Runner { remote, thread: Some(thread) })
+        let place = Place::Thread { tasks, wake: Arc::new(wake) };
+        Ok(Runner { remote: Remote { clock: Clock::running(), place }, thread: Some(thread) })
+    }
+
+    /// Without a thread: the engine does something only in [`Remote::advance`], and while somebody waits for
+    /// a result. What it should call back is called at once or then.
+    pub fn here(acquisition: Acquisition) -> Self {
+        let clock = acquisition.clock().clone();
+        let engine = Engine { acquisition, waiting: HashMap::new() };
+        let place = Place::Here(Arc::new(Mutex::new(Some(engine))));
+        Runner { remote: Remote { clock, place }, thread: None }
     }
 
     /// Uses the engine from other threads.
@@ -82,9 +106,9 @@ impl Runner {
     }
 
     fn close(&mut self) -> Vec<Stopped> {
-        self.remote.end();
+        let stopped = self.remote.close();
         let ended = self.thread.take().map(JoinHandle::join);
-        ended.and_then(Result::ok).unwrap_or_default()
+        ended.and_then(Result::ok).unwrap_or(stopped)
     }
 }
 
@@ -98,8 +122,46 @@ impl Remote {
     /// Ends the engine, however many remotes there are: what is waited for fails at once. The motors that
     /// were started through it are stopped.
     pub fn end(&self) {
-        // It fails if the engine has ended.
-        let _ = self.wake.shutdown(std::net::Shutdown::Both);
+        self.close();
+    }
+
+    /// Gives the motors that an engine without a thread has stopped.
+    fn close(&self) -> Vec<Stopped> {
+        match &self.place {
+            Place::Thread { wake, .. } => {
+                // It fails if the engine has ended.
+                let _ = wake.shutdown(std::net::Shutdown::Both);
+                Vec::new()
+            }
+            Place::Here(engine) => {
+                let engine = lock(engine).take();
+                engine.map_or_else(Vec::new, Engine::stop)
+            }
+        }
+    }
+
+    /// Advances an engine without a thread. Gives when that should be done again, if nothing is received
+    /// before.
+    pub fn advance(&self) -> Option<Duration> {
+        match &self.place {
+            Place::Thread { .. } => None,
+            Place::Here(engine) => lock(engine).as_mut().and_then(Engine::advance),
+        }
+    }
+
+    /// Waits for the next of these; `None` if no more come.
+    pub(crate) fn next<T>(&self, results: &Receiver<T>) -> Option<T> {
+        while let Place::Here(_) = &self.place {
+            match results.try_recv() {
+                Ok(result) => return Some(result),
+                Err(TryRecvError::Disconnected) => return None,
+                Err(TryRecvError::Empty) => {}
+            }
+            if self.advance() != Some(Duration::ZERO) {
+                self.clock.wait(self.clock.now() + STEP);
+            }
+        }
+        results.recv().ok()
     }
 
     /// Runs a function on the engine, between two steps of it, and gives its result.
@@ -115,7 +177,7 @@ impl Remote {
             // Whoever asked may have gone.
             let _ = sender.send(task(engine));
         })?;
-        receiver.recv().map_err(|_| Ended)
+        self.next(&receiver).ok_or(Ended)
     }
 
     /// Runs a function on the engine, between two steps of it, and does not wait for it.
@@ -167,7 +229,7 @@ impl Remote {
         self.latch_then(by, move || {
             let _ = sender.send(());
         })?;
-        receiver.recv().map_err(|_| Ended)
+        self.next(&receiver).ok_or(Ended)
     }
 
     /// As [`latch`](Self::latch), without waiting: `done` is called in the engine's thread.
@@ -201,7 +263,7 @@ impl Remote {
     /// See [`CommandError`].
     pub fn command(&self, by: &Arc<str>, request: Request, time_to_live: Micros) -> CommandResult {
         let wait = |ended| self.command_then(by, request, time_to_live, ended);
-        Self::wait(wait).unwrap_or(Err(CommandError::Ended))
+        self.wait(wait).unwrap_or(Err(CommandError::Ended))
     }
 
     /// As [`command`](Self::command), without waiting: `ended` receives the result in the engine's thread.
@@ -235,7 +297,7 @@ impl Remote {
     /// # Errors
     /// See [`CommandError`]. The motor may still be turning.
     pub fn stop(&self, by: &Arc<str>, request: Request) -> CommandResult {
-        Self::wait(|ended| self.stop_then(by, request, ended)).unwrap_or(Err(CommandError::Ended))
+        self.wait(|ended| self.stop_then(by, request, ended)).unwrap_or(Err(CommandError::Ended))
     }
 
     /// As [`stop`](Self::stop), without waiting: `ended` receives the result in the engine's thread.
@@ -274,16 +336,23 @@ impl Remote {
         })
     }
 
-    fn wait(begin: impl FnOnce(Ending) -> Result<(), Ended>) -> Result<CommandResult, Ended> {
+    fn wait(
+        &self,
+        begin: impl FnOnce(Ending) -> Result<(), Ended>,
+    ) -> Result<CommandResult, Ended> {
         let (sender, receiver) = mpsc::channel();
         // Whoever asked may have gone.
         begin(Box::new(move |result| drop(sender.send(result))))?;
-        receiver.recv().map_err(|_| Ended)
+        self.next(&receiver).ok_or(Ended)
     }
 
     fn send(&self, task: impl FnOnce(&mut Engine) + Send + 'static) -> Result<(), Ended> {
-        self.tasks.send(Box::new(task)).map_err(|_| Ended)?;
-        match (&*self.wake).write(&[0]) {
+        let (tasks, wake) = match &self.place {
+            Place::Thread { tasks, wake } => (tasks, wake),
+            Place::Here(engine) => return lock(engine).as_mut().map(task).ok_or(Ended),
+        };
+        tasks.send(Box::new(task)).map_err(|_| Ended)?;
+        match (&**wake).write(&[0]) {
             Ok(_) => Ok(()),
             // It is awake if it has not read the last bytes.
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(()),
@@ -292,9 +361,19 @@ impl Remote {
     }
 }
 
+fn lock(engine: &Mutex<Option<Engine>>) -> MutexGuard<'_, Option<Engine>> {
+    engine.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 fn tell(waiting: &mut HashMap<CommandId, Ending>, id: CommandId, result: CommandResult) {
     if let Some(ended) = waiting.remove(&id) {
         ended(result);
+    }
+}
+
+impl fmt::Debug for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Engine").finish_non_exhaustive()
     }
 }
 
@@ -308,8 +387,7 @@ impl Engine {
                     Err(TryRecvError::Disconnected) => return self.end(inbox),
                 }
             }
-            let Engine { acquisition, waiting } = &mut self;
-            let wait = acquisition.advance(&mut |id, result| tell(waiting, id, result));
+            let wait = self.advance();
             match self.await_next(&woken, wait) {
                 Ok(is_woken) if !(is_woken && is_closed(&mut woken)) => {}
                 _ => return self.end(inbox),
@@ -317,12 +395,21 @@ impl Engine {
         }
     }
 
-    /// Stops the motors, and tells those who wait.
+    fn advance(&mut self) -> Option<Duration> {
+        let Engine { acquisition, waiting } = self;
+        acquisition.advance(&mut |id, result| tell(waiting, id, result))
+    }
+
     fn end(mut self, inbox: &Receiver<Task>) -> Vec<Stopped> {
         // Nothing that is asked for here is sent any more.
         while let Ok(task) = inbox.try_recv() {
             task(&mut self);
         }
+        self.stop()
+    }
+
+    /// Stops the motors, and tells those who wait.
+    fn stop(self) -> Vec<Stopped> {
         let Engine { acquisition, waiting } = self;
         let stopped = acquisition.end();
         waiting.into_values().for_each(|ended| ended(Err(CommandError::Ended)));

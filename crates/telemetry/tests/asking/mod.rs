@@ -13,8 +13,28 @@ use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Line, P
 
 use crate::shared::LIMIT;
 
+/// What carries the bytes of a program.
+pub trait Connection {
+    fn write(&mut self, bytes: &[u8]);
+    /// Waits for more.
+    fn read(&mut self) -> Vec<u8>;
+}
+
+impl Connection for UnixStream {
+    fn write(&mut self, bytes: &[u8]) {
+        self.write_all(bytes).unwrap();
+    }
+
+    fn read(&mut self) -> Vec<u8> {
+        let mut bytes = [0; 4096];
+        let size = Read::read(self, &mut bytes).unwrap();
+        assert!(size > 0, "the connection has ended");
+        bytes[..size].to_vec()
+    }
+}
+
 pub struct Asker {
-    stream: UnixStream,
+    connection: Box<dyn Connection>,
     dialogue: Dialogue,
     pub events: VecDeque<Event>,
     ended: VecDeque<Ended>,
@@ -27,9 +47,13 @@ impl Asker {
 
     pub fn over(stream: UnixStream, name: &str) -> Self {
         stream.set_read_timeout(Some(LIMIT)).unwrap();
+        Self::by(Box::new(stream), name)
+    }
+
+    pub fn by(connection: Box<dyn Connection>, name: &str) -> Self {
         let dialogue = Dialogue::default();
         let (events, ended) = (VecDeque::new(), VecDeque::new());
-        let mut asker = Asker { stream, dialogue, events, ended };
+        let mut asker = Asker { connection, dialogue, events, ended };
         let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
         asker.ask(hello).unwrap();
         asker
@@ -37,7 +61,7 @@ impl Asker {
 
     pub fn send(&mut self, ask: Ask) -> u32 {
         let (id, bytes) = self.dialogue.request(ask).unwrap();
-        self.stream.write_all(&bytes).unwrap();
+        self.connection.write(&bytes);
         id
     }
 
@@ -84,12 +108,7 @@ impl Asker {
                 Some(Heard::Ended(ended)) => return self.ended.push_back(ended),
                 Some(Heard::Text(Text::Event(event))) => return self.events.push_back(event),
                 Some(_) => return,
-                None => {
-                    let mut bytes = [0; 4096];
-                    let size = self.stream.read(&mut bytes).unwrap();
-                    assert!(size > 0, "the connection has ended");
-                    self.dialogue.push(&bytes[..size]);
-                }
+                None => self.dialogue.push(&self.connection.read()),
             }
         }
     }

@@ -1,9 +1,10 @@
 //! One program at a time changes a motor of a share that has leases.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::asking::{Asker, command};
-use crate::shared::{PATIENT, Share};
+use crate::shared::PATIENT;
+use crate::virtual_share::VirtualShare;
 use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
 
@@ -15,8 +16,10 @@ const SPEED: [u8; 2] = [2, 30];
 /// SET_REG SPEED_KP 300.
 const GAIN: [u8; 4] = [1, 5, 44, 1];
 
-fn share(name: &str, lease: Duration) -> Share {
-    Share::leasing(&format!("leases-{name}"), PATIENT, Some(lease), |link| link)
+fn share(lease: Duration) -> VirtualShare {
+    let share = VirtualShare::new();
+    share.lease(lease);
+    share
 }
 
 fn motor() -> MotorName {
@@ -35,25 +38,22 @@ fn turn(program: &mut Asker) {
 }
 
 /// A share whose motor turns for Alice, and Bob.
-fn turning_for_alice(name: &str, lease: Duration) -> (Share, Asker, Asker) {
-    let share = share(name, lease);
-    let [mut alice, bob] = ["alice", "bob"].map(|who| Asker::join(&share.path, who));
+fn turning_for_alice(lease: Duration) -> (VirtualShare, Asker, Asker) {
+    let share = share(lease);
+    let [mut alice, bob] = ["alice", "bob"].map(|who| share.join(who));
     turn(&mut alice);
     share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
     (share, alice, bob)
 }
 
 /// Waits for the end of a lease, and changes the motor then.
-fn gets(program: &mut Asker, bytes: &[u8]) {
-    let end = Instant::now() + PATIENT;
-    while program.ask(command("st0", 1, bytes)).is_err() {
-        assert!(Instant::now() < end, "the lease does not end");
-    }
+fn gets(share: &VirtualShare, program: &mut Asker, bytes: &[u8]) {
+    share.until(|| program.ask(command("st0", 1, bytes)).is_ok());
 }
 
 #[test]
 fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
-    let (share, mut alice, mut bob) = turning_for_alice("one", Duration::from_millis(10));
+    let (share, mut alice, mut bob) = turning_for_alice(Duration::from_millis(10));
     // The lease is over; the motor turns.
     for bytes in [&RAMP[..], &START, &GAIN] {
         assert_eq!(
@@ -65,13 +65,13 @@ fn only_the_program_that_turns_a_motor_changes_it_and_all_may_stop_it() {
     alice.ask(command("st0", 1, &RAMP)).unwrap();
     bob.ask(command("st0", 1, &STOP)).unwrap();
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
-    gets(&mut bob, &RAMP);
+    gets(&share, &mut bob, &RAMP);
 }
 
 #[test]
 fn a_lease_ends_by_itself_and_when_its_program_leaves() {
-    let share = share("ends", Duration::from_secs(3600));
-    let (mut alice, mut bob) = (Asker::join(&share.path, "alice"), Asker::join(&share.path, "bob"));
+    let share = share(Duration::from_secs(3600));
+    let (mut alice, mut bob) = (share.join("alice"), share.join("bob"));
     // A read needs none, and gives none.
     alice.ask(command("st0", 1, &SPEED)).unwrap();
     bob.ask(command("st0", 1, &GAIN)).unwrap();
@@ -80,12 +80,12 @@ fn a_lease_ends_by_itself_and_when_its_program_leaves() {
     // Another motor is free.
     alice.ask(command("st0", 2, &RAMP)).unwrap();
     drop(bob);
-    gets(&mut alice, &GAIN);
+    gets(&share, &mut alice, &GAIN);
 }
 
 #[test]
 fn a_motor_is_taken_explicitly_and_the_log_says_so() {
-    let (share, mut alice, mut bob) = turning_for_alice("take", Duration::from_secs(3600));
+    let (share, mut alice, mut bob) = turning_for_alice(Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     let taken = alice.event(Happening::Taken);
     assert_eq!(taken.message, "st0, motor 1: bob takes it from alice");
@@ -104,7 +104,7 @@ fn a_motor_is_taken_explicitly_and_the_log_says_so() {
 
 #[test]
 fn a_taken_motor_stops_with_the_program_that_took_it() {
-    let (share, mut alice, mut bob) = turning_for_alice("taken", Duration::from_secs(3600));
+    let (share, mut alice, mut bob) = turning_for_alice(Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     drop(bob);
     // Alice is still there.
@@ -115,8 +115,8 @@ fn a_taken_motor_stops_with_the_program_that_took_it() {
 
 #[test]
 fn a_share_without_leases_refuses_to_take() {
-    let share = Share::new("leases-none");
-    let mut program = Asker::join(&share.path, "alice");
+    let share = VirtualShare::new();
+    let mut program = share.join("alice");
     let refusal = program.ask(Ask::Take { motor: motor() }).unwrap_err();
     assert_eq!(refusal.reason, Reason::Usage);
 }
@@ -131,7 +131,7 @@ fn own(bytes: &[u8]) -> Ask {
 
 #[test]
 fn a_program_from_which_a_motor_was_taken_does_not_stop_it_at_its_end() {
-    let (share, mut alice, mut bob) = turning_for_alice("end", PATIENT);
+    let (share, mut alice, mut bob) = turning_for_alice(PATIENT);
     let lost = |refusal: Result<Answer, Refusal>| {
         let Refusal { reason, message, .. } = refusal.unwrap_err();
         assert_eq!(reason, Reason::Held);
@@ -144,5 +144,5 @@ fn a_program_from_which_a_motor_was_taken_does_not_stop_it_at_its_end() {
     bob.ask(own(&STOP)).unwrap();
     lost(alice.ask(own(&STOP)));
     // A program that has never moved it may know more: an earlier share may have been killed.
-    Asker::join(&share.path, "carol").ask(own(&STOP)).unwrap();
+    share.join("carol").ask(own(&STOP)).unwrap();
 }

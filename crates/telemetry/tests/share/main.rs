@@ -3,8 +3,11 @@
 #[path = "../asking/mod.rs"]
 mod asking;
 mod asks;
+mod closing;
 #[path = "../drives/mod.rs"]
 mod drives;
+#[path = "../engine/mod.rs"]
+mod engine;
 mod faulty;
 mod frames;
 mod leases;
@@ -19,3 +22,4 @@ mod shared;
 mod stopping;
 mod stops;
 mod stream;
+mod virtual_share;

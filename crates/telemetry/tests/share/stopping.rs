@@ -12,6 +12,7 @@ use motorlink_telemetry::share::message::*;
 
 use crate::asking::Asker;
 use crate::shared::{LIMIT, Share};
+use crate::virtual_share::VirtualShare;
 
 /// RMD motors have this time for a reply. Most of the stops here wait for it several times.
 pub const SHORT: Duration = Duration::from_millis(500);
@@ -110,24 +111,35 @@ fn turn_before_the_share(link: &mut dyn EventBytes) {
 }
 
 /// A share whose motor 2 on st0 turns already, and the cable of st0, which is cut by `true`.
-pub fn share_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
-    share_while(name, begins_cut, |_| None)
+pub fn share_of_a_turning_motor(begins_cut: bool) -> (VirtualShare, Arc<AtomicBool>) {
+    share_while(begins_cut, |_| None)
+}
+
+/// The same with ports.
+pub fn ports_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
+    let is_cut = Arc::new(AtomicBool::new(begins_cut));
+    let now = Arc::clone(&is_cut);
+    let share = Share::with(name, SHORT, move |mut link| {
+        turn_before_the_share(&mut *link);
+        Cable::cut_while(link, &now)
+    });
+    share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
+    (share, is_cut)
 }
 
 /// A share whose motor 2 on st0 turns already. Its requests alone are lost, until this is `false`.
-pub fn share_of_a_lost_motor(name: &str) -> (Share, Arc<AtomicBool>) {
-    share_while(name, true, |bytes| (request_of(bytes).0 != 2).then(|| bytes.to_vec()))
+pub fn share_of_a_lost_motor() -> (VirtualShare, Arc<AtomicBool>) {
+    share_while(true, |bytes| (request_of(bytes).0 != 2).then(|| bytes.to_vec()))
 }
 
 /// A share whose motor 2 on st0 turns already. While this is so, `passes` has the requests.
 pub fn share_while(
-    name: &str,
     begins: bool,
     passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
-) -> (Share, Arc<AtomicBool>) {
+) -> (VirtualShare, Arc<AtomicBool>) {
     let is_so = Arc::new(AtomicBool::new(begins));
     let (now, passes): (_, Arc<Passes>) = (Arc::clone(&is_so), Arc::new(passes));
-    let share = Share::with(name, SHORT, move |mut link| {
+    let share = VirtualShare::with(SHORT, move |mut link| {
         turn_before_the_share(&mut *link);
         Cable::with(link, &now, &passes)
     });

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::asking::{Asker, command};
-use crate::shared::{LIMIT, Share};
 use crate::stopping::{
-    Cable, READ_STATUS, SHORT, START, eventually, heard_and_unstopped, motors,
-    share_of_a_turning_motor, stop_all, stop_all_of, stops,
+    Cable, READ_STATUS, SHORT, START, heard_and_unstopped, motors, share_of_a_turning_motor,
+    stop_all, stop_all_of, stops,
 };
+use crate::virtual_share::VirtualShare;
 use motorlink_telemetry::share::message::*;
 
 /// The ID of no motor.
@@ -23,8 +23,8 @@ const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
 
 #[test]
 fn an_id_that_was_only_searched_is_absent_at_every_stop() {
-    let share = Share::with("stops-searched", SHORT, |link| link);
-    let mut program = Asker::join(&share.path, "searches");
+    let share = VirtualShare::with(SHORT, |link| link);
+    let mut program = share.join("searches");
     program.ask(command("rmd0", 1, &READ)).unwrap();
     program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
     // The first stop fails before the next one.
@@ -50,8 +50,8 @@ fn an_id_that_was_only_searched_is_absent_at_every_stop() {
 
 #[test]
 fn ids_that_never_answered_are_absent_where_others_confirm() {
-    let share = Share::with("stops-nobody", SHORT, |link| link);
-    let mut program = Asker::join(&share.path, "searches");
+    let share = VirtualShare::with(SHORT, |link| link);
+    let mut program = share.join("searches");
     program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
     let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY, 30]);
     assert_eq!(stopped, motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));
@@ -59,8 +59,8 @@ fn ids_that_never_answered_are_absent_where_others_confirm() {
 
 #[test]
 fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
-    let share = Share::new("stops-missing");
-    let mut program = Asker::join(&share.path, "searches");
+    let share = VirtualShare::new();
+    let mut program = share.join("searches");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
     for _ in 0..2 {
@@ -79,8 +79,8 @@ fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
 fn a_motor_that_answered_and_is_silent_now_may_turn() {
     let is_cut = Arc::new(AtomicBool::new(false));
     let cut = Arc::clone(&is_cut);
-    let share = Share::with("stops-silent", SHORT, move |link| Cable::cut_while(link, &is_cut));
-    let mut program = Asker::join(&share.path, "reads");
+    let share = VirtualShare::with(SHORT, move |link| Cable::cut_while(link, &is_cut));
+    let mut program = share.join("reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
     assert_eq!(heard_and_unstopped(&mut program, "st0"), (vec![1], vec![]));
@@ -95,7 +95,7 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
     let absent = stops(&mut program, 5);
     assert!(absent <= 3, "{absent} stops to a number that the drive does not have");
     assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
-    let mut other = Asker::join(&share.path, "comes later");
+    let mut other = share.join("comes later");
     assert_eq!(heard_and_unstopped(&mut other, "st0"), (vec![1], vec![1]));
     cut.store(false, Ordering::SeqCst);
     assert_eq!(stop_all(&mut program)[&("st0".to_owned(), 1)], "confirmed");
@@ -114,8 +114,8 @@ fn stopped_on_st0(program: &mut Asker) -> Option<u8> {
 
 #[test]
 fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
-    let (share, _cut) = share_of_a_turning_motor("stops-restart", false);
-    let mut program = Asker::join(&share.path, "reads");
+    let (share, _cut) = share_of_a_turning_motor(false);
+    let mut program = share.join("reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
@@ -125,7 +125,7 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
     while stops(&mut program, 7) == 0 {}
     assert_eq!(stop_all_of(&mut program, "st0", &[1]), motors("st0", &[(1, "confirmed")]));
     assert_eq!([(); 2].map(|()| stopped_on_st0(&mut program)), [Some(1), Some(2)]);
-    eventually(|| [1, 2, 3, 7].map(|motor| stops(&mut program, motor)) == [2; 4]);
+    share.until(|| [1, 2, 3, 7].map(|motor| stops(&mut program, motor)) == [2; 4]);
     // The drive has motors 1 and 2, the bus has 1 to 4.
     let is_of_no_motor = |event: &&Event| {
         event.motor > Some(if event.line.as_deref() == Some("st0") { 2 } else { 4 })
@@ -136,8 +136,8 @@ fn a_stop_of_all_reaches_motors_that_a_share_before_this_one_turned() {
 
 #[test]
 fn where_nothing_has_answered_a_stop_is_not_confirmed_and_is_repeated() {
-    let (share, cut) = share_of_a_turning_motor("stops-unanswered", true);
-    let mut program = Asker::join(&share.path, "comes after a restart");
+    let (share, cut) = share_of_a_turning_motor(true);
+    let mut program = share.join("comes after a restart");
     let mut stopped = stop_all(&mut program);
     assert_eq!(stopped.remove(&("st0".to_owned(), ANY_MOTOR)), Some("may turn"));
     assert_eq!(stopped, motors("rmd0", &[1, 2, 3, 4].map(|motor| (motor, "confirmed"))));
@@ -162,24 +162,21 @@ fn where_nothing_has_answered_a_stop_is_not_confirmed_and_is_repeated() {
 fn a_release_ends_the_repeats_where_nothing_has_answered() {
     let is_cut = Arc::new(AtomicBool::new(true));
     let cut = Arc::clone(&is_cut);
-    let share = Share::with("stops-released", SHORT, move |link| Cable::cut_while(link, &is_cut));
-    let mut program = Asker::join(&share.path, "releases");
+    let share = VirtualShare::with(SHORT, move |link| Cable::cut_while(link, &is_cut));
+    let mut program = share.join("releases");
     assert_eq!(stop_all_of(&mut program, "st0", &[ANY_MOTOR]), motors("st0", &[(0, "may turn")]));
     program.ask(Ask::Release).unwrap();
     assert!(heard_and_unstopped(&mut program, "st0").1.is_empty());
     cut.store(false, Ordering::SeqCst);
     // Stops of the last round may still be sent: they end after 2 s and a timeout for each number.
-    let end = std::time::Instant::now() + LIMIT;
-    while program.ask(command("st0", 1, &START)).is_err() {
-        assert!(std::time::Instant::now() < end, "the motor does not start");
-    }
+    share.until(|| program.ask(command("st0", 1, &START)).is_ok());
 }
 
 #[test]
 fn a_motor_without_owner_stops_with_the_program_that_changed_its_speed() {
-    let (share, _) = share_of_a_turning_motor("stops-ramped", false);
-    let mut watcher = Asker::join(&share.path, "watches");
-    let mut program = Asker::join(&share.path, "ramps");
+    let (share, _) = share_of_a_turning_motor(false);
+    let mut watcher = share.join("watches");
+    let mut program = share.join("ramps");
     program.ask(command("st0", 2, &RAMP)).unwrap();
     drop(program);
     let stop = watcher.event(Happening::Stopped);
@@ -189,9 +186,9 @@ fn a_motor_without_owner_stops_with_the_program_that_changed_its_speed() {
 
 #[test]
 fn a_motor_stays_with_its_owner_if_another_program_changes_its_speed() {
-    let share = Share::new("stops-owned");
-    let mut owner = Asker::join(&share.path, "owns");
-    let mut program = Asker::join(&share.path, "ramps");
+    let share = VirtualShare::new();
+    let mut owner = share.join("owns");
+    let mut program = share.join("ramps");
     owner.ask(command("st0", 1, &RAMP)).unwrap();
     owner.ask(command("st0", 1, &START)).unwrap();
     program.ask(command("st0", 1, &RAMP)).unwrap();

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time;
 
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
@@ -391,14 +390,13 @@ impl Hub {
         let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
-                let again = time::Instant::now() + AGAIN;
                 for held in self
                     .lines
                     .iter_mut()
                     .map(|(_, value)| value)
                     .filter(|held| !held.has_answered())
                 {
-                    held.owe_stop(name, again);
+                    held.owe_stop(name, AGAIN);
                 }
                 let lines = self.lines.iter();
                 let all =

@@ -1,7 +1,9 @@
 //! Programs that change motors of a share with leases: the first one has the motor.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use motorlink_proto::time::{Instant, Micros};
 
 use super::Hub;
 use super::asked::{Refused, usage};
@@ -16,7 +18,7 @@ impl Hub {
     /// From now on a motor that a program has changed is not changed by another one for this time, or as
     /// long as it turns for the program, unless the other takes it.
     pub fn lease(&mut self, length: Duration) {
-        self.lease = Some(length);
+        self.lease = Some(length.into());
     }
 
     /// A program changes a motor.
@@ -32,7 +34,7 @@ impl Hub {
             return Ok(());
         };
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
-        let now = Instant::now();
+        let now = held.now();
         if let Some(why) = held.lease_of_another(motor, session, now) {
             return Err((Reason::Held, why));
         }
@@ -53,7 +55,7 @@ impl Hub {
         };
         let (line, motor) = self.motor(motor)?;
         let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };
-        let now = Instant::now();
+        let now = held.now();
         let is_held = held.lease_of_another(motor, session, now).is_some();
         let lease = Lease { session, name: Arc::clone(name), until: now + length };
         let before = held.leases.insert(motor, lease);
@@ -107,10 +109,10 @@ impl Held {
                 "{line}: motor {number} turns for {name}, who holds it; stop it or take it"
             ));
         }
-        let left = lease.until.checked_duration_since(now).filter(|left| !left.is_zero())?;
+        let left = Some(lease.until.since(now)).filter(|left| *left != Micros(0))?;
         Some(format!(
             "{line}: {name} holds motor {number} for another {:.1} s; wait or take it",
-            left.as_secs_f64()
+            Duration::from(left).as_secs_f64()
         ))
     }
 }

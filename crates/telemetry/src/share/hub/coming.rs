@@ -2,10 +2,11 @@
 
 use std::io;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use motorlink::port::{Place, PortName};
 use motorlink::st::Profile;
+use motorlink_proto::time::Micros;
 
 use super::Hub;
 use super::asked::{Refused, usage};
@@ -249,7 +250,7 @@ impl Hub {
         }
         // Under a latch nothing turns.
         if let Some(by) = self.owed.take(&held.place()).as_ref().or(self.latch.as_ref()) {
-            held.owe_stop(by, Instant::now());
+            held.owe_stop(by, Micros(0));
         }
         self.last_line += 1;
         self.lines.insert(self.last_line, held);

@@ -1,7 +1,8 @@
 //! That one program at a time changes a motor.
 
 use std::sync::Arc;
-use std::time::Instant;
+
+use motorlink_proto::time::Instant;
 
 use super::place::SessionId;
 

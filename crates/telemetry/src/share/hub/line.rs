@@ -1,6 +1,7 @@
 //! A line that a share holds, and whose motors are whose.
 
 use std::collections::BTreeSet;
+use std::convert::Infallible;
 use std::io;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use super::leases::Lease;
 use super::owed::{Owed, UnansweredStop};
 use super::place::{SessionId, seconds, wall_now};
 use super::reasons::may_be_executed;
-use crate::acquisition::Tally;
+use crate::acquisition::{Acquisition, Tally};
 use crate::event::{CommandError, What};
 use crate::line::{LineError, Request, Stopped};
 use crate::plan::Wants;
@@ -83,6 +84,21 @@ impl Held {
     /// # Errors
     /// The system gives no thread.
     pub fn start(name: &str, opened: Opened) -> io::Result<Self> {
+        Self::with(name, opened, |engine| Runner::start(name, engine))
+    }
+
+    /// An open line whose engine the caller advances.
+    pub fn here(name: &str, opened: Opened) -> (Self, Remote) {
+        let Ok(held) = Self::with::<Infallible>(name, opened, |engine| Ok(Runner::here(engine)));
+        let remote = held.remote().clone();
+        (held, remote)
+    }
+
+    fn with<E>(
+        name: &str,
+        opened: Opened,
+        start: impl FnOnce(Acquisition) -> Result<Runner, E>,
+    ) -> Result<Self, E> {
         let Opened { port, speaks, engine: mut acquisition, tap } = opened;
         let clock = acquisition.clock().clone();
         let events = Subscription::new(EVENTS, Full::DropOldest);
@@ -112,7 +128,7 @@ impl Held {
             unanswered_stop: None,
             owed: Map::new(),
             searched: None,
-            runner: Runner::start(name, acquisition)?,
+            runner: start(acquisition)?,
         })
     }
 
@@ -188,6 +204,11 @@ impl Held {
     /// The place of its port, also if the device is away now.
     pub(super) fn places(&self) -> Place {
         self.opened_at.clone().and(&self.place())
+    }
+
+    /// The time of the line's clock.
+    pub(super) fn now(&self) -> Instant {
+        self.clock.now()
     }
 
     pub(super) fn remote(&self) -> &Remote {
@@ -325,7 +346,7 @@ impl Held {
             let _ = self.remote().stop_then(by, Request::stop(motor), tell);
         }
         drop(ended);
-        let owed: Vec<(Motor, CommandResult)> = results.iter().collect();
+        let owed = std::iter::from_fn(|| self.remote().next(&results)).collect::<Vec<_>>();
         let mut stopped = self.runner.end();
         for (motor, result) in owed {
             if stopped.iter().all(|one| one.motor != motor) {

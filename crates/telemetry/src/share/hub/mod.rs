@@ -20,9 +20,9 @@ mod work;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::time::{Duration, Instant};
 
 use litemap::LiteMap as Map;
+use motorlink_proto::time::Micros;
 
 use super::frame::Frame;
 use super::message::{self, Ending, Event, Happening};
@@ -63,7 +63,7 @@ pub struct Hub {
     last_session: u64,
     latch: Option<Arc<str>>,
     /// How long a motor stays with the program that changed it. `None`: others may change it at any time.
-    lease: Option<Duration>,
+    lease: Option<Micros>,
     /// What no request may exceed on a line that a program opens.
     limits: Limits,
     log: VecDeque<Event>,
@@ -241,16 +241,15 @@ impl Hub {
 
     /// Repeats stops that no drive has confirmed.
     fn repeat_stops(&mut self) {
-        let now = Instant::now();
         for line in self.numbers() {
-            let due = self.lines.get(&line).map(|held| held.due_again(now));
+            let due = self.lines.get(&line).map(Held::due_again);
             for motor in due.into_iter().flatten() {
                 self.stop_again(line, motor, Why::Repeated);
             }
-            if let Some(motor) = self.lines.get_mut(&line).and_then(|held| held.due_search(now)) {
+            if let Some(motor) = self.lines.get_mut(&line).and_then(Held::due_search) {
                 self.search(line, motor);
             }
-            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
+            if let Some(by) = self.lines.get_mut(&line).and_then(Held::due_stop) {
                 self.stop_line(line, None, &by);
             }
         }
@@ -277,7 +276,7 @@ impl Hub {
             if events.iter().any(|event| event.event == Happening::Back)
                 && let Some(by) = &self.latch
             {
-                held.owe_stop(by, Instant::now());
+                held.owe_stop(by, Micros(0));
             }
             for motor in doubts {
                 self.doubt(line, motor);
@@ -407,7 +406,7 @@ impl Hub {
         let by = held.owed.get(&motor).map_or_else(|| "share".into(), |owed| Arc::clone(&owed.by));
         let ended = move |result| tell(Work::Search(motor, result));
         // If the engine has ended, the share ends.
-        let _ = held.remote().command_then(&by, Request::stop(motor), LONGEST_PAUSE.into(), ended);
+        let _ = held.remote().command_then(&by, Request::stop(motor), LONGEST_PAUSE, ended);
     }
 
     /// Receives the end of something in an engine's thread.

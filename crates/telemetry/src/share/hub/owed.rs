@@ -1,15 +1,15 @@
 //! Stops that motors have not confirmed.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use motorlink::port::Place;
+use motorlink_proto::time::{Instant, Micros};
 
 /// The pause before a stop that failed is repeated.
-pub(super) const AGAIN: Duration = Duration::from_secs(1);
+pub(super) const AGAIN: Micros = Micros::from_millis(1_000);
 
 /// The longest pause before a number is searched again.
-pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+pub(super) const LONGEST_PAUSE: Micros = Micros::from_millis(60_000);
 
 /// A stop that a motor has not confirmed.
 pub(super) struct Owed {
@@ -18,7 +18,7 @@ pub(super) struct Owed {
     pub(super) is_off: bool,
     next: Next,
     /// The pause before the next search.
-    pause: Duration,
+    pause: Micros,
 }
 
 /// When a stop is sent again. If the motor answers anything, that is at once.
@@ -51,7 +51,7 @@ impl Owed {
     /// Each search waits longer than the one before it.
     pub(super) fn search(&mut self, now: Instant) {
         self.next = Next::Search(now + self.pause);
-        self.pause = (self.pause * 2).min(LONGEST_PAUSE);
+        self.pause = (self.pause + self.pause).min(LONGEST_PAUSE);
     }
 
     /// Whether it is repeated now.

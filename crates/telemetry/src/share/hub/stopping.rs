@@ -1,7 +1,8 @@
 //! Which motors of a line a stop is sent to, and what becomes of it.
 
 use std::sync::Arc;
-use std::time::Instant;
+
+use motorlink_proto::time::Micros;
 
 use super::line::Held;
 use super::owed::{AGAIN, Owed, UnansweredStop};
@@ -58,7 +59,7 @@ impl Held {
 
     /// Repeats a stop that failed.
     fn repeat(&mut self, motor: Motor, why: &CommandError) {
-        let (now, is_there) = (Instant::now(), self.is_there(motor));
+        let (now, is_there) = (self.now(), self.is_there(motor));
         // All are stopped again and again while none has answered.
         let is_of_all = self.unanswered_stop.is_some();
         let Some(owed) = self.owed.get_mut(&motor) else { return };
@@ -79,13 +80,15 @@ impl Held {
     }
 
     /// The motors whose stop is repeated now.
-    pub(super) fn due_again(&self, now: Instant) -> Vec<Motor> {
+    pub(super) fn due_again(&self) -> Vec<Motor> {
+        let now = self.now();
         self.owed.iter().filter(|(_, owed)| owed.is_due(now)).map(|(motor, _)| *motor).collect()
     }
 
     /// The number that is searched now, one after the other: a silent line has time for others between
     /// them.
-    pub(super) fn due_search(&mut self, now: Instant) -> Option<Motor> {
+    pub(super) fn due_search(&mut self) -> Option<Motor> {
+        let now = self.now();
         if self.searched.is_some() {
             return None;
         }
@@ -164,15 +167,16 @@ impl Held {
         Address::Motor { is_absent: is_precaution || is_unheard || self.is_absent(motor) }
     }
 
-    /// No motor has answered yet: all are stopped at `next`, and again until one answers.
-    pub(super) fn owe_stop(&mut self, by: &Arc<str>, next: Instant) {
+    /// No motor has answered yet: all are stopped after this time, and again until one answers.
+    pub(super) fn owe_stop(&mut self, by: &Arc<str>, wait: Micros) {
+        let next = self.now() + wait;
         self.unanswered_stop = Some(UnansweredStop { by: Arc::clone(by), next });
     }
 
     /// Whose stop of all motors has to be repeated now. It is repeated for the last time when one has
     /// answered: the motors that turn may not be those that answer first.
-    pub(super) fn due_stop(&mut self, now: Instant) -> Option<Arc<str>> {
-        let has_answered = self.has_answered();
+    pub(super) fn due_stop(&mut self) -> Option<Arc<str>> {
+        let (now, has_answered) = (self.now(), self.has_answered());
         let stop = self.unanswered_stop.as_mut().filter(|stop| has_answered || stop.next <= now)?;
         stop.next = now + AGAIN;
         let by = Arc::clone(&stop.by);

@@ -1,0 +1,158 @@
+//! A share on virtual time: its hub without a socket, and drives in this thread.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::time::Duration;
+
+use motorlink::port::{EventBytes, PortError};
+use motorlink_link::fault::Faults;
+use motorlink_proto::st::Profile;
+use motorlink_proto::time::{Instant, Micros};
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{RmdLine, StLine};
+use motorlink_telemetry::runner::Remote;
+use motorlink_telemetry::share::frame::{Reader, append};
+use motorlink_telemetry::share::hub::{Held, Hub, SessionId};
+use motorlink_telemetry::share::opening::Opened;
+use motorlink_telemetry::share::wire::Tap;
+use motorlink_telemetry::share::words::Speaks;
+use motorlink_testbench::{Bench, BenchConfig};
+
+use crate::asking::{Asker, Connection};
+use crate::engine::Polled;
+use crate::shared::{LIMIT, PATIENT};
+
+/// How often the engines look at their lines.
+const STEP: Micros = Micros::from_millis(1);
+/// As the server.
+const BATCH: Micros = Micros::from_millis(25);
+
+/// A share of simulated drives: the line st0 and the line rmd0. Time passes while a program waits.
+pub struct VirtualShare(Rc<World>);
+
+struct World {
+    bench: Bench,
+    hub: RefCell<Hub>,
+    engines: Vec<Remote>,
+    due: Cell<Instant>,
+}
+
+impl VirtualShare {
+    pub fn new() -> Self {
+        Self::with(PATIENT, |link| link)
+    }
+
+    /// With something around the serial line. Drives have this time for a reply, an ST drive at most 1 s.
+    pub fn with(
+        timeout: Duration,
+        around: impl FnOnce(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+    ) -> Self {
+        let bench = Bench::new(&BenchConfig::default()).unwrap();
+        let (st, st_engine) = st(&bench, timeout.min(Duration::from_secs(1)), around);
+        let (rmd, rmd_engine) = rmd(&bench, timeout);
+        let hub = RefCell::new(Hub::new("test", vec![st, rmd], || {}));
+        let (engines, due) = (vec![st_engine, rmd_engine], Cell::default());
+        VirtualShare(Rc::new(World { bench, hub, engines, due }))
+    }
+
+    /// One program at a time changes a motor.
+    pub fn lease(&self, length: Duration) {
+        self.0.hub.borrow_mut().lease(length);
+    }
+
+    pub fn join(&self, name: &str) -> Asker {
+        let session = self.0.hub.borrow_mut().join();
+        let (world, reader) = (Rc::clone(&self.0), Reader::default());
+        Asker::by(Box::new(Joined { world, session, reader }), name)
+    }
+
+    /// Waits until this is so, and looks as often as a person can.
+    pub fn until(&self, mut is: impl FnMut() -> bool) {
+        let end = self.0.bench.now() + LIMIT.into();
+        while !is() {
+            assert!(self.0.bench.now() < end, "it never is");
+            (0..20).for_each(|_| self.0.step());
+        }
+    }
+
+    pub fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
+        let at = self.0.bench.signals().iter().position(|it| it.name == signal).unwrap();
+        self.until(|| what(self.0.bench.values()[at]));
+    }
+}
+
+fn st(
+    bench: &Bench,
+    timeout: Duration,
+    around: impl FnOnce(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+) -> (Held, Remote) {
+    let port = "/dev/st".parse().unwrap();
+    let tap = Tap::default();
+    let mut link = Some(tap.around_line(around(Box::new(Polled(bench.bytes(&Faults::NONE))))));
+    let open = move || link.take().ok_or(PortError::NotFound { port: "st".to_owned() });
+    let options = motorlink::st::Options { timeout, ..Default::default() };
+    let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
+    let engine = Acquisition::new(Box::new(StLine::new(client)));
+    Held::here("st0", Opened { port, speaks: Speaks::St(Profile::Spec), engine, tap })
+}
+
+fn rmd(bench: &Bench, timeout: Duration) -> (Held, Remote) {
+    let port = "slcan:/dev/rmd".parse().unwrap();
+    let tap = Tap::default();
+    let link = tap.around_bus(Box::new(Polled(bench.can(&Faults::NONE))));
+    let options = motorlink::rmd::Options { timeout, ..Default::default() };
+    let client = motorlink::rmd::EventClient::over("rmd", link, options);
+    let engine = Acquisition::new(Box::new(RmdLine::new(client)));
+    Held::here("rmd0", Opened { port, speaks: Speaks::Rmd, engine, tap })
+}
+
+impl World {
+    fn step(&self) {
+        for engine in &self.engines {
+            while engine.advance() == Some(Duration::ZERO) {}
+        }
+        let mut hub = self.hub.borrow_mut();
+        hub.advance();
+        let now = self.bench.now();
+        if now >= self.due.get() {
+            self.due.set(now + BATCH);
+            hub.collect().unwrap();
+        }
+        while hub.take_event().is_some() {}
+        self.bench.clock().wait(now + STEP);
+    }
+}
+
+/// A program at the hub.
+struct Joined {
+    world: Rc<World>,
+    session: SessionId,
+    reader: Reader,
+}
+
+impl Connection for Joined {
+    fn write(&mut self, bytes: &[u8]) {
+        self.reader.push(bytes);
+        while let Some(frame) = self.reader.take().unwrap() {
+            self.world.hub.borrow_mut().received(self.session, &frame, Micros(0));
+        }
+    }
+
+    fn read(&mut self) -> Vec<u8> {
+        loop {
+            let next = self.world.hub.borrow_mut().next(self.session);
+            if let Some(frame) = next {
+                let mut bytes = Vec::new();
+                append(frame.kind, &frame.payload, &mut bytes).unwrap();
+                return bytes;
+            }
+            self.world.step();
+        }
+    }
+}
+
+impl Drop for Joined {
+    fn drop(&mut self) {
+        self.world.hub.borrow_mut().leave(self.session);
+    }
+}
