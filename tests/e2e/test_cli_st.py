@@ -398,7 +398,7 @@ def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
 
 def test_a_line_that_echoes_is_told(run, tmp_path):
     with device(tmp_path / "echo", lambda received: received) as port:
-        message = run("st", "-p", port, "--timeout", "200ms", "start").ended(3).err
+        message = run("st", "-p", port, "start").ended(3).err
     assert "is received again" in message and "echoes" in message
 
 

@@ -275,7 +275,8 @@ def test_an_outage_of_a_watch_is_in_its_stream_and_so_is_its_end(sim, start, wor
     watch.interrupt()
     assert watch.wait() == 0
     lines = check("\n".join(watch.out))
-    assert not watch.err
+    # A machine that stood still makes the line slower.
+    assert all(line.startswith('{"note":') for line in watch.err), watch.err
     assert [line["event"] for line in lines if "event" in line] == ["outage", "back"]
     assert [line["t"] for line in lines] == sorted(line["t"] for line in lines)
     name = f"serial:{port}" if protocol == "st" else port

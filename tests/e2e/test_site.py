@@ -508,7 +508,7 @@ def test_many_messages_in_both_directions_lose_no_connection(site):
         while not ends.is_set():
             for size in range(20):
                 arm1.put(sample, b"m" * size)
-            time.sleep(0.0005)
+            time.sleep(0.002)
 
     publisher = threading.Thread(target=publish, daemon=True)
     publisher.start()
