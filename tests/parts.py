@@ -43,7 +43,9 @@ class Run:
         self.begun = time.monotonic()
         with self.log.open("wb") as output:
             self.process = subprocess.Popen(
-                ["make", "--no-print-directory", part, *(["AGAIN=1"] if again else [])],
+                # `times` prints the processor time of all that it has run.
+                ["sh", "-c", '"$@"; code=$?; times; exit $code', "sh", "make", "--no-print-directory", part]
+                + (["AGAIN=1"] if again else []),
                 cwd=REPOSITORY,
                 # What cargo keeps for a next build costs a tenth of the first one.
                 env={"CARGO_INCREMENTAL": "0", **os.environ},
@@ -69,6 +71,8 @@ class Run:
         compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
         self.compiled = sum(60 * int(m or 0) + float(s) for m, s in compiled)
         self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
+        times = re.findall(r"(\d+)m([\d.]+)s", "".join(self.output.splitlines()[-1:]))
+        self.processor = sum(60 * int(m) + float(s) for m, s in times)
 
     def end(self):
         """Ends its processes."""
@@ -84,8 +88,9 @@ class Run:
     def __str__(self):
         verdict = "FAILED" if not self.passed else "skipped" if self.skipped else "passed"
         tests = f"{self.tests} tests" if self.tests else ""
-        compiled = f"{self.compiled:.0f} s of it cargo compiled" if self.compiled > 1 else ""
-        return f"{self.label:18} {verdict:8} {self.seconds:5.0f} s  {tests:11} {compiled}".rstrip()
+        processor = f"{self.processor:.0f} s of processor"
+        compiled = f"cargo compiled for {self.compiled:.0f} s" if self.compiled > 1 else ""
+        return f"{self.label:18} {verdict:8} {self.seconds:5.0f} s  {processor:19}  {tests:11} {compiled}".rstrip()
 
 
 class Runner:

@@ -518,11 +518,13 @@ def test_many_messages_in_both_directions_lose_no_connection(site):
         answered.extend(it for it in alice.get(ask, timeout=5) if it.ok)
         return time.monotonic() > end and len(heard) > 1000 and len(answered) > 100
 
-    eventually(is_enough, "many messages in both directions", within=60)
-    # Or the nodes miss this run of arm1.
-    arm1.put(f"{ROOT}/arm1/node/ended/many", "")
-    ends.set()
-    publisher.join()
+    try:
+        eventually(is_enough, "many messages in both directions", within=60)
+        # Or the nodes miss this run of arm1.
+        arm1.put(f"{ROOT}/arm1/node/ended/many", "")
+    finally:
+        ends.set()
+        publisher.join()
     assert not gone and site.running[0].process.poll() is None
     for it in (*declared, *tokens):
         it.undeclare()

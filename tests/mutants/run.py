@@ -1,161 +1,195 @@
 #!/usr/bin/env python3
 """Mutation testing: which single faults in the code no test notices (docs/CHECKS.md).
 
-The mutants are a sample of those that cargo-mutants makes, drawn with a seed, and those of
-tests/mutants/by_hand.toml, which people made in Python and in the page. The tests run in levels, the cheapest
-first, until one notices the mutant: it fails twice with it. tests/mutants/results.json has the result of each
-mutant as soon as it is known, so a run that was ended goes on where it was. A mutant that has a result
-is tested again with AGAIN: first with the command that noticed it.
+The mutants in Rust are a sample of those that cargo-mutants makes, drawn with a seed. All of them are in one
+build: schemata.py says how. One run of all tests shows which test reaches which mutant, and a mutant is tested
+by those only, the cheapest first. Those of by_hand.toml, which people made in Python and in the page, are made one
+after the other. A test notices a mutant if it fails twice with it. results.json has the test that noticed each
+mutant, "" if none did, as soon as that is known: so a run that was ended goes on where it was.
 """
 
 import argparse
+import contextlib
 import json
 import os
-import random
 import re
+import resource
 import signal
 import subprocess
+import sys
+import threading
+import time
 import tomllib
-from collections import Counter
+from collections import Counter, defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import schemata
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECORD = REPOSITORY / "tests/mutants/results.json"
-CRATES = ["proto", "motorlink", "link", "telemetry", "recording", "capture", "cli", "fleet", "monitor"]
+TREE = REPOSITORY / "target/mutants/tree"
+REACHED = REPOSITORY / "target/mutants/reached"
 #: Their tests measure, fuzz, or read the source.
-NO_TESTS_OF_BEHAVIOUR = {"structure", "fuzz", "bench", "kernels", "reliability", "python"}
+NO_TESTS_OF_BEHAVIOUR = {"structure", "fuzz", "bench", "kernels", "reliability"}
 #: A command that takes longer hangs, s.
-LIMIT = 900
+LIMIT = 1200
+PYTEST = f"{REPOSITORY}/.venv/bin/python -m pytest -q -p no:cacheprovider -n 4 --dist worksteal"
+PYTHON_TESTS = "cd bindings/python/tests && ../../../.venv-python/bin/python -m pytest -q -p no:cacheprovider -n 4"
 
 
-def output(*command, cwd=REPOSITORY):
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=True).stdout
+def run(command, limit=LIMIT, **variables):
+    """Whether a shell command in the tree passes, and what it prints."""
+    environment = {**os.environ, "CARGO_PROFILE_DEV_DEBUG": "0", "RUST_TEST_THREADS": "16", **variables}
+    process = subprocess.Popen(
+        command, shell=True, cwd=TREE, env=environment, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+    )  # fmt: skip
+    try:
+        text = process.communicate(timeout=limit)[0]
+    except subprocess.TimeoutExpired:
+        text = f"no end in {limit:.0f} s"
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    return process.returncode == 0, text
 
 
-class Tree:
-    """The committed files once more, with a build of their own."""
-
-    def __init__(self):
-        self.path = REPOSITORY / "target/mutants/tree"
-        if not self.path.exists():
-            output("git", "clone", "--quiet", "--shared", str(REPOSITORY), str(self.path))
-        output("git", "fetch", "--quiet", "origin", cwd=self.path)
-        head = output("git", "rev-parse", "HEAD").strip()
-        output("git", "checkout", "--quiet", "--force", "--detach", head, cwd=self.path)
-        self.environment = {
-            **os.environ,
-            "CARGO_PROFILE_DEV_DEBUG": "0",
-            "CARGO_INCREMENTAL": "1",
-            "RUST_TEST_THREADS": "16",
-        }
-
-    def passes(self, command):
-        """Whether a shell command passes, and what it prints."""
-        print(f"    {command}", flush=True)
-        process = subprocess.Popen(
-            command, shell=True, cwd=self.path, env=self.environment, start_new_session=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-        )  # fmt: skip
-        try:
-            text = process.communicate(timeout=LIMIT)[0]
-        except subprocess.TimeoutExpired:
-            text = f"no end in {LIMIT} s"
-        try:
-            os.killpg(process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
-        process.communicate()
-        return process.returncode == 0, text
-
-    def restore(self):
-        output("git", "checkout", "--quiet", "--force", "--", ".", cwd=self.path)
+def processor():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
-def of_cargo(seed, count):
-    """A sample: name and how to make the mutant."""
-    crates = [argument for crate in CRATES for argument in ("--file", f"crates/{crate}/src/**/*.rs")]
-    listed = json.loads(output("cargo", "mutants", "--list", "--json", "--diff", *crates))
-    # Names with the same text have a number: lines change with each commit.
-    seen, mutants = Counter(), []
-    for it in listed:
-        name = re.sub(r":\d+:\d+:", ":", it["name"])
-        seen[name] += 1
-        mutants.append({**it, "name": f"{name} #{seen[name]}"})
-    return random.Random(seed).sample(mutants, count)
+def must(command, **variables):
+    passed, text = run(command, 3600, **variables)
+    if not passed:
+        sys.exit(f"{command}\n{text[-4000:]}")
+    return text
 
 
-def dependents():
-    """For each package of the workspace those that depend on it, the nearest first."""
-    found = json.loads(output("cargo", "metadata", "--format-version=1", "--no-deps", "--locked"))["packages"]
-    direct = {it["name"]: {dependency["name"] for dependency in it["dependencies"]} for it in found}
-    names = [name for name in direct if name.removeprefix("motorlink-") not in NO_TESTS_OF_BEHAVIOUR]
-    above = {}
-    for package in direct:
-        above[package], reached = [], {package}
-        while more := [it for it in names if it not in reached and direct[it] & reached]:
-            above[package] += more
-            reached |= set(more)
-    return above
+class Program:
+    """A test program of cargo."""
+
+    def __init__(self, message):
+        package = re.search(r"(?:#|/)(motorlink[\w-]*)(?:@|#|$)", message["package_id"])[1]
+        self.package = package.removeprefix("motorlink-")
+        self.name = f"{self.package} {message['target']['name']}"
+        self.path = message["executable"]
+        self.folder = Path(message["manifest_path"]).parent
+
+    def run(self, limit=LIMIT, tests="", **variables):
+        return run(f"cd {self.folder} && {self.path} {tests}", limit, CARGO_MANIFEST_DIR=str(self.folder), **variables)
+
+    def notices(self, mutant, limit):
+        passed, text = self.run(limit, MUTANT=mutant)
+        if passed:
+            return False
+        failed = re.findall(r"^    (\S+)$", text.rpartition("\nfailures:\n")[2], re.M)
+        return not self.run(limit, f"--exact {' '.join(failed)}", MUTANT=mutant)[0]
 
 
-def test(*packages):
-    return "cargo test --locked --quiet --all-features " + " ".join(f"-p {it}" for it in packages)
+def programs():
+    text = must("cargo test --workspace --all-features --locked --lib --bins --tests --no-run --message-format=json 2>&1")
+    messages = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+    tests = [it for it in messages if it.get("executable") and it.get("profile", {}).get("test")]
+    found = map(Program, tests)
+    return [it for it in found if it.package not in NO_TESTS_OF_BEHAVIOUR]
 
 
-def levels(mutant, above):
-    """Commands that test it. They are not run if the crate does not compile."""
-    if package := mutant.get("package"):
-        yield test(package) + " --lib --bins --tests"
-        if above[package]:
-            yield test(*above[package]) + " --lib --bins --tests"
-        yield "make e2e T=-x"
-        yield "make python T=-x"
-    elif mutant["file"].startswith("web/"):
-        yield "make web-test"
-        yield "make browser"
-    else:
-        yield "make python T=-x"
-        yield "make e2e T=-x"
+class Tests:
+    """All tests, and which of them reach a mutant."""
+
+    def __init__(self, mutants):
+        must("cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames "
+             "--example wireshark_frames --locked")  # fmt: skip
+        self.programs = programs()
+        must("make $PWD/.venv-python/ready && .venv-python/bin/python -m pip install --quiet "
+             "--config-settings 'build-args=--profile=dev --features=typescript' .")  # fmt: skip
+        self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink {PYTEST}"
+        self.turn = threading.Lock()
+        known = json.loads(REACHED.with_suffix(".json").read_text()) if REACHED.with_suffix(".json").exists() else {}
+        if known.get("mutants") != [it["name"] for it in mutants]:
+            known = {"mutants": [it["name"] for it in mutants], **self.trace()}
+            REACHED.with_suffix(".json").write_text(json.dumps(known))
+        self.seconds = known["seconds"]
+        self.reached = {int(number): tests for number, tests in known["reached"].items()}
+
+    def trace(self):
+        """Runs all tests once without a mutant."""
+        seconds, reached = {}, defaultdict(list)
+        for name, test in [
+            *((it.name, it.run) for it in self.programs),
+            ("e2e", lambda **variables: run(self.end_to_end, 3600, **variables)),
+            ("python", lambda **variables: run(PYTHON_TESTS, 3600, **variables)),
+        ]:
+            folder = REACHED / name.replace(" ", "/")
+            folder.mkdir(parents=True, exist_ok=True)
+            begun, before = time.monotonic(), processor()
+            passed, text = test(MUTANTS_REACHED=str(folder))
+            seconds[name] = time.monotonic() - begun
+            print(f"{name}: {seconds[name]:.0f} s, {processor() - before:.0f} s of processor"
+                  f"{'' if passed else ', FAILED without a mutant'}", flush=True)  # fmt: skip
+            if not passed:
+                print(text[-1500:], flush=True)
+            for file in folder.iterdir():
+                for line in file.read_text().splitlines():
+                    number, _, of_pytest = line.partition(" ")
+                    of_pytest = of_pytest.rpartition(" (")[0]
+                    label = f"e2e {of_pytest}" if name == "e2e" else name
+                    if of_pytest or name != "e2e":
+                        reached[number].append(label)
+                file.unlink()
+        return {"seconds": seconds, "reached": {number: sorted(set(it)) for number, it in reached.items()}}
+
+    def notice(self, number, package):
+        """The test that notices a mutant; "" if none does."""
+        reached = self.reached.get(number, [])
+        mine = [it for it in self.programs if it.name in reached]
+        for program in sorted(mine, key=lambda it: (it.package != package, self.seconds[it.name])):
+            if program.notices(str(number), 60 + 5 * self.seconds[program.name]):
+                return program.name
+        # Of a resource that many tests share, only the first one is known to reach the mutant.
+        tests = [it.removeprefix("e2e ") for it in reached if it.startswith("e2e ")]
+        for chosen in (tests, sorted({it.partition("::")[0] for it in tests})):
+            if chosen and (test := self.pytest(self.end_to_end, chosen, number)):
+                return f"e2e {test}"
+        if "python" in reached and (test := self.pytest(PYTHON_TESTS, [], number)):
+            return f"python {test}"
+        return ""
+
+    def pytest(self, command, tests, number):
+        """The first of the tests that fails twice."""
+        arguments = REACHED / f"{number}.txt"
+        arguments.write_text("\n".join(tests))
+        # Two of these at once would be late.
+        with self.turn:
+            passed, text = run(f"{command} -x -rfE @{arguments}", MUTANT=str(number))
+            failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", text, re.M)[:4]
+            for test in failed:
+                arguments.write_text(test)
+                if not run(f"{command} @{arguments}", MUTANT=str(number))[0]:
+                    return test
+        if not passed and not failed:
+            return "no end" if text.startswith("no end") else f"pytest itself: {text[-300:]}"
+        return None
 
 
-def second(command, text):
-    """The tests again that failed."""
-    if command.startswith("make"):
-        return f"{command} AGAIN=1"
-    target = re.search(r"to rerun pass `(.*)`", text)
-    failed = re.findall(r"^    (\S+)$", text.rpartition("\nfailures:\n")[2], re.M)
-    return f"cargo test --locked --quiet --all-features {target[1]} -- --exact {' '.join(failed)}" if target else command
-
-
-def make(tree, mutant):
-    """Changes the file."""
-    path = tree.path / mutant["file"]
-    if "diff" in mutant:
-        subprocess.run(["patch", "--quiet", str(path)], input=mutant["diff"], text=True, check=True)
-        return
+def by_hand(mutant):
+    """The tests that notice a mutant of by_hand.toml."""
+    path = TREE / mutant["file"]
     text = path.read_text()
     if text.count(mutant["find"]) != 1:
-        raise SystemExit(f"{mutant['name']}: {mutant['file']} does not have the text of `find` exactly once")
+        sys.exit(f"{mutant['name']}: {mutant['file']} does not have the text of `find` exactly once")
     path.write_text(text.replace(mutant["find"], mutant["replace"]))
-
-
-def noticed(tree, mutant, above, before):
-    """The command that notices the mutant, "" for none, None if it does not compile."""
-    make(tree, mutant)
-    if package := mutant.get("package"):
-        if not tree.passes(f"cargo build --locked --quiet --all-features -p {package}")[0]:
-            return None
-    commands = [it for it in (before,) if it] + list(levels(mutant, above))
-    for command in commands:
-        passed, text = tree.passes(command)
-        if passed:
-            continue
-        if text.startswith("no end"):
-            return command
-        again = second(command, text)
-        if not tree.passes(again)[0]:
-            return again if again.startswith("cargo") else command
-    return ""
+    is_page = mutant["file"].startswith("web/")
+    commands = ["make web-test", "make browser T=-x"] if is_page else ["make python T=-x", "make e2e T=-x"]
+    try:
+        for command in commands:
+            if not run(command)[0] and not run(f"{command} AGAIN=1")[0]:
+                return command
+        return ""
+    finally:
+        path.write_text(text)
 
 
 def main():
@@ -164,34 +198,40 @@ def main():
     arguments.add_argument("--count", type=int, default=120)
     arguments.add_argument("--again", action="store_true", help="also mutants that have a result")
     given = arguments.parse_args()
+    schemata.checkout(REPOSITORY, TREE)
     record = json.loads(RECORD.read_text()) if RECORD.exists() else {}
-    by_hand = tomllib.loads((REPOSITORY / "tests/mutants/by_hand.toml").read_text())["mutant"]
-    mutants = by_hand + of_cargo(given.seed, given.count)
-    above = dependents()
-    tree = Tree()
-    lost = []
-    for number, mutant in enumerate(mutants, 1):
-        name = mutant["name"]
-        before = record.get(name)
-        if name in record and not given.again:
-            continue
-        print(f"{number} of {len(mutants)}: {name}", flush=True)
-        try:
-            record[name] = noticed(tree, mutant, above, before)
-        finally:
-            tree.restore()
-        print(f"    -> {record[name]!r}", flush=True)
-        if before and not record[name]:
-            lost.append(name)
-        RECORD.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
-    results = [record[it["name"]] for it in mutants]
-    missed = [it["name"] for it in mutants if record[it["name"]] == ""]
-    for name in missed:
+    drawn = record.setdefault(f"seed {given.seed}", {})
+    of_people = record.setdefault("by hand", {})
+    before = {**drawn, **of_people}
+    made = tomllib.loads((REPOSITORY / "tests/mutants/by_hand.toml").read_text())["mutant"]
+    lock = threading.Lock()
+
+    def tell(results, name, noticed):
+        with lock:
+            results[name] = noticed
+            RECORD.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
+            print(f"{name}\n    -> {noticed!r}", flush=True)
+
+    if given.again or not drawn or None in drawn.values():
+        mutants = schemata.sample(TREE, given.seed, given.count, list(drawn))
+        drawn |= {it["name"]: drawn.get(it["name"]) for it in mutants}
+        tests = Tests(mutants)
+        todo = [(number, it) for number, it in enumerate(mutants, 1) if given.again or drawn[it["name"]] is None]
+        # Most tests wait.
+        with ThreadPoolExecutor(2) as workers:
+            notice = lambda it: tell(drawn, it[1]["name"], tests.notice(it[0], it[1]["package"]))  # noqa: E731
+            list(workers.map(notice, todo))
+    schemata.restore(TREE)
+    for mutant in made:
+        if given.again or mutant["name"] not in of_people:
+            tell(of_people, mutant["name"], by_hand(mutant))
+    results = {**drawn, **of_people}
+    for name in (missed := [name for name, noticed in results.items() if not noticed]):
         print(f"NOT NOTICED: {name}")
-    compiled = [it for it in results if it is not None]
-    print(f"seed {given.seed}: {len(compiled)} mutants compile, {len(compiled) - len(missed)} of them are noticed")
-    if lost:
-        raise SystemExit("\n".join(["noticed before, and no more:", *lost]))
+    levels = Counter(noticed.partition(" ")[0] or "none" for noticed in results.values())
+    print(f"seed {given.seed}: {len(results) - len(missed)} of {len(results)} are noticed; by {dict(levels)}")
+    if lost := [name for name in missed if before.get(name)]:
+        sys.exit("\n".join(["noticed before, and no more:", *lost]))
 
 
 if __name__ == "__main__":
