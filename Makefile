@@ -28,7 +28,9 @@ FAILED = $(if $(AGAIN),--last-failed)
 # Tests that pytest and cargo run at a time. Most of them wait.
 WORKERS ?= 4
 export RUST_TEST_THREADS ?= 16
-PYTEST_FLAGS = -q -rfEs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED)
+PYTEST_FLAGS = -q -rfEs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED) \
+	-p measured $(if $(AGAIN),,--junitxml=$(CURDIR)/target/parts/$@.xml)
+e2e ros2 python pages firmware-test: export PYTHONPATH = $(CURDIR)/tests
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # For all that the tests build, clippy is the compiler: so it needs no build of its own. It tells warnings again
@@ -53,7 +55,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel mutants fuzz soak bench bench-python reliability sizes docs header python-table python-docs web-types web monitor deadman view
+.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel mutants fuzz soak bench bench-python reliability sizes table docs header python-table python-docs web-types web monitor deadman view
 .PHONY: ros2 fleet-scale fleet-faults install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -92,7 +94,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
 unit: ## 5 min: tests in Rust
-	$(CARGO) test --workspace --all-features --locked $(T)
+	$(CARGO) --config "target.'cfg(unix)'.runner = '$(CURDIR)/tests/measured'" test --workspace --all-features --locked $(T)
 
 python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
@@ -237,6 +239,9 @@ sizes: board-target ## flash and RAM on a Cortex-M4, from C and Rust: docs/SIZES
 	cd probe && $(CARGO) build --release --locked && $(SIZES) > ../docs/SIZES.md
 
 # ---- What is written by a command ----
+
+table: ## docs/CHECKS.md: files of tests and what they cost in the last run of `make test FORCE=1`
+	$(PYTHON) tests/table.py
 
 docs: ## the tables of docs/CONFORMANCE.md
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked

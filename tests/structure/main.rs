@@ -1,4 +1,4 @@
-//! Neither the modules of a crate nor crates depend on each other in a cycle.
+//! Neither the modules of a crate nor crates depend on each other in a cycle, and all tests are compiled.
 
 mod cycles;
 mod expand;
@@ -46,6 +46,25 @@ fn crates_have_no_cycles() {
         }
     }
     assert!(reports.is_empty(), "{reports}");
+}
+
+/// With `autotests = false` Cargo leaves out what nothing names.
+#[test]
+fn no_file_of_tests_is_left_out() {
+    let (_, packages) = repository();
+    for package in &packages {
+        let folder = package.folder().join("tests");
+        let all = fs::read_to_string(folder.join("all.rs")).unwrap_or_default();
+        for entry in folder.read_dir().into_iter().flatten() {
+            let path = entry.expect("the folder can be listed").path();
+            let is_target = package.targets.iter().any(|target| target.src_path == path);
+            let name = path.file_stem().expect("it has a name").to_string_lossy();
+            let is_left_out = path.extension().is_some_and(|it| it == "rs")
+                && !is_target
+                && !all.contains(&format!("\nmod {name};\n"));
+            assert!(!is_left_out, "{} is in no program of the tests", path.display());
+        }
+    }
 }
 
 fn repository() -> (&'static Path, Vec<Package>) {

@@ -1,19 +1,17 @@
 //! Requests of pages on lines that fail: no wrong value, and what is known after a failure.
 
-mod world;
-
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::world::{LIMIT, Page, World, rmd, st};
 use motorlink::port::{ByteLink, EventBytes, Evented, FaultBytes, FaultCan, Link, PortError};
 use motorlink_link::fault::Faults;
 use motorlink_monitor::message::{Answer, Ask};
 use motorlink_proto::rmd::IDENTIFIERS;
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{MotorName, Reason};
-use world::{LIMIT, Page, World, rmd, st};
 
 fn read(motor: MotorName, name: &str) -> Ask {
     Ask::Read { motor, names: vec![name.to_owned()] }
@@ -86,7 +84,7 @@ async fn a_reply_that_comes_twice_never_becomes_a_value() {
     let on_line = Arc::clone(&repeats);
     let world = World::with(
         "twice",
-        (Profile::Spec, world::PATIENT),
+        (Profile::Spec, crate::world::PATIENT),
         move |link| {
             let repeats = Arc::clone(&on_line);
             Box::new(Twice { link, last: Vec::new(), again: Vec::new(), requests: 0, repeats })

@@ -1,14 +1,12 @@
 //! What pages read of drives, and commands that they send, through a real share.
 
-mod world;
-
 use std::sync::atomic::Ordering;
 
+use crate::world::{World, act, rmd, st};
 use motorlink_link::fault::Faults;
 use motorlink_monitor::message::{Answer, Ask, Mode};
 use motorlink_proto::st::{Profile, Reading, RegisterId};
 use motorlink_telemetry::share::message::Reason;
-use world::{World, act, rmd, st};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn values_are_those_that_a_client_reads() {

@@ -1,15 +1,13 @@
 //! Motion of pages, through a real share: what is on the wire, and what ends it.
 
-mod world;
-
 use std::time::Duration;
 
+use crate::world::{Page, Sent, World, connect, rmd, st};
 use motorlink_monitor::message::{Answer, Ask, Mode};
 use motorlink_proto::rmd::{Code, Payload, SetPositionLimited, SetSpeed, SetTorque};
 use motorlink_proto::st::{CurrentReference, Profile, Ramp, Request, TorqueRamp};
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
 use motorlink_telemetry::share::program::Refusal;
-use world::{Page, Sent, World, connect, rmd, st};
 
 fn run(motor: MotorName, mode: Mode, target: f64, rate: f64) -> Ask {
     Ask::Run { motor, mode, target, rate, hold: false }
@@ -45,7 +43,7 @@ fn torques(frames: &[Vec<u8>]) -> Vec<f64> {
 
 /// Waits until the wire has what is wanted.
 async fn until<T>(what: impl Fn() -> Option<T>) -> T {
-    let end = std::time::Instant::now() + world::LIMIT;
+    let end = std::time::Instant::now() + crate::world::LIMIT;
     loop {
         if let Some(found) = what() {
             return found;
@@ -148,7 +146,7 @@ async fn a_position_is_the_drives_own_move() {
     assert_eq!(sent.max_speed.0, 400);
     assert!((sent.angle.degrees() - start - 90.0).abs() < 0.02);
     let angle = async || page.read(rmd(2), &["multi_turn_angle_degrees"]).await[0].0.unwrap();
-    let end = std::time::Instant::now() + world::LIMIT;
+    let end = std::time::Instant::now() + crate::world::LIMIT;
     while (angle().await - start - 90.0).abs() > 2.0 {
         assert!(std::time::Instant::now() < end);
     }
@@ -319,7 +317,7 @@ async fn no_start_follows_a_stop_that_comes_while_a_run_begins() {
     let is_stop = |bytes: &[u8]| bytes == [0x03, 0x02];
     let mut stopped_early = 0;
     for round in 0..20 {
-        let end = std::time::Instant::now() + world::LIMIT;
+        let end = std::time::Instant::now() + crate::world::LIMIT;
         while page.read(st(1), &["STATUS"]).await[0].1 != "IDLE" {
             assert!(std::time::Instant::now() < end, "the motor does not stop");
         }

@@ -1,14 +1,12 @@
 //! Writes, limits and settings files of pages, through a real share.
 
-mod world;
-
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use crate::world::{Page, World, act, rmd, st};
 use motorlink_monitor::message::{Answer, Ask, Mode};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{MotorName, Reason};
-use world::{Page, World, act, rmd, st};
 
 fn write(motor: MotorName, name: &str, value: f64, to_rom: bool) -> Ask {
     Ask::Write { motor, name: name.to_owned(), value, to_rom }
@@ -228,7 +226,7 @@ async fn a_restore_needs_a_motor_at_rest_and_a_file_for_it() {
         "{message}"
     );
     page.act(rmd(2), "off", &[]).await.unwrap();
-    let end = Instant::now() + world::LIMIT;
+    let end = Instant::now() + crate::world::LIMIT;
     while let Err(why) = page.ask(restore(rmd(2), &file)).await {
         assert!(why.message.contains("turns at") && Instant::now() < end, "{}", why.message);
     }

@@ -1,12 +1,10 @@
 //! The session that turns the motors of a page ends with a reason.
 
-mod world;
-
+use crate::world::{LIMIT, World, connect};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Reason, Text, decode};
 use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::time::timeout;
-use world::{LIMIT, World, connect};
 
 /// A speed of 360 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];

@@ -1,16 +1,14 @@
 //! The connection of the server to a share that ends and is started again.
 
-mod world;
-
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::world::{LIMIT, World};
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, Text, decode};
 use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::time::timeout;
-use world::{LIMIT, World};
 
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
 const STOP: u8 = 0x81;

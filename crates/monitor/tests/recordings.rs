@@ -1,7 +1,5 @@
 //! Recordings of a real share of simulated drives.
 
-mod world;
-
 use std::fs;
 use std::os::fd::BorrowedFd;
 use std::os::unix::fs::PermissionsExt;
@@ -10,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::world::{LIMIT, World, connect};
 use motorlink::port::{ByteLink, EventBytes, Evented, Link, PortError};
 use motorlink_monitor::message::{
     Answer, Ask, Condition, Phase, Recorded, RecordingContent, RecordingFile, RecordingPart,
@@ -22,7 +21,6 @@ use motorlink_telemetry::share::frame::{Kind, Reader};
 use motorlink_telemetry::share::message::{Reason, decode};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::time::timeout;
-use world::{LIMIT, World, connect};
 
 const PAGE: &str = "page 1";
 
@@ -36,7 +34,7 @@ struct Desk {
 
 impl Desk {
     async fn new(name: &str) -> Self {
-        let folder = world::path(name, "recordings");
+        let folder = crate::world::path(name, "recordings");
         Self::at(name, folder).await
     }
 
@@ -201,8 +199,8 @@ async fn motors_without_values_for_a_time_are_named() {
     let cut = Arc::clone(&is_cut);
     let around =
         move |link| -> Box<dyn EventBytes> { Box::new(Cable { link, is_cut: Arc::clone(&cut) }) };
-    let world = World::with("gaps", (Profile::Spec, world::PATIENT), around, |link| link);
-    let desk = Desk::of(world, world::path("gaps", "recordings")).await;
+    let world = World::with("gaps", (Profile::Spec, crate::world::PATIENT), around, |link| link);
+    let desk = Desk::of(world, crate::world::path("gaps", "recordings")).await;
     desk.record().await;
     let told = desk.told(|told| told.values > 200 && told.slowest.is_some()).await;
     assert_eq!(told.gaps, []);
@@ -273,7 +271,7 @@ async fn a_recording_that_starts_can_be_ended() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_folder_that_cannot_be_written_is_said() {
-    let below = world::path("folder", "missing").join("below");
+    let below = crate::world::path("folder", "missing").join("below");
     let desk = Desk::at("missing", below.clone()).await;
     let (reason, why) = desk.refused(Ask::Record { rate: None }).await;
     assert_eq!(reason, Reason::Usage);
@@ -319,7 +317,7 @@ async fn a_rate_that_is_not_possible_is_refused() {
 async fn names_lead_to_recordings_of_the_folder_only() {
     let desk = Desk::new("names").await;
     fs::create_dir(&desk.folder).unwrap();
-    let outside = world::path("names", "outside.mcap");
+    let outside = crate::world::path("names", "outside.mcap");
     fs::write(&outside, "secret").unwrap();
     std::os::unix::fs::symlink(&outside, desk.folder.join("link.mcap")).unwrap();
     fs::create_dir(desk.folder.join("folder.mcap")).unwrap();

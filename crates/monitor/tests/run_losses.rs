@@ -1,18 +1,16 @@
 //! Runs whose references get no reply: they continue, or the motor stops and the page gets the reason.
 
-mod world;
-
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::world::{LIMIT, Page, World, rmd};
 use motorlink::port::{CanLink, EventCan, Evented, Link, PortError};
 use motorlink_monitor::message::{Answer, Ask, Mode, Ran};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::Code;
 use motorlink_proto::st::Profile;
-use world::{LIMIT, Page, World, rmd};
 
 /// Below the time that a run waits for replies.
 const TIMEOUT: Duration = Duration::from_millis(150);

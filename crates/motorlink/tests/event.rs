@@ -1,21 +1,18 @@
 //! What the clients for event loops promise, driven by a loop of one descriptor.
 
-mod served;
-mod wire;
-
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::fd::BorrowedFd;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
+use crate::served::Served;
+use crate::wire::Fresh;
 use motorlink::port::{EventBytes, FdLink, PortError, PortName};
 use motorlink::rmd::{self, Code, MotorId, SpeedLimit};
 use motorlink::st::{self, Command, LimitError, Limits, Progress, RegisterId, Request};
 use motorlink::{BackOff, LinkState};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use served::Served;
-use wire::Fresh;
 
 /// Waits as an event loop does; what has no descriptor is asked again at once.
 fn wait(descriptor: Option<BorrowedFd<'_>>, time: Option<Duration>) {

@@ -1,18 +1,16 @@
 //! A link that does not want to wait any longer: the exchange is given up, and nothing else.
 
-mod served;
-
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
+use crate::served::Served;
 use motorlink::LinkState;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, Link, PortError};
 use motorlink::rmd::{self};
 use motorlink::st::{self, Error, Options, register};
-use served::Served;
 
 /// The flag that interrupts a call, and the number of times the port was opened.
 #[derive(Clone, Default)]

@@ -1,17 +1,15 @@
 //! A client that is used from within its own wait, as a signal's handler does.
 
-mod wire;
-
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, mpsc};
 use std::thread;
 use std::time::Duration;
 
+use crate::wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 use motorlink::can::CanFrame;
 use motorlink::port::PortError;
 use motorlink::rmd::{self};
 use motorlink::st::{self, Command, register};
-use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 
 /// Longer than any test waits for a condition.
 const LONG: Duration = Duration::from_secs(60);

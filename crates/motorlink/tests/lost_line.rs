@@ -1,13 +1,11 @@
 //! What stops a motor does not wait until a lost line has recovered.
 
-mod wire;
-
 use std::time::Duration;
 
+use crate::wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 use motorlink::st::{
     Client, Command, EventClient, Options, Progress, Request, SyncState, register,
 };
-use wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 
 /// GET_BOARD_INFO and GET_REVUP_DATA: the questions of recovery.
 const INFO: [u8; 3] = [0x06, 0x00, 0x06];

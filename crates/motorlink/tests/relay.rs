@@ -1,15 +1,13 @@
 //! The relay behind `motorlink guard`, without a process of its own.
 
-mod served;
-
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
+use crate::served::Served;
 use motorlink::relay::{Event, Part, Reason, Relay, RelayError, RelayOptions};
 use motorlink::rmd::StopAction;
 use motorlink::st::{Client, Options, Status};
-use served::Served;
 
 const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
 const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];

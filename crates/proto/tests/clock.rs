@@ -1,17 +1,13 @@
 //! A clock that is set back, as by a counter of 32 bits that wraps around.
 
-mod common;
-mod rmd_bench;
-mod st_bench;
-
-use common::{Memory, SlaveFixture, answer};
+use crate::common::{Memory, SlaveFixture, answer};
+use crate::rmd_bench::{Node, motor, trusted_host};
+use crate::st_bench::{MS, STATUS, master};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{self, *};
 use motorlink_proto::st::{self, Profile, Recovery};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
-use rmd_bench::{Node, motor, trusted_host};
-use st_bench::{MS, STATUS, master};
 
 /// The last moment of a counter of 32 bits.
 const LAST: Instant = Instant(u32::MAX as u64);

@@ -1,12 +1,10 @@
 //! The replies, settings and modes of a drive.
 
-mod rmd_bench;
-
+use crate::rmd_bench::{Node, motor};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
-use rmd_bench::{Node, motor};
 
 const SHIPPED: Pid = Pid {
     position_kp: 100,

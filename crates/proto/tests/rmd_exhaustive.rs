@@ -1,11 +1,9 @@
 //! Every code with every value of every byte, through drive and host.
 
-mod rmd_bench;
-
+use crate::rmd_bench::{Node, motor, trusted_host};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Instant;
-use rmd_bench::{Node, motor, trusted_host};
 
 /// The values of the bytes that are not varied.
 const PATTERNS: [u8; 3] = [0x00, 0xFF, 0x5A];

@@ -1,12 +1,10 @@
 //! The host against drives on a virtual clock.
 
-mod rmd_bench;
-
+use crate::rmd_bench::{Pair, motor, trusted_host};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
-use rmd_bench::{Pair, motor, trusted_host};
 
 fn temperature(reply: &[u8; 8]) -> i8 {
     MotionStatus::decode(reply).temperature.0

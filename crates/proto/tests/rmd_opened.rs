@@ -1,13 +1,11 @@
 //! Motors with pending replies to a former host, and adapters that echo (SPEC-NOTES R29).
 
-mod rmd_bench;
-
+use crate::rmd_bench::{Node, Pair, motor, trusted_host};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::Celsius;
 use proptest::prelude::*;
-use rmd_bench::{Node, Pair, motor, trusted_host};
 
 const SPEED: [u8; 8] = [0xA2, 0, 0, 0, 0x10, 0x27, 0, 0];
 

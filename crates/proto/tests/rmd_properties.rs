@@ -1,12 +1,10 @@
 //! Properties of any frames in any order.
 
-mod rmd_bench;
-
+use crate::rmd_bench::{Node, motor, trusted_host};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
-use rmd_bench::{Node, motor, trusted_host};
 use std::collections::HashMap;
 
 fn any_frame() -> impl Strategy<Value = CanFrame> {

@@ -1,8 +1,6 @@
 //! Every header with every length, in both directions.
 
-mod model;
-
-use model::{Twins, framed};
+use crate::model::{Twins, framed};
 use motorlink_proto::st::*;
 use motorlink_proto::time::Instant;
 
@@ -31,7 +29,7 @@ fn the_slave_answers_every_header_and_length_as_the_model_does() {
                     }
                 }
                 for length in 129..=255 {
-                    assert_eq!(twins.bytes(&[header, length]), []);
+                    assert_eq!(twins.bytes(&[header, length]), [0_u8; 0]);
                     twins.wait(25_000);
                     twins.poll();
                     twins.overrun();

@@ -1,8 +1,6 @@
 //! Frames under every prefix, bit flips and noise.
 
-mod common;
-
-use common::{Memory, SlaveFixture, answer};
+use crate::common::{Memory, SlaveFixture, answer};
 use motorlink_proto::st::*;
 use motorlink_proto::time::Micros;
 use proptest::prelude::*;

@@ -1,12 +1,9 @@
 //! The master alone and with a slave, on a virtual clock.
 
-mod common;
-mod st_bench;
-
+use crate::st_bench::{MS, Pair, STATUS, master};
 use motorlink_proto::st::*;
 use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
-use st_bench::{MS, Pair, STATUS, master};
 
 #[test]
 fn an_exchange_is_sent_once_and_ends_with_the_payload() {

@@ -1,8 +1,6 @@
 //! The slave against its model, byte for byte.
 
-mod model;
-
-use model::Twins;
+use crate::model::Twins;
 use motorlink_proto::st::Profile;
 use proptest::prelude::*;
 

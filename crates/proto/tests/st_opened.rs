@@ -1,12 +1,9 @@
 //! A line that was just opened: pending replies to a former master, and echoes (SPEC-NOTES S16).
 
-mod common;
-mod st_bench;
-
+use crate::st_bench::{MS, Pair, STATUS};
 use motorlink_proto::st::*;
 use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
-use st_bench::{MS, Pair, STATUS};
 
 const INFO: [u8; 3] = [0x06, 0x00, 0x06];
 const GET_STATUS: [u8; 4] = [0x02, 0x01, 0x02, 0x05];
@@ -38,7 +35,7 @@ fn three_questions_bring_a_just_opened_line_in_sync() {
 
 #[test]
 fn a_trusted_line_gets_the_request_at_once() {
-    for master in [opened(Recovery::None), st_bench::master(Recovery::Drain)] {
+    for master in [opened(Recovery::None), crate::st_bench::master(Recovery::Drain)] {
         let mut pair = pair(Recovery::Drain, Micros(0));
         pair.master = master;
         assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));

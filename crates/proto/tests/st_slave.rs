@@ -1,8 +1,6 @@
 //! The slave against the document's paragraphs, on a virtual clock.
 
-mod common;
-
-use common::{Memory, SlaveFixture, all_features, answer};
+use crate::common::{Memory, SlaveFixture, all_features, answer};
 use motorlink_proto::st::register::{Access, Origin};
 use motorlink_proto::st::*;
 use motorlink_proto::time::{Instant, Micros};
@@ -73,7 +71,7 @@ fn target_motor_counts_from_zero_and_refuses_missing_motors() {
 fn a_frame_that_is_not_whole_after_25_ms_is_answered_with_timeout() {
     for cut in 1..GET_STATUS.len() {
         let mut bench = spec();
-        assert_eq!(bench.bytes(&GET_STATUS[..cut]), []);
+        assert_eq!(bench.bytes(&GET_STATUS[..cut]), [0_u8; 0]);
         let deadline = bench.slave.deadline().expect("a frame is under way");
         assert_eq!(deadline, Instant(25_000));
         assert_eq!(bench.slave.poll(Instant(24_999)), None);
@@ -100,10 +98,14 @@ fn a_byte_behind_the_deadline_begins_a_new_command() {
 fn a_length_over_128_is_answered_with_timeout_after_25_ms_of_silence() {
     let mut bench = spec();
     for length in 129..=255u8 {
-        assert_eq!(bench.bytes(&[0x02, length]), []);
+        assert_eq!(bench.bytes(&[0x02, length]), [0_u8; 0]);
         for _ in 0..20 {
             bench.now += Micros::from_millis(20);
-            assert_eq!(bench.bytes(&GET_STATUS), [], "the slave drops all bytes until silence");
+            assert_eq!(
+                bench.bytes(&GET_STATUS),
+                [0_u8; 0],
+                "the slave drops all bytes until silence"
+            );
         }
         bench.now += Micros::from_millis(25);
         let reply = bench.slave.poll(bench.now).expect("a NACK is due").to_vec();
@@ -124,7 +126,7 @@ fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
     assert_eq!((bench.slave.deadline(), bench.slave.is_receiving()), (None, true));
     assert_eq!(answer(&bench.bytes(&GET_STATUS[3..])), Ok(vec![0]));
     assert!(!bench.slave.is_receiving());
-    assert_eq!(bench.bytes(&[0x02, 128]), []);
+    assert_eq!(bench.bytes(&[0x02, 128]), [0_u8; 0]);
     assert!(!bench.slave.is_receiving());
     assert_eq!(answer(&bench.bytes(&GET_STATUS)), Ok(vec![0]), "the next byte is a header");
 }

@@ -1,8 +1,6 @@
 //! Writes that are read back.
 
-mod common;
-
-use common::{Memory, SlaveFixture};
+use crate::common::{Memory, SlaveFixture};
 use motorlink_proto::st::*;
 
 const KP: RegisterId = RegisterId::SPEED_KP;
@@ -54,7 +52,7 @@ fn write(
 }
 
 fn bench(profile: Profile) -> SlaveFixture {
-    SlaveFixture::new(profile, 2, Memory::with(common::all_features()))
+    SlaveFixture::new(profile, 2, Memory::with(crate::common::all_features()))
 }
 
 #[test]

@@ -1,8 +1,5 @@
 //! The engine of a line against simulated drives on virtual time.
 
-mod engine;
-mod got;
-
 use std::sync::Arc;
 
 use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, SetSpeed, Stop};
@@ -18,8 +15,8 @@ use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Subscription};
 use motorlink_testbench::{Bench, BenchConfig};
 
-use engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
-use got::Got;
+use crate::engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
+use crate::got::Got;
 
 const CENTISECOND: Micros = Micros(10_000);
 
@@ -36,11 +33,6 @@ fn rmd_engine(bench: &Bench, faults: &str) -> Engine {
 impl Engine {
     fn command(&mut self, request: Request) -> Result<CommandId, CommandError> {
         self.acquisition.command(&"test".into(), request, SECOND)
-    }
-
-    fn stop(&mut self, request: Request) -> CommandId {
-        let ended = &mut self.ended;
-        self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
     }
 
     fn latch(&mut self) {

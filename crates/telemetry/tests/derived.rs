@@ -1,8 +1,5 @@
 //! Values that are computed from two others, against simulated motors on virtual time.
 
-mod engine;
-mod got;
-
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Mutex};
@@ -25,8 +22,8 @@ use motorlink_telemetry::schedule::{Lane, LineRules};
 use motorlink_telemetry::signal::Signal;
 use motorlink_telemetry::subscription::Record;
 
-use engine::{Engine, Polled, SECOND, bench, rmd, signals, spec};
-use got::Got;
+use crate::engine::{Engine, Polled, SECOND, bench, rmd, signals, spec};
+use crate::got::Got;
 
 const CENTISECOND: Micros = Micros(10_000);
 const PRODUCT: &str = "voltage_times_iq_va";

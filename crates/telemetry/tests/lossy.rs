@@ -1,7 +1,5 @@
 //! Lines that lose bytes, delay them or bring replies twice: how much is read, and that nothing wrong is.
 
-mod engine;
-
 use std::time::Duration;
 
 use motorlink::port::{ByteLink, Link, PortError};
@@ -14,7 +12,7 @@ use motorlink_telemetry::rows::{Item, Rows};
 use motorlink_telemetry::signal::Signal;
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 
-use engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
+use crate::engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
 
 /// An engine on a bad line needs no finer steps.
 const STEP: Micros = Micros(500);

@@ -1,7 +1,5 @@
 //! Commands and stops while the client below the engine recovers its line, on virtual time.
 
-mod engine;
-
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -18,7 +16,7 @@ use motorlink_telemetry::line::{Reply, Request};
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::subscription::Record;
 
-use engine::{Engine, SECOND, bench, signals, spec, st, st_options};
+use crate::engine::{Engine, SECOND, bench, signals, spec, st, st_options};
 
 /// When something was sent.
 type Sent = (Instant, Vec<u8>);
@@ -103,29 +101,24 @@ fn rmd_engine() -> (Engine, Wire) {
 }
 
 impl Engine {
-    fn command(&mut self, request: Request, time_to_live: Micros) -> CommandId {
+    fn send(&mut self, request: Request, time_to_live: Micros) -> CommandId {
         self.acquisition.command(&"test".into(), request, time_to_live).unwrap()
     }
 
-    fn stop(&mut self, request: Request) -> CommandId {
-        let ended = &mut self.ended;
-        self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
-    }
-
-    fn result(&self, id: CommandId) -> &Result<Reply, CommandError> {
+    fn end_of(&self, id: CommandId) -> &Result<Reply, CommandError> {
         let ended = self.ended.iter().find(|(ended, _)| *ended == id);
         &ended.unwrap_or_else(|| panic!("{id:?} is not over: {:?}", self.ended)).1
     }
 
     /// A reply is lost. It may still come, so the client recovers the line with the next request.
     fn lose_line(&mut self, wire: &Wire, read: Request) {
-        let synced = self.command(read.clone(), SECOND);
+        let synced = self.send(read.clone(), SECOND);
         self.run(Micros(5 * SECOND.0));
-        assert!(self.result(synced).is_ok(), "{:?}", self.ended);
+        assert!(self.end_of(synced).is_ok(), "{:?}", self.ended);
         wire.mute(true);
-        let lost = self.command(read, SECOND);
+        let lost = self.send(read, SECOND);
         self.run(Micros(5 * SECOND.0));
-        assert!(self.result(lost).is_err(), "{:?}", self.ended);
+        assert!(self.end_of(lost).is_err(), "{:?}", self.ended);
         wire.mute(false);
     }
 }
@@ -152,9 +145,9 @@ fn a_start_is_not_sent_after_its_time_to_live_when_a_line_was_recovered() {
     let (mut engine, wire) = st_engine();
     engine.lose_line(&wire, read_status(1));
     let events = engine.subscribe(&[], SECOND);
-    let start = engine.command(execute(Command::StartMotor), Micros(2_000));
+    let start = engine.send(execute(Command::StartMotor), Micros(2_000));
     engine.run(Micros(5 * SECOND.0));
-    assert!(matches!(engine.result(start), Err(CommandError::Expired)), "{:?}", engine.ended);
+    assert!(matches!(engine.end_of(start), Err(CommandError::Expired)), "{:?}", engine.ended);
     assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
     // No event says that it was sent.
     while let Some(record) = events.take() {
@@ -162,9 +155,9 @@ fn a_start_is_not_sent_after_its_time_to_live_when_a_line_was_recovered() {
         assert!(!matches!(event.what, What::Commanded(..)), "{event:?}");
     }
     // The line has been recovered.
-    let start = engine.command(execute(Command::StartMotor), Micros(2_000));
+    let start = engine.send(execute(Command::StartMotor), Micros(2_000));
     engine.run(SECOND);
-    assert!(engine.result(start).is_ok(), "{:?}", engine.ended);
+    assert!(engine.end_of(start).is_ok(), "{:?}", engine.ended);
 }
 
 #[test]
@@ -174,19 +167,19 @@ fn commands_that_expire_do_not_keep_a_line_from_being_recovered() {
     let ramp = Ramp { speed_rpm: 900, duration_ms: 100 };
     let mut last = None;
     for _ in 0..3_000 {
-        last = Some(engine.command(Request::st(1, St::SetRamp(ramp)), Micros(1_000)));
+        last = Some(engine.send(Request::st(1, St::SetRamp(ramp)), Micros(1_000)));
         engine.run(Micros(2_000));
     }
     engine.run(SECOND);
-    assert!(engine.result(last.unwrap()).is_ok(), "{:?}", engine.ended.last());
+    assert!(engine.end_of(last.unwrap()).is_ok(), "{:?}", engine.ended.last());
 }
 
 #[test]
 fn a_stop_does_not_wait_for_the_recovery_of_a_poll() {
     let (mut engine, wire) = st_engine();
     engine.lose_line(&wire, read_status(1));
-    let start = engine.command(execute(Command::StartMotor), SECOND);
-    let other = engine.command(Request::st(2, St::GetRegister(RegisterId::STATUS)), SECOND);
+    let start = engine.send(execute(Command::StartMotor), SECOND);
+    let other = engine.send(Request::st(2, St::GetRegister(RegisterId::STATUS)), SECOND);
     engine.subscribe(&signals(st(1), &["SPEED_MEAS"]), Micros(10_000));
     engine.run(Micros(1_000));
     let asked = engine.clock.now();
@@ -194,9 +187,9 @@ fn a_stop_does_not_wait_for_the_recovery_of_a_poll() {
     engine.run(Micros(5 * SECOND.0));
     let first = wire.times(&frame_of(Command::StopMotor))[0];
     assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
-    assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
-    assert!(matches!(engine.result(start), Err(CommandError::Overtaken)), "{:?}", engine.ended);
-    assert!(engine.result(other).is_ok(), "{:?}", engine.ended);
+    assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
+    assert!(matches!(engine.end_of(start), Err(CommandError::Overtaken)), "{:?}", engine.ended);
+    assert!(engine.end_of(other).is_ok(), "{:?}", engine.ended);
     assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
 }
 
@@ -204,14 +197,14 @@ fn a_stop_does_not_wait_for_the_recovery_of_a_poll() {
 fn a_read_that_was_not_sent_gives_way_to_a_stop() {
     let (mut engine, wire) = st_engine();
     engine.lose_line(&wire, read_status(1));
-    let read = engine.command(read_status(2), SECOND);
+    let read = engine.send(read_status(2), SECOND);
     engine.run(Micros(1_000));
     let asked = engine.clock.now();
     engine.stop(execute(Command::StopMotor));
     engine.run(Micros(5 * SECOND.0));
     let first = wire.times(&frame_of(Command::StopMotor))[0];
     assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
-    assert!(matches!(engine.result(read), Err(CommandError::Overtaken)), "{:?}", engine.ended);
+    assert!(matches!(engine.end_of(read), Err(CommandError::Overtaken)), "{:?}", engine.ended);
 }
 
 #[test]
@@ -222,10 +215,10 @@ fn a_request_that_no_line_takes_is_over_at_once() {
     let turn = SetSpeed { speed: CentiDps::from_dps(360.0) };
     let refused =
         [Request::rmd(id, &turn), Request::st(9, St::ExecuteCommand(Command::StartMotor))];
-    let refused = refused.map(|request| engine.command(request, SECOND));
+    let refused = refused.map(|request| engine.send(request, SECOND));
     engine.run(Micros(5 * SECOND.0));
     for id in refused {
-        assert!(matches!(engine.result(id), Err(CommandError::Line(_))), "{:?}", engine.ended);
+        assert!(matches!(engine.end_of(id), Err(CommandError::Line(_))), "{:?}", engine.ended);
     }
 }
 
@@ -236,20 +229,20 @@ fn motion_is_not_sent_after_its_time_to_live_when_a_motor_was_silent() {
     engine.lose_line(&wire, Request::rmd(id, &ReadStatus));
     let turn = Request::rmd(id, &SetSpeed { speed: CentiDps::from_dps(360.0) });
     wire.mute(true);
-    let lost = engine.command(Request::rmd(id, &ReadStatus), SECOND);
+    let lost = engine.send(Request::rmd(id, &ReadStatus), SECOND);
     engine.run(Micros(200_000));
-    assert!(engine.result(lost).is_err());
+    assert!(engine.end_of(lost).is_err());
     wire.mute(false);
-    let late = engine.command(turn.clone(), Micros(100));
+    let late = engine.send(turn.clone(), Micros(100));
     engine.run(Micros(5 * SECOND.0));
-    assert!(matches!(engine.result(late), Err(CommandError::Expired)), "{:?}", engine.ended);
+    assert!(matches!(engine.end_of(late), Err(CommandError::Expired)), "{:?}", engine.ended);
     assert_eq!(wire.times(&[Code::SetSpeed.into()]), []);
-    let again = engine.command(turn, SECOND);
+    let again = engine.send(turn, SECOND);
     engine.run(SECOND);
-    assert!(engine.result(again).is_ok(), "{:?}", engine.ended);
+    assert!(engine.end_of(again).is_ok(), "{:?}", engine.ended);
     let stop = engine.stop(Request::rmd(id, &Stop));
     engine.run(SECOND);
-    assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+    assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
 }
 
 #[test]
@@ -267,6 +260,6 @@ fn each_motor_of_a_lost_line_gets_its_stop_at_once() {
         assert!(first.since(asked) <= Micros(1_000), "{motor}: {:?}", first.since(asked));
     }
     for stop in stops {
-        assert!(engine.result(stop).is_ok(), "{:?}", engine.ended);
+        assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
     }
 }

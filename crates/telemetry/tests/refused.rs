@@ -1,8 +1,5 @@
 //! Registers that a drive refuses, and values of the other profile.
 
-mod engine;
-mod got;
-
 use std::sync::Arc;
 
 use motorlink_proto::st::Profile;
@@ -12,8 +9,8 @@ use motorlink_telemetry::line::LineError;
 use motorlink_telemetry::signal::Signal;
 use motorlink_testbench::{Bench, BenchConfig};
 
-use engine::{Engine, SECOND, bench, signals, spec, st, st_options};
-use got::Got;
+use crate::engine::{Engine, SECOND, bench, signals, spec, st, st_options};
+use crate::got::Got;
 
 const CENTISECOND: Micros = Micros(10_000);
 

@@ -1,13 +1,11 @@
 //! The engine in a thread, against simulated drives on ptys.
 
-mod drives;
-
 use std::collections::BTreeMap;
 use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drives::served;
+use crate::drives::served;
 use motorlink::rmd::EventClient;
 use motorlink_link::port::{CanLink, EventCan, Evented, Link, PortError};
 use motorlink_proto::can::CanFrame;

@@ -1,7 +1,5 @@
 //! Stops while polling is saturated.
 
-mod engine;
-
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -15,7 +13,7 @@ use motorlink_telemetry::line::Request;
 use motorlink_telemetry::signal::Signal;
 use motorlink_telemetry::subscription::Record;
 
-use engine::{Engine, SECOND, bench, rmd, signals, spec, st as st_motor, st_options};
+use crate::engine::{Engine, SECOND, bench, rmd, signals, spec, st as st_motor, st_options};
 
 const CENTISECOND: Micros = Micros(10_000);
 

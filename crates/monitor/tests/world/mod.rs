@@ -1,5 +1,4 @@
 //! A share of simulated drives on ptys, what is on its wires, and a page.
-#![allow(dead_code, reason = "each test uses a part")]
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,7 +45,6 @@ pub struct Page {
     pub drives: Drives,
     pub view: Program,
     pub drive: Drive,
-    pub viewing: Mutex<Option<tokio::task::JoinHandle<()>>>,
 }
 
 /// The session of a page that moves motors.
@@ -163,12 +161,12 @@ impl World {
 
     /// A page, with the drives of a server of its own.
     pub async fn page(&self) -> Page {
-        let (view, listening) = connect(&self.path, "page").await;
+        let (view, _) = connect(&self.path, "page").await;
         let Ok(share::Answer::Lines { lines, .. }) = view.ask(share::Ask::Lines).await else {
             panic!("no lines")
         };
         let drives = Drives::new(lines);
-        Page { drives, view, drive: Drive::new(&self.path), viewing: Mutex::new(Some(listening)) }
+        Page { drives, view, drive: Drive::new(&self.path) }
     }
 
     /// Another page of the same server.

@@ -1,5 +1,4 @@
 //! A drive that stores the values of its commands, and a slave that receives whole frames.
-#![allow(dead_code)]
 
 use std::collections::HashMap;
 

@@ -1,5 +1,4 @@
 //! A host and drives on one simulated bus and a virtual clock.
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;

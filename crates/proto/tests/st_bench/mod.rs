@@ -1,5 +1,4 @@
 //! Master and slave on a line with a virtual clock.
-#![allow(dead_code)]
 
 use std::collections::VecDeque;
 

@@ -13,7 +13,7 @@ use motorlink_proto::st::{MotorNumber, Profile};
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::CommandError;
-use motorlink_telemetry::line::{Reply, RmdLine, StLine};
+use motorlink_telemetry::line::{Reply, Request, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal};
@@ -105,6 +105,11 @@ impl Engine {
                 self.clock.wait(self.clock.now() + self.step);
             }
         }
+    }
+
+    pub fn stop(&mut self, request: Request) -> CommandId {
+        let ended = &mut self.ended;
+        self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
     }
 
     pub fn subscribe(&mut self, signals: &[Signal], period: Micros) -> Subscription {

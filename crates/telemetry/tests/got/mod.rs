@@ -1,5 +1,4 @@
 //! What a consumer got.
-#![allow(dead_code, reason = "no test needs all of it")]
 
 use motorlink_proto::time::Instant;
 use motorlink_telemetry::event::What;

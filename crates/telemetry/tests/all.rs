@@ -1,0 +1,14 @@
+//! One program of the tests that need none of their own: each more has to be linked.
+
+mod acquisition;
+mod derived;
+mod drives;
+mod engine;
+mod got;
+mod lossy;
+mod recovery;
+mod refused;
+mod relayed;
+mod runner;
+mod saturated;
+mod schedule;
