@@ -94,7 +94,9 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
 unit: ## 5 min: tests in Rust
-	$(CARGO) --config "target.'cfg(unix)'.runner = '$(CURDIR)/tests/measured'" test --workspace --all-features --locked $(T)
+	$(CARGO) --config "target.'cfg(unix)'.runner = '$(CURDIR)/tests/measured'" test --workspace --all-features --locked \
+		$(or $(T),--lib --bins --tests --examples)
+	$(if $(T),,$(CARGO) test --workspace --all-features --locked --doc)
 
 python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .

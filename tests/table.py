@@ -12,7 +12,7 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[1]
 PARTS = REPOSITORY / "target/parts"
 PAGE = REPOSITORY / "docs/CHECKS.md"
-FOLDERS = {"e2e": "tests/e2e", "python": "bindings/python/tests", "pages": "tests/pages", "firmware-test": "tests/firmware"}
+OF_PYTEST = ["e2e", "python", "pages", "firmware-test"]
 #: Files that cost less are one row of each part, s.
 LEAST = 10
 
@@ -28,9 +28,10 @@ def of_pytest(part):
     """Tests, seconds and seconds of the processor of each file."""
     rows = defaultdict(lambda: [0, 0.0, 0.0])
     for case in xml.parse(PARTS / f"{part}.xml").iter("testcase"):
-        name = case.get("classname").replace(".", "/").split("/")
-        file = next(at for at in range(len(name), 0, -1) if (REPOSITORY / FOLDERS[part] / ("/".join(name[:at]) + ".py")).exists())
-        row = rows[f"{FOLDERS[part]}/{'/'.join(name[:file])}.py"]
+        # A class in the file may be behind it.
+        name = Path(case.get("classname").replace(".", "/") + ".py")
+        file = next((it for it in (name, name.parent.with_suffix(".py")) if (REPOSITORY / it).exists()), name)
+        row = rows[str(file)]
         used = [it.get("value") for it in case.iter("property") if it.get("name") == "processor"]
         row[0] += 1
         row[1] += float(case.get("time"))
@@ -70,7 +71,7 @@ def of_playwright():
 
 
 def main():
-    parts = {"unit": of_cargo(), **{part: of_pytest(part) for part in FOLDERS}, "browser": of_playwright()}
+    parts = {"unit": of_cargo(), **{part: of_pytest(part) for part in OF_PYTEST}, "browser": of_playwright()}
     lines = ["| file | part | tests | seconds | of the processor | promise |", "|---|---|--:|--:|--:|---|"]
     for part, rows in parts.items():
         dear = {file: row for file, row in rows.items() if row[1] >= LEAST}
