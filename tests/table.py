@@ -21,7 +21,7 @@ def promise(path):
     """The first sentence of a file."""
     text = path.read_text()
     found = re.match(r'(?:#!.*\n)?(?:r?"""|//! |/\*\* |// )((?:.|\n(?!\n))+?)(?:\.\s|\.$|:\s|\n\n|"""|\*/)', text)
-    return " ".join(re.sub(r"\n(?://!|//| \*)? ?", " ", found[1]).split()) if found else ""
+    return " ".join(re.sub(r"\n(?://!|//| \*)? ?", " ", found[1]).split()).rstrip(".") if found else ""
 
 
 def of_pytest(part):
