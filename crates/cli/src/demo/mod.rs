@@ -8,6 +8,7 @@ mod story;
 mod table;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use motorlink::{rmd, st};
 
@@ -37,15 +38,12 @@ pub struct Args {
 pub fn run(args: Args) -> Result<(), Failure> {
     interrupt::take_over();
     let drives = Drives::start()?;
-    let st = st::Client::open(&drives.st.parse()?, st::Options::default())?;
-    let bus = rmd::Client::open(
-        &drives.rmd.parse()?,
-        rmd::Options {
-            // On a busy machine the simulator may answer later than a motor would.
-            timeout: std::time::Duration::from_millis(500),
-            ..rmd::Options::default()
-        },
-    )?;
+    // On a busy machine the simulator may answer later than a drive would.
+    let timeout = Duration::from_secs(3);
+    let patient = st::Options { timeout, ..st::Options::default() };
+    let st = st::Client::open(&drives.st.parse()?, patient)?;
+    let patient = rmd::Options { timeout, ..rmd::Options::default() };
+    let bus = rmd::Client::open(&drives.rmd.parse()?, patient)?;
     // These stop the motors however the demo ends.
     let _st_guard = st.stop_on_drop().reporting(|stopped| match &stopped.result {
         Ok(()) => note(format!("ST {} acknowledged its stop", stopped.motor)),
