@@ -5,7 +5,7 @@ The mutants in Rust are a sample of those that cargo-mutants makes, drawn with a
 build: schemata.py says how. One run of all tests shows which test reaches which mutant, and a mutant is tested
 by those only, the cheapest first. Those of by_hand.toml, which people made in Python and in the page, are made one
 after the other. A test notices a mutant if it fails twice with it. results.json has the test that noticed each
-mutant, "" if none did, as soon as that is known: so a run that was ended goes on where it was.
+mutant, "" if none did, as soon as that is known: so an interrupted run can be continued.
 """
 
 import argparse
@@ -13,7 +13,6 @@ import contextlib
 import json
 import os
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -53,11 +52,6 @@ def run(command, limit=LIMIT, **variables):
         os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     return process.returncode == 0, text
-
-
-def processor():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def must(command, **variables):
@@ -124,11 +118,10 @@ class Tests:
         ]:
             folder = REACHED / name.replace(" ", "/")
             folder.mkdir(parents=True, exist_ok=True)
-            begun, before = time.monotonic(), processor()
+            begun = time.monotonic()
             passed, text = test(MUTANTS_REACHED=str(folder))
             seconds[name] = time.monotonic() - begun
-            print(f"{name}: {seconds[name]:.0f} s, {processor() - before:.0f} s of processor"
-                  f"{'' if passed else ', FAILED without a mutant'}", flush=True)  # fmt: skip
+            print(f"{name}: {seconds[name]:.0f} s{'' if passed else ', FAILED without a mutant'}", flush=True)
             if not passed:
                 print(text[-1500:], flush=True)
             for file in folder.iterdir():
@@ -214,13 +207,13 @@ def main():
 
     if given.again or not drawn or None in drawn.values():
         mutants = schemata.sample(TREE, given.seed, given.count, list(drawn))
-        drawn |= {it["name"]: drawn.get(it["name"]) for it in mutants}
+        # Without those whose code is gone.
+        drawn = record[f"seed {given.seed}"] = {it["name"]: drawn.get(it["name"]) for it in mutants}
         tests = Tests(mutants)
         todo = [(number, it) for number, it in enumerate(mutants, 1) if given.again or drawn[it["name"]] is None]
         # Most tests wait.
         with ThreadPoolExecutor(2) as workers:
-            notice = lambda it: tell(drawn, it[1]["name"], tests.notice(it[0], it[1]["package"]))  # noqa: E731
-            list(workers.map(notice, todo))
+            list(workers.map(lambda it: tell(drawn, it[1]["name"], tests.notice(it[0], it[1]["package"])), todo))
     schemata.restore(TREE)
     for mutant in made:
         if given.again or mutant["name"] not in of_people:

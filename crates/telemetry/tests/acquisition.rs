@@ -39,10 +39,6 @@ impl Engine {
         let ended = &mut self.ended;
         self.acquisition.latch(&"operator".into(), &mut |id, result| ended.push((id, result)));
     }
-
-    fn result(&self, id: CommandId) -> Option<&Result<Reply, CommandError>> {
-        self.ended.iter().find(|(ended, _)| *ended == id).map(|(_, result)| result)
-    }
 }
 
 #[test]

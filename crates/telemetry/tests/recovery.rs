@@ -106,8 +106,7 @@ impl Engine {
     }
 
     fn end_of(&self, id: CommandId) -> &Result<Reply, CommandError> {
-        let ended = self.ended.iter().find(|(ended, _)| *ended == id);
-        &ended.unwrap_or_else(|| panic!("{id:?} is not over: {:?}", self.ended)).1
+        self.result(id).unwrap_or_else(|| panic!("{id:?} is not over: {:?}", self.ended))
     }
 
     /// A reply is lost. It may still come, so the client recovers the line with the next request.

@@ -112,6 +112,11 @@ impl Engine {
         self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
     }
 
+    /// How a command or a stop ended, if it has.
+    pub fn result(&self, id: CommandId) -> Option<&Result<Reply, CommandError>> {
+        self.ended.iter().find(|(ended, _)| *ended == id).map(|(_, result)| result)
+    }
+
     pub fn subscribe(&mut self, signals: &[Signal], period: Micros) -> Subscription {
         let subscription = Subscription::new(1_000_000, Full::DropNewest);
         let wants: Wants = signals.iter().map(|signal| (*signal, period)).collect();

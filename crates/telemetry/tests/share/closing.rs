@@ -10,7 +10,9 @@ use crate::stopping::{
 };
 use motorlink_telemetry::share::message::*;
 
-fn stands(share: &Share) {
+/// Opens the port of st0 again. Its motor stops then.
+fn stands_once_opened(share: &Share, program: &mut Asker, port: &str) {
+    program.ask(open(port, Protocol::St)).unwrap();
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
 }
 
@@ -27,8 +29,7 @@ fn a_port_that_is_opened_under_a_latch_has_its_motors_stopped() {
     program.ask(close("st0")).unwrap();
     program.ask(Ask::Latch).unwrap();
     cut.store(false, Ordering::SeqCst);
-    program.ask(open(&port, Protocol::St)).unwrap();
-    stands(&share);
+    stands_once_opened(&share, &mut program, &port);
 }
 
 #[test]
@@ -40,8 +41,7 @@ fn a_stop_of_a_port_that_was_closed_is_sent_when_it_is_opened() {
     assert_eq!(stopped, motors("st0", &[(ANY_MOTOR, "may turn")]));
     program.ask(close("st0")).unwrap();
     cut.store(false, Ordering::SeqCst);
-    program.ask(open(&port, Protocol::St)).unwrap();
-    stands(&share);
+    stands_once_opened(&share, &mut program, &port);
 }
 
 #[test]
@@ -63,8 +63,7 @@ fn a_stop_of_all_names_a_port_that_is_being_closed() {
     let Ok(Answer::Close { motors }) = program.end_of(closing) else { panic!() };
     assert!(motors[0].failure.is_some(), "{motors:?}");
     cut.store(false, Ordering::SeqCst);
-    other.ask(open(&port, Protocol::St)).unwrap();
-    stands(&share);
+    stands_once_opened(&share, &mut other, &port);
 }
 
 #[test]
@@ -80,6 +79,5 @@ fn a_line_that_is_closed_during_a_stop_owes_it() {
     let failed = motors.iter().filter(|one| one.failure.is_some());
     assert_eq!(failed.map(|one| one.motor.motor).collect::<Vec<_>>(), [2]);
     // The port is opened without the cable.
-    program.ask(open(&port, Protocol::St)).unwrap();
-    stands(&share);
+    stands_once_opened(&share, &mut program, &port);
 }

@@ -22,6 +22,8 @@ pub const READ_STATUS: [u8; 2] = [2, 2];
 /// EXECUTE_CMD START_MOTOR.
 pub const START: [u8; 2] = [3, 1];
 
+type SerialLine = Box<dyn EventBytes>;
+
 /// What becomes of a request on its way to the drive.
 type Passes = dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync;
 
@@ -117,12 +119,8 @@ pub fn share_of_a_turning_motor(begins_cut: bool) -> (VirtualShare, Arc<AtomicBo
 
 /// The same with ports.
 pub fn ports_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
-    let is_cut = Arc::new(AtomicBool::new(begins_cut));
-    let now = Arc::clone(&is_cut);
-    let share = Share::with(name, SHORT, move |mut link| {
-        turn_before_the_share(&mut *link);
-        Cable::cut_while(link, &now)
-    });
+    let (is_cut, around) = turning(begins_cut, |_| None);
+    let share = Share::with(name, SHORT, around);
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     (share, is_cut)
 }
@@ -137,14 +135,24 @@ pub fn share_while(
     begins: bool,
     passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
 ) -> (VirtualShare, Arc<AtomicBool>) {
-    let is_so = Arc::new(AtomicBool::new(begins));
-    let (now, passes): (_, Arc<Passes>) = (Arc::clone(&is_so), Arc::new(passes));
-    let share = VirtualShare::with(SHORT, move |mut link| {
-        turn_before_the_share(&mut *link);
-        Cable::with(link, &now, &passes)
-    });
+    let (is_so, around) = turning(begins, passes);
+    let share = VirtualShare::with(SHORT, around);
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     (share, is_so)
+}
+
+/// What is around a line whose motor 2 is turned. While the flag is set, `passes` has the requests.
+fn turning(
+    begins: bool,
+    passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
+) -> (Arc<AtomicBool>, impl FnMut(SerialLine) -> SerialLine + Send + 'static) {
+    let is_so = Arc::new(AtomicBool::new(begins));
+    let (now, passes): (_, Arc<Passes>) = (Arc::clone(&is_so), Arc::new(passes));
+    let around = move |mut link: SerialLine| -> SerialLine {
+        turn_before_the_share(&mut *link);
+        Cable::with(link, &now, &passes)
+    };
+    (is_so, around)
 }
 
 /// Stops all motors: whether each of some confirmed, may turn or is absent. The share also stops the motors

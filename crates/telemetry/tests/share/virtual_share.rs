@@ -66,7 +66,7 @@ impl VirtualShare {
         Asker::by(Box::new(Joined { world, session, reader }), name)
     }
 
-    /// Waits until this is so, and looks as often as a person can.
+    /// Waits until this is so. It looks every 20 ms.
     pub fn until(&self, mut is: impl FnMut() -> bool) {
         let end = self.0.bench.now() + LIMIT.into();
         while !is() {

@@ -242,14 +242,15 @@ impl Hub {
     /// Repeats stops that no drive has confirmed.
     fn repeat_stops(&mut self) {
         for line in self.numbers() {
-            let due = self.lines.get(&line).map(Held::due_again);
-            for motor in due.into_iter().flatten() {
+            let Some(held) = self.lines.get(&line) else { continue };
+            let now = held.now();
+            for motor in held.due_again(now) {
                 self.stop_again(line, motor, Why::Repeated);
             }
-            if let Some(motor) = self.lines.get_mut(&line).and_then(Held::due_search) {
+            if let Some(motor) = self.lines.get_mut(&line).and_then(|held| held.due_search(now)) {
                 self.search(line, motor);
             }
-            if let Some(by) = self.lines.get_mut(&line).and_then(Held::due_stop) {
+            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
                 self.stop_line(line, None, &by);
             }
         }

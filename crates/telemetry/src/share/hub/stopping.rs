@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::time::Micros;
+use motorlink_proto::time::{Instant, Micros};
 
 use super::line::Held;
 use super::owed::{AGAIN, Owed, UnansweredStop};
@@ -80,15 +80,13 @@ impl Held {
     }
 
     /// The motors whose stop is repeated now.
-    pub(super) fn due_again(&self) -> Vec<Motor> {
-        let now = self.now();
+    pub(super) fn due_again(&self, now: Instant) -> Vec<Motor> {
         self.owed.iter().filter(|(_, owed)| owed.is_due(now)).map(|(motor, _)| *motor).collect()
     }
 
     /// The number that is searched now, one after the other: a silent line has time for others between
     /// them.
-    pub(super) fn due_search(&mut self) -> Option<Motor> {
-        let now = self.now();
+    pub(super) fn due_search(&mut self, now: Instant) -> Option<Motor> {
         if self.searched.is_some() {
             return None;
         }
@@ -175,8 +173,8 @@ impl Held {
 
     /// Whose stop of all motors has to be repeated now. It is repeated for the last time when one has
     /// answered: the motors that turn may not be those that answer first.
-    pub(super) fn due_stop(&mut self) -> Option<Arc<str>> {
-        let (now, has_answered) = (self.now(), self.has_answered());
+    pub(super) fn due_stop(&mut self, now: Instant) -> Option<Arc<str>> {
+        let has_answered = self.has_answered();
         let stop = self.unanswered_stop.as_mut().filter(|stop| has_answered || stop.next <= now)?;
         stop.next = now + AGAIN;
         let by = Arc::clone(&stop.by);
