@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 pub mod arrival;
+mod overdue;
 pub mod relay;
 pub mod rmd;
 pub mod settings;

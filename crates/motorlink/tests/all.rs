@@ -2,7 +2,6 @@
 
 mod arrival;
 mod event;
-mod fast_moves;
 mod full_turn;
 mod host_faults;
 mod interruption;
@@ -10,6 +9,7 @@ mod limits;
 mod looking;
 mod lost_line;
 mod opened;
+mod pause;
 mod relay;
 mod rmd_stopping;
 mod served;

@@ -268,22 +268,25 @@ impl EventClient {
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
     pub fn into_client(self) -> Client {
-        let Driven { port, session, exchanges } = self.driven;
+        let Driven { port, session, overdue, exchanges } = self.driven;
         let port = port.map(|link| link as Box<dyn CanLink>);
-        Client::driving(Driven { port, session, exchanges })
+        Client::driving(Driven { port, session, overdue, exchanges })
     }
 
     fn moved(
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let Driven { port, session, .. } = &mut self.driven;
+        let Driven { port, session, overdue, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(None) };
         let mut listens = STEP;
         loop {
             let now = clock.now();
-            match session.poll(now) {
+            let reads_first = overdue.reads_first(now);
+            let output =
+                if reads_first { SessionOutput::Wait(Some(now)) } else { session.poll(now) };
+            match output {
                 SessionOutput::Transmit(frame) => {
                     if let Err(error) = link.send(&frame) {
                         let (id, why) = not_done(error)?;
@@ -291,11 +294,12 @@ impl EventClient {
                     }
                 }
                 SessionOutput::Done(id, result) => {
+                    overdue.clear();
                     each(id, result.map_err(|error| error.behind(link.as_ref())));
                 }
                 SessionOutput::Wait(until) => {
                     let came = match listens {
-                        0 => Ok(None),
+                        0 if !reads_first => Ok(None),
                         _ => link.receive(Some(Duration::ZERO)),
                     };
                     let came = match came {
@@ -307,6 +311,11 @@ impl EventClient {
                         }
                     };
                     let Some(frame) = came else {
+                        if reads_first {
+                            overdue.clear();
+                            continue;
+                        }
+                        until.inspect(|until| overdue.waits(*until));
                         let wait = until.map(|until| until.since(now).into());
                         let full = link.flush()?.then_some(FULL);
                         // Frames that the link holds already do not make the descriptor readable.
@@ -314,7 +323,7 @@ impl EventClient {
                         return Ok([wait, full, more].into_iter().flatten().min());
                     };
                     session.receive(now, &frame);
-                    listens -= 1;
+                    listens = listens.saturating_sub(1);
                 }
             }
         }

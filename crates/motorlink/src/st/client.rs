@@ -16,6 +16,7 @@ use motorlink_proto::time::{self, Instant};
 
 use super::session::{Exchanged, Rules, Session};
 use super::{Error, Options};
+use crate::overdue::Overdue;
 use crate::turn::{Turn, Turns};
 use proto::{Effect, Started};
 
@@ -66,6 +67,7 @@ type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 pub(super) struct Driven<L> {
     pub(super) port: Reopening<L>,
     pub(super) session: Session,
+    pub(super) overdue: Overdue,
     pub(super) received: [u8; 256],
     /// When the last exchange ended.
     pub(super) ended: Instant,
@@ -433,7 +435,8 @@ impl<L: ByteLink> Driven<L> {
         if let Some(holder) = port.open_link().and_then(Link::holder) {
             session.set_holder(holder);
         }
-        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
+        let (ended, overdue) = (port.now(), Overdue::default());
+        Driven { port, session, overdue, received: [0; 256], ended, exchanges: 0 }
     }
 
     /// Begins an exchange with motor number `motor`.
@@ -525,9 +528,14 @@ impl<L: ByteLink> Driven<L> {
     ) -> Result<Option<Outcome<T>>, PortError> {
         loop {
             let now = self.port.now();
-            match self.session.poll(now) {
+            let reads_first = self.overdue.reads_first(now);
+            let output = if reads_first { Output::Wait(Some(now)) } else { self.session.poll(now) };
+            match output {
                 Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
                 Output::Wait(until) => {
+                    if !reads_first {
+                        until.inspect(|until| self.overdue.waits(*until));
+                    }
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
                     if left == Some(Duration::ZERO) {
@@ -538,8 +546,12 @@ impl<L: ByteLink> Driven<L> {
                     let size = self.port.link()?.0.read(&mut self.received, wait)?;
                     let now = self.port.now();
                     self.session.receive(now, &self.received[..size]);
+                    if reads_first && size == 0 {
+                        self.overdue.clear();
+                    }
                 }
                 Output::Done(result) => {
+                    self.overdue.clear();
                     return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
                 }
             }
