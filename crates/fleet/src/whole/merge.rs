@@ -84,6 +84,8 @@ pub(super) struct Merge {
     latches: bool,
     /// Until when a node that comes is stopped first.
     stops_until: f64,
+    /// The nodes that have answered the last stop. What turns there since then was started on purpose.
+    stopped: BTreeSet<Name>,
     /// Now, by the clock of stops and by the wall clock.
     now: f64,
     wall: f64,
@@ -105,6 +107,7 @@ impl Merge {
             last_group: 0,
             latches: false,
             stops_until: f64::NEG_INFINITY,
+            stopped: BTreeSet::new(),
             now: 0.0,
             wall: 0.0,
             out: Vec::new(),
@@ -147,7 +150,7 @@ impl Merge {
         if self.latches {
             self.ask(node, Ask::Latch, Of::Nothing);
         }
-        if self.now < self.stops_until {
+        if self.now < self.stops_until && !self.stopped.contains(node) {
             self.ask(node, Ask::Stop { motor: None }, Of::Nothing);
         }
         self.ask(node, Ask::Lines, Of::Lines);
@@ -243,6 +246,7 @@ impl Merge {
             Ask::Rates { line: None } => self.all(id, Kind::Rates),
             Ask::Stop { motor: None } => {
                 self.stops_until = self.now + PENDING;
+                self.stopped.clear();
                 self.all(id, Kind::Stop);
             }
             Ask::Latch => {
@@ -342,6 +346,9 @@ impl Merge {
             if matches!(of, Of::Lines) {
                 self.tell_lines(node, &before, lines);
             }
+        }
+        if let (Of::Round(_) | Of::Nothing, Ok(Answer::Stop { .. })) = (&of, &result) {
+            self.stopped.insert(node.clone());
         }
         let new = match (&of, &result) {
             (Of::Again(number), Ok(Answer::Subscribe { subscription })) => {

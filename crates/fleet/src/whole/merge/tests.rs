@@ -350,6 +350,20 @@ fn a_node_that_comes_gets_the_latch_and_the_stop_first() {
 }
 
 #[test]
+fn a_node_that_has_stopped_and_comes_again_is_not_stopped_once_more() {
+    let mut fleet = Fleet::of(&["arm1"]);
+    fleet.asked(1, Ask::Stop { motor: None });
+    let id = fleet.one("arm1").id;
+    fleet.answers("arm1", id, Answer::Stop { motors: vec![] });
+    // Somebody turns a motor, and the connection is lost for a moment.
+    fleet.0.gone(&name("arm1"), "the network is cut");
+    fleet.0.came(&name("arm1"));
+    assert_eq!(fleet.one("arm1").ask, Ask::Lines);
+    fleet.asked(2, Ask::Stop { motor: None });
+    assert_eq!(fleet.one("arm1").ask, Ask::Stop { motor: None });
+}
+
+#[test]
 fn a_latch_that_a_node_did_not_get_is_no_success() {
     let mut fleet = Fleet::of(&["arm1", "arm2"]);
     fleet.0.gone(&name("arm2"), "the network is cut");
