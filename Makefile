@@ -21,6 +21,8 @@ PAGES_VENV := $(CURDIR)/.venv-pages
 # Which tests of a part to run: arguments of cargo test for unit and miri; of pytest, in
 # the folder of the tests, for e2e, python, pages and firmware-test.
 T =
+# LONG=1: also what takes long, in e2e, python, pages, firmware-test and browser.
+export LONG
 # Tests in Rust that take seconds. `make check` leaves them out, `make test` runs them.
 QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header every_target_stands)
 # AGAIN=1: the tests of pytest and Playwright that failed in the last run, or all if that did not come so far.
@@ -35,7 +37,7 @@ PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # For all that the tests build, clippy is the compiler: so it needs no build of its own. It tells warnings again
 # each time; LINT fails if there is one.
-lint check unit e2e ros2 python pages browser ffi-test firmware-test test-socketcan: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+lint unit e2e ros2 python pages browser ffi-test firmware-test test-socketcan: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
 LINT = @mkdir -p target; $(CARGO) test $(1) --locked --no-run >target/$@.log 2>&1; built=$$?; \
 	cat target/$@.log; [ $$built = 0 ] && ! grep -q '^warning' target/$@.log
 
@@ -45,10 +47,13 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 # The Python package with the same features, so that it shares that build.
 AS_TESTED := --config-settings 'build-args=--profile=dev --features=typescript'
 
-# The parts of `make test`: two run at a time, in this order. The emulators of firmware-test delay
-# other processes by up to 2.5 s, so it runs beside parts that do not wait for real time.
-ALL_PARTS := firmware-test miri lint rustdoc web-test unit python e2e browser pages ffi-test probe determinism cost test-socketcan deny
-PARTS = $(ALL_PARTS)
+# The parts of `make test`: two run at a time, in this order. The first ones compile, beside each other. Those
+# that wait for real time run beside one another; emulators delay other processes by up to 2.5 s.
+TEST_PARTS := lint probe web-test unit e2e browser python pages ffi-test firmware-test cost determinism test-socketcan
+# Those of `make verify` only. With LONG=1 the other parts have all their tests.
+LONG_PARTS := rustdoc miri deny ros2
+ALL_PARTS := $(TEST_PARTS) $(LONG_PARTS)
+PARTS = $(TEST_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python browser pages firmware-test ffi-test test-socketcan
 RUNS ?= 5
@@ -71,20 +76,32 @@ monitor: toolchain web ## simulated drives in a browser
 
 test: toolchain $(if $(SUDO),packages) ## 30 min: parts unit .. deny but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py $(if $(FORCE),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
+	@$(PYTHON) tests/parts.py $(if $(FORCE)$(LONG),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
 
-verify: FORCE = 1
-verify: ONCE = 1
-verify: test ## 30 min: all parts, also unchanged ones, without a second chance
+# Before a release, and each night in the public CI. A part that fails has no second chance.
+verify: toolchain $(if $(SUDO),packages) ## 4 h: all parts with all tests, beside a load, on one core, faults, soak, mutants
+	$(MAKE) --no-print-directory test PARTS="$(ALL_PARTS)" FORCE=1 ONCE=1 LONG=1
+	$(MAKE) --no-print-directory flakes RUNS=1
+	taskset --cpu-list 0 $(MAKE) --no-print-directory flakes RUNS=1 LOAD=0
+	$(MAKE) --no-print-directory reliability MOST=1000000
+	$(MAKE) --no-print-directory soak
+	$(MAKE) --no-print-directory mutants SEED=$$(date +%j) COUNT=20
 
 # Zenoh takes minutes to build.
 WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python \
 	--no-default-features --features motorlink-monitor/typescript \
 	--features motorlink-cli/conformance,motorlink-cli/monitor,motorlink-cli/record,motorlink-cli/watch
-check: toolchain ## 3 min: format, clippy and the quick tests, while you work; not the network of nodes
+CLI_ALONE = -p motorlink-cli --no-default-features --features conformance,monitor,record,watch
+# The crates with files that differ from this revision.
+SINCE ?= HEAD
+CHANGED = $(shell { git diff --name-only $(SINCE); git ls-files --others --exclude-standard; } | \
+	sed -nE 's,^crates/(motorlink)?([a-z]*)/.*,motorlink-\2,p' | sed 's/-$$//' | sort -u)
+check: toolchain ## 1 min: format, clippy, the quick tests of the crates that you changed; not the network of nodes
 	$(CARGO) fmt --all --check
-	$(call LINT,$(WITHOUT_NETWORK))
-	$(CARGO) test $(WITHOUT_NETWORK) --locked --quiet --lib --bins --tests -- $(QUICK)
+	$(CARGO) clippy $(WITHOUT_NETWORK) --all-targets --locked --quiet -- -D warnings
+	$(CARGO) test $(addprefix -p ,motorlink-structure $(filter-out motorlink-cli motorlink-fleet,$(CHANGED))) \
+		--all-features --locked --quiet --lib --bins --tests -- $(QUICK)
+	$(if $(filter motorlink-cli,$(CHANGED)),$(CARGO) test $(CLI_ALONE) --locked --quiet --lib --bins --tests -- $(QUICK))
 
 flakes: PARTS = $(TIMED)
 flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
@@ -127,12 +144,12 @@ browser: web ## 6 min: the monitor in Debian's Chromium, on simulated drives
 
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
-# With few cases a property; brute force is left out.
-miri: ## 3 min: proto and the C face without undefined behaviour
+# With few cases a property; brute force is left out. All other crates that it interprets forbid `unsafe`.
+miri: ## 2 min: the C face without undefined behaviour; not in `make test`
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
-		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
+		$(CARGO) +$(NIGHTLY) miri test -p motorlink-ffi --locked $(T)
 
 firmware-test: $(VENV)/ready ## 7 min: boards in QEMU against the conformance kit and hosts
 	$(PROGRAM)
@@ -194,10 +211,10 @@ deny: ## 3 min: licences, known holes
 
 # ---- Campaigns and figures ----
 
-# A whole run takes hours. It goes on where it was ended. AGAIN=1: also those that have a result.
+# AGAIN=1: also those that have a result.
 SEED ?= 1
 COUNT ?= 120
-mutants: $(VENV)/ready $(PYTHON_VENV)/ready ## which single faults in the code no test notices: SEED=1 COUNT=120
+mutants: $(VENV)/ready ## which single faults in the code no test notices: SEED=1 COUNT=120
 	command -v cargo-mutants >/dev/null || $(CARGO) install --locked cargo-mutants
 	$(PYTHON) tests/mutants/run.py --seed $(SEED) --count $(COUNT) $(if $(AGAIN),--again)
 
@@ -209,9 +226,9 @@ fuzz: nightly ## every fuzz target for SECONDS=60 each
 soak: ## a million exchanges with a thousand reconnects
 	$(CARGO) test --release --locked -p motorlink --all-features --test soak -- --ignored --nocapture
 
-# Fails with a seed and a trace if a guarantee is violated.
+# Fails with a seed and a trace if a guarantee is violated. MOST=1000000 exchanges of each trial, printed.
 reliability: ## 100 million exchanges on bad lines, docs/RELIABILITY.md
-	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
+	$(CARGO) run --release --locked -p motorlink-reliability -- $(if $(MOST),--most $(MOST),--update docs/RELIABILITY.md)
 
 # UPDATE=1 writes them into docs/BENCHMARKS.md, with the engine for SECONDS=60.
 bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in docs/BENCHMARKS.md

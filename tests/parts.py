@@ -32,6 +32,12 @@ LIMIT = 3600
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S.*?)(?: - .*)?$|^test (\S+) .*\.\.\. FAILED$|^  +\d+\) (.+?)[ ─]*$", re.M)
 
 
+def processor(output):
+    """The seconds that `times` of the shell printed last, for what it has run."""
+    times = re.findall(r"(?:\d+m[\d.]+s ?){2}\n", output)
+    return sum(60 * int(m) + float(s) for m, s in re.findall(r"(\d+)m([\d.]+)s", "".join(times[-1:])))
+
+
 class Run:
     """One run of a part."""
 
@@ -71,8 +77,7 @@ class Run:
         compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
         self.compiled = sum(60 * int(m or 0) + float(s) for m, s in compiled)
         self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
-        times = re.findall(r"(\d+)m([\d.]+)s", "".join(self.output.splitlines()[-1:]))
-        self.processor = sum(60 * int(m) + float(s) for m, s in times)
+        self.processor = processor(self.output)
 
     def end(self):
         """Ends its processes."""
@@ -137,8 +142,7 @@ class Runner:
         """Records the parts that came to their end; those that failed once did not pass."""
         for part in dict.fromkeys(run.part for run in self.over):
             runs = [run for run in self.over if run.part == part]
-            skipped = list(dict.fromkeys(line for run in runs for line in run.skipped))
-            self.unchanged.ran(part, part not in flaky and all(run.passed for run in runs), skipped)
+            self.unchanged.ran(part, part not in flaky and all(run.passed and not run.skipped for run in runs))
 
     def stop(self):
         with self.lock:
@@ -186,8 +190,6 @@ def main():
     kept = {}
     if not given.force and given.runs == 1:
         kept = {part: entry for part in parts if (entry := unchanged.entry(part))}
-        if given.strict:
-            kept = {part: entry for part, entry in kept.items() if not entry["skipped"]}
         parts = [part for part in parts if part not in kept]
     for part, entry in kept.items():
         print(f"{part:18} unchanged since {entry['revision']}", flush=True)
@@ -215,8 +217,8 @@ def main():
             hogs.terminate()
             hogs.wait()
 
-    for lines in (*(it["skipped"] for it in kept.values()), *(it.skipped for it in runner.over)):
-        for line in lines:
+    for run in runner.over:
+        for line in run.skipped:
             print(line)
     if idle:
         print("the load ended before the parts")
@@ -232,9 +234,7 @@ def main():
         print(f"FLAKY: {run.part} failed, and passed when it ran again alone: see {run.log.relative_to(REPOSITORY)}")
         for test in run.failed_tests:
             print(f"FLAKY: {run.part}: {test}")
-    skips = [bool(it["skipped"]) for it in kept.values()]
-    skipped += sum(skips)
-    sys.exit(bool(failed or not passed and all(skips) or idle or given.strict and skipped))
+    sys.exit(bool(failed or not passed and not kept or idle or given.strict and skipped))
 
 
 if __name__ == "__main__":

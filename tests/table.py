@@ -9,6 +9,8 @@ import xml.etree.ElementTree as xml
 from collections import defaultdict
 from pathlib import Path
 
+from parts import processor
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 PARTS = REPOSITORY / "target/parts"
 PAGE = REPOSITORY / "docs/CHECKS.md"
@@ -49,11 +51,10 @@ def of_cargo():
         if not (file and ends):
             continue
         own = [it for it in crates if (it / file).exists() and program in (Path(file).stem, Path(file).parent.name, crate(it))]
-        times = re.findall(r"^(\d+)m([\d.]+)s (\d+)m([\d.]+)s", run, re.M)
         row = rows[str((own[0] / file).relative_to(REPOSITORY)) if own else program]
         row[0] += int(ends[1])
         row[1] += float(ends[2])
-        row[2] += sum(60 * int(it[0]) + float(it[1]) + 60 * int(it[2]) + float(it[3]) for it in times[-1:])
+        row[2] += processor(run)
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Parts of `make test` that cost much, and what they read.
+"""Parts of `make test`, and what they read.
 
 While all of that is as it was when the part passed, `make test` does not run the part again.
 tests/unchanged.json is the record. `make verify` and FORCE=1 run all parts. Security updates change
@@ -20,34 +20,39 @@ COMMON = [
     ":(glob)*", ":(exclude,glob)*.md", "*Cargo.toml", "*Cargo.lock", ".cargo", "*.gitattributes",
     "tests/install", "tests/parts.py", "tests/unchanged.py",
 ]
+#: What firmware-test takes from the tests of the program.
+OF_E2E = [f"tests/e2e/{it}.py" for it in ("conftest", "program", "st_wire", "test_rmd_can", "test_st_bytes")]
 #: What crates/ffi/packaging installs.
 INSTALLED = ["docs/C.md", "docs/SIZES.md", "docs/SPEC-NOTES.md"]
-#: The packages that a part compiles, with all crates of this repository that they depend on; other paths.
+#: The packages that a part tests, with all crates of this repository that they depend on; other paths. The
+#: command line counts only where it is tested: in unit, e2e and pages, which always run.
 PARTS = {
+    "browser": (["motorlink-monitor"], ["crates/cli/src/monitor", "crates/cli/src/share", "crates/cli/src/sim", "web"]),
     "cost": (["motorlink-kernels"], []),
-    "deny": ([], ["tests/deny"]),
     "determinism": (["motorlink-sim"], []),
+    "ffi-test": (["motorlink-conformance", "motorlink-ffi"], ["vectors", *INSTALLED]),
     "firmware-test": (
-        ["motorlink-cli", "motorlink-embedded", "motorlink-ffi"],
-        ["firmware", ":(glob)tests/*.py", "tests/firmware", "tests/e2e", "scenarios", *INSTALLED],
+        ["motorlink-conformance", "motorlink-embedded", "motorlink-ffi"],
+        ["firmware", ":(glob)tests/*.py", "tests/firmware", *OF_E2E, *INSTALLED],
     ),
-    "miri": (["motorlink-ffi", "motorlink-proto"], ["vectors"]),
     "probe": (
         ["motorlink-embedded", "motorlink-ffi", "motorlink-proto", "motorlink-sim"],
         ["firmware", "probe", *INSTALLED],
     ),
-    "rustdoc": (["*"], []),
-    "test-socketcan": (["motorlink-cli"], ["tests/socketcan"]),
+    "python": (
+        ["motorlink-fleet", "motorlink-recording", "motorlink-testbench"],
+        ["bindings/python", "tests/measured.py", "tests/e2e/recordings.py", "docs/PYTHON.md", "scenarios", "vectors"],
+    ),
+    "test-socketcan": (["motorlink-telemetry"], ["tests/socketcan"]),
+    "web-test": ([], ["web"]),
 }
-#: What may be skipped in a run that is recorded: the list of vulnerabilities is not there everywhere.
-MAY_SKIP = "SKIPPED: advisories"
 #: Variables that change what is built or tested, but for those that say where things are or what is printed.
 OF_BUILDS = ("CARGO", "RUST", "MIRI", "VALGRIND", "PROPTEST", "GLIBC")
 HARMLESS = (
     "CARGO_HOME", "CARGO_TARGET_DIR", "CARGO_TERM", "RUSTUP_", "RUST_BACKTRACE", "RUST_LOG", "RUST_TEST_THREADS",
 )  # fmt: skip
 #: Variables of make that choose parts.
-OF_CHOICE = ("PARTS=", "FORCE=", "STRICT=")
+OF_CHOICE = ("PARTS=", "FORCE=", "STRICT=", "ONCE=", "LONG=")
 
 
 def output(*command):
@@ -86,7 +91,7 @@ def tools():
 def folders(packages):
     """The folders of packages and of all crates of this repository that they depend on."""
     found = crates()
-    wanted, folders = list(found) if packages == ["*"] else list(packages), set()
+    wanted, folders = list(packages), set()
     while wanted:
         package = found[wanted.pop()]
         folder = str(Path(package["manifest_path"]).parent.relative_to(REPOSITORY))
@@ -124,22 +129,21 @@ class Unchanged:
         self.states = {part: state(part) for part in parts if part in PARTS}
 
     def entry(self, part):
-        """The entry of a part that need not run: its revision, and what was skipped."""
+        """The entry of a part that need not run: its revision."""
         entry, now = self.record.get(part), self.states.get(part)
         return entry if entry and now and entry["state"] == now else None
 
-    def ran(self, part, passed, skipped):
-        """Records whether a part passed. What it reads may have changed meanwhile."""
+    def ran(self, part, passed):
+        """Records whether a part passed without skips. What it reads may have changed meanwhile."""
         now = self.states.get(part)
         if now is None or now != state(part):
             return
         was = self.record.pop(part, None)
-        if passed and all(line.startswith(MAY_SKIP) for line in skipped):
+        if passed:
             revision = output("git", "rev-parse", "--short=8", "HEAD").strip()
-            entry = {"revision": revision, "state": now, "skipped": skipped}
             # The revision stays the first one.
-            is_same = was and {**was, "revision": revision} == entry
-            self.record[part] = was if is_same else entry
+            is_same = was and was["state"] == now
+            self.record[part] = was if is_same else {"revision": revision, "state": now}
         whole = RECORD.with_suffix(".new")
         whole.write_text(json.dumps(self.record, indent=1, sort_keys=True) + "\n")
         whole.replace(RECORD)

@@ -158,7 +158,8 @@ def pytest_collection_modifyitems(items):
     items += others
 
 
-@pytest.fixture(params=["rust", "c"])
+# The bare-metal example is in C, too.
+@pytest.fixture(params=["rust", pytest.param("c", marks=pytest.mark.long)])
 def board(request):
     """A board that has just been switched on."""
     board = Board(request.param)

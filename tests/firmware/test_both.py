@@ -63,6 +63,7 @@ def rates(board, *hosts):
     return [round(rates[host]) for host in hosts]
 
 
+@pytest.mark.long
 def test_bursts_on_one_uart_and_on_both(board, capsys):
     alone = rates(board, st_exchanges) + rates(board, rmd_exchanges)
     both = rates(board, st_exchanges, rmd_exchanges)
@@ -91,7 +92,7 @@ def test_motors_of_both_kinds_turn_at_once(board, st, rmd, eventually, capsys):
         print(f"\n{board.language}: with five motors turning, time passes at {2 / took:.0%} of real time")
 
 
-@pytest.mark.parametrize("language", ["rust", "c"])
+@pytest.mark.parametrize("language", ["rust", pytest.param("c", marks=pytest.mark.long)])
 def test_a_host_can_stop_the_time_of_a_board_that_is_too_slow_for_it(language):
     # An instruction takes 1.024 us: the motors' time cannot follow the timer's.
     board = Board(language, "-icount", "shift=10,sleep=off")

@@ -7,6 +7,9 @@ and the example in C passes the one of ST on its board, too.
 import pytest
 
 
+pytestmark = pytest.mark.long
+
+
 @pytest.mark.parametrize(("board", "protocol"), [("rust", "st"), ("c", "rmd")], indirect=["board"])
 def test_the_kit_passes(board, run, protocol):
     port = {"st": board.st_port, "rmd": board.rmd_port}[protocol]

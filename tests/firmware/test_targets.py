@@ -28,7 +28,14 @@ TARGETS = {
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Os"]
 
 
-@pytest.fixture(scope="module", params=TARGETS)
+# The processor with the fewest instructions, and the one of another family.
+ALWAYS = ("thumbv6m-none-eabi", "riscv32imac-unknown-none-elf")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(it, marks=() if it in ALWAYS else pytest.mark.long) for it in TARGETS],
+)
 def installed(request, tmp_path_factory):
     """A target, and the prefix in which its library is installed."""
     compiler, emulator = TARGETS[request.param]

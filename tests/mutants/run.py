@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 import tomllib
-from collections import Counter, defaultdict
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -101,27 +101,31 @@ class Tests:
              "--config-settings 'build-args=--profile=dev --features=typescript' .")  # fmt: skip
         self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink {PYTEST}"
         self.turn = threading.Lock()
-        known = json.loads(REACHED.with_suffix(".json").read_text()) if REACHED.with_suffix(".json").exists() else {}
-        if known.get("mutants") != [it["name"] for it in mutants]:
-            known = {"mutants": [it["name"] for it in mutants], **self.trace()}
-            REACHED.with_suffix(".json").write_text(json.dumps(known))
+        of_tests = schemata.output("git", "rev-parse", "HEAD:crates", "HEAD:bindings", "HEAD:tests/e2e", cwd=TREE)
+        names, known = [*of_tests.split(), *(it["name"] for it in mutants)], {}
+        if REACHED.with_suffix(".json").exists():
+            known = json.loads(REACHED.with_suffix(".json").read_text())
+        if known.get("mutants") != names:
+            known = {"mutants": names, "seconds": {}, "reached": {}}
+        self.trace(known)
         self.seconds = known["seconds"]
-        self.reached = {int(number): tests for number, tests in known["reached"].items()}
+        self.reached = {int(number): sorted(set(tests)) for number, tests in known["reached"].items()}
 
-    def trace(self):
-        """Runs all tests once without a mutant."""
-        seconds, reached = {}, defaultdict(list)
+    def trace(self, known):
+        """Runs once, without a mutant, the tests that are not known yet."""
         for name, test in [
             *((it.name, it.run) for it in self.programs),
             ("e2e", lambda **variables: run(self.end_to_end, 3600, **variables)),
             ("python", lambda **variables: run(PYTHON_TESTS, 3600, **variables)),
         ]:
+            if name in known["seconds"]:
+                continue
             folder = REACHED / name.replace(" ", "/")
             folder.mkdir(parents=True, exist_ok=True)
             begun = time.monotonic()
             passed, text = test(MUTANTS_REACHED=str(folder))
-            seconds[name] = time.monotonic() - begun
-            print(f"{name}: {seconds[name]:.0f} s{'' if passed else ', FAILED without a mutant'}", flush=True)
+            known["seconds"][name] = time.monotonic() - begun
+            print(f"{name}: {known['seconds'][name]:.0f} s{'' if passed else ', FAILED without a mutant'}", flush=True)
             if not passed:
                 print(text[-1500:], flush=True)
             for file in folder.iterdir():
@@ -130,9 +134,9 @@ class Tests:
                     of_pytest = of_pytest.rpartition(" (")[0]
                     label = f"e2e {of_pytest}" if name == "e2e" else name
                     if of_pytest or name != "e2e":
-                        reached[number].append(label)
+                        known["reached"].setdefault(number, []).append(label)
                 file.unlink()
-        return {"seconds": seconds, "reached": {number: sorted(set(it)) for number, it in reached.items()}}
+            REACHED.with_suffix(".json").write_text(json.dumps(known))
 
     def notice(self, number, package):
         """The test that notices a mutant; "" if none does."""
