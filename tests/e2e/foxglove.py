@@ -5,7 +5,6 @@ import json
 import struct
 import time
 from collections import namedtuple
-from contextlib import suppress
 
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
@@ -64,12 +63,6 @@ class Viewer:
         while not (found := condition()):
             self.receive(max(0.0, end - time.monotonic()))
         return found
-
-    def catch_up(self):
-        """Takes all messages that have arrived."""
-        with suppress(TimeoutError):
-            while True:
-                self.receive(0)
 
     def subscribe(self, topic):
         """Subscribes to a topic once it is there; gives the number of the subscription."""

@@ -78,8 +78,8 @@ class Page:
         self.heard = []
         self.news = threading.Condition()
         self.last, self.frame = 0, 0
-        #: The beat and the frame of signs of life; what a test changes.
-        self.lives, self.held, self.draws, self.late = lives, False, True, 0.0
+        #: What a test changes: signs of life, and the key of hold-to-run in them.
+        self.lives, self.held = lives, False
         self.has_ended = False
         #: (when it came, its number)
         self.beats = []
@@ -111,11 +111,8 @@ class Page:
 
     def sign(self, **members):
         """Gives a sign of life."""
-        self.frame += self.draws
-        now = time.monotonic()
-        with self.news:
-            beats = [number for came, number in self.beats if came <= now - self.late]
-        sign = {"beat": beats[-1] if beats else 0, "frame": self.frame, "held": self.held, "at": now * 1e3}
+        self.frame += 1
+        sign = {"beat": self.beats[-1][1], "frame": self.frame, "held": self.held, "at": time.monotonic() * 1e3}
         with suppress(ConnectionClosed, OSError):
             self.socket.send(json.dumps({**sign, **members}))
 
@@ -171,11 +168,6 @@ class Page:
     def lapsed(self, within=15):
         """Waits until the server stops the motors of the page; gives the reason."""
         return self.until(kind("lapsed"), within)["message"]
-
-    def forget(self):
-        """Forgets what was heard."""
-        with self.news:
-            self.heard.clear()
 
     def closed(self, within=20):
         """Waits until the server closes the connection; gives its last text that says why."""

@@ -37,10 +37,10 @@ class Capture:
         head = struct.pack(">IBBBB", identifier, len(data), 4 if fd else 0, 0, 0)
         return self.packet(head + data, sent, **place)
 
-    def cooked_can(self, identifier, data, sent):
+    def cooked_can(self, identifier, data, sent, **place):
         """A frame as the interface `any` of Linux captures it."""
         head = struct.pack(">HHH8sH", 4 if sent else 0, 280, 0, b"", 0x000C)
-        return self.packet(head + struct.pack("<IBBBB", identifier, len(data), 0, 0, 0) + data)
+        return self.packet(head + struct.pack("<IBBBB", identifier, len(data), 0, 0, 0) + data, **place)
 
     def serial(self, data, sent, **place):
         """A packet of RTAC_SERIAL: its header has the direction."""

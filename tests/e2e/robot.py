@@ -67,13 +67,13 @@ class Robot:
 
     def commands(self, topic="/arm1/joint_commands"):
         """A function that publishes joint commands."""
+        import numpy
+
         publish = self.publisher(topic)
         types = self.session.store.types
         header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), "")
 
         def command(name, position=(), velocity=(), effort=()):
-            import numpy
-
             arrays = {"position": position, "velocity": velocity, "effort": effort}
             arrays = {key: numpy.array(values, dtype=float) for key, values in arrays.items()}
             publish(header=header, name=list(name), **arrays)

@@ -5,7 +5,7 @@ import math
 import shutil
 
 import pytest
-from wireshark import PROFILES, on_can, on_line
+from wireshark import on_can, on_line, some
 
 pytestmark = pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
 
@@ -139,15 +139,16 @@ def test_frames_of_rmd(both, sets, told):
     assert len(checked) > 300 and sum(checked) > 100
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-def test_frames_of_st(run, both, sets, profile):
+def test_frames_of_st(run, both, sets):
+    profile = "mcsdk-5.4"
     spec = json.loads(run("spec", "json").ended(0).out)["st"]
     tables = {
         "registers": {row["id"]: row["name"] for row in spec["registers"]},
         "commands": {row["number"]: row["name"] for row in spec["commands"]},
     }
     # decode finds the direction by the header, the dissector by the capture if it has one.
-    capture = on_line([frame for frame in sets[f"st {profile}"] if frame["sent"] != (frame["data"][0] in REPLIES)])
+    frames = [frame for frame in sets[f"st {profile}"] if frame["sent"] != (frame["data"][0] in REPLIES)]
+    capture = on_line(some(frames, 1 / 3))
     packets = both("st", capture, "--profile", profile, preferences=[f"motorlink.st.profile:{profile}"])
     checked = [check_st(tables, *packet) for packet in packets]
-    assert len(checked) > 5000 and sum(checked) > 5000
+    assert len(checked) > 1500 and sum(checked) > 1500

@@ -34,13 +34,15 @@ def judged(run, *arguments):
     return report.json
 
 
-@pytest.mark.parametrize("options", [["--motors", "3", "--pfc", "1"], ["--motors", "1", "--d-access", "none"]])
-def test_a_slave_written_from_the_document_alone_passes_without_readings(run, written, options):
+@pytest.mark.parametrize(
+    "options, spin", [(["--motors", "3", "--pfc", "1"], ["--spin"]), (["--motors", "1", "--d-access", "none"], [])]
+)
+def test_a_slave_written_from_the_document_alone_passes_without_readings(run, written, options, spin):
     line, control = written("st_slave.py", *options)
     fault = f"{BACK_DOOR} {control} fault 1 2"
-    port = ["-p", f"tcp:{line}", "--spin", "--fault-on", f"{fault} on", "--fault-off", f"{fault} off"]
+    port = ["-p", f"tcp:{line}", *spin, "--fault-on", f"{fault} on", "--fault-off", f"{fault} off"]
     report = judged(run, "st", *port)
-    assert report["failed"] == 0 and report["passed"] > 350
+    assert report["failed"] == 0 and report["passed"] > (350 if spin else 300)
     assert report["reading"] > 0, "it reads TARGET_MOTOR otherwise"
     assert run("conformance", "st", "-p", f"tcp:{line}", "--only", "ST-4.4-18", "--readings", "strict").code == 1
 

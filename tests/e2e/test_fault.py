@@ -1,4 +1,7 @@
-"""`--fault`: a line with chosen faults, on real and on simulated ports."""
+"""`--fault`: a line with chosen faults, on real and on simulated ports; writes that are verified.
+
+What each fault does is tested in crates/link/src/fault.
+"""
 
 import json
 import time
@@ -13,7 +16,7 @@ RMD = ("rmd", "-p", "sim:")
 
 
 def test_what_is_late_still_comes(run, drives):
-    for port in ("pty", "tcp", "sim"):
+    for port in ("pty", "sim"):
         began = time.monotonic()
         late = run("st", "-p", drives.port(port), "--fault", "delay=60ms", "get", "STATUS").ended(0)
         assert time.monotonic() - began >= 0.12, "both ways"
@@ -22,28 +25,10 @@ def test_what_is_late_still_comes(run, drives):
     assert "angle" in late.out
 
 
-@pytest.mark.parametrize("fault", ["drop=1", "cut=5s@1", "drop=1,only=sent", "drop=1,only=received"])
-def test_a_line_that_loses_everything_has_failed(run, drives, fault):
-    for port in ("pty", "sim"):
-        lost = run("st", "-p", drives.port(port), "--timeout", "100ms", "--fault", fault, "info").ended(3)
-        assert "no reply in time" in lost.err
-    assert "does not answer" in run(*RMD, "--fault", fault, "status").ended(3).err
-
-
 def test_damage_is_found_and_shown(run):
     damaged = run(*ST, "--fault", "flip=1e-1,only=received,seed=2", "--trace", "info").ended(3)
     assert "06 00 06" in damaged.err, "what the program sent"
     assert "f0 20 05 04 04 53" not in damaged.err, "what it received"
-
-
-def test_the_same_seed_does_the_same(run):
-    def received(seed):
-        fault = f"flip=3e-2,only=received,seed={seed}"
-        trace = run(*ST, "--fault", fault, "--trace", "info").err
-        return [line.split("<-")[1] for line in trace.splitlines() if "<-" in line]
-
-    assert received(5)[0] == received(5)[0]
-    assert received(5)[0] != received(6)[0]
 
 
 def test_a_watch_goes_on_through_damage(run):
@@ -57,18 +42,10 @@ def test_a_watch_goes_on_through_damage(run):
     assert events and events == ["outage", "back"] * (len(events) // 2)
 
 
-def test_a_bus_with_foreign_frames_and_copies_works(run):
-    fault = "flood=20@0.5,dup=0.2,insert=0.2,seed=1"
-    status = run(*RMD, "--fault", fault, "--json", "status", "--every", "5ms", "--count", 20)
-    assert sum("values" in line for line in status.ended(0).lines) == 20
-
-
 @pytest.mark.parametrize(
     "arguments, why",
     [
         ((*ST, "--fault", "flop=1", "info"), "there is no fault `flop`"),
-        ((*ST, "--fault", "flip=2", "info"), "a rate from 0 to 1"),
-        ((*ST, "--fault", "seed=7", "info"), "no fault is named"),
         ((*ST, "--fault", "corrupt=1e-3", "info"), "use flip"),
         ((*RMD, "--fault", "stuck0=1s@1", "status"), "use cut"),
         (("st", "-p", "/dev/ttyNONE", "--fault", "drop=1", "scan"), "cannot be used with --fault"),
@@ -78,17 +55,11 @@ def test_what_makes_no_sense_is_refused_before_anything_is_sent(run, arguments, 
     assert why in run(*arguments).ended(2).err
 
 
-def test_a_verified_write_reads_back(run, drives):
-    for port in ("pty", "sim"):
-        st = ("st", "-p", drives.port(port))
-        done = run(*st, "--json", "--trace", "set", "SPEED_KP", 790, "--verify").ended(0)
-        assert (done.json["ok"], done.json["attempts"]) == (True, 1)
-        sent = [line for line in done.err.splitlines() if "->" in line]
-        assert sum("SPEED_KP" in line for line in sent) == 3, "a read, a write and a read"
-    assert "790" in run("st", "-p", drives.port("pty"), "get", "SPEED_KP").ended(0).out
-
-
-def test_a_verified_write_is_repeated_where_the_line_loses_it(run):
+def test_a_verified_write_reads_back_and_is_repeated_where_the_line_loses_it(run):
+    done = run(*ST, "--json", "--trace", "set", "SPEED_KP", 790, "--verify").ended(0)
+    assert (done.json["ok"], done.json["attempts"]) == (True, 1)
+    sent = [line for line in done.err.splitlines() if "->" in line]
+    assert sum("SPEED_KP" in line for line in sent) == 3, "a read, a write and a read"
     fault = ("--timeout", "50ms", "--fault", "drop=5e-2,seed=2")
     done = run(*ST, *fault, "--json", "set", "SPEED_KP", 700, "--verify=9").ended(0)
     assert done.json["attempts"] > 1
@@ -99,27 +70,22 @@ def test_a_verified_write_is_repeated_where_the_line_loses_it(run):
 def test_a_drive_that_acknowledges_and_ignores_is_found_out(run, tmp_path):
     config = tmp_path / "mcsdk.toml"
     config.write_text('profile = "mcsdk-5.4"\n')
-    st = ("st", "-p", f"sim:{config}", "--profile", "mcsdk-5.4")
-    for verify in ([], ["--verify"]):
-        found = run(*st, "--raw", "set", "DAC_OUT1", 5, *verify).ended(1)
-        assert "DAC_OUT1 should be 5 and reads" in found.err
-
-
-@pytest.mark.parametrize("register", ["RAMP_FINAL_SPEED", "CONTROL_MODE", "TORQUE_REF", "TARGET_MOTOR"])
-def test_what_acts_on_the_motor_is_not_verified(run, register):
-    refused = run(*ST, "--trace", "set", register, 1, "--verify").ended(2)
+    st = ("st", "-p", f"sim:{config}", "--profile", "mcsdk-5.4", "--raw")
+    assert "DAC_OUT1 should be 5 and reads" in run(*st, "set", "DAC_OUT1", 5, "--verify").ended(1).err
+    # What acts on the motor is not verified.
+    refused = run(*ST, "--trace", "set", "RAMP_FINAL_SPEED", 1, "--verify").ended(2)
     assert "cannot be verified" in refused.err and "->" not in refused.err
 
 
 def test_a_line_that_is_too_slow_is_said_and_again_if_that_changes(run):
     slow = ("--fault", "delay=20ms")
-    table = run(*ST, *slow, "--timeout", "5s", "get", "SPEED_MEAS", "--every", "10ms", "--count", 60).ended(0)
+    table = run(*ST, *slow, "--timeout", "5s", "get", "SPEED_MEAS", "--every", "10ms", "--count", 40).ended(0)
     notes = [line for line in table.err.splitlines() if line]
     assert notes and all(line.startswith("asked 100 Hz; this line carries about ") for line in notes)
     rates = [float(line.split()[-2]) for line in notes]
     assert all(2 < rate < 25 for rate in rates), "an exchange takes 40 ms"
     assert all(max(a, b) / min(a, b) > 1.4 for a, b in pairwise(rates)), "nothing is said twice"
     times = [float(line.split()[0]) for line in table.out.splitlines()[2:]]
-    assert times == sorted(times) and len(times) == 60 and times[-1] >= 59 * 0.04
+    assert times == sorted(times) and len(times) == 40 and times[-1] >= 39 * 0.04
     notes = run(*RMD, *slow, "--json", "angle", "--every", "5ms", "--count", 2).ended(0).err
     assert json.loads(notes)["note"].startswith("asked 200 Hz; this line carries about ")

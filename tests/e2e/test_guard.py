@@ -1,17 +1,15 @@
 """`motorlink guard`: motors stop when the program that started them has ended for any reason."""
 
 import json
-import os
 import signal
 import socket
 import struct
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from program import children, environment, eventually, says_halted
+from program import children, environment, eventually
 from st_wire import ACK, EXECUTE, GET_REG, Line, frame, header
 
 STATUS, SPEED_KP = 0x02, 0x05
@@ -105,41 +103,6 @@ def test_a_motor_that_coasts_is_not_said_to_rest(sim, guard, client, tmp_path):
     rests(drives, 1)
 
 
-def test_without_a_guard_an_st_motor_spins_on(sim, client):
-    drives = sim(rmd=())
-    program = client(drives.st, "1:1")
-    runs(drives, 1)
-    program.kill()
-    program.wait()
-    began = drives.do("state")["t"]
-    eventually(lambda: drives.do("state")["t"] > began + 1, "a second passes")
-    assert drives.motor(1)["status"] == "RUN"
-
-
-def test_a_motor_that_its_program_stopped_is_left_alone(sim, guard, client):
-    drives = sim(rmd=())
-    process = guard(drives.st)
-    program = client(process.port, "1:1", "2:1", "1:2")
-    runs(drives, 2)
-    program.kill()
-    process.says_halted("motor 2")
-    assert not any("motor 1" in text for text in process.err), process.err
-    rests(drives, 2)
-
-
-def test_motor_number_0_is_whichever_motor_it_may_be(sim, guard, client):
-    drives = sim(rmd=())
-    with Line(drives.st) as line:
-        line.get(STATUS, motor=2)
-    process = guard(drives.st)
-    program = client(process.port, "0:1")
-    runs(drives, 2)
-    program.kill()
-    rests(drives, 2)
-    process.says_halted("motor 1")
-    assert not any("motor 3" in text for text in process.err), "this drive has two"
-
-
 def test_a_program_that_dies_in_the_middle_of_a_request(sim, guard, run, tmp_path):
     # Shipped firmware waits for the rest of a frame for ever.
     drives = sim("--profile", "mcsdk-5.4", rmd=())
@@ -184,16 +147,6 @@ def test_a_second_program_is_turned_away(sim, guard, run, start):
     eventually(lambda: run("st", "-p", f"tcp:{tcp}", "info").code == 0, "the next program")
 
 
-def test_a_stopped_program_is_noticed_by_its_silence(sim, guard, client):
-    drives = sim(rmd=())
-    process = guard(drives.st, "--silence", "500ms")
-    program = client(process.port, "1:1")
-    program.send_signal(signal.SIGSTOP)
-    process.says_halted("motor 1", "the program is silent: ")
-    rests(drives, 1)
-    program.send_signal(signal.SIGCONT)
-
-
 def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, guard, start):
     drives = sim(rmd=())
     process = guard(drives.st, "--silence", "1s")
@@ -209,19 +162,6 @@ def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, g
         eventually(lambda: drives.do("state")["t"] > began + 1.5, "silence")
     process.says("closed the port")
     assert not any("silent" in text for text in process.err), process.err
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_guard_stops_the_motors(sim, guard, client, tmp_path, number):
-    drives = sim(rmd=())
-    process = guard(drives.st)
-    client(process.port, "1:1")
-    runs(drives, 1)
-    process.process.send_signal(number)
-    assert process.wait() == 0
-    assert any(says_halted(text, "motor 1", "the guard ends: ") for text in process.err), process.err
-    rests(drives, 1)
-    assert not os.path.lexists(tmp_path / "drive")
 
 
 def test_a_drive_that_is_unplugged_is_stopped_when_it_is_back(sim, guard, client):
@@ -263,41 +203,3 @@ def test_a_guard_whose_drive_is_silent_says_so_when_it_ends(sim, guard, client):
         assert any("may still turn" in text for text in process.err), process.err
     finally:
         drives.process.send_signal(signal.SIGCONT)
-
-
-# RMD: the protocol's own means is the drive's shutdown time.
-
-CAN_CLIENT = """
-import sys, can
-with can.Bus(interface="slcan", channel=sys.argv[1], bitrate=1000000) as bus:
-    bus.send(can.Message(arbitration_id=0x141, is_extended_id=False,
-                         data=[0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0]))
-    assert bus.recv(10).data[0] == 0xA2
-    print("done", flush=True)
-    sys.stdin.read()
-"""
-
-
-@pytest.mark.parametrize("shutdown_ms", [0, 300])
-def test_an_rmd_motor_stops_by_its_shutdown_time_or_not_at_all(sim, tmp_path, shutdown_ms):
-    config = tmp_path / "bench.toml"
-    config.write_text(f"[[rmd.motor]]\nid = 1\nshutdown_ms = {shutdown_ms}\n")
-    drives = sim(config, st=())
-    program = subprocess.Popen(
-        [sys.executable, "-c", CAN_CLIENT, drives.can],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert program.stdout.readline() == "done\n"
-        assert shutdown_ms or drives.motor(1)["mode"] == "speed"
-    finally:
-        program.kill()
-        program.communicate()
-    if shutdown_ms:
-        eventually(lambda: drives.motor(1)["mode"] == "off", "the motor is off")
-    else:
-        began = drives.do("state")["t"]
-        eventually(lambda: drives.do("state")["t"] > began + 2, "two seconds pass")
-        assert drives.motor(1)["mode"] == "speed"

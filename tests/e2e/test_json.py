@@ -20,19 +20,19 @@ VALIDATOR = Draft202012Validator(SCHEMA)
 #: What reads or acts on a drive, as a person gives it.
 ST = [
     *("info", "status", "registers", "get SPEED_MEAS FLAGS STATUS DAC_OUT1 0x3F", "segment SPEED_MEAS I_A"),
-    *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start --ramp 900 100 --speed-limit 1000", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
+    *("set SPEED_KP 3 --verify", "start --ramp 900 100 --speed-limit 1000", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
     *("revup-data", "revup-data 1 500 200 250", "current-reference 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
-    *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS", "--raw revup-data"),
-    *("get TORQUE_REF --full-scale 16.5", "set TORQUE_REF 0.1 --full-scale 16.5", "revup-data --full-scale 16.5"),
+    *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS"),
+    *("set TORQUE_REF 0.1 --full-scale 16.5", "revup-data --full-scale 16.5"),
 ]
 #: What the other profile has.
-MCSDK = ["torque-ramp 100 50", "position 1.5rad 0.5s", "get SPEED_MEAS SC_RS", "status"]
+MCSDK = ["torque-ramp 100 50", "position 1.5rad 0.5s", "get SPEED_MEAS SC_RS"]
 RMD = [
-    *("scan 1 2", "status", "angle", "angle --every 5ms --count 2", "--raw status", "pid", "pid 1 2 3 4 5 6"),
-    *("acceleration", "acceleration 9", "encoder", "encoder-offset 5 --write-rom", "zero --write-rom"),
+    *("scan 1 2", "status", "angle", "angle --every 5ms --count 2", "--raw status", "pid speed_kp=5"),
+    *("acceleration", "encoder", "encoder-offset 5 --write-rom", "zero --write-rom"),
     *("off --id 1", "stop --id 1", "run"),
     *("torque 0.1", "speed 20", "position 10", "single-turn-position 45.5 cw --full-turn", "clear-errors"),
-    *("torque4 0 0 0 0", "torque4 0 0 0 0 --expect 1,2", "torque 1 --current-limit 1", "raw 9a"),
+    *("torque4 0 0 0 0", "raw 9a"),
     *("status --gear-ratio 6 --encoder-bits 14", "encoder --encoder-bits 14", "acceleration 9 --gear-ratio 6"),
 ]
 #: What a running share is asked for.
@@ -44,8 +44,8 @@ DECODE = {
     "st": ["22 01 1e 41 f0 04 ce 07 00 00 ca", "ff 01 0b 0c", "27 06 e8 03 00 00 f4 01 0f", "29 01 02 2c"],
     "rmd": ["141#9A1900F000000009", "141#9A00000000000000", "280#640000009CFFD007", "7FF#00", "00000141#R"],
 }
-#: What reads or writes a file of settings.
-FILES = ["dump", "dump FILE --overwrite", "diff FILE", "restore FILE", "restore FILE --dry-run"]
+#: test_settings_files.py checks their lines.
+FILES = ["dump", "diff", "restore"]
 #: What reads a recording.
 RECORDINGS = [
     *("info FILE", "info FILE --events", "info FILE --settings st0/motor1", "recover FILE"),
@@ -134,47 +134,21 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
     assert all(line["motor"] in range(1, 5) and line["port"] == "sim:" for line in out)
 
 
-@pytest.mark.parametrize("command", FILES)
-@pytest.mark.parametrize("protocol, setting", [("st", "SPEED_KP"), ("rmd", "speed_kp")])
-@pytest.mark.parametrize("differs", [False, True])
-def test_settings_are_told_by_name(checked, run, tmp_path, protocol, setting, command, differs):
-    motor = (protocol, "-p", "sim:", *(("--timeout", "500ms") if protocol == "rmd" else ()))
-    file = tmp_path / "motor1.toml"
-    run(*motor, "dump", file).ended(0)
-    if differs:
-        file.write_text(re.sub(f"^{setting} = .*$", f"{setting} = 77", file.read_text(), flags=re.M))
-    words = command.replace("FILE", str(file)).split()
-    out, err = checked(*motor, *words, code=1 if differs and words[0] == "diff" else 0)
-    assert all((line["motor"], line["port"]) == (1, "sim:") for line in out)
-    assert bool(err) == (differs and words[0] == "diff")
-    is_dump = words[0] == "dump"
-    assert (setting in out[0].get("values", {})) == (differs or is_dump)
-
-
 @pytest.mark.parametrize(
     "words, code, error",
     [
         ("st -p sim: set STATUS 1", 1, {"kind": "refused", "motor": 1, "name": "SET_READ_ONLY", "code": 2}),
         ("st -p sim: -m 5 status", 1, {"kind": "refused", "motor": 5, "name": "BAD_MOTOR_SELECTED"}),
         ("st -p sim: get SPEED_MES", 2, {"kind": "usage", "port": "sim:"}),
-        ("st -p sim: position 1rad 1s", 2, {"kind": "usage"}),
         ("st info", 2, {"kind": "usage"}),
         ("st -p sim: fly", 2, {"kind": "usage"}),
-        ("st -p sim: get", 2, {"kind": "usage"}),
-        ("st -p sim: scan", 2, {"kind": "usage"}),
         ("st -p /dev/nothing-there info", 3, {"kind": "link", "port": "serial:/dev/nothing-there"}),
-        ("rmd -p sim: torque 33", 2, {"kind": "usage", "port": "sim:"}),
         ("rmd -p sim: zero", 2, {"kind": "usage", "try": "add --write-rom to allow it"}),
         ("rmd -p sim: -i 9 status", 3, {"kind": "silent", "motor": 9, "try": SCAN}),
-        ("st -p foo: info", 2, {"kind": "usage"}),
-        ("rmd -p sim: -i 9 angle", 3, {"kind": "silent", "motor": 9}),
         ("rmd -p sim: scan 9", 3, {"kind": "link"}),
         ("guard st -p sim:", 2, {"kind": "usage"}),
-        ("share -p sim: --at nowhere", 2, {"kind": "usage"}),
-        ("monitor --listen 0.0.0.0:0", 2, {"kind": "usage"}),
         ("monitor --share unix:./nowhere --listen 127.0.0.1:0", 3, {"kind": "link"}),
         ("sim run /nothing-there.toml", 2, {"kind": "usage"}),
-        ("conformance st -p sim: --only no_such_case", 2, {"kind": "usage"}),
     ],
 )
 def test_a_failure_is_an_object_on_stderr(checked, words, code, error):
@@ -203,7 +177,7 @@ def test_revup_data_has_digits(checked):
 
 def test_a_silent_drive_is_told(checked, tmp_path):
     with device(tmp_path / "silent") as port:
-        for command in ("info", "status", "start", "revup-data", "raw 02 40"):
+        for command in ("info", "raw 02 40"):
             out, err = checked("st", "-p", port, "--timeout", "50ms", *command.split(), code=3)
             assert not out and err[0]["error"]["kind"] == "link"
             assert err[0]["error"]["port"] == f"serial:{port}"
@@ -222,11 +196,10 @@ def test_an_adapter_that_echoes_and_a_damaged_reply_are_no_silence(checked, tmp_
     assert (error["kind"], error["motor"], error["port"]) == ("link", 1, f"slcan:{link}")
 
 
-@pytest.mark.parametrize("words", ["st -p sim: info", "rmd -p sim: status", "st registers"])
-def test_a_full_disk_is_not_the_ports_failure(motorlink, words):
+def test_a_full_disk_is_not_the_ports_failure(motorlink):
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [motorlink, *words.split(), "--json"],
+            [motorlink, "st", "-p", "sim:", "info", "--json"],
             **{"stdout": full, "stderr": subprocess.PIPE, "text": True, "env": environment()},
         )
     (line,) = check(done.stderr)
@@ -256,16 +229,13 @@ def test_an_error_that_stays_has_its_values(checked, tmp_path):
     assert err[0]["error"] == out[0]["error"]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [("st", "get", "SPEED_MEAS"), ("st", "segment", "SPEED_MEAS"), ("rmd", "angle"), ("rmd", "status")],
-)
+@pytest.mark.parametrize("words", [("st", "segment", "SPEED_MEAS"), ("rmd", "status")])
 def test_an_outage_of_a_watch_is_in_its_stream_and_so_is_its_end(sim, start, words):
     protocol, *command = words
     served = {"st": ("pty",)} if protocol == "st" else {"rmd": ("slcan-pty",)}
     drives = sim(**{"st": (), "rmd": (), **served})
     port = drives.port("pty" if protocol == "st" else "slcan")
-    watch = start(protocol, "-p", port, "--timeout", "500ms", "--json", *command, "--every", "200ms")
+    watch = start(protocol, "-p", port, "--timeout", "500ms", "--json", *command, "--every", "100ms")
     watch.more_lines(2)
     drives.kill()
     watch.until(lambda: any('"outage"' in line for line in watch.out), "the outage")

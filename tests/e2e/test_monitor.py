@@ -5,7 +5,6 @@ import os
 import signal
 import struct
 import subprocess
-from contextlib import ExitStack
 
 import pytest
 
@@ -14,7 +13,7 @@ from program import eventually
 from sharing import Client, are_still, event, speeds
 
 #: Pages that are killed. ROUNDS=20 for more.
-ROUNDS = int(os.environ.get("ROUNDS", "3"))
+ROUNDS = int(os.environ.get("ROUNDS", "1"))
 #: A deadline that a live page keeps on a busy machine.
 DEADLINE = ("--deadline", "2s")
 #: A busy machine may be late with a reply.
@@ -99,19 +98,13 @@ def test_the_motors_of_killed_pages_stop_and_those_of_others_turn_on(site, watch
     turns_on()
 
 
-@pytest.mark.parametrize("ends", ["frozen", "not drawn", "late"])
-def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(site, watcher, ends):
+def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(site, watcher):
     turns_on = turns_too(watcher)
     with site.page() as page:
         page.alive().turn()
         turns(watcher)
         assert page.beat["holds"]
-        if ends == "frozen":
-            page.lives = False
-        elif ends == "not drawn":
-            page.draws = False
-        else:
-            page.late = 3.0
+        page.lives = False
         why = "the page gave no sign of life for 2000 ms"
         assert page.lapsed() == why
         rests(watcher)
@@ -120,8 +113,7 @@ def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(s
         assert watcher.until(event("left", by=control))["message"] == f"{control} left: {why}"
         answer = page.act("st0", 1, "START_MOTOR")
         assert (answer["kind"], answer["reason"]) == ("refusal", "lapsed")
-        page.forget()
-        page.lives, page.draws, page.late = True, True, 0.0
+        page.lives = True
         eventually(lambda: page.act("st0", 1, "START_MOTOR")["kind"] == "answer", "a page that is alive again")
         page.act_soon("rmd0", 2, "set_speed", speed_dps=360)
         turns(watcher)
@@ -137,17 +129,9 @@ def test_hold_to_run_ends_with_the_key(site, watcher):
         page.held = False
         assert page.lapsed() == "the key or the finger of hold-to-run is up"
         rests(watcher)
-        # Without the key the next sign of life ends it, before or after it is sent.
-        page.forget()
-        answer = page.act("rmd0", 2, "set_speed", hold=True, speed_dps=360)
-        why = page.lapsed() if answer["kind"] == "answer" else answer["message"]
-        # The sign of life may also come while it waits: the stop is ahead of it then.
-        assert why in ("the key or the finger of hold-to-run is up", "a stop came first; nothing was sent")
-        rests(watcher)
 
 
-@pytest.mark.parametrize("way", ["socket", "beacon"])
-def test_a_page_lets_its_motors_go(site, watcher, way):
+def test_a_page_lets_its_motors_go(site, watcher):
     turns_on = turns_too(watcher)
     with site.page() as page, site.page() as other:
         page.alive().turn()
@@ -160,27 +144,24 @@ def test_a_page_lets_its_motors_go(site, watcher, way):
             assert site.post(f"/api/let-go?{query}", headers)[0] == 204
         assert site.post("/api/let-go")[0] == 400
         assert page.beat["holds"] and is_turning(watcher)
-        if way == "socket":
-            assert page.ask("let-go")["to"] == "let-go"
-        else:
-            assert site.post(f"/api/let-go?run={run}&page={name}")[0] == 204
+        assert site.post(f"/api/let-go?run={run}&page={name}")[0] == 204
         assert page.lapsed() == "the page has let its motors go"
         rests(watcher)
         turns_on()
 
 
-@pytest.mark.parametrize("way", ["socket", "post", "viewer", "viewer post"])
+@pytest.mark.parametrize("way", ["socket", "viewer post"])
 def test_stop_all_stops_all_motors_and_latches(site, watcher, way):
     turns_too(watcher)
-    with site.page() as page, site.page(site.viewer) as viewer:
+    with site.page() as page:
         page.alive().turn()
         turns(watcher)
-        if "post" in way:
-            status, body = site.post("/api/stop-all", site.viewer if "viewer" in way else None)
+        if way == "viewer post":
+            status, body = site.post("/api/stop-all", site.viewer)
             assert status == 200
             motors = json.loads(body)["motors"]
         else:
-            motors = (viewer if way == "viewer" else page).ask("stop-all")["motors"]
+            motors = page.ask("stop-all")["motors"]
         stopped = {(it["line"], it["motor"]): it.get("failure") for it in motors}
         assert stopped.items() >= {("st0", 1): None, ("rmd0", 2): None, ("rmd0", 1): None}.items()
         rests(watcher)
@@ -192,61 +173,22 @@ def test_stop_all_stops_all_motors_and_latches(site, watcher, way):
         turns(watcher)
 
 
-def test_a_stop_of_one_motor_leaves_the_others(site, watcher):
-    with site.page() as page:
-        page.alive().turn()
-        turns(watcher)
-        (stopped,) = page.ask("stop", motor={"line": "st0", "motor": 1})["motors"]
-        assert stopped == {"line": "st0", "motor": 1}
-        eventually(lambda: abs(speeds(watcher)[0]) < 30, "a motor that rests")
-        assert speeds(watcher)[1] > 300
-        page.act_soon("st0", 1, "START_MOTOR")
-        turns(watcher)
-
-
-@pytest.mark.parametrize("way", ["page", "other page", "program", "share", "stop-all", "vanished", "frozen"])
+@pytest.mark.parametrize("way", ["share", "vanished"])
 def test_what_stops_a_motor_also_ends_its_run(site, watcher, run, way):
     with site.page() as page, site.page() as other:
         motor = {"line": "rmd0", "motor": 2}
         answer = page.alive().ask("run", **motor, mode="speed", target=360, rate=60, hold=False)
         assert answer["kind"] == "answer", answer
         eventually(lambda: speeds(watcher)[1] > 30, "a motor that turns")
-        if way in ("page", "other page"):
-            {"page": page, "other page": other}[way].ask("stop", motor=motor)
-        elif way == "program":
-            watcher.ask("stop", motor=motor)
-        elif way == "share":
+        if way == "share":
             run("share", "stop", "--at", f"unix:{site.path}").ended(0)
-        elif way == "stop-all":
-            assert site.post("/api/stop-all")[0] == 200
-        elif way == "vanished":
-            page.vanish()
         else:
-            page.lives = False
+            page.vanish()
         rests(watcher)
         # Its next references would come each 20 ms.
         began, beats = len(other.beats), 20
         while len(other.beats) < began + beats:
             assert are_still(watcher)
-
-
-def test_runs_that_wait_do_not_begin_after_the_stop_of_another_page(site, watcher):
-    motor = {"line": "rmd0", "motor": 2}
-    with site.page() as page, site.page() as other:
-        for _ in range(5 * ROUNDS):
-            page.alive()
-            members = {**motor, "mode": "speed", "rate": 6000, "hold": False}
-            sent = [page.send("run", **members, target=target) for target in (300, -300, 300)]
-            # The server has the runs when it answers this.
-            page.ask("lines")
-            assert other.ask("stop", motor=motor)["kind"] == "answer"
-            for it in sent:
-                page.until(lambda heard, it=it: isinstance(heard, dict) and heard.get("id") == it)
-            # Three periods in which a run would be at its target.
-            began = len(other.beats)
-            eventually(lambda began=began: len(other.beats) > began + 3, "beats")
-            rests(watcher)
-            page.forget()
 
 
 def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, watcher):
@@ -261,18 +203,6 @@ def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, wat
         assert page.ask("lines")["kind"] == "answer"
         stopped = {it["motor"]: it.get("failure") for it in page.ask("stop-all")["motors"]}
         assert stopped[1] is None and "never answered" in stopped[20]
-
-
-def test_a_page_and_a_viewer_that_turned_nothing_leave_without_a_trace(site, watcher):
-    with site.page() as page:
-        page.alive().turn()
-        turns(watcher)
-        for headers in (site.operator, site.viewer):
-            with site.page(headers) as other:
-                other.alive()
-            watcher.until(event("left", by=other.welcome["name"]))
-        assert is_turning(watcher)
-        assert page.beat["holds"]
 
 
 def test_a_terminated_server_stops_all_motors_first(monitor, watcher):
@@ -305,20 +235,6 @@ def test_a_server_that_was_suspended_counts_the_time(monitor, watcher):
         rests(watcher)
 
 
-def test_a_guard_stops_the_motor_when_the_server_is_killed(start, serve, drives, tmp_path):
-    drive = tmp_path / "drive"
-    guard = start("guard", "st", "-p", drives.st, "--serve", f"pty:{drive}", "--json")
-    guard.line(0)
-    server, site = serve("-p", drive, *PATIENT)
-    with site.page() as page:
-        page.alive()
-        for command, values in (("SET_RAMP", {"speed_rpm": 1500, "duration_ms": 100}), ("START_MOTOR", {})):
-            page.act_soon("st0", 1, command, **values)
-        eventually(lambda: drives.motor(1, drives.ports[0]["port"])["speed_rpm"] > 1000, "a motor that turns")
-        server.kill()
-        eventually(lambda: abs(drives.motor(1, drives.ports[0]["port"])["speed_rpm"]) < 30, "a motor that rests")
-
-
 @pytest.fixture
 def share(start, drives, tmp_path):
     """`share()`: a share of these drives, again and again at the same place."""
@@ -334,7 +250,7 @@ def share(start, drives, tmp_path):
     return share
 
 
-def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share):
+def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share, run):
     share()
     watcher = Client(share.path, "watcher")
     turns_on = turns_too(watcher)
@@ -346,10 +262,7 @@ def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share)
             server.kill()
             rests(watcher)
         turns_on()
-
-
-def test_a_running_share_with_another_profile_is_not_shown(run, share):
-    share()
+    # Nor is a share shown as what it is not.
     words = ("monitor", "--listen", "127.0.0.1:0", "--share", f"unix:{share.path}", "--profile", "mcsdk-5.4")
     refused = run(*words).ended(2)
     assert "st0 of the share has the profile spec, not mcsdk-5.4" in refused.err
@@ -382,22 +295,6 @@ def test_pages_are_told_that_the_share_is_lost_and_back(serve, share):
         page.turn()
         turns(watcher)
         assert site.post("/api/stop-all")[0] == 200
-        rests(watcher)
-
-
-def test_several_pages_have_names_and_sessions_of_their_own(site, watcher):
-    with ExitStack() as stack:
-        pages = [stack.enter_context(site.page()) for _ in range(3)]
-        assert [page.welcome["name"] for page in pages] == ["page 1", "page 2", "page 3"]
-        one, two, _ = [page.alive() for page in pages]
-        one.turn()
-        turns(watcher)
-        # The last who moves a motor has it.
-        two.act_soon("rmd0", 2, "set_speed", speed_dps=340)
-        one.leave()
-        eventually(lambda: abs(speeds(watcher)[0]) < 30, "the motor of the page that left")
-        assert speeds(watcher)[1] > 300
-        two.leave()
         rests(watcher)
 
 
@@ -435,6 +332,7 @@ def test_pages_come_through_tls(start, certificate):
         (["--deadline", "100ms"], "--deadline is 200ms"),
         (["--share", "unix:x", "-p", "sim:"], "leave -p out"),
         (["-p", "share:./x/st0", "-p", "sim:"], "shown alone"),
+        (["-p", "zenoh:arm1/st0"], "--fleet"),
     ],
 )
 def test_what_cannot_be_served_is_refused(run, certificate, words, said):
@@ -443,24 +341,14 @@ def test_what_cannot_be_served_is_refused(run, certificate, words, said):
     assert files.get(said, said) in done.err
 
 
-def test_an_address_of_the_network_needs_a_word(start):
-    monitor = start("monitor", "--listen", "0.0.0.0:0", "--insecure", "--json")
-    site = Site(json.loads(monitor.line(0)))
-    with site.page() as page:
-        assert page.ask("lines")["kind"] == "answer"
-
-
-@pytest.mark.parametrize(("words", "reason"), [([], "forbidden"), (["--open-addresses"], "line")])
-def test_pages_from_the_network_connect_to_no_address_without_a_word(start, words, reason):
+def test_pages_from_the_network_connect_to_no_address_without_a_word(start):
     # Nobody listens there.
     port = {"port": "slcan:tcp:127.0.0.1:1", "protocol": "rmd"}
-    own = Site(json.loads(start("monitor", "--listen", "127.0.0.1:0", "--json").line(0)))
-    listen = ["--listen", "0.0.0.0:0", "--insecure"]
-    open_ = Site(json.loads(start("monitor", *listen, *words, "--json").line(0)))
-    for site, wanted in ((own, "line"), (open_, reason)):
-        with site.page() as page:
+    own, insecure = ["--listen", "127.0.0.1:0"], ["--listen", "0.0.0.0:0", "--insecure"]
+    for words, reason in ((own, "line"), (insecure, "forbidden"), ([*insecure, "--open-addresses"], "line")):
+        with Site(json.loads(start("monitor", *words, "--json").line(0))).page() as page:
             for ask in ("open", "scan"):
-                assert page.ask(ask, **port)["reason"] == wanted, ask
+                assert page.ask(ask, **port)["reason"] == reason, ask
 
 
 def test_the_usual_port_may_be_taken(start):

@@ -13,22 +13,27 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from monitoring import Site, frame, is_kind, upgraded
-from program import eventually
+from program import Running, eventually
 from sharing import Client
 
-OTHERS = ["http://evil.example", "http://127.0.0.1:3000", "https://{own}", "null", "http://localhost.evil.example"]
-NAMES = ["evil.example", "evil.example:{port}", "127.0.0.1.evil.example:{port}", "a@127.0.0.1", ""]
-
-
-@pytest.fixture
-def monitor(start):
-    """A monitor of simulated drives."""
-    return start("monitor", "--listen", "127.0.0.1:0", "--json")
+@pytest.fixture(scope="module")
+def monitor(motorlink):
+    """A monitor of simulated drives, which all tests use."""
+    monitor = Running([motorlink, "monitor", "--listen", "127.0.0.1:0", "--json"])
+    yield monitor
+    monitor.end()
 
 
 @pytest.fixture
 def site(monitor):
     return Site(json.loads(monitor.line(0)))
+
+
+@pytest.fixture
+def own(start):
+    """A monitor of the test's own, and its site."""
+    monitor = start("monitor", "--listen", "127.0.0.1:0", "--json")
+    return monitor, Site(json.loads(monitor.line(0)))
 
 
 def is_well(site):
@@ -44,37 +49,29 @@ def refused(site, status, **options):
     assert error.value.response.status_code == status
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_name_that_another_site_gave_this_address_is_refused(site, name):
-    host = name.format(port=site.port)
+def test_a_name_that_another_site_gave_this_address_is_refused(site):
+    host = f"evil.example:{site.port}"
     for headers in (site.operator, {**site.operator, "Origin": f"http://{host}"}):
         for method, path in (("GET", "/"), ("GET", f"/?token={site.tokens['url']}"), ("POST", "/api/stop-all")):
             status, answer, body = site.request(method, path, {**headers, "Host": host})
-            assert status in (400, 403), (method, path, headers)
+            assert status == 403, (method, path, headers)
             assert "Set-Cookie" not in answer and site.tokens["url"].encode() not in body
 
 
-@pytest.mark.parametrize("origin", OTHERS)
-def test_a_page_of_another_site_opens_no_connection_and_posts_nothing(site, origin):
-    origin = origin.format(own=site.authority)
-    refused(site, 403, origin=origin)
-    for path in ("/api/stop-all", "/api/let-go?run=x&page=page%201"):
-        assert site.request("POST", path, {**site.operator, "Origin": origin})[0] == 403
-    assert site.request("GET", "/", {**site.operator, "Origin": origin})[0] == 403
-
-
-def test_what_does_not_say_where_it_comes_from_is_refused_where_that_matters(site):
+def test_a_page_of_another_site_opens_no_connection_and_posts_nothing(site):
+    for origin in ("http://evil.example", f"https://{site.authority}"):
+        refused(site, 403, origin=origin)
+        for path in ("/api/stop-all", "/api/let-go?run=x&page=page%201"):
+            assert site.request("POST", path, {**site.operator, "Origin": origin})[0] == 403
+        assert site.request("GET", "/", {**site.operator, "Origin": origin})[0] == 403
+    # Nor does what does not say where it comes from.
     refused(site, 403, origin=None)
     assert site.request("POST", "/api/stop-all", site.operator)[0] == 403
 
 
 def test_nothing_is_given_without_a_token(site):
     other = "0" * 32
-    cookies = [
-        {}, {"Cookie": f"motorlink-{site.port}={other}"}, {"Cookie": f"motorlink={site.tokens['url']}"},
-        {"Cookie": f"motorlink-{site.port}="}, {"Cookie": f"motorlink-{site.port}={site.tokens['url'][:-1]}"},
-    ]
-    for headers in cookies:
+    for headers in ({}, {"Cookie": f"motorlink-{site.port}={other}"}):
         for path in ("/", "/assets/index.js", "/ws", f"/?token={other}", "/?token=", "/no-such-path"):
             assert site.request("GET", path, {**headers, "Origin": site.origin})[0] == 401, (headers, path)
         assert site.post("/api/stop-all", headers)[0] == 401
@@ -121,6 +118,10 @@ def test_a_viewer_sees_and_stops_and_does_nothing_else(site):
         ("command", {**motor, "bytes": [3, 1], "time_to_live": 1.0}),
         ("confirm", motor), ("hello", {"protocol": 1, "name": "x"}),
     ]
+    with site.page() as page:
+        # These go past the server.
+        for ask, members in forbidden[-3:]:
+            assert page.ask(ask, **members)["reason"] == "forbidden"
     with site.page(site.viewer) as page:
         assert page.welcome["role"] == "viewer"
         for ask, members in forbidden:
@@ -139,13 +140,6 @@ def test_a_viewer_sees_and_stops_and_does_nothing_else(site):
         assert page.ask("release")["kind"] == "answer"
 
 
-def test_a_page_may_not_speak_past_the_server(site):
-    with site.page() as page:
-        for ask, members in (("command", {"line": "st0", "motor": 1, "bytes": [3, 1], "time_to_live": 1.0}),
-                             ("confirm", {"line": "st0", "motor": 1}), ("hello", {"protocol": 1, "name": "x"})):
-            assert page.ask(ask, **members)["reason"] == "forbidden"
-
-
 def test_requests_that_are_wrong_are_refused_and_the_connection_goes_on(site):
     wrong = [
         {"id": 101, "ask": "fly"}, {"id": 102, "ask": "stop", "motor": 7}, {"id": 103, "ask": "read", "line": "st0"},
@@ -162,15 +156,12 @@ def test_requests_that_are_wrong_are_refused_and_the_connection_goes_on(site):
         assert page.ask("lines")["kind"] == "answer"
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "{", "[]", "null", "7", '"x"', '{"ask":"stop-all"}', '{"id":-1,"ask":"lines"}', '{"id":4294967296}',
-     '{"beat":-1}', '{"beat":1,"frame":1e999,"held":true,"at":0}', "[" * 10000, b"\0\1\2", '{"id":"1"}'],
-)
-def test_what_is_no_message_ends_the_connection_with_a_reason(site, text):
-    with site.page(lives=False) as page:
-        page.socket.send(text)
-        assert page.closed()
+def test_what_is_no_message_ends_the_connection_with_a_reason(site):
+    for text in ("", "{", "null", '{"ask":"stop-all"}', '{"id":-1,"ask":"lines"}', '{"id":4294967296}', '{"beat":-1}',
+                 '{"beat":1,"frame":1e999,"held":true,"at":0}', "[" * 10000, b"\0\1\2"):
+        with site.page(lives=False) as page:
+            page.socket.send(text)
+            assert page.closed(), text
     is_well(site)
 
 
@@ -203,31 +194,22 @@ def ended(stream, within=20):
     return received
 
 
-@pytest.mark.parametrize(
-    "bytes_",
-    [b"\xff" * 100, frame(b"\xff\xfe\xfd"), b"\x81\x05hello", frame(b"x", opcode=3), frame(b"", opcode=9) * 2000],
-    ids=["noise", "no-utf8", "unmasked", "reserved", "pings"],
-)
-def test_what_no_browser_sends_ends_the_connection(site, bytes_):
-    with upgraded(site) as stream:
-        stream.sendall(bytes_)
-        ended(stream)
-    is_well(site)
-
-
-def test_more_than_a_thousand_messages_in_a_second_end_the_connection(site):
+def test_what_no_browser_sends_ends_the_connection(site):
     sign = frame(json.dumps({"beat": 1, "frame": 1, "held": True, "at": 0}).encode())
-    with upgraded(site) as stream:
-        with suppress(ConnectionError):
-            stream.sendall(sign * 50_000)
-        ended(stream)
+    # Noise, no UTF-8, without a mask, pings, and more than a thousand messages in a second.
+    for bytes_ in (b"\xff" * 100, frame(b"\xff\xfe\xfd"), b"\x81\x05hello", frame(b"", opcode=9) * 2000, sign * 50_000):
+        with upgraded(site) as stream:
+            with suppress(ConnectionError):
+                stream.sendall(bytes_)
+            ended(stream)
     is_well(site)
 
 
-def test_pages_beyond_the_limit_are_told_so_and_the_others_go_on(site):
+def test_pages_beyond_the_limit_are_told_so_and_the_others_go_on(own):
+    _, site = own
     with ExitStack() as stack:
         pages = [stack.enter_context(site.page()) for _ in range(32)]
-        for _ in range(8):
+        for _ in range(2):
             with site.open() as extra:
                 assert "as many pages" in json.loads(extra.recv(10))["message"]
                 with pytest.raises(ConnectionClosed):
@@ -270,14 +252,15 @@ def test_requests_that_are_too_big_are_refused(site):
 
 
 def test_noise_on_the_port_ends_that_connection_only(site):
-    for _ in range(50):
+    for _ in range(10):
         with socket.create_connection((site.host, site.port), timeout=20) as stream:
             stream.sendall(os.urandom(500) + b"\r\n\r\n")
             ended(stream)
     is_well(site)
 
 
-def test_a_page_that_does_not_read_slows_nobody_and_is_closed(site):
+def test_a_page_that_does_not_read_slows_nobody_and_is_closed(own):
+    _, site = own
     signals = [{"line": "st0", "motor": motor, "name": "SPEED_MEAS"} for motor in (1, 2)]
     members = {"signals": signals, "period": 0.01, "queue": 10_000, "drop": "oldest"}
     with upgraded(site) as deaf, site.page() as page:
@@ -296,13 +279,11 @@ def test_a_page_that_does_not_read_slows_nobody_and_is_closed(site):
         assert page.ask("stop-all")["kind"] == "answer"
 
 
-def test_the_socket_of_the_share_is_this_users_alone(site):
+def test_the_socket_of_the_share_is_this_users_alone_and_removed_at_the_end(own):
+    monitor, site = own
     assert os.stat(site.path).st_mode & 0o077 == 0
     assert os.stat(os.path.dirname(site.path)).st_mode & 0o077 == 0
     assert Client(site.path, "program").ask("lines")["kind"] == "answer"
-
-
-def test_the_folder_of_the_share_is_removed_at_the_end(monitor, site):
     monitor.interrupt()
     assert monitor.wait() == 0
     assert not os.path.exists(os.path.dirname(site.path))
@@ -322,7 +303,7 @@ def test_strangers_whose_requests_do_not_arrive_keep_nobody_out(site):
         slow.sendall(words[40:].encode())
         assert slow.recv(12) == b"HTTP/1.1 200"
         slow.close()
-        for _ in range(int(os.environ.get("ROUNDS", "5"))):
+        for _ in range(int(os.environ.get("ROUNDS", "1"))):
             for number in range(300):
                 stranger = strangers.enter_context(socket.create_connection((site.host, site.port), 10))
                 stranger.sendall(b"POST /api/stop-all HTTP/1.1\r\n" if number % 2 else b"G")
@@ -346,7 +327,7 @@ def test_a_flood_of_strangers_keeps_nobody_out(site):
 
         floods = [pool.submit(flood) for _ in range(2)]
         try:
-            for _ in range(20):
+            for _ in range(5):
                 assert site.post("/api/stop-all")[0] == 200
         finally:
             done.set()

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import time
 import tty
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy
@@ -117,29 +116,22 @@ def test_the_readers_of_others_show_what_the_drives_do(run, sim, record, tmp_pat
     assert "motor = 1" in file.attachments["st0_motor1.toml"]
 
 
-def test_rosbags_reads_the_same_joint_states(sim, record, tmp_path):
+    check_with_rosbags(path, file.of("/joint_states"))
+
+
+def check_with_rosbags(path, ours):
+    """It reads the same joint states by its own types, and every message by the types of the file."""
     typesys = pytest.importorskip("rosbags.typesys")
-    drives, path = sim(), tmp_path / "run.mcap"
-    recorded(record(path, "-p", f"slcan:{drives.can}", "--id", "1", until=2))
-    types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with open(path, "rb") as file:
-        messages = list(make_reader(file).iter_messages(topics=["/joint_states"]))
-    ours = File(path).of("/joint_states")
-    assert len(messages) == len(ours) > 10
-    for (schema, _, message), expected in zip(messages, ours):
-        joint = types.deserialize_cdr(message.data, schema.name)
+        messages = list(make_reader(file).iter_messages())
+    types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    joints = [types.deserialize_cdr(it.data, schema.name) for schema, channel, it in messages if channel.topic == "/joint_states"]
+    assert len(joints) == len(ours) > 10
+    for joint, expected in zip(joints, ours):
         assert joint.name == expected.name
         assert numpy.array_equal(joint.position, expected.position)
         assert joint.header.stamp.nanosec == expected.header.stamp.nanosec
-
-
-def test_rosbags_knows_every_generated_type(drives, record, tmp_path):
-    typesys = pytest.importorskip("rosbags.typesys")
-    path = tmp_path / "run.mcap"
-    recorded(record(path, "-p", drives.st, "-p", f"slcan:{drives.can}", until=2))
     types = typesys.get_typestore(typesys.Stores.EMPTY)
-    with open(path, "rb") as file:
-        messages = list(make_reader(file).iter_messages())
     for schema in {schema.name: schema for schema, _, _ in messages}.values():
         types.register(typesys.get_types_from_msg(schema.data.decode(), schema.name))
     for schema, _, message in messages:
@@ -147,19 +139,17 @@ def test_rosbags_knows_every_generated_type(drives, record, tmp_path):
 
 
 def test_a_kill_loses_the_last_second_at_most(drives, record, tmp_path):
-    for number, after in enumerate((0.31, 0.77, 1.13)):
-        path = tmp_path / f"run{number}.mcap"
-        cable = Plug(drives.st_address)
-        running = record(path, "-p", cable.port, "-p", f"slcan:{drives.can}", until=1)
-        # A moment after a flush that no rhythm of the recorder decides.
-        time.sleep(after)
-        # On a busy machine the line itself may be silent: that is not a loss.
-        seen = cable.delivered
-        running.kill()
-        cable.unplug()
-        label = "port_{}".format(cable.port.rsplit(":", 1)[1])
-        lost = seen - max(kept(path, f"/{label}/frames"))
-        assert lost < 1.0e9, f"{lost / 1e9:.3f} s are lost"
+    path, cable = tmp_path / "run.mcap", Plug(drives.st_address)
+    running = record(path, "-p", cable.port, "-p", f"slcan:{drives.can}", until=1)
+    # A moment after a flush that no rhythm of the recorder decides.
+    time.sleep(0.77)
+    # On a busy machine the line itself may be silent: that is not a loss.
+    seen = cable.delivered
+    running.kill()
+    cable.unplug()
+    label = "port_{}".format(cable.port.rsplit(":", 1)[1])
+    lost = seen - max(kept(path, f"/{label}/frames"))
+    assert lost < 1.0e9, f"{lost / 1e9:.3f} s are lost"
 
 
 def test_an_existing_file_is_kept(run, drives, tmp_path):
@@ -167,11 +157,7 @@ def test_an_existing_file_is_kept(run, drives, tmp_path):
     path.write_text("old")
     outcome = run("record", "-p", drives.st, "-o", path, *QUICK).ended(2)
     assert "exists already" in outcome.err and "--force" in outcome.err
-    # Not even --force destroys it before the port is open.
-    run("record", "-p", f"{tmp_path}/nothing", "-o", path, "--force", *QUICK).ended(3)
     assert path.read_text() == "old"
-    run("record", "-p", drives.st, "-o", path, "--force", "--duration", "500ms", *QUICK).ended(0)
-    assert File(path).of("/st0/motor1/signals")
 
 
 def test_the_name_of_the_file_is_shown_without_control_characters(run, drives, tmp_path):
@@ -182,19 +168,10 @@ def test_the_name_of_the_file_is_shown_without_control_characters(run, drives, t
     assert is_clean(done.err), done.err
 
 
-def test_a_fifo_is_refused_at_once(run, tmp_path):
-    path = tmp_path / "fifo"
-    os.mkfifo(path)
-    done = run("record", "-p", "sim:", "-o", path, "--force").ended(3)
-    assert "it is not a regular file" in done.err
-
-
 def test_a_place_that_cannot_be_written_is_refused_before_the_port_is_opened(run, tmp_path):
     folder = tmp_path / "none"
     outcome = run("record", "-p", f"{tmp_path}/nothing", "-o", folder / "run.mcap").ended(3)
     assert f"cannot write `{folder}/run.mcap`" in outcome.err and "mkdir -p" in outcome.err
-    outcome = run("record", "-p", f"{tmp_path}/nothing", "-o", "/proc/run.mcap").ended(3)
-    assert "cannot write `/proc/run.mcap`" in outcome.err
     outcome = run("record", "-p", "sim:", "-o", "-").ended(2)
     assert "stdout" in outcome.err
 
@@ -211,11 +188,15 @@ def test_nothing_is_left_where_no_motor_answers(run, sim, tmp_path):
 
 
 @pytest.mark.parametrize("ending", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGINT, signal.SIGINT]])
-def test_a_signal_ends_the_start_at_once_and_leaves_no_file(start, tmp_path, ending):
+def test_a_signal_ends_the_start_at_once_and_leaves_what_was_there(start, tmp_path, ending):
     drive, port = pty.openpty()
     tty.setraw(port)
     path = tmp_path / "run.mcap"
-    words = ("--motor", "1", "--timeout", "10s", "-o", path)
+    # One of them finds an older file.
+    old = ending == [signal.SIGINT]
+    if old:
+        path.write_text("old")
+    words = ("--motor", "1", "--timeout", "10s", "-o", path, *["--force"] * old)
     running = start("record", "-p", os.ttyname(port), *words)
     # The first question about the settings, which this drive never answers.
     assert os.read(drive, 64)
@@ -223,20 +204,7 @@ def test_a_signal_ends_the_start_at_once_and_leaves_no_file(start, tmp_path, end
     for number in ending:
         running.process.send_signal(number)
     assert running.wait(5) == 130, running.err
-    assert not path.exists()
-    os.close(drive), os.close(port)
-
-
-def test_a_signal_before_the_start_keeps_a_file_that_exists(start, tmp_path):
-    drive, port = pty.openpty()
-    tty.setraw(port)
-    path = tmp_path / "run.mcap"
-    path.write_text("old")
-    running = start("record", "-p", os.ttyname(port), "--timeout", "10s", "-o", path, "--force")
-    assert os.read(drive, 64)
-    running.interrupt()
-    assert running.wait(5) == 130, running.err
-    assert path.read_text() == "old"
+    assert path.read_text() == "old" if old else not path.exists()
     os.close(drive), os.close(port)
 
 
@@ -268,39 +236,10 @@ def test_a_full_disk_ends_the_recording_and_not_the_motors(motorlink, run, sim, 
     run(*turning, "stop").ended(0)
 
 
-def test_a_folder_that_is_removed_is_said_at_once(drives, record, tmp_path):
-    folder = tmp_path / "gone"
-    folder.mkdir()
-    running = record(folder / "run.mcap", "-p", drives.st, until=1)
-    os.remove(folder / "run.mcap")
-    folder.rmdir()
-    assert running.wait() == 3
-    assert any("was removed while it was written" in line for line in running.err), running.err
-    assert not any("motorlink recover" in line for line in running.err), running.err
-
-
-@contextmanager
-def closed_output(motorlink, *words):
-    """The program with a closed output."""
-    process = subprocess.Popen(
-        [motorlink, *map(str, words)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
-    process.stdout.readline()
-    process.stdout.close()
-    yield process
-    process.kill()
-    process.communicate()
-
-
-def test_a_closed_output_does_not_stop_the_recording(motorlink, drives, tmp_path):
+def test_a_closed_output_does_not_stop_the_recording(piped, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    words = ("record", "-p", drives.st, "-o", path, "--json", "--duration", "3s", *QUICK)
-    with closed_output(motorlink, *words) as process:
-        assert process.wait(30) == 0
+    words = ("-p", drives.st, "-o", path, "--json", "--duration", "3s", *QUICK)
+    piped(f"record {' '.join(map(str, words))}", "| head -n 1").ended(0)
     times = [time for topic, time, _ in File(path).messages if topic == "/st0/motor1/signals"]
     assert max(times) - min(times) > 2e9
 
@@ -331,56 +270,37 @@ def test_a_recording_goes_on_when_its_port_is_back(drives, record, tmp_path):
 
 def test_files_are_rotated_and_end_by_size(run, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    words = ("--rotate", "30kB", "--max-size", "100kB", "--fsync", "1s", "--json", *QUICK)
+    words = ("--rotate", "15kB", "--max-size", "40kB", "--fsync", "1s", "--json", *QUICK)
     told = run("record", "-p", drives.st, "-o", path, *words, within=60).ended(0).lines[-1]
     assert told["files"] == sorted(map(str, tmp_path.glob("run_*.mcap"))) and len(told["files"]) > 1
-    assert sum(os.path.getsize(file) for file in told["files"]) == told["bytes"] >= 100_000
+    assert sum(os.path.getsize(file) for file in told["files"]) == told["bytes"] >= 40_000
     parts = [dict(File(file).metadata)["motorlink"]["part"] for file in told["files"]]
     assert parts == [str(number) for number in range(len(parts))]
     assert all(File(file).of("/st0/motor1/signals") for file in told["files"][:-1])
 
 
-def test_chosen_signals_are_recorded_at_the_rate(run, drives, tmp_path):
+def test_what_is_recorded_is_chosen_and_what_does_not_come_is_named(run, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    words = ("SPEED_MEAS", "speed_dps", "--duration", "3s", "--no-settings", *PATIENT, "--rate", "20")
-    ports = ("-p", drives.st, "-p", f"slcan:{drives.can}", "--id", "1")
-    run("record", *ports, "-o", path, *words).ended(0)
+    # Motor 2 of the simulated drive has no flux weakening, and the bus no motor 9.
+    words = ("SPEED_MEAS", "TORQUE_MEAS", "FLUXWK_BUS", "speed_dps", "--id", "1,9", "--full-scale", "16.5")
+    words = ("-p", drives.st, "-p", f"slcan:{drives.can}", *words, "--duration", "2s", "--no-settings")
+    words += ("--rate", "20", "--timeout", "300ms", "-o", path)
+    told = run("record", *words, "--json").ended(0).lines[-1]
+    assert (told["refused"], told["silent"]) == (["st0/motor2/FLUXWK_BUS"], ["can0/motor9"])
     file = File(path)
     assert not file.attachments
-    rows = file.of("/st0/motor1/signals")
-    assert 30 <= len(rows) <= 65 and rows[0].speed_meas == 0
     assert {topic for topic, _, _ in file.messages if "signals" in topic} == {
         "/st0/motor1/signals",
         "/st0/motor2/signals",
         "/can0/motor1/signals",
     }
-
-
-def test_a_refused_signal_is_named_and_the_others_keep_their_rate(run, drives, tmp_path):
-    path = tmp_path / "run.mcap"
-    # Motor 2 of the simulated drive has no flux weakening.
-    words = ("SPEED_MEAS", "FLUXWK_BUS", "--motor", "2", "--no-settings", "--duration", "3s", *QUICK)
-    said = run("record", "-p", drives.st, "-o", path, *words, "--json").ended(0).lines
-    assert said[-1]["refused"] == ["st0/motor2/FLUXWK_BUS"]
-    # It is that of the last second, in which a busy machine may read nothing.
-    assert any(told.get("achieved_hz") for told in said), said
-    row = File(path).of("/st0/motor2/signals")[-1]
-    assert math.isnan(row.fluxwk_bus) and row.speed_meas == 0
-    text = run("record", "-p", drives.st, "-o", path, "--force", *words).ended(0).out
-    assert ", refused: st0/motor2/FLUXWK_BUS, " in text
-
-
-def test_the_current_of_an_st_drive_is_an_effort_with_its_full_scale(run, drives, tmp_path):
-    path = tmp_path / "run.mcap"
-    words = ("TORQUE_MEAS", "--motor", "1", "--no-settings", "--duration", "2s", *QUICK)
-    run("record", "-p", drives.st, "-o", path, *words, "--full-scale", "16.5").ended(0)
-    file = File(path)
-    rows, joints = file.of("/st0/motor1/signals"), file.of("/joint_states")
-    assert len(rows) == len(joints) > 3
-    for row, joint in zip(rows, joints):
-        assert list(joint.effort) == [pytest.approx(row.torque_meas * 16.5 / 32767)]
-    run("record", "-p", drives.st, "-o", path, "--force", *words).ended(0)
-    assert not File(path).of("/joint_states")
+    rows = file.of("/st0/motor2/signals")
+    assert 20 <= len(rows) <= 45 and math.isnan(rows[-1].fluxwk_bus) and rows[-1].speed_meas == 0
+    torques = [row.torque_meas for row in file.of("/st0/motor1/signals")]
+    efforts = [joint.effort[0] for joint in file.of("/joint_states") if joint.name == ["st0_motor1"]]
+    assert efforts == pytest.approx([torque * 16.5 / 32767 for torque in torques])
+    text = run("record", "--force", *words).ended(0).out
+    assert ", refused: st0/motor2/FLUXWK_BUS, " in text and ", SILENT: can0/motor9, " in text
     assert "is not a full scale" in run("record", "-p", drives.st, "-o", path, "--full-scale", "0").ended(2).err
 
 
@@ -507,23 +427,11 @@ def test_a_scenario_is_recorded_and_has_the_same_bytes_each_time(run, tmp_path):
     assert "commanded" in file.events()
 
 
-def test_a_motor_that_never_answers_is_named(run, drives, tmp_path):
-    words = ("-p", f"slcan:{drives.can}", "-o", tmp_path / "run.mcap", "--id", "1,9", "--duration", "3s")
-    words += ("--no-settings", "--rate", "10", "--timeout", "300ms")
-    assert run("record", *words, "--json").ended(0).lines[-1]["silent"] == ["can0/motor9"]
-    assert ", SILENT: can0/motor9, " in run("record", *words, "--force").ended(0).out
-
-
-@pytest.mark.parametrize("option", ["--id", "--motor"])
-def test_motors_of_a_port_that_is_not_there_are_refused(run, drives, tmp_path, option):
+def test_motors_of_a_port_that_is_not_there_and_a_name_of_another_format_are_refused(run, drives, tmp_path):
     path = tmp_path / "run.mcap"
-    port = drives.st if option == "--id" else f"slcan:{drives.can}"
-    assert "no port is a" in run("record", "-p", port, "-o", path, option, "5").ended(2).err
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("ending", ["csv", "log", "asc", "pcapng", "svg", "png"])
-def test_a_recording_has_no_name_of_another_format(run, tmp_path, ending):
-    path = tmp_path / f"run.{ending}"
-    assert "MCAP" in run("record", "-p", "sim:", "-o", path, "--duration", "1s").ended(2).err
-    assert not path.exists()
+    for port, option in ((drives.st, "--id"), (f"slcan:{drives.can}", "--motor")):
+        assert "no port is a" in run("record", "-p", port, "-o", path, option, "5").ended(2).err
+    for ending in ("csv", "pcapng"):
+        path = tmp_path / f"run.{ending}"
+        assert "MCAP" in run("record", "-p", "sim:", "-o", path, "--duration", "1s").ended(2).err
+    assert list(tmp_path.iterdir()) == []

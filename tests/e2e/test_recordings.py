@@ -4,8 +4,6 @@ import csv
 import io
 import json
 import math
-import os
-import re
 import struct
 from xml.etree import ElementTree
 
@@ -13,7 +11,6 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from program import PATIENT
 from recordings import START, TOML, Recording, short
 from test_printed_text import HOSTILE, is_clean, is_shown
 
@@ -103,7 +100,7 @@ def test_a_repaired_file_is_read_by_others_and_has_all_that_was_whole(run, tmp_p
     whole, content = messages(path), path.read_bytes()
     assert run("recover", path).ended(0).out.startswith(f"whole      {len(whole)} messages in 1.991 s")
     assert not new.exists(), "a whole file needs no copy"
-    for end in range(1000, len(content), 1711):
+    for end in (1000, len(content) // 2):
         path.write_bytes(content[:end])
         done = run("recover", path, "--force", "--json").ended(4)
         told, error = done.json, json.loads(done.err)
@@ -119,11 +116,12 @@ def test_a_repaired_file_is_read_by_others_and_has_all_that_was_whole(run, tmp_p
             recovered = [it.metadata for it in reader.iter_metadata() if it.name == "recovered"]
             assert recovered[0]["messages"] == str(len(got))
             assert [it.name for it in reader.iter_attachments()] == ["st0_motor1.toml", "can0_motor2.toml"]
-        assert run("recover", new).ended(0).out.startswith("whole")
+    assert run("recover", new).ended(0).out.startswith("whole")
 
 
-def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(run, path):
-    whole, content = messages(path), bytearray(path.read_bytes())
+def test_what_is_damaged_is_left_out_counted_and_said(run, path):
+    whole, original = messages(path), path.read_bytes()
+    content = bytearray(original)
     with open(path, "rb") as file:
         middle = make_reader(file).get_summary().chunk_indexes[1]
     content[middle.chunk_start_offset + middle.chunk_length // 2] ^= 1
@@ -131,27 +129,18 @@ def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(run, path):
     done = run("recover", path, "--json").ended(4)
     lost = done.json["lost"]
     assert done.json["messages"] + lost["messages"] == len(whole) and lost["messages"] > 0
-    got = messages(path.with_name("run.recovered.mcap"))
+    new = path.with_name("run.recovered.mcap")
+    got = messages(new)
     assert len(got) == done.json["messages"] and set(got) < set(whole)
-
-
-def test_a_damaged_fact_is_said(run, path):
-    damaged = path.read_bytes().replace(b"serial:./st0", b"serial:./st1")
-    path.write_bytes(damaged)
+    # A damaged fact, and a damaged index, which costs no message.
+    path.write_bytes(original.replace(b"serial:./st0", b"serial:./st1"))
     assert "changed that have no checksum of their own" in run("info", path).ended(0).out
-    assert "changed that have no checksum" in run("info", path, "--json").ended(0).json["lost"]["why"]
-    assert "changed that have no checksum" in run("recover", path).ended(4).out
-
-
-def test_a_damaged_index_costs_no_message(run, path):
-    whole, content = messages(path), bytearray(path.read_bytes())
-    with open(path, "rb") as file:
-        middle = make_reader(file).get_summary().chunk_indexes[1]
+    content = bytearray(original)
     for offset in middle.message_index_offsets.values():
         content[offset + 20] ^= 1
     path.write_bytes(content)
-    assert "an index is missing or wrong; no message was lost" in run("recover", path).ended(4).err
-    assert messages(path.with_name("run.recovered.mcap")) == whole
+    assert "an index is missing or wrong; no message was lost" in run("recover", path, "--force").ended(4).err
+    assert messages(new) == whole
 
 
 def test_nothing_is_overwritten_unasked(run, cut):
@@ -162,8 +151,7 @@ def test_nothing_is_overwritten_unasked(run, cut):
     assert new.read_text() == "mine"
     run("recover", cut, "-o", new, "--force").ended(4)
     assert messages(new)
-    for command in [("convert", cut, new), ("plot", cut, "-o", new)]:
-        run(*command).ended(2)
+    run("convert", cut, new).ended(2)
     message = run("recover", cut, "-o", cut, "--force").ended(2).err
     assert "is the same file as" in message and "which is read" in message
 
@@ -192,7 +180,6 @@ def test_another_file_is_refused(run, tmp_path, content, what):
     # A recorder that was killed at once leaves an empty file.
     code, told = (2, f"cannot read `{path}`: {what}") if content else (4, "is empty: its writer ended before")
     assert told in run("recover", path).ended(code).err
-    assert "No such file" in run("info", tmp_path / "none.mcap").ended(2).err
 
 
 def test_a_table_has_a_column_for_each_signal_and_rows_in_the_order_of_time(run, path, tmp_path):
@@ -254,26 +241,10 @@ def test_a_picture_has_signals_by_unit_events_and_gaps(run, path, tmp_path):
 
 def test_a_picture_is_a_png_if_its_name_says_so(run, path, tmp_path):
     run("plot", path, "-o", tmp_path / "run.png").ended(0)
-    run("plot", path, "-o", tmp_path / "run.svg").ended(0)
-    svg = ElementTree.parse(tmp_path / "run.svg").getroot()
+    svg = ElementTree.fromstring(run("plot", path, "-o", "-").ended(0).out)
     png = (tmp_path / "run.png").read_bytes()
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
-    size = struct.unpack(">II", png[16:24])
-    assert size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
-
-
-def test_a_spike_is_never_lost(run, tmp_path):
-    recording = Recording(tmp_path / "run.mcap", chunk=1 << 20)
-    recording.signals("/st0/motor1/signals", SPEED_MEAS="rpm")
-    for n in range(20_000):
-        recording.row("/st0/motor1/signals", n / 100, 5000 if n == 12_345 else 0)
-    recording.finish()
-    picture = run("plot", tmp_path / "run.mcap", "-o", "-").ended(0).out
-    assert len(picture) < 100_000
-    lines = [line.get("points") for line in ElementTree.fromstring(picture).iter() if line.tag.endswith("polyline")]
-    longest = max(lines, key=len)
-    heights = {float(point.split(",")[1]) for point in longest.split()}
-    assert len(heights) == 2, "the rest and the spike"
+    assert struct.unpack(">II", png[16:24]) == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
 
 
 def test_a_part_of_the_time_is_drawn(run, path):
@@ -290,7 +261,8 @@ def test_texts_of_a_recording_are_shown_without_control_characters(run, tmp_path
     recording = Recording(path)
     recording.drive("st0", 1, identity=HOSTILE)
     recording.writer.add_metadata("motorlink", {"version": HOSTILE, "command": HOSTILE})
-    recording.topic(f"/st0/{HOSTILE}", "other/msg/Type", "int32 x\n")
+    for topic in (f"/st0/{HOSTILE}", "/" + 100_000 * "a"):
+        recording.topic(topic, "other/msg/Type", "int32 x\n")
     recording.signals("/st0/motor1/signals", **{"SPEED_MEAS": "\x1b[2Jrpm", "\u202eREF": "rpm"})
     recording.row("/st0/motor1/signals", 0, 1, 2)
     recording.row("/st0/motor1/signals", 0.1, 1, 2)
@@ -320,15 +292,6 @@ def test_names_of_lines_and_settings_are_shown_without_control_characters(run, t
     assert is_shown(run("info", path, "--settings", "st0/motor1").ended(0).out)
 
 
-def test_a_topic_may_have_any_length(run, tmp_path):
-    path = tmp_path / "run.mcap"
-    recording = Recording(path)
-    for topic in ("/" + 100_000 * "a", "/b"):
-        recording.topic(topic, "other/msg/Type", "int32 x\n")
-    recording.finish()
-    assert re.search("/b +0 messages", run("info", path).ended(0).out)
-
-
 def test_values_of_any_size_are_drawn(run, tmp_path):
     path = tmp_path / "run.mcap"
     recording = Recording(path)
@@ -339,30 +302,6 @@ def test_values_of_any_size_are_drawn(run, tmp_path):
     assert "Speed (rpm)" in texts(run("plot", path, "-o", "-").ended(0).out)
 
 
-def test_a_real_recording_is_shown_converted_and_drawn(run, sim, tmp_path):
-    drives, path = sim(), tmp_path / "run.mcap"
-    run("record", "-p", drives.st, "-o", path, "--duration", "2s", "--rate", "50", *PATIENT).ended(0)
-    info = run("info", path, "--json").ended(0).json
-    assert "lost" not in info and info["drives"][0]["label"] == "st0"
-    settings = run("info", path, "--settings", "st0/motor1").ended(0).out
-    assert "SPEED_KP" in settings
-    table = rows(run("convert", path, "-").ended(0).out)
-    voltages = [name for name in table[0] if name.endswith("BUS_VOLTAGE [V]")]
-    assert {row[name] for row in table for name in voltages} == {"", "24", "325"}
-    assert len(table) > 50
-    picture = run("plot", path, "-o", "-").ended(0).out
-    assert "IDLE" in texts(picture) and "Voltage (V)" in texts(picture)
-    assert run("recover", path).ended(0).out.startswith("whole")
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) * 3 // 4])
-    run("recover", path).ended(4)
-    new = path.with_name("run.recovered.mcap")
-    assert re.search(r"/st0/frames +\d+ messages", run("info", new).ended(0).out)
-    assert len(messages(new)) > 50
-
-
-def test_a_full_disk_leaves_no_half_a_file(run, path):
-    if not os.path.exists("/dev/full"):
-        pytest.skip("this system has no /dev/full")
+def test_a_full_disk_is_said(run, path):
     message = run("convert", path, "/dev/full").ended(3).err
     assert "cannot write `/dev/full`: No space left" in message

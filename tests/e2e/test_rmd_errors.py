@@ -5,7 +5,6 @@ import pytest
 from peers import device, slcan_adapter
 from program import eventually
 
-MOTIONS = ["torque 0.5", "speed 90", "position 90", "single-turn-position 90 cw --full-turn", "run"]
 TEXT = "motor 2 answered and does not turn: it reports low voltage protection (supply 5.0 V, 25 °C)"
 LOW = "plant.supply.voltage = 5.0\n"
 
@@ -18,30 +17,22 @@ def bus(tmp_path):
     return f"sim:{config}"
 
 
-@pytest.mark.parametrize("words", MOTIONS)
-def test_a_motor_with_an_error_is_told_after_a_motion_command(run, bus, words):
-    words = words.split()
-    run("rmd", "-p", bus, "-i", 1, *words).ended(0)
-    failed = run("rmd", "-p", bus, "-i", 2, *words).ended(1)
-    assert TEXT in failed.err and failed.out == "", failed
-    clear = f"`motorlink rmd -p {bus} --id 2 clear-errors`, and repeat the command"
-    assert f"remove the cause, then {clear}" in failed.err
-    failed = run("rmd", "-p", bus, "-i", 2, "--json", *words).ended(1)
+def test_a_motor_with_an_error_is_told_after_a_motion_command(run, bus):
+    for words in ("torque 0.5", "speed 90", "position 90", "single-turn-position 90 cw --full-turn", "run"):
+        failed = run("rmd", "-p", bus, "-i", 2, *words.split()).ended(1)
+        assert TEXT in failed.err and failed.out == "", failed
+        clear = f"`motorlink rmd -p {bus} --id 2 clear-errors`, and repeat the command"
+        assert f"remove the cause, then {clear}" in failed.err
+    failed = run("rmd", "-p", bus, "-i", 2, "--json", "speed", 90).ended(1)
     assert failed.out == "" and '"kind":"refused"' in failed.err and '"motor":2' in failed.err
 
 
-def test_of_several_motors_the_one_with_an_error_is_told(run, bus):
-    lines = run("rmd", "-p", bus, "--id", "1,2", "--json", "speed", 90).ended(1).lines
+@pytest.mark.parametrize("words", [("--id", "1,2", "speed", 90), ("torque4", 0.5, 0.5, 0, 0, "--expect", "1,2")])
+def test_of_several_motors_the_one_with_an_error_is_told(run, bus, words):
+    lines = run("rmd", "-p", bus, "--json", *words).ended(1).lines
     assert [(line["motor"], line["ok"]) for line in lines] == [(1, True), (2, False)]
     assert lines[1]["error"]["kind"] == "refused"
-    assert TEXT in run("rmd", "-p", bus, "--id", "1,2", "speed", 90).ended(1).err
-
-
-def test_torque4_tells_the_motor_with_an_error(run, bus):
-    torque4 = ("torque4", 0.5, 0.5, 0, 0, "--expect", "1,2")
-    lines = run("rmd", "-p", bus, "--json", *torque4).ended(1).lines
-    assert [(line["motor"], line["ok"]) for line in lines] == [(1, True), (2, False)]
-    assert TEXT in run("rmd", "-p", bus, *torque4).ended(1).err
+    assert TEXT in run("rmd", "-p", bus, *words).ended(1).err
 
 
 def test_after_the_error_is_cleared_the_motor_turns(run, sim):

@@ -1,6 +1,6 @@
 """`motorlink node --ros2`, as zenoh-ros2-sdk and rosbags see it.
 
-ROUNDS=30 pytest tests/e2e/test_ros2.py -s    kills, freezes and silences each publisher 30 times, with times.
+ROUNDS=30 pytest tests/e2e/test_ros2.py -s    kills and freezes publishers and cuts the network 30 times, with times.
 """
 
 import json
@@ -30,7 +30,7 @@ from ruamel.yaml import YAML  # noqa: E402
 
 from robot import DIAGNOSTICS, STATE, TRIGGER, Robot  # noqa: E402
 
-ROUNDS = int(os.environ.get("ROUNDS", "5"))
+ROUNDS = int(os.environ.get("ROUNDS", "1"))
 ROS = get_typestore(Stores.ROS2_JAZZY)
 LIVE = 0.2
 PERIOD = 0.02
@@ -116,45 +116,6 @@ class Publisher(Killed):
         assert self.said == "ready\n"
 
 
-class Source:
-    """A publisher whose clock the test sets."""
-
-    def __init__(self, node, gid):
-        hash = ROS.hash_rihs01(STATE)
-        self.key = f"0/arm1/joint_commands/sensor_msgs::msg::dds_::JointState_/{hash}"
-        self.zenoh, self.gid, self.sequence = network(node.address), bytes([gid] * 16), 0
-
-    def put(self, sent, **message):
-        self.send(*self.sample(sent, **message))
-
-    def send(self, payload, attachment):
-        self.zenoh.put(self.key, payload, attachment=attachment)
-
-    def sample(self, sent, name=("wheel",), position=(), velocity=(), effort=()):
-        import numpy
-
-        self.sequence += 1
-        attachment = struct.pack("<qqB", self.sequence, int(sent * 1e9), 16) + self.gid
-        header = ROS.types["std_msgs/msg/Header"](ROS.types["builtin_interfaces/msg/Time"](0, 0), "")
-        arrays = [numpy.array(it, dtype=float) for it in (position, velocity, effort)]
-        message = ROS.types[STATE](header, list(name), *arrays)
-        return bytes(ROS.serialize_cdr(message, STATE)), attachment
-
-    def stream(self, seconds, behind=0.0, **message):
-        """Publishes for a time. Its clock is behind."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self.put(time.time() - behind, **message)
-            time.sleep(PERIOD)
-
-    def turn(self, direct, behind=0.0, rpm=900):
-        """Publishes until the wheel turns at this speed."""
-        end = time.monotonic() + 20
-        while abs(direct.rpm() - rpm) > 60:
-            assert time.monotonic() < end, "the wheel at speed"
-            self.stream(0.1, behind, **wheel(rpm))
-
-
 def turns(direct, rpm=900, within=20):
     eventually(lambda: abs(direct.rpm() - rpm) < 100, "the wheel at speed", within)
 
@@ -203,41 +164,19 @@ def test_ros_tools_see_the_topics_and_services_that_the_node_announces(node, rob
     assert set(services) == {"/arm1/stop_all", "/arm1/clear_faults"}
 
 
-def test_hashes_are_those_of_rosbags(node, robot):
-    tokens = [str(it.ok.key_expr) for it in robot.session.liveliness.get("@ros2_lv/0/**")]
-    for kind in (STATE, DIAGNOSTICS):
-        name = kind.rsplit("/", 1)[1]
-        hashes = {it.split("/")[-2] for it in tokens if f"::{name}_/" in it}
-        assert hashes == {ROS.hash_rihs01(kind)}
-
-
-def test_joint_states_are_what_the_drives_say(node, robot, direct):
-    states = robot.hears("/arm1/joint_states", STATE)
+def test_rosbags_reads_what_the_drives_say_in_a_recording_of_the_topics(node, direct, tmp_path):
     # RMD motor 2 to 90°, and ST motor 1 to 900 rpm.
-    move = struct.pack("<BxHi", 0xA4, 360, 9000)
-    assert direct.command("rmd0", 2, *move)["kind"] == "answer"
-    assert direct.command("st0", 1, 7, *struct.pack("<iH", 900, 100))["kind"] == "answer"
-    assert direct.command("st0", 1, 3, 1)["kind"] == "answer"
+    for line, motor, code in [
+        ("rmd0", 2, struct.pack("<BxHi", 0xA4, 360, 9000)),
+        ("st0", 1, struct.pack("<BiH", 7, 900, 100)),
+        ("st0", 1, bytes([3, 1])),
+    ]:
+        assert direct.command(line, motor, *code)["kind"] == "answer"
     eventually(lambda: abs(angle(direct) - 90) < 0.2 and abs(direct.rpm() - 900) < 20, "motion", within=20)
-    time.sleep(0.3)
-    at, now = angle(direct), time.time()
-    time.sleep(0.3)
-    # A value that a busy machine could not read lately is none.
-    state = next(it for it in reversed(states) if not math.isnan(it.position[1]))
-    assert state.name == ["wheel", "arm", "watched"]
-    assert math.isnan(state.position[0])
-    assert state.position[1] == pytest.approx(0.5 - math.radians(at) / 6, abs=0.001)
-    assert state.velocity[0] == pytest.approx(direct.rpm() * RPM, abs=2)
-    assert math.isnan(state.effort[0]) and math.isfinite(state.effort[1]) and math.isnan(state.effort[2])
-    stamp = state.header.stamp.sec + state.header.stamp.nanosec / 1e9
-    assert now - 0.5 < stamp < time.time()
-
-
-def test_rosbags_reads_a_recording_of_the_topics(node, direct, tmp_path):
-    zenoh, heard = network(node.address), []
+    at, began, zenoh, heard = angle(direct), time.time(), network(node.address), []
     zenoh.declare_subscriber("0/**", lambda it: heard.append((str(it.key_expr), it.payload.to_bytes(),
                                                               it.attachment.to_bytes())))
-    eventually(lambda: len({key for key, *_ in heard}) == 2 and len(heard) > 40, "both topics", within=20)
+    eventually(lambda: len({key for key, *_ in heard}) == 2 and len(heard) > 60, "both topics", within=20)
     zenoh.close()
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         topics = {}
@@ -254,15 +193,22 @@ def test_rosbags_reads_a_recording_of_the_topics(node, direct, tmp_path):
         read = [(it.topic, bag.deserialize(raw, it.msgtype)) for it, _, raw in bag.messages()]
     assert len(read) == len(heard)
     states = [it for topic, it in read if topic == "/arm1/joint_states"]
-    wanted = 0.5 - math.radians(angle(direct)) / 6
-    assert states[-1].position[1] == pytest.approx(wanted, abs=0.001)
+    # A value that a busy machine could not read lately is none.
+    state = next(it for it in reversed(states) if not math.isnan(it.position[1]) and not math.isnan(it.velocity[0]))
+    assert state.name == ["wheel", "arm", "watched"]
+    assert math.isnan(state.position[0])
+    assert state.position[1] == pytest.approx(0.5 - math.radians(at) / 6, abs=0.001)
+    assert state.velocity[0] == pytest.approx(900 * RPM, abs=2)
+    assert math.isnan(state.effort[0]) and math.isfinite(state.effort[1]) and math.isnan(state.effort[2])
+    stamp = state.header.stamp.sec + state.header.stamp.nanosec / 1e9
+    assert began - 0.5 < stamp < time.time()
     (arm,) = [it for it in [it for topic, it in read if topic == "/diagnostics"][-1].status if "arm1: arm" in it.name]
     assert (arm.level, arm.message, arm.hardware_id) == (0, "OK", "arm1/rmd0/2")
 
 
-@pytest.mark.parametrize("how", ["killed", "frozen", "silent"])
+@pytest.mark.parametrize("how", ["killed", "frozen"])
 def test_a_motor_stops_when_its_publisher_is_lost(node, direct, how):
-    times, number = [], {"killed": signal.SIGKILL, "frozen": signal.SIGSTOP, "silent": signal.SIGUSR1}[how]
+    times, number = [], {"killed": signal.SIGKILL, "frozen": signal.SIGSTOP}[how]
     for _ in range(3 * ROUNDS):
         with turning(node, direct) as publisher:
             direct.others.clear()
@@ -298,24 +244,6 @@ def test_an_arm_follows_positions_and_stops_with_its_publisher(node, robot, dire
     direct.until(event("stopping", motor=2, by="ros2"))
 
 
-def test_samples_that_waited_in_a_network_move_nothing(node, direct, diagnostics):
-    for round in range(ROUNDS):
-        source = Source(node, 10 + round)
-        # The clock of its computer is an hour behind.
-        source.turn(direct, behind=3600)
-        cut = time.time() - 3600
-        quiet(direct)
-        time.sleep(1.0)
-        # All samples of the time without network come at once.
-        before = int(diagnostics("commands").details.get("old", 0))
-        for step in range(40):
-            source.put(cut + PERIOD * step, **wheel())
-        time.sleep(0.2)
-        assert abs(direct.rpm()) < 30
-        eventually(lambda: int(diagnostics("commands").details.get("old", 0)) >= before + 40, "40 old samples")
-        source.zenoh.close()
-
-
 def test_a_network_that_is_cut_stops_the_motor_and_brings_no_old_motion(node, direct, diagnostics):
     times = []
     for _ in range(ROUNDS):
@@ -337,134 +265,52 @@ def test_a_network_that_is_cut_stops_the_motor_and_brings_no_old_motion(node, di
     assert max(times) < LIVE + SLACK
 
 
-def test_samples_of_an_unknown_publisher_that_come_at_once_move_nothing(node, direct, diagnostics):
-    source = Source(node, 10)
-    # All are there first: on a busy machine each takes almost a period.
-    begun = time.time() - 30
-    for sample in [source.sample(begun + PERIOD * step, **wheel()) for step in range(500)]:
-        source.send(*sample)
-    time.sleep(0.5)
+def test_a_command_that_is_wrong_moves_nothing_and_is_counted(node, robot, direct, diagnostics):
+    command = robot.commands()
+
+    def is_counted():
+        command(name=["wheel", "leg"], velocity=[50.0, 50.0])
+        time.sleep(PERIOD)
+        return int(diagnostics("commands").details.get("unknown_joint", 0)) > 10
+
+    eventually(is_counted, "counts", within=10)
     assert abs(direct.rpm()) < 30
-    assert int(diagnostics("commands").details["accepted"]) == 0
-
-
-BAD = [
-    ("bad_value", {"name": ["wheel"], "velocity": [math.nan]}),
-    ("bad_value", {"name": ["wheel"], "velocity": [math.inf]}),
-    ("bad_value", {"name": ["wheel"], "velocity": [1e9]}),
-    ("bad_lengths", {"name": ["wheel"], "velocity": [50.0, 50.0]}),
-    ("bad_lengths", {"name": ["wheel"], "position": [50.0]}),
-    ("bad_lengths", {"name": ["wheel"]}),
-    ("unknown_joint", {"name": ["wheel", "leg"], "velocity": [50.0, 50.0]}),
-    ("joint_twice", {"name": ["wheel", "wheel"], "velocity": [50.0, 50.0]}),
-    ("read_only_joint", {"name": ["wheel", "watched"], "velocity": [50.0, 50.0]}),
-]
-
-
-@pytest.mark.parametrize(["kind", "message"], BAD)
-def test_a_command_that_is_wrong_moves_nothing_and_is_counted(node, direct, diagnostics, kind, message):
-    source = Source(node, 10)
-    source.stream(1.0, **message)
-    assert abs(direct.rpm()) < 30
-    eventually(lambda: int(diagnostics("commands").details.get(kind, 0)) > 10, kind, within=5)
     status = diagnostics("commands")
     assert status.level == 1 and status.message.startswith("refused: "), status
 
 
-def test_bytes_that_are_no_command_move_nothing(node, direct, diagnostics):
-    source = Source(node, 10)
-    source.turn(direct)
-    quiet(direct)
-    # Until diagnostics have the last sample.
-    time.sleep(1.5)
-    before = int(diagnostics("commands").details["accepted"])
-    for attachment in (None, b"", b"\x01" * 32):
-        source.zenoh.put(source.key, b"\x00\x01\x00\x00", attachment=attachment)
-    for size in range(200):
-        source.sequence += 1
-        attachment = struct.pack("<qqB", source.sequence, int(time.time() * 1e9), 16) + source.gid
-        source.zenoh.put(source.key, b"\x00\x01\x00\x00" + os.urandom(size), attachment=attachment)
-    eventually(lambda: int(diagnostics("commands").details.get("unreadable", 0)) > 100, "counts", within=5)
-    assert diagnostics("commands").details["not_rmw_zenoh"] == "3"
-    assert int(diagnostics("commands").details["accepted"]) == before
-    assert abs(direct.rpm()) < 30
-
-
-def test_one_publisher_commands_at_a_time(node, direct, diagnostics):
-    kept = 0
-    for _ in range(3 * ROUNDS):
-        with turning(node, direct):
-            with Publisher(node, **wheel(300)) as second:
-                time.sleep(1.0)
-                # Not if the first one was late on a busy machine.
-                kept += abs(direct.rpm() - 900) < 100
-                eventually(lambda: int(diagnostics("commands").details.get("other_publisher", 0)), "counts")
-                second.process.kill()
-            turns(direct)
-        quiet(direct)
-        if kept >= ROUNDS:
-            break
-    assert kept >= ROUNDS
-
-
-def test_an_arm_does_not_jump_at_its_start(node, direct, diagnostics):
-    assert abs(angle(direct)) < 1
-    # The joint is at 0.5 rad.
-    for _ in range(ROUNDS):
-        with Publisher(node, name=["arm"], position=[0.0]):
-            time.sleep(1.0)
-            assert abs(angle(direct)) < 1
-            why = "the first position is 0.000 rad"
-            eventually(lambda: why in diagnostics("commands").message, why, within=5)
-        time.sleep(2 * LIVE)
-
-
-def test_a_latch_holds_until_commands_begin_again(node, direct, run, diagnostics):
-    for _ in range(ROUNDS):
-        with turning(node, direct):
-            assert run("fleet", "stop-all", within=60, **via(node)).code == 0
-            stands(direct)
-            run("fleet", "release", **via(node)).ended(0)
-            # It sends on, and is not obeyed.
-            time.sleep(0.5)
-            assert abs(direct.rpm()) < 30
-            eventually(lambda: diagnostics("wheel").level == 2, "a blocked wheel", within=5)
-        time.sleep(2 * LIVE)
-        with turning(node, direct):
-            pass
-        quiet(direct)
-
-
-def test_a_latch_without_a_stop_stops_the_motor_and_a_program_that_takes_it_keeps_it_turning(node, direct, run):
+def test_a_latch_holds_until_commands_begin_again_and_a_program_that_takes_a_motor_keeps_it(
+    node, direct, run, diagnostics
+):
     with turning(node, direct):
         run("fleet", "latch", **via(node)).ended(0)
         stands(direct)
         run("fleet", "release", **via(node)).ended(0)
+        # It sends on, and is not obeyed.
+        time.sleep(0.5)
+        assert abs(direct.rpm()) < 30
+        eventually(lambda: diagnostics("wheel").level == 2, "a blocked wheel", within=5)
     time.sleep(2 * LIVE)
     with turning(node, direct):
         taker = Client(node.path, "taker")
         assert taker.ask("take", motor={"line": "st0", "motor": 1})["kind"] == "answer"
+        eventually(lambda: "taker" in diagnostics("wheel").message, "who holds it", within=5)
         time.sleep(2 * LIVE)
-        turns(direct, 900)
+        turns(direct)
         taker.socket.close()
         stands(direct)
 
 
-def test_another_program_that_holds_the_motor_is_not_disturbed(node, direct, diagnostics):
-    assert direct.command("st0", 1, 7, *struct.pack("<iH", 600, 100))["kind"] == "answer"
-    assert direct.command("st0", 1, 3, 1)["kind"] == "answer"
-    turns(direct, 600)
-    with Publisher(node, **wheel(900)):
-        eventually(lambda: "looks" in diagnostics("wheel").message, "who holds it", within=5)
-        time.sleep(1.0)
-        turns(direct, 600)
-
-
-def test_a_wheel_stops_at_zero_and_starts_again(node, direct):
-    source = Source(node, 10)
+def test_a_wheel_stops_at_zero_and_starts_again(node, robot, direct):
+    command = robot.commands()
     for rpm in (900, 0, -900, 0):
-        source.turn(direct, rpm=rpm)
-    source.zenoh.close()
+
+        def is_there(rpm=rpm):
+            command(**wheel(rpm))
+            time.sleep(PERIOD)
+            return abs(direct.rpm() - rpm) < 60
+
+        eventually(is_there, "the wheel at speed", within=20)
 
 
 def test_stop_all_stops_motors_and_says_so(node, robot, direct):
@@ -499,20 +345,6 @@ def test_a_fault_ends_a_motion_until_it_is_cleared_and_commands_begin_again(node
         pass
 
 
-def test_a_motor_that_does_not_answer_is_stale_and_has_no_state(node, robot, diagnostics):
-    states = robot.hears("/arm1/joint_states", STATE)
-    eventually(lambda: states and states[-1].name == ["wheel", "arm", "watched"], "all joints", within=20)
-    node.drives.process.send_signal(signal.SIGSTOP)
-    try:
-        eventually(lambda: diagnostics("wheel").level == diagnostics("arm").level == 3, "STALE", within=20)
-        before = len(states)
-        time.sleep(0.3)
-        assert len(states) == before
-    finally:
-        node.drives.process.send_signal(signal.SIGCONT)
-    eventually(lambda: diagnostics("arm").level == 0, "OK", within=30)
-
-
 def test_the_files_of_the_example_have_the_names_that_the_node_announces(nodes):
     ready = json.loads(nodes("arm1", "--ros2", "--config", EXAMPLE / "node.toml").out[0])["ros2"]
     control = ElementTree.parse(EXAMPLE / "arm.urdf").getroot().find("ros2_control")
@@ -538,8 +370,6 @@ def test_a_file_that_is_not_possible_is_refused(run, file):
     for before, after, why in [
         ('line = "st0"', 'line = "st7"', "no line st7; the lines are st0, rmd0"),
         ('command = "position"', 'command = "velocity"\nspeed = 1', "speed"),
-        ('name = "arm"', 'name = "wheel"', "two joints have the name wheel"),
-        ('time_to_live_seconds = 0.2', "time_to_live_seconds = 0.0", "time_to_live_seconds is 0.02 to 10"),
     ]:
         file.write_text(FILE.replace(before, after))
         refused = run(*words)

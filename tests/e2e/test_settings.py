@@ -55,11 +55,11 @@ def value(number):
 def set_speed_kp(run, tmp_path):
     """Sets SPEED_KP to 800 on a drive whose reads give `replies` in turn; gives the outcome and what was written."""
 
-    def set_speed_kp(*replies, code, options=()):
+    def set_speed_kp(*replies, code):
         left, written = list(replies), []
         link = tmp_path / f"drive{len(list(tmp_path.iterdir()))}"
         with device(link, drive(lambda: left.pop(0), written.append)) as port:
-            words = ("--timeout", "500ms", "set", "SPEED_KP", 800, *options)
+            words = ("--timeout", "500ms", "set", "SPEED_KP", 800)
             return run("st", "-p", port, *words).ended(code), written
 
     return set_speed_kp
@@ -71,9 +71,6 @@ def test_set_has_the_old_and_the_new_value(st):
     done = st("--json", "--raw", "set", "SPEED_KP", -3, "--verify").ended(0).json
     assert (done["before"], done["values"]) == ({"SPEED_KP": {"digits": 800}}, {"SPEED_KP": {"digits": -3}})
     assert "CONTROL_MODE was SPEED (0x1), is TORQUE (0x0)" in st("set", "CONTROL_MODE", "torque").ended(0).out
-
-
-def test_set_says_that_a_register_is_write_only(st):
     told = st("set", "IQ_SPEEDMODE", 5).ended(0).out
     assert "IQ_SPEEDMODE is written; its value is unknown: IQ_SPEEDMODE is write-only" in told
     done = st("--json", "set", "IQ_SPEEDMODE", 5).ended(0).json
@@ -94,11 +91,9 @@ def test_set_says_that_the_write_was_acknowledged_if_the_line_fails_then(set_spe
 
 def test_set_says_that_a_drive_refuses_to_read(set_speed_kp):
     refusal = nack(GET_WRITE_ONLY)
-    told, written = set_speed_kp(refusal, refusal, code=0)
-    assert "SPEED_KP is written; its value is unknown: the drive refuses to read it (GET_WRITE_ONLY)" in told.out
     told, _ = set_speed_kp(value(700), refusal, code=0)
     assert "SPEED_KP was 700 s16A/unit and is written; its new value is unknown:" in told.out
-    told, _ = set_speed_kp(refusal, value(800), code=0)
+    told, written = set_speed_kp(refusal, value(800), code=0)
     assert "SPEED_KP is 800 s16A/unit; its old value is unknown:" in told.out
     assert written == [800]
 
@@ -118,21 +113,15 @@ def test_pid_sets_one_gain_and_leaves_the_others(rmd):
     assert list(rmd("--json", "pid").ended(0).values.values()) == [9, 2, 120, 4, 5, 7]
 
 
-@pytest.mark.parametrize(
-    "words, said",
-    [
+def test_gains_that_make_no_sense_are_not_sent(run):
+    for words, said in (
         ("1 2", "2 gains are given, and a motor has six"),
-        ("1 2 3 4 5 6 7", "no more were expected"),
         ("speed=3", "the gains are position_kp, position_ki, speed_kp"),
-        ("speed_kp=256", "a whole number from 0 to 255"),
-        ("speed_kp=", "a whole number from 0 to 255"),
         ("speed_kp=1 2", "a motor has no gain `2`"),
-        ("1 2 3 4 5 x", "a whole number from 0 to 255"),
-    ],
-)
-def test_gains_that_make_no_sense_are_not_sent(rmd, words, said):
-    told = rmd("--trace", "pid", *words.split()).ended(2).err
-    assert said in told and "#31" not in told
+        ("1 2 3 4 5 256", "a whole number from 0 to 255"),
+    ):
+        told = run("rmd", "-p", "sim:", "--trace", "pid", *words.split()).ended(2).err
+        assert said in told and "#31" not in told
 
 
 def test_acceleration_and_encoder_offset_have_the_old_and_the_new_value(rmd):
@@ -162,7 +151,7 @@ def told_by_motor(run, tmp_path):
                 return [f"t1418{command}00{left.pop(0)}"] if left else []
             return [can] if command in ("31", "34") else [f"t1418{command}1900F000000000"]
 
-        with device(tmp_path / "can0", slcan_adapter(motor)) as path:
+        with device(tmp_path / f"can{len(list(tmp_path.iterdir()))}", slcan_adapter(motor)) as path:
             port = ("-p", f"slcan:{path}", "--timeout", "100ms")
             return run("rmd", *port, *words.split()).ended(code)
 
@@ -170,12 +159,8 @@ def told_by_motor(run, tmp_path):
 
 
 @pytest.mark.parametrize("words", ["pid speed_kp=9", "acceleration 9"])
-def test_a_setting_is_not_written_if_the_old_one_cannot_be_read(told_by_motor, words):
+def test_a_setting_that_cannot_be_read_is_not_written_or_said_to_be_written(told_by_motor, words):
     assert "not written:" in told_by_motor(words, code=3).err
-
-
-@pytest.mark.parametrize("words", ["pid speed_kp=9", "acceleration 9"])
-def test_a_setting_that_cannot_be_read_back_is_said_to_be_written(told_by_motor, words):
     told = told_by_motor(words, 6 * "00", code=3)
     assert "the motor confirmed the write, but" in told.err and told.out == ""
 
@@ -183,8 +168,3 @@ def test_a_setting_that_cannot_be_read_back_is_said_to_be_written(told_by_motor,
 def test_another_program_that_changes_gains_in_between_is_told(told_by_motor):
     told = told_by_motor("pid speed_kp=100", "646464096464", "6464640A6464", code=1)
     assert "speed ki is 10 instead of 9" in told.err and "another program changed them" in told.err
-
-
-def test_a_motor_that_takes_less_acceleration_is_told(told_by_motor):
-    told = told_by_motor("acceleration 1000", "000010000000", "0000F4010000", code=1)
-    assert "acceleration is 500 °/s² instead of 1000 °/s²" in told.err

@@ -20,9 +20,7 @@ from program import eventually
 from sharing import Client, are_still, event, speeds
 
 #: Programs that are killed. ROUNDS=50 for more.
-ROUNDS = int(os.environ.get("ROUNDS", "5"))
-#: Stops of each kind from a shell.
-RUNS_OF_STOPS = max(2, ROUNDS // 2)
+ROUNDS = int(os.environ.get("ROUNDS", "1"))
 START, STOP, RUNNING = (3, 1), (3, 2), 6
 
 #: A program that watches a motor.
@@ -155,25 +153,16 @@ def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, drives, run
     assert not share.path.exists()
 
 
-def test_after_the_kill_of_a_share_programs_see_the_end_and_a_new_one_takes_its_place(
-    share, drives, start
-):
-    client = Client(share.path, "x")
+def test_a_new_share_takes_the_place_of_a_killed_one_and_stops_all_motors_that_it_turned(share, drives, start):
+    process, client = program(TURNS, share, "turning"), Client(share.path, "x")
     share.process.send_signal(signal.SIGKILL)
     share.wait()
+    # Programs see the end.
     assert list(iter(client.receive, None)) is not None
-    new = start("share", "-p", drives.st, "--at", f"unix:{share.path}")
-    assert new.line(0).startswith(f"share at unix:{share.path}: st0 (serial:")
-    assert Client(share.path, "y").ask("lines")["kind"] == "answer"
-
-
-def test_a_new_share_stops_all_motors_that_one_before_it_turned(share, drives, start):
-    process = program(TURNS, share, "turning")
-    share.process.send_signal(signal.SIGKILL)
-    share.wait()
     process.communicate()
-    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--timeout", "1s", "--json"]
-    start("share", *words, "--at", f"unix:{share.path}").line(0)
+    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--timeout", "1s"]
+    new = start("share", *words, "--at", f"unix:{share.path}")
+    assert new.line(0).startswith(f"share at unix:{share.path}: st0 (serial:")
     # No program has read or commanded a motor of this share.
     operator = Client(share.path, "operator")
     motors = operator.ask("stop")["motors"]
@@ -221,7 +210,7 @@ def test_a_share_with_all_its_programs_takes_stops_and_nothing_else(share, run):
     """64 programs are the limit. A stop from a shell has a place of its own."""
     programs = [Client(share.path, f"program {number}") for number in range(64)]
     at, motor = ("--at", f"unix:{share.path}"), ("rmd", "-p", f"share:{share.path}/rmd0", "--id", 2)
-    for stop in RUNS_OF_STOPS * [("share", "stop", *at), (*motor, "stop")]:
+    for stop in ROUNDS * [("share", "stop", *at), (*motor, "stop")]:
         programs[0].command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
         eventually(lambda: speeds(programs[0])[1] > 300, "a motor that turns")
         run(*stop).ended(0)
@@ -230,7 +219,7 @@ def test_a_share_with_all_its_programs_takes_stops_and_nothing_else(share, run):
     assert "the share has 64 programs, which is the limit; of others it takes only stops" in refused.err
     # Programs that come to stop, and stay, do not keep the places.
     idle = [Client(share.path, f"idle {number}") for number in range(12)]
-    for _ in range(RUNS_OF_STOPS):
+    for _ in range(2):
         run("share", "stop", *at).ended(0)
     for connection in (*programs, *idle):
         connection.socket.close()
@@ -287,3 +276,54 @@ def test_the_log_says_who_did_what(start, sim, tmp_path):
     ):
         running.until(lambda: any(said in line for line in running.out), said)
     assert re.fullmatch(r"\d\d:\d\d:\d\d tuner joined", running.out[1]), running.out[1]
+
+
+def test_a_line_is_opened_turned_recorded_and_closed(start, drives, tmp_path):
+    path, port = tmp_path / "share", f"slcan:{drives.can}"
+    start("share", "-p", drives.st, "--at", f"unix:{path}", "--timeout", "2s").line(0)
+    client, other = Client(path, "opens"), Client(path, "sees")
+
+    def names():
+        return [line["line"] for line in client.ask("lines")["lines"]]
+
+    def are_read(*lines):
+        rates = client.ask("rates")["rates"]
+        return set(lines) <= {it["line"] for it in rates if it["achieved"] > 0}
+
+    assert client.ask("open", port=port, protocol="rmd", timeout=10)["line"] == "rmd0"
+    assert other.until(event("opened", line="rmd0", by="opens"))["message"] == f"rmd0: opens opened {port}"
+    assert names() == ["st0", "rmd0"]
+    lines = [word for line in ("st0", "rmd0") for word in ("-p", f"share:{path}/{line}")]
+    few = ["--motor", 1, "--id", 2, "--no-settings"]
+    recorder = start("record", *lines, *few, "-o", tmp_path / "run.mcap", "--json")
+    client.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
+    eventually(lambda: client.dps(2) > 100, "a motor that turns")
+    eventually(lambda: are_read("st0", "rmd0"), "signals of both lines that are read", within=30)
+    assert {"line": "rmd0", "motor": 2} in other.ask("close", line="rmd0")["motors"]
+    client.until(event("closed", line="rmd0", by="sees"))
+    assert names() == ["st0"]
+    eventually(lambda: are_read("st0"), "a line that is read on")
+    assert recorder.process.poll() is None
+    recorder.interrupt()
+    assert recorder.wait() == 0
+    # The port is free.
+    assert client.ask("open", port=port, protocol="rmd", timeout=10)["line"] == "rmd1"
+    eventually(lambda: client.dps(2, "rmd1") == 0, "a motor that stands")
+
+
+def test_a_drive_that_comes_under_a_latch_is_stopped(sim, start, run, tmp_path):
+    drives, path, link = sim(rmd=()), tmp_path / "share", tmp_path / "drive"
+    link.symlink_to(drives.st)
+    start("share", "-p", link, "--at", f"unix:{path}", "--timeout", "2s").line(0)
+    client = Client(path, "latches")
+    client.ask("latch")
+    assert "failure" not in client.ask("stop")["motors"][0]
+    # Another drive, whose motor turns, comes in the place of this one.
+    other = sim("--stdin", st=(f"pty:{tmp_path}/other",), rmd=())
+    run("st", "-p", other.st, "start", "--ramp", "1000", "100ms").ended(0)
+    eventually(lambda: other.motor(1)["speed_rpm"] > 500, "a motor that turns")
+    (tmp_path / "next").symlink_to(other.st)
+    (tmp_path / "next").replace(link)
+    drives.end()
+    client.until(event("back", line="st0"))
+    eventually(lambda: abs(client.rpm()) < 30, "a motor that stands")

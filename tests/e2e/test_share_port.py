@@ -1,6 +1,5 @@
 """`-p share:PATH/LINE`: the command line on a drive that other programs use at the same time."""
 
-import csv
 import os
 import signal
 import struct
@@ -9,12 +8,9 @@ import pytest
 
 from program import eventually
 from sharing import Client, event
-from test_json import check
-from terminal import Terminal
 
 #: Programs that are killed. ROUNDS=50 for more.
-ROUNDS = int(os.environ.get("ROUNDS", "3"))
-PERIOD = 0.01
+ROUNDS = int(os.environ.get("ROUNDS", "1"))
 
 
 @pytest.fixture
@@ -54,9 +50,6 @@ def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
     assert "SDK" in run(*st, "info").ended(0).out
     scan = run(*st, "scan").ended(0)
     assert "SDK" in scan.out and "baud" not in scan.out and "has no baud rate" in scan.err
-    found = run(*st, "scan", "--json").ended(0)
-    check(found.out + found.err)
-    assert found.json["finding"] == "drive" and "baud" not in found.json
     run(*st, "segment", "0", "SPEED_MEAS", "STATUS").ended(0)
     run(*st, "dump", str(tmp_path / "m.toml")).ended(0)
     run(*st, "set", "SPEED_KP", "124").ended(0)
@@ -68,14 +61,11 @@ def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
     refused = run(*st, "-m", "5", "stop").ended(1)
     assert "BAD_MOTOR_SELECTED" in refused.err and "no motor of this number" in refused.err
     assert "may still be turning" not in refused.err
-    assert "BAD_FRAME_ID" in run(*st, "raw", "0x1f").ended(1).err
 
 
 def test_rmd_commands_work_as_on_a_port_of_their_own(share, run, direct):
     rmd = ["rmd", "-p", share.rmd]
     assert len(run(*rmd, "scan", "--json").ended(0).lines) == 4
-    run(*rmd, "--id", "2", "status").ended(0)
-    run(*rmd, "--id", "2", "pid").ended(0)
     run(*rmd, "--id", "2", "dump").ended(0)
     run(*rmd, "torque4", "0", "0", "0", "0.1").ended(0)
     run(*rmd, "status", "--every", "20ms", "--count", "10").ended(0)
@@ -83,7 +73,7 @@ def test_rmd_commands_work_as_on_a_port_of_their_own(share, run, direct):
     eventually(lambda: all(abs(direct.dps(motor)) < 5 for motor in (1, 2, 3, 4)), "motors that stop")
 
 
-def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path, start, drives):
+def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path):
     def error(port, code, *more):
         return run("st", "-p", port, *more, "get", "STATUS").ended(code).err
 
@@ -93,29 +83,13 @@ def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path, start
     assert "cannot be used as a serial line" in error(share.rmd, 2)
     other = error(share.st, 2, "--profile", "mcsdk-5.4")
     assert "profile spec; nothing was sent" in other and "--profile spec" in other
-
-
-@pytest.mark.parametrize("protocol", ["st", "rmd"])
-def test_the_kit_needs_a_port_of_its_own(share, run, protocol):
-    told = run("conformance", protocol, "-p", getattr(share, protocol)).ended(2)
+    told = run("conformance", "st", "-p", share.st).ended(2)
     assert "the kit needs a port of its own; end the share" in told.err and told.out == ""
-
-
-def test_a_latch_refuses_motion_and_the_readers_go_on(share, run, start, direct):
-    reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms", "--json")
-    reads.line(3)
-    direct.ask("latch")
-    for command in (["start"], ["ramp", "1000", "100"]):
-        refused = run("st", "-p", share.st, *command).ended(1)
-        assert "looks latched: motion is refused until the latch is released" in refused.err
-    turned = run("rmd", "-p", share.rmd, "--id", "1", "speed", "100").ended(1)
-    assert "motion is refused until the latch is released" in turned.err
-    run("st", "-p", share.st, "stop").ended(0)
-    direct.ask("release")
-    run("st", "-p", share.st, "start").ended(0)
-    reads.more_lines()
-    reads.interrupt()
-    assert reads.wait() in (0, 130)
+    guard = run("guard", "st", "-p", share.st, "--serve", f"pty:{tmp_path}/guarded").ended(2)
+    assert "use it without a guard" in guard.err
+    # The socket of a share is no port of a drive.
+    failed = run("st", "-p", f"unix:{share.path}", "status").ended(3)
+    assert "write -p share:PATH/st0, or /rmd0 for RMD motors" in failed.err, failed.err
 
 
 def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, direct):
@@ -130,13 +104,12 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     eventually(lambda: abs(direct.rpm()) < 30 and abs(direct.dps(3)) < 5, "motors that stop")
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_a_move_that_waits_leaves_a_motor_that_another_program_has_moved_since(share, start, direct, sent):
-    for _ in range(max(3, ROUNDS)):
+def test_a_move_that_waits_leaves_a_motor_that_another_program_has_moved_since(share, start, direct):
+    for _ in range(ROUNDS):
         waits = start("rmd", "-p", share.rmd, "--id", 2, "position", 720000, "--max-speed", 100, "--wait")
         eventually(lambda: direct.dps(2) > 50, "a motor that turns")
         assert direct.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 30000))["kind"] == "answer"
-        waits.process.send_signal(sent)
+        waits.interrupt()
         assert waits.wait() != 0
         eventually(lambda: direct.dps(2) > 290, "the speed of the other program")
         assert not any("was stopped" in line for line in waits.err), waits.err
@@ -227,113 +200,3 @@ def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path)
     finally:
         share.process.send_signal(signal.SIGCONT)
     reads.more_lines()
-
-
-def test_reads_that_wait_too_long_in_a_share_do_not_end_a_program(start, sim, tmp_path):
-    drives = sim(rmd=())
-    share = start("share", "-p", drives.st, "--at", f"unix:{tmp_path}/share", "--timeout", "1s")
-    share.line(0)
-    # Requests of one wait behind those of the other.
-    reads = [
-        start("st", "-p", f"share:{tmp_path}/share/st0", "get", "STATUS", "--every", "10ms", "--json")
-        for _ in range(2)
-    ]
-    for program in reads:
-        program.line(3)
-    looks = Client(tmp_path / "share", "looks")
-    drives.process.send_signal(signal.SIGSTOP)
-    try:
-        for program in reads:
-            program.until(lambda: any('"outage"' in line for line in program.out), "an outage")
-        expired = 0
-        while expired < 3:
-            expired += looks.command("st0", 1, 2, 2, within=0.3).get("reason") == "expired"
-    finally:
-        drives.process.send_signal(signal.SIGCONT)
-    for program in reads:
-        program.until(lambda: any('"back"' in line for line in program.out), "the end of the outage")
-        program.more_lines()
-
-
-def test_a_guard_is_refused_in_front_of_a_share(share, run, tmp_path):
-    guard = run("guard", "st", "-p", share.st, "--serve", f"pty:{tmp_path}/guarded").ended(2)
-    assert "use it without a guard" in guard.err
-
-
-def test_watch_shows_and_stops_motors_of_a_share(share, motorlink, direct):
-    direct.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
-    direct.command("st0", 1, 3, 1)
-    eventually(lambda: direct.rpm() > 1000, "a motor that turns")
-    terminal = Terminal([motorlink, "watch", "-p", share.st, "-p", share.rmd], 80, 24)
-    try:
-        terminal.shows("st0:1", "rmd0:2", "RUN", "6 motors on 2 ports")
-        terminal.press("space")
-        eventually(lambda: is_idle(direct), "a motor that stops")
-        terminal.press("q")
-        assert terminal.wait() == 0
-    finally:
-        terminal.end()
-
-
-def read_times(path):
-    """The times of the samples of a CSV file, s."""
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    return [float(row["t [s]"]) for row in rows]
-
-
-def gaps(times):
-    """The times between samples, s."""
-    return sorted(b - a for a, b in zip(times, times[1:]))
-
-
-def test_each_program_can_be_killed_and_the_others_go_on(share, start, direct, tmp_path):
-    every = ["--every", f"{PERIOD * 1000:.0f}ms"]
-    st = ["st", "-p", share.st, "get", "SPEED_MEAS", "TORQUE_MEAS", "SPEED_KP"]
-
-    def watches():
-        viewer = start(*st, *every, "--json")
-        viewer.line(2)
-        return viewer
-
-    def records(name):
-        path = tmp_path / f"{name}.csv"
-        recorder = start(*st, *every, "--csv", str(path))
-        recorder.line(3)
-        return recorder, path
-
-    def tunes():
-        client = Client(share.path, "tuner")
-        gain = client.command("st0", 1, 1, 5, *struct.pack("<h", 200))
-        ramp = client.command("st0", 1, 7, *struct.pack("<iH", 1500, 100))
-        start = client.command("st0", 1, 3, 1)
-        assert {it["kind"] for it in (gain, ramp, start)} == {"answer"}, (gain, ramp, start)
-        return client
-
-    recorder, path = records("all")
-    viewer, tuner = watches(), tunes()
-    for turn in range(ROUNDS):
-        eventually(lambda: direct.rpm() > 1000, "a motor that turns")
-        # A program that only looks is killed: the motor keeps turning.
-        other, _ = records(f"killed-{turn}")
-        other.process.kill()
-        viewer.process.kill()
-        viewer.wait()
-        viewer = watches()
-        assert direct.rpm() > 1000
-        # The tuner leaves: its motor stops, and the recorder continues.
-        tuner.socket.close()
-        eventually(lambda: is_idle(direct), "a motor that stops")
-        tuner = tunes()
-    recorder.interrupt()
-    recorder.wait()
-    times = gaps(read_times(path))
-    assert len(times) > 50 * ROUNDS
-    late = sum(gap > 2 * PERIOD for gap in times)
-    print(f"{ROUNDS} rounds, {len(times)} gaps, {late} above {2 * PERIOD} s, longest {times[-1]:.3f} s")
-
-
-def test_the_socket_of_a_share_is_no_port_of_a_drive(share, run):
-    for words in (["st", "-p", f"unix:{share.path}"], ["rmd", "-p", f"slcan:unix:{share.path}"]):
-        failed = run(*words, "status").ended(3)
-        assert "write -p share:PATH/st0, or /rmd0 for RMD motors" in failed.err, failed.err

@@ -59,18 +59,16 @@ def stopping(start, tmp_path):
         yield stopping
 
 
-COMMANDS = [
-    (("rmd", "--id", "2", "off"), "motor 2 is off", "motor 2"),
-    (("rmd", "--id", "2", "stop"), "motor 2 is stopped; `run` resumes", "motor 2"),
-    (("rmd", "--id", "2,3", "off"), "motor 2 is off", "motors 2, 3"),
-    (("rmd", "off", "--all"), "motor 1 is off", "all motors"),
-    (("st", "stop"), "motor 1: STOP_MOTOR acknowledged", "motor 1"),
-]
-
-
-@pytest.mark.parametrize("words, done, _motors", COMMANDS)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_first_signal_lets_a_stop_complete(stopping, words, done, _motors, number):
+@pytest.mark.parametrize(
+    "words, number, done",
+    [
+        (("rmd", "--id", "2", "off"), signal.SIGINT, "motor 2 is off"),
+        (("rmd", "--id", "2", "stop"), signal.SIGTERM, "motor 2 is stopped; `run` resumes"),
+        (("rmd", "off", "--all"), signal.SIGHUP, "motor 1 is off"),
+        (("st", "stop"), signal.SIGINT, "motor 1: STOP_MOTOR acknowledged"),
+    ],
+)
+def test_a_first_signal_lets_a_stop_complete(stopping, words, number, done):
     line, program = stopping(*words)
     program.process.send_signal(number)
     line.heals.set()
@@ -78,8 +76,15 @@ def test_a_first_signal_lets_a_stop_complete(stopping, words, done, _motors, num
     assert program.line(0) == done
 
 
-@pytest.mark.parametrize("words, _done, motors", COMMANDS)
-def test_a_second_signal_ends_a_stop_and_names_the_motors(stopping, words, _done, motors):
+@pytest.mark.parametrize(
+    "words, motors",
+    [
+        (("rmd", "--id", "2,3", "off"), "motors 2, 3"),
+        (("rmd", "off", "--all"), "all motors"),
+        (("st", "stop"), "motor 1"),
+    ],
+)
+def test_a_second_signal_ends_a_stop_and_names_the_motors(stopping, words, motors):
     _, program = stopping(*words)
     program.process.send_signal(signal.SIGINT)
     program.process.send_signal(signal.SIGTERM)

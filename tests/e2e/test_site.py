@@ -52,31 +52,20 @@ def site(motorlink, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sessions(site):
-    """`sessions(who)`: the session of somebody; None: the router does not take it."""
+    """`sessions(who)`: the session of somebody."""
     opened = {}
 
     def session(who):
         if who not in opened:
-            try:
-                opened[who] = network(site.file(who))
-            except zenoh.ZError:
-                opened[who] = None
+            opened[who] = network(site.file(who))
         return opened[who]
 
     yield session
-    for one in filter(None, opened.values()):
+    for one in opened.values():
         one.close()
 
 
 # What somebody may try. Each gives whether it had an effect.
-
-
-def sees_nodes(site, session, who):
-    return any("/arm1/" in it for it in tokens(session, f"{ROOT}/*/node/alive/*"))
-
-
-def hears_of_nodes(site, session, who):
-    return hears_tokens(session, f"{ROOT}/*/node/alive/*", PAUSE)
 
 
 def hears_of_ends(site, session, who):
@@ -84,41 +73,9 @@ def hears_of_ends(site, session, who):
     return hears(session, f"{ROOT}/*/node/ended/*", lambda: site.nodes["arm1"].put(ended, ""))
 
 
-def asks_info(site, session, who):
-    return bool(answers(session, f"{ROOT}/*/node/info/*"))
-
-
-def asks_columns(site, session, who):
-    return bool(answers(session, f"{ROOT}/arm1/st0/1/columns"))
-
-
-def asks_identity(site, session, who):
-    return bool(answers(session, f"{ROOT}/arm1/st0/1/identity"))
-
-
-def asks_register(site, session, who):
-    return bool(answers(session, f"{ROOT}/arm1/st0/1/registers/STATUS"))
-
-
-def asks_all_registers(site, session, who):
-    return bool(answers(session, f"{ROOT}/*/*/*/registers/*", timeout=5))
-
-
-def asks_settings(site, session, who):
-    return bool(answers(session, f"{ROOT}/arm1/st0/1/settings", timeout=5))
-
-
 def hears_why_not(site, session, who):
     replies = session.get(f"{ROOT}/arm1/st7/1/identity", timeout=PAUSE)
     return any(b"no line" in it.err.payload.to_bytes() for it in replies if it.ok is None)
-
-
-def hears_state(site, session, who):
-    return hears(session, f"{ROOT}/arm1/node/state", within=2.2)
-
-
-def hears_samples(site, session, who):
-    return hears(session, f"{ROOT}/*/*/*/samples")
 
 
 def hears_events(site, session, who):
@@ -177,7 +134,7 @@ def moves(site, session, who, name=None):
 
 
 def moves_as_another(site, session, who):
-    return any(moves(site, session, who, name) for name in ("alice", "bob", "arm1") if name != who)
+    return moves(site, session, who, "bob" if who == "alice" else "alice")
 
 
 def asks_with_wildcards(site, session, who):
@@ -209,11 +166,6 @@ def answers_falsely(site, session, asked, key, *takes):
 def answers_as_arm1(site, session, who):
     key = f"{ROOT}/arm1/node/info/false"
     return answers_falsely(site, session, f"{ROOT}/*/node/info/*", key, key)
-
-
-def answers_about_a_drive_as_arm1(site, session, who):
-    key = f"{ROOT}/arm1/false/1/identity"
-    return answers_falsely(site, session, f"{ROOT}/*/*/*/identity", key, key)
 
 
 def answers_others_queries_as_arm1(site, session, who):
@@ -266,43 +218,55 @@ def says_that_alice_is_gone(site, session, who):
     return stopped
 
 
+#: What all programs may do; the key of what is asked or heard.
+PUBLIC = {
+    "sees_nodes": lambda session: any("/arm1/" in it for it in tokens(session, f"{ROOT}/*/node/alive/*")),
+    "hears_of_nodes": lambda session: hears_tokens(session, f"{ROOT}/*/node/alive/*", PAUSE),
+    "asks_info": lambda session: answers(session, f"{ROOT}/*/node/info/*"),
+    "asks_columns": lambda session: answers(session, f"{ROOT}/arm1/st0/1/columns"),
+    "asks_identity": lambda session: answers(session, f"{ROOT}/arm1/st0/1/identity"),
+    "asks_register": lambda session: answers(session, f"{ROOT}/arm1/st0/1/registers/STATUS"),
+    "asks_settings": lambda session: answers(session, f"{ROOT}/arm1/st0/1/settings", timeout=5),
+    "hears_state": lambda session: hears(session, f"{ROOT}/arm1/node/state", within=2.2),
+    "hears_samples": lambda session: hears(session, f"{ROOT}/*/*/*/samples"),
+}
 WHAT = [
-    *(sees_nodes, asks_info, asks_columns, asks_identity, asks_register, asks_all_registers, asks_settings),
     # What is under way of an earlier subscription would also come to that to all.
-    *(hears_why_not, hears_all, hears_state, hears_samples, hears_events),
-    *(joins_to_see, reads, stops, moves, moves_as_another, asks_with_wildcards),
-    *(says_false_state, answers_as_arm1, answers_about_a_drive_as_arm1, answers_others_queries_as_arm1),
-    *(is_alive_as_arm1, takes_requests_of_others, sees_programs, says_that_alice_is_gone),
-    *(hears_of_nodes, hears_of_ends, says_that_arm1_ends),
+    *(hears_why_not, hears_all, hears_events, joins_to_see, reads, stops, moves, moves_as_another),
+    *(asks_with_wildcards, says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1),
+    *(takes_requests_of_others, sees_programs, says_that_alice_is_gone, hears_of_ends, says_that_arm1_ends),
 ]
-SEE = {sees_nodes, asks_info, asks_columns, asks_identity, asks_register, asks_all_registers, asks_settings,
-       hears_why_not, hears_state, hears_samples, hears_events, joins_to_see, reads, hears_of_nodes}
-MEET = {hears_of_nodes, hears_of_ends}
+SEE = {hears_why_not, hears_events, joins_to_see, reads}
+MEET = {hears_of_ends}
 #: All else is denied. The node itself is the control of what others may not do in its name.
 MAY = {
-    "nobody": set(),
-    "plain": set(),
-    "stranger": set(),
     "bob": SEE,
     "alice": SEE | {stops, moves, says_that_alice_is_gone},
     "arm2": MEET,
-    "arm1": MEET | {says_false_state, answers_as_arm1, answers_about_a_drive_as_arm1,
-                    answers_others_queries_as_arm1, is_alive_as_arm1, takes_requests_of_others,
-                    sees_programs, says_that_arm1_ends},
+    "arm1": MEET | {says_false_state, answers_as_arm1, answers_others_queries_as_arm1, is_alive_as_arm1,
+                    takes_requests_of_others, sees_programs, says_that_arm1_ends},
 }
 
 
 @pytest.mark.parametrize("what", WHAT, ids=lambda it: it.__name__)
 @pytest.mark.parametrize("who", MAY)
 def test_each_may_do_what_its_role_allows_and_nothing_else(site, sessions, who, what):
-    session = sessions(who)
-    assert (session is None) == (who in ("nobody", "plain", "stranger"))
-    had_effect = session is not None and what(site, session, who)
-    assert had_effect == (what in MAY[who])
+    assert what(site, sessions(who), who) == (what in MAY[who])
 
 
-SPIES = [hears_all, asks_with_wildcards, stops, moves, is_alive_as_arm1, takes_requests_of_others,
-         sees_programs]
+@pytest.mark.parametrize("who", MAY)
+def test_all_programs_see_what_is_public_and_nodes_see_nodes_alone(site, sessions, who):
+    seen = {name for name, sees in PUBLIC.items() if sees(sessions(who))}
+    assert seen == (set(PUBLIC) if who in ("bob", "alice") else {"hears_of_nodes"})
+
+
+@pytest.mark.parametrize("who", ["nobody", "plain", "stranger"])
+def test_the_router_takes_nobody_without_its_certificate(site, who):
+    with pytest.raises(zenoh.ZError):
+        network(site.file(who))
+
+
+SPIES = [hears_all, asks_with_wildcards, moves, takes_requests_of_others, sees_programs]
 
 
 @pytest.mark.parametrize("what", SPIES, ids=lambda it: it.__name__)
@@ -349,8 +313,7 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
     for node in ("arm1", "arm2"):
         assert f"node {node} is there, but does not answer" in stopped.out
     assert "may still turn" in stopped.err and "confirmed" not in stopped.out
-    for order in ("latch", "release"):
-        assert "no answer of arm1, arm2" in run("fleet", order, *via).ended(3).err
+    assert "no answer of arm1, arm2" in run("fleet", "release", *via).ended(3).err
     # Each waits 2 or 3 s for an answer.
     assert time.monotonic() - began < 15
     assert site.direct.rpm() > 1400
@@ -386,19 +349,15 @@ def changed(site, who, tmp_path, **replaced):
     return path
 
 
-@pytest.mark.parametrize("fault", ["nobody", "plain", "stranger", "host", "port"])
+@pytest.mark.parametrize("fault", ["plain", "stranger", "host"])
 def test_a_network_that_refuses_a_program_is_named_at_once(site, run, fault, tmp_path):
-    way = {
-        "host": lambda: changed(site, "alice", tmp_path, host=("tls/127.0.0.1", "tls/localhost")),
-        "port": lambda: changed(site, "alice", tmp_path, port=(site.address, "tls/127.0.0.1:1")),
-    }.get(fault, lambda: site.file(fault))()
+    host = ("tls/127.0.0.1", "tls/localhost")
+    way = changed(site, "alice", tmp_path, host=host) if fault == "host" else site.file(fault)
     began = time.monotonic()
-    for words in (["fleet", "list", "--via", way], ["fleet", "stop-all", "--via", way],
-                  ["st", "-p", f"zenoh:arm1/st0?via={way}", "status"]):
+    for words in (["fleet", "stop-all", "--via", way], ["st", "-p", f"zenoh:arm1/st0?via={way}", "status"]):
         refused = run(*words).ended(3)
         assert "nothing answers at t" in refused.err, refused.err
-        if fault in ("stranger", "host", "port"):
-            assert "or it refuses the certificate of alice" in refused.err
+        assert ("or it refuses the certificate of alice" in refused.err) == (fault != "plain")
     if fault == "stranger":
         file = site.folder / "other/nodes/arm2.json5"
         node = run("node", "-p", "sim:", "--network", file).ended(3)
@@ -531,14 +490,13 @@ def test_many_messages_in_both_directions_lose_no_connection(site):
     alice.close()
 
 
-@pytest.mark.parametrize("how", ["silent", "without a certificate"])
-def test_a_flood_of_strangers_does_not_delay_a_stop(site, sessions, how):
+def test_a_flood_of_strangers_does_not_delay_a_stop(site, sessions):
     """The operator is connected. For some seconds new programs cannot connect: Zenoh needs 0.1 s for each
-    connection that fails. So these tests come late."""
+    connection that fails. So this test comes late."""
     turn(site)
     alice = member(site, sessions("alice"), "alice")
     assert joins(alice)
-    with strangers(site.address, 200, is_silent=how == "silent"):
+    with strangers(site.address, 200, is_silent=False):
         began = time.monotonic()
         assert alice.stop({"line": "st0", "motor": 1})["kind"] == "answer"
         assert time.monotonic() - began < 1

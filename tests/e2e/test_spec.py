@@ -246,54 +246,12 @@ def test_the_message_to_four_motors_is_a_request(databases, tables, frames):
             assert message.encode(made["values"]) == data
 
 
-def test_cantools_reads_the_example_frames(databases, tables):
-    rows = {row["code"]: row for row in tables["rmd"]["commands"]}
-    count = 0
-    for vector in VECTORS:
-        data, identifier = bytes.fromhex(vector["bytes"]), int(vector["id"], 16)
-        if len(data) != 8 or identifier - 0x140 not in IDS or data[0] not in rows:
-            continue
-        message = databases[vector["dir"]].get_message_by_frame_id(identifier)
-        raw = message.decode(data, decode_choices=False, scaling=False)
-        for field in rows[data[0]][vector["dir"]]:
-            signals = signals_of(message, field, data[0])
-            assert joined(signals, raw) == vector["fields"][field["name"]], vector
-        count += 1
-    assert count > 50
-
-
-def test_random_frames_mean_the_same_to_cantools_and_proto(databases, tables, frames):
-    chance = random.Random(16)
-    rows = tables["rmd"]["commands"]
-    lines = []
-    for _ in range(2000):
-        row, kind = chance.choice(rows), chance.choice(("request", "reply"))
-        data = bytes([row["code"], *chance.randbytes(7)])
-        lines.append((row, {"kind": kind, "data": data.hex()}))
-    for (row, line), made in zip(lines, frames([line for _, line in lines])):
-        message = message_of(databases, line["kind"])
-        raw = message.decode(bytes.fromhex(line["data"]), decode_choices=False, scaling=False)
-        for field in row[line["kind"]]:
-            signals = signals_of(message, field, row["code"])
-            assert joined(signals, raw) == made["digits"][field["name"]]
-
-
-def test_unknown_codes_are_errors_of_cantools(databases, tables):
-    known = {row["code"] for row in tables["rmd"]["commands"]}
-    for kind in ("request", "reply"):
-        for code in set(range(256)) - known:
-            with pytest.raises(cantools.database.DecodeError):
-                message_of(databases, kind).decode(bytes([code, *bytes(7)]))
-
-
-@pytest.mark.parametrize("ids, motors", [((), 1), (("--id", "1..4"), 4), (("--all",), 32)])
-def test_a_file_has_the_motors_that_are_asked_for(run, ids, motors):
-    done = run("spec", "dbc", *ids).ended(0)
-    assert done.out.count("\nBO_ 3") == motors
+def test_a_file_has_the_motors_that_are_asked_for(run):
+    for ids, motors in (((), 1), (("--id", "1..4"), 4), (("--all",), 32)):
+        assert run("spec", "dbc", *ids).ended(0).out.count("\nBO_ 3") == motors
+    done = run("spec", "dbc").ended(0)
     assert "describes replies" in done.err and "--direction request" in done.err
-    assert not run("spec", "dbc", *ids, "--direction", "reply").ended(0).err
-    text = run("spec", "dbc", *ids, "--direction", "request").ended(0).out
-    assert len(cantools.database.load_string(text, "dbc", strict=True).messages) == motors + 1
+    assert not run("spec", "dbc", "--direction", "reply").ended(0).err
 
 
 def test_words_that_make_no_file(run, tmp_path):
@@ -309,15 +267,14 @@ def test_words_that_make_no_file(run, tmp_path):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("what", ["dbc", "json", "markdown"])
-def test_a_file_is_replaced_only_on_demand(run, tmp_path, what):
+def test_a_file_is_replaced_only_on_demand(run, tmp_path):
     path = tmp_path / "file"
     path.write_text("mine")
-    done = run("spec", what, "-o", path).ended(2)
+    done = run("spec", "json", "-o", path).ended(2)
     assert "exists; nothing was written" in done.err and "--force" in done.err
     assert path.read_text() == "mine"
-    run("spec", what, "-o", path, "--force").ended(0)
-    assert path.read_text() == run("spec", what).ended(0).out
+    run("spec", "json", "-o", path, "--force").ended(0)
+    assert path.read_text() == run("spec", "json").ended(0).out
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
 

@@ -70,7 +70,7 @@ def test_nodes_with_one_name_are_stopped_both_and_one_that_vanishes_is_not_forgo
     # By its name no motor is moved, and the motors of both are stopped.
     moved = run("rmd", "-p", "zenoh:arm1/rmd0", "--id", "2", "speed", "100", MOTORLINK_NETWORK=via[1]).ended(3)
     assert "2 nodes have the name arm1" in moved.err and "fleet stop-all --node arm1" in moved.err
-    for _ in range(max(ROUNDS, 2)):
+    for _ in range(ROUNDS):
         first.turn()
         second.turn()
         run("fleet", "stop-all", "--node", "arm1", *via, within=60).ended(0)

@@ -140,24 +140,23 @@ def test_rmd_programs_in_turn_read_their_own_values(pairs):
     assert any(end == "right" for _, end in rmd.counts), "something comes through"
 
 
-@pytest.mark.parametrize("arguments", [["off"], ["status"], ["angle"], ["pid"], ["zero", "--write-rom"], ["scan"]])
+@pytest.mark.parametrize("arguments", [["off"], ["zero", "--write-rom"], ["scan"]])
 def test_an_adapter_that_echoes_is_named_with_or_without_a_motor(run, pairs, arguments):
     rmd = pairs("rmd")
     rmd.line.fate = Fate(echo=True)
-    for motor in (1, 9):
+    for motor in (1, 9) if arguments == ["off"] else (1,):
         words = arguments if arguments == ["scan"] else ["--id", motor, *arguments]
         echoed = run("rmd", "-p", f"slcan:{rmd.line.port}", *words).ended(3)
         assert "echo=1" in echoed.err
         assert echoed.out == ""
         # A busy machine may be late with a reply.
         patient = ["--timeout", "1s"] if motor == 1 else []
-        code = 0 if motor == 1 or words == ["scan"] else 3
-        run("rmd", "-p", f"slcan:{rmd.line.port}?echo=1", *patient, *words).ended(code)
+        run("rmd", "-p", f"slcan:{rmd.line.port}?echo=1", *patient, *words).ended(0 if motor == 1 else 3)
 
 
-@pytest.mark.parametrize("arguments", [["stop"], ["get", "STATUS"], ["start"]])
-def test_a_serial_line_that_echoes_is_named(run, pairs, arguments):
+@pytest.mark.parametrize("command", ["stop", "start"])
+def test_a_serial_line_that_echoes_is_named(run, pairs, command):
     st = pairs("st")
     st.line.fate = Fate(echo=True)
-    echoed = run("st", "-p", st.line.port, *arguments).ended(3)
+    echoed = run("st", "-p", st.line.port, command).ended(3)
     assert "the line echoes" in echoed.err and "baud" not in echoed.err

@@ -1,4 +1,7 @@
-"""`--gear-ratio`, `--encoder-bits` and `--full-scale`: each value is converted once."""
+"""`--gear-ratio`, `--encoder-bits` and `--full-scale`: each value is converted once.
+
+The conversions are tested in crates/proto/src/rmd/gear.rs and encoder.rs, and crates/proto/src/st/full_scale.rs.
+"""
 
 import csv
 
@@ -24,6 +27,12 @@ def rmd(run, sim):
 
 
 @pytest.fixture
+def geared(run):
+    """Runs `motorlink rmd` with the gear ratio on motors inside its process."""
+    return lambda *words: run("rmd", "-p", "sim:", "--gear-ratio", RATIO, "--trace", *words)
+
+
+@pytest.fixture
 def st(run, sim):
     """Runs `motorlink st` on a drive of the test's own, with the profile that has torque ramps."""
     port = sim("--profile", "mcsdk-5.4", rmd=()).port("pty")
@@ -46,15 +55,13 @@ def test_a_move_with_wait_ends_at_the_angle_of_the_output_shaft(rmd):
     # 0.1° at the motor shaft is the tolerance.
     assert rmd("--json", "angle").ended(0).values["multi_turn_angle"] == near(30 * RATIO, 0.1)
     assert rmd("--json", "angle", geared=True).ended(0).values["multi_turn_angle"] == near(30, 0.1 / RATIO + PLACE)
-
-
-def test_the_tolerance_of_a_wait_is_that_of_the_output_shaft(rmd):
-    wait = ("--max-speed", 60, "--wait", "--wait-tolerance", 1)
-    rmd("position", 30, *wait, geared=True).ended(0)
-    # As many degrees of the motor shaft fit a frame.
-    beyond = (*wait[:-1], 4_000_000)
+    # The tolerance is that of the output shaft. As many degrees of the motor shaft fit a frame.
+    beyond = ("--max-speed", 60, "--wait", "--wait-tolerance", 4_000_000)
     assert "3579139.411 °" in rmd("position", 30, *beyond, geared=True).ended(2).err
     rmd("position", 0, *beyond).ended(0)
+    words = ("position", 60, "--max-speed", 1, "--wait", "--wait-timeout", "100ms")
+    refused = rmd(*words, geared=True).ended(1).err
+    assert "from its target" in refused and "those of the motor shaft, 6 times" in refused
 
 
 def test_text_table_csv_and_json_have_the_same_values(rmd, tmp_path):
@@ -79,95 +86,53 @@ def test_text_table_csv_and_json_have_the_same_values(rmd, tmp_path):
     assert table.split()[-3:-1] == 2 * [f"{shown['multi_turn_angle']:.3f}"]
 
 
-def test_a_speed_is_multiplied_and_its_reading_divided(rmd):
-    rmd("speed", 20, geared=True).ended(0)
-    for _ in range(200):
-        fast = rmd("--json", "status").ended(0).values["speed"]
-        if fast > 115:
-            break
-    assert fast == near(20 * RATIO, 5)
-    assert rmd("--json", "status", geared=True).ended(0).values["speed"] == near(20, 1)
-    rmd("--id", 1, "off").ended(0)
+def test_a_speed_and_an_acceleration_are_multiplied(geared):
+    assert "-> 141#a2 00 00 00 e0 2e 00 00" in geared("speed", 20).ended(0).err
+    written = geared("--json", "acceleration", 100).ended(0)
+    assert written.json["values"]["acceleration"] == {"value": 100.0, "unit": "°/s²", "shaft": "output"}
+    assert "-> 141#34 00 00 00 58 02 00 00" in written.err
+    assert "give 0, or 0.2 °/s² at least" in geared("acceleration", 0.01).ended(2).err
 
 
-def test_an_acceleration_limit_is_written_and_read_behind_the_gear(rmd):
-    written = rmd("--json", "acceleration", 100, geared=True).ended(0).json
-    assert written["values"]["acceleration"] == {"value": 100.0, "unit": "°/s²", "shaft": "output"}
-    assert rmd("--json", "acceleration").ended(0).values == {"acceleration": 600}
-    refused = rmd("acceleration", 0.01, geared=True).ended(2).err
-    assert "give 0, or 0.2 °/s² at least" in refused
+def test_a_speed_limit_is_that_of_the_output_shaft(geared):
+    for command in ("speed 60.1", "position 10 --max-speed 60.2", "raw a2 00 00 00 39 8d 00 00"):
+        refused = geared("--speed-limit", 60, *command.split()).ended(2).err
+        assert "360 °/s" in refused and "those of the motor shaft, 6 times those of the output" in refused
+        assert "->" not in refused
+    geared("--speed-limit", 60, "speed", 60).ended(0)
 
 
-@pytest.mark.parametrize(
-    "command", ["speed 60.1", "position 10 --max-speed 60.2", "position 10", "raw a2 00 00 00 39 8d 00 00"]
-)
-def test_a_speed_limit_is_that_of_the_output_shaft(rmd, command):
-    limit = ("--speed-limit", 60)
-    refused = rmd(*limit, *command.split(), geared=True).ended(2).err
-    assert "360 °/s" in refused and "those of the motor shaft, 6 times those of the output" in refused
-    assert rmd("--json", "status").ended(0).values["speed"] == 0
-    rmd(*limit, "speed", 60, geared=True).ended(0)
-    rmd("--id", 1, "off").ended(0)
-
-
-def test_a_move_that_does_not_arrive_names_the_shaft_of_its_distance(rmd):
-    words = ("position", 60, "--max-speed", 1, "--wait", "--wait-timeout", "100ms")
-    refused = rmd(*words, geared=True).ended(1).err
-    assert "from its target" in refused and "those of the motor shaft, 6 times" in refused
-
-
-def test_a_move_within_a_turn_is_refused_behind_a_gear(rmd):
-    refused = rmd("single-turn-position", 10, "cw", "--full-turn", geared=True).ended(2).err
+def test_a_move_within_a_turn_is_refused_behind_a_gear(run, geared):
+    refused = geared("single-turn-position", 10, "cw", "--full-turn").ended(2).err
     assert "one turn of the motor shaft" in refused and "use `position`" in refused
-    rmd("--gear-ratio", 1, "single-turn-position", 10, "cw", "--full-turn").ended(0)
-    rmd("--id", 1, "off").ended(0)
+    # A ratio of 1 names the shaft and changes no value.
+    one = ("rmd", "-p", "sim:", "--json", "--gear-ratio", 1)
+    shown = run(*one, "single-turn-position", 10, "cw", "--full-turn").ended(0).json["values"]
+    assert shown["speed"]["shaft"] == "output"
+    assert "shaft" not in run("rmd", "-p", "sim:", "--json", "angle").ended(0).out
 
 
-def test_a_ratio_of_1_names_the_shaft_and_changes_no_value(rmd):
-    plain = rmd("--json", "angle").ended(0)
-    shown = rmd("--json", "--gear-ratio", 1, "angle").ended(0)
-    assert shown.values == plain.values
-    assert {value["shaft"] for value in shown.json["values"].values()} == {"output"}
-    assert all("shaft" not in value for value in plain.json["values"].values())
-
-
-@pytest.mark.parametrize("ratio", ["0", "-6", "nan", "inf", "-inf", "1e300", "6:1", ""])
-def test_a_ratio_that_is_none_is_refused(run, ratio):
-    refused = run("rmd", "-p", "sim:", f"--gear-ratio={ratio}", "angle").ended(2).err
-    assert "--gear-ratio" in refused and ("0.001 to 10000" in refused or "for a gear of 6:1" in refused)
-
-
-@pytest.mark.parametrize("option", ["--gear-ratio=6", "--encoder-bits=14"])
-def test_raw_values_are_not_converted(run, option):
-    refused = run("rmd", "-p", "sim:", "--raw", option, "status").ended(2).err
-    assert "leave one out" in refused
+@pytest.mark.parametrize("words", ["rmd --gear-ratio=6 status", "rmd --encoder-bits=14 status", "st --full-scale=9 info"])
+def test_raw_values_are_not_converted(run, words):
+    protocol, *rest = words.split()
+    assert "leave one out" in run(protocol, "-p", "sim:", "--raw", *rest).ended(2).err
 
 
 # The encoder.
 
 
 def test_encoder_counts_have_an_angle_behind_them(rmd):
-    rmd("position", 90, "--max-speed", 720, "--wait").ended(0)
+    rmd("position", 180, "--max-speed", 720, "--wait").ended(0)
     values = rmd("--json", "--encoder-bits", 14, "encoder").ended(0).values
     assert list(values) == ["position", "position_angle", "raw", "raw_angle", "offset", "offset_angle"]
     assert values["position_angle"] == near(values["position"] * 360 / COUNTS, 0.005)
-    assert values["position_angle"] == near(90, 0.2)
+    assert values["position_angle"] == near(180, 0.2)
     assert list(rmd("--json", "encoder").ended(0).values) == ["position", "raw", "offset"]
-
-
-def test_counts_beyond_the_given_width_are_an_error(rmd):
-    rmd("position", 180, "--max-speed", 720, "--wait").ended(0)
-    refused = rmd("--encoder-bits", 12, "encoder").ended(1).err
-    assert "an encoder of 12 bits ends at 4095" in refused
+    # Counts beyond the given width are an error.
+    assert "an encoder of 12 bits ends at 4095" in rmd("--encoder-bits", 12, "encoder").ended(1).err
     offset = rmd("--encoder-bits", 14, "--write-rom", "encoder-offset", COUNTS).ended(1).err
     assert "nothing was sent" in offset
     assert rmd("--json", "encoder").ended(0).values["offset"] == 0
-
-
-@pytest.mark.parametrize("bits", ["11", "19", "0", "-14", "14.5", "x"])
-def test_a_width_that_no_encoder_has_is_refused(run, bits):
-    refused = run("rmd", "-p", "sim:", f"--encoder-bits={bits}", "encoder").ended(2).err
-    assert "12 to 18 bits" in refused
 
 
 # The full scale.
@@ -184,10 +149,7 @@ def test_currents_are_taken_and_shown_in_amperes(st):
     words = ("get", "TORQUE_REF", "--every", "5ms", "--count", 1, "--csv", "-")
     header, row = csv.reader(st(*FULL_SCALE, *words).ended(0).out.splitlines())
     assert (header[1], row[1]) == ("TORQUE_REF [A]", "1.4996")
-
-
-def test_each_command_takes_amperes(st):
-    st(*FULL_SCALE, "torque-ramp", 0.5, 100).ended(0)
+    assert "ramp to Iq 0.4" in st(*FULL_SCALE, "torque-ramp", 0.5, 100).ended(0).out
     st(*FULL_SCALE, "set", "TORQUE_REF", 1).ended(0)
     assert st("--json", "get", "TORQUE_REF").ended(0).values == {"TORQUE_REF": 1985}
     st(*FULL_SCALE, "revup-data", 1, 500, 1.65, 300).ended(0)
@@ -196,45 +158,14 @@ def test_each_command_takes_amperes(st):
     st(*FULL_SCALE, "set", "SPEED_KP", 1200).ended(0)
 
 
-@pytest.mark.parametrize("amps, code", [("1", 0), ("1.01", 2), ("-1.01", 2)])
-def test_a_current_limit_is_in_amperes(st, amps, code):
+def test_a_current_limit_is_in_amperes_and_none_is_beyond_the_full_scale(st):
     limited = (*FULL_SCALE, "--current-limit", 1)
-    st(*limited, "current-reference", amps, 0).ended(code)
-    st(*limited, "current-reference", 0, amps).ended(code)
-    st(*limited, "torque-ramp", amps, 50).ended(code)
-    st(*limited, "set", "TORQUE_REF", amps).ended(code)
-    st(*limited, "revup-data", 0, 500, amps, 300).ended(code)
-
-
-@pytest.mark.parametrize(
-    "words", ["current-reference 16.6 0", "current-reference nan 0", "set TORQUE_REF inf", "set TORQUE_REF x", "torque-ramp -17 50"]
-)
-def test_a_current_beyond_the_full_scale_is_refused(st, words):
     st("current-reference", 5, 5).ended(0)
-    st(*FULL_SCALE, *words.split()).ended(2)
+    for command in ("current-reference {} 0", "torque-ramp {} 50", "set TORQUE_REF {}", "revup-data 0 500 {} 300"):
+        st(*limited, *command.format("-1.01").split()).ended(2)
+        st(*FULL_SCALE, *command.format("16.6").split()).ended(2)
     assert st("--json", "get", "TORQUE_REF").ended(0).values == {"TORQUE_REF": 5}
-
-
-def test_without_a_full_scale_a_current_is_a_whole_number_of_digits(st):
+    st(*limited, "current-reference", 1, -1).ended(0)
     refused = st("current-reference", 1.5, 0).ended(2).err
     assert "s16A" in refused and "--full-scale" in refused
     assert "does not fit" in st("current-reference", 40000, 0).ended(2).err
-
-
-@pytest.mark.parametrize("amps", ["0", "-8.25", "nan", "inf", "1e300", "x"])
-def test_a_full_scale_that_is_none_is_refused(run, amps):
-    refused = run("st", "-p", "sim:", f"--full-scale={amps}", "info").ended(2).err
-    assert "--full-scale" in refused and ("digit 32767" in refused or "such as 16.5" in refused)
-
-
-def test_raw_currents_are_not_converted(st):
-    assert "leave one out" in st("--raw", *FULL_SCALE, "get", "TORQUE_REF").ended(2).err
-
-
-# The number of a motor.
-
-
-def test_motor_0_is_refused_with_the_number_to_write(run):
-    refused = run("st", "-p", "sim:", "--motor", 0, "start").ended(2).err
-    assert "the first motor is 1" in refused and "write 1" in refused
-    assert "1 to 32" in run("rmd", "-p", "sim:", "--id", 0, "off").ended(2).err

@@ -8,30 +8,6 @@ from peers import Plug
 from program import PATIENT, eventually
 from terminal import Terminal
 
-#: The keys from the list of motors to each view, and what is in it.
-VIEWS = {
-    "motors": ((), "got/asked"),
-    "details": (("enter",), "possible"),
-    "registers": (("r",), "of 68 registers"),
-    "help": (("?",), "any key closes"),
-}
-
-
-def go_to(terminal, view):
-    """Goes from the list of motors to a view. Gives a text of the view."""
-    keys, text = VIEWS[view]
-    terminal.shows("got/asked")
-    terminal.press(*keys)
-    terminal.shows(text)
-    return text
-
-
-def go_back(terminal, view):
-    if view != "motors":
-        terminal.press("esc")
-    terminal.shows("got/asked")
-
-
 @pytest.fixture
 def bench(sim, run):
     """Drives of both kinds: ST motor 1 and RMD motor 2 turn, when they are told to."""
@@ -58,13 +34,12 @@ def bench(sim, run):
     return Bench()
 
 
-@pytest.mark.parametrize("columns, lines", [(80, 24), (200, 60)])
-def test_twelve_motors_have_a_row_each(sim, watch, tmp_path, columns, lines):
+def test_twelve_motors_have_a_row_each(sim, watch, tmp_path):
     st, rmd = (tmp_path / "st0", tmp_path / "st1"), (tmp_path / "can0", tmp_path / "can1")
     sim(st=[f"pty:{path}" for path in st], rmd=[f"slcan-pty:{path}" for path in rmd])
     ports = [word for path in st for word in ("-p", path)]
     ports += [word for path in rmd for word in ("-p", f"slcan:{path}")]
-    terminal = watch(*ports, columns=columns, lines=lines)
+    terminal = watch(*ports)
     names = [f"st{bus}:{number}" for bus in (0, 1) for number in (1, 2)]
     names += [f"can{bus}:{number}" for bus in (0, 1) for number in (1, 2, 3, 4)]
     terminal.shows("12 motors on 4 ports", *names, "SPACE STOP ALL", "q quit")
@@ -72,27 +47,19 @@ def test_twelve_motors_have_a_row_each(sim, watch, tmp_path, columns, lines):
         eventually(lambda: "/10.0" in terminal.line_of(f"{name} "), f"the rate of {name}", 30)
         row = terminal.line_of(f"{name} ")
         assert ("IDLE" if name.startswith("st") else "at rest") in row
-        assert "°C" in row and " V " in row and "…" not in row and len(row) <= columns
+        assert "°C" in row and " V " in row and "…" not in row and len(row) <= 80
     terminal.press("q")
     assert terminal.wait() == 0
     eventually(lambda: terminal.is_as_before, "the terminal as before")
 
 
-def test_values_are_those_of_the_drives(bench, watch):
-    bench.turn()
-    terminal = watch(*bench.ports, "--rate", 20)
-    terminal.shows("RUN", "turning", "360 °/s")
-    eventually(lambda: "/20.0" in terminal.line_of("st0:1 "), "the rate")
-
-
-@pytest.mark.parametrize("key", ["space", "!", "F12", "ctrl-x"])
-def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch, key):
+def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch):
     bench.turn()
     terminal = watch(*bench.ports)
     terminal.shows("RUN", "turning")
     terminal.press("r", "/", "SPEED_KP", "enter", "e", "12")
     terminal.shows("new value of SPEED_KP: 12_")
-    terminal.press(key)
+    terminal.press("F12")
     bench.rests()
     terminal.shows("LATCHED", "new value of SPEED_KP: 12_")
     terminal.press("esc")
@@ -103,27 +70,25 @@ def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch, key):
     terminal.shows("stop confirmed by all 6")
 
 
-@pytest.mark.parametrize("before", ["many keys", "a resize"])
-def test_stop_all_that_comes_together_with_more_is_taken(bench, watch, before):
+def test_stop_all_that_comes_together_with_more_is_taken(bench, watch):
     bench.turn()
     terminal = watch(*bench.ports)
     terminal.shows("RUN")
     # What comes while it is stopped comes together.
     terminal.signal(signal.SIGSTOP)
-    if before == "many keys":
-        terminal.press("j" * 1500)
-    else:
-        terminal.resize(100, 30)
+    terminal.press("j" * 1500)
+    terminal.resize(100, 30)
     terminal.press("space")
     terminal.signal(signal.SIGCONT)
     terminal.shows("LATCHED", "stop confirmed")
     bench.rests()
 
 
-def test_s_stops_the_selected_motor_only(bench, watch):
+def test_values_are_those_of_the_drives_and_s_stops_the_selected_motor_only(bench, watch):
     bench.turn()
-    terminal = watch(*bench.ports)
-    terminal.shows("RUN", "turning")
+    terminal = watch(*bench.ports, "--rate", 20)
+    terminal.shows("RUN", "turning", "360 °/s")
+    eventually(lambda: "/20.0" in terminal.line_of("st0:1 "), "the rate")
     terminal.press("s")
     terminal.shows("stop confirmed by 1 of 6: st0:1")
     eventually(lambda: bench.speed("st") < 1, "a motor at rest", 30)
@@ -132,20 +97,6 @@ def test_s_stops_the_selected_motor_only(bench, watch):
     terminal.press("j", "j", "j", "s")
     terminal.shows("stop confirmed by 2 of 6: st0:1 can0:2")
     bench.rests()
-
-
-def test_the_latch_is_released_after_a_y(bench, watch):
-    terminal = watch(*bench.ports)
-    terminal.shows("can0:4")
-    terminal.press("!")
-    terminal.shows("LATCHED")
-    terminal.press("u")
-    terminal.shows("release the latch of watch")
-    terminal.press("n")
-    terminal.shows_no("y or n")
-    assert "LATCHED" in terminal.text
-    terminal.press("u", "y")
-    terminal.shows_no("LATCHED")
 
 
 def test_a_register_is_written_and_read_back(bench, watch, run):
@@ -158,20 +109,14 @@ def test_a_register_is_written_and_read_back(bench, watch, run):
     terminal.press("e", "70000", "enter")
     terminal.shows("NOT WRITTEN", "32767")
     assert terminal.bold("NOT WRITTEN")
+    # One that the drive refuses is not edited.
+    terminal.press("/", "OBSERVER_CR_C1", "enter")
+    terminal.shows("OBSERVER_CR_C1 exists only in drives", "that are built with: state observer with CORDIC")
+    terminal.press("e")
+    terminal.shows("OBSERVER_CR_C1 cannot be edited: refused: GET_WRITE_ONLY")
     terminal.press("q")
     assert terminal.wait() == 0
     assert "777" in run("st", "-p", bench.st, *PATIENT, "get", "SPEED_KP").ended(0).out
-
-
-def test_a_register_that_the_drive_refuses_is_not_edited(bench, watch):
-    terminal = watch(*bench.ports)
-    terminal.shows("can0:4")
-    terminal.press("r", "/", "OBSERVER_CR_C1", "enter")
-    terminal.shows("OBSERVER_CR_C1 exists only in drives", "that are built with: state observer with CORDIC")
-    (line,) = (line for line in terminal.text.splitlines() if ">OBSERVER_CR_C1" in line)
-    assert " e Observer gain" not in line
-    terminal.press("e")
-    terminal.shows("OBSERVER_CR_C1 cannot be edited: refused: GET_WRITE_ONLY")
 
 
 def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run):
@@ -184,8 +129,6 @@ def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run
     terminal.shows("speed_kp was", "is 77 (read back)")
     terminal.press("e", "256", "enter")
     terminal.shows("NOT WRITTEN: `256` is not a gain: a gain is a whole number", "from 0 to 255; type the number alone")
-    terminal.press("e", "speed_kp=9", "enter")
-    terminal.shows("NOT WRITTEN: `speed_kp=9` is not a gain", "type the number alone; nothing was sent")
     terminal.press("esc")
     terminal.shows_no("with `speed_kp`")
     terminal.press("end", "e", "1500", "enter")
@@ -195,55 +138,25 @@ def test_a_gain_and_the_acceleration_are_written_and_read_back(bench, watch, run
     assert "77" in run("rmd", "-p", bench.can, *PATIENT, "--id", 3, "pid").ended(0).out
 
 
-def test_a_register_that_moves_the_motor_is_refused(bench, watch):
-    terminal = watch("-p", bench.st, "--motor", 1)
-    terminal.shows("IDLE")
-    terminal.press("r", "/", "CONTROL_MODE", "enter", "e")
-    terminal.shows("CONTROL_MODE makes the drive act: use `motorlink st set`")
-    assert "new value" not in terminal.text
-
-
-def test_every_other_key_of_the_help_does_what_it_says(bench, watch):
+def test_the_help_has_all_keys_and_those_that_are_sequences_do_what_it_says(bench, watch):
     terminal = watch(*bench.ports)
     terminal.shows("can0:4")
     terminal.press("?")
-    terminal.shows("any key closes this help")
-    terminal.shows("SPACE ! F12 Ctrl-X", "up down j k", "Enter", "e Enter", "r ", "s ", "u ", "n ", "Esc", "Ctrl-Z", "q Ctrl-C")
+    terminal.shows("any key closes this help", "SPACE ! F12 Ctrl-X", "up down j k", "Enter", "e Enter", "r ", "s ", "u ",
+                   "n ", "Esc", "Ctrl-Z", "q Ctrl-C")
     assert "…" not in terminal.text
     terminal.press("esc")
     terminal.shows_no("any key closes this help")
-    ways = (("down", 1), ("j", 2), ("up", 1), ("k", 0), ("end", 5), ("home", 0), ("page-down", 5), ("page-up", 0))
     names = ("st0:1", "st0:2", "can0:1", "can0:2", "can0:3", "can0:4")
-    for key, row in ways:
+    for key, row in (("down", 1), ("up", 0), ("end", 5), ("home", 0), ("page-down", 5), ("page-up", 0)):
         terminal.press(key)
         terminal.shows(f">{names[row]}")
-    terminal.press("enter")
-    terminal.shows("st0:1  IDLE", "CONTROL_MODE", "SPEED (0x1)", "MOTOR_POWER", "replies")
-    for key, name in (("down", "st0:2"), ("up", "st0:1"), ("j", "st0:2"), ("k", "st0:1")):
-        terminal.press(key)
-        terminal.shows(f"{name}  IDLE")
-    terminal.press("esc")
-    terminal.shows("got/asked")
     terminal.press("end", "enter")
     terminal.shows("can0:4  at rest", "multi_turn_angle_degrees", "phase_a_amps", "0.00 °")
     terminal.press("r")
     terminal.shows("can0:4  at rest", ">position_kp", "7 of 7 registers")
-    for key, name in (("down", "position_ki"), ("j", "speed_kp"), ("up", "position_ki"), ("k", "position_kp"), ("end", "acceleration"), ("home", "position_kp")):
-        terminal.press(key)
-        terminal.shows(f">{name}")
     terminal.press("/", "torque_k")
     terminal.shows("search: torque_k_", "2 of 7 registers")
-    terminal.press("enter", "enter")
-    terminal.shows("new value of torque_kp: _", "2 of 7 registers")
-    terminal.press("esc")
-    terminal.shows_no("new value")
-    terminal.press("/", "torque_k")
-    terminal.shows("search: torque_k_")
-    terminal.press("esc")
-    terminal.shows("7 of 7 registers")
-    terminal.shows_no("search:")
-    terminal.press("esc")
-    terminal.shows(">can0:4")
 
 
 def test_motors_that_appear_later_are_found(bench, watch):
@@ -253,8 +166,6 @@ def test_motors_that_appear_later_are_found(bench, watch):
     terminal.shows("6 motors on 2 ports", "st0: 1 more motors", "can0: 3 more motors")
     for name in ("st0:2", "can0:1", "can0:3", "can0:4"):
         eventually(lambda: "/10.0" in terminal.line_of(f"{name} "), f"the rate of {name}", 30)
-    terminal.press("n")
-    terminal.shows("st0: 0 more motors", "can0: 0 more motors")
     terminal.press("end")
     terminal.shows(">can0:4")
     terminal.press("!")
@@ -273,34 +184,20 @@ def cable(sim, run):
     cable.unplug()
 
 
-@pytest.mark.parametrize("view", VIEWS)
-def test_a_port_that_goes_away_and_comes_back_is_said(cable, watch, view):
+def test_a_stop_while_the_port_is_gone_is_loud_and_is_repeated_when_it_is_back(cable, watch):
     terminal = watch("-p", cable.port)
-    text = go_to(terminal, view)
+    terminal.shows("RUN")
     cable.unplug()
-    if view != "help":
-        terminal.shows("PORT GONE", "port gone" if view != "registers" else text)
-    cable.plug_in()
-    go_back(terminal, view)
-    terminal.shows("the port is back after", "RUN", "°C", within=30)
-    assert cable.speed() > 300
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_a_stop_while_the_port_is_gone_is_loud_and_is_repeated_when_it_is_back(cable, watch, view):
-    terminal = watch("-p", cable.port)
-    text = go_to(terminal, view)
-    cable.unplug()
+    terminal.shows("PORT GONE", "port gone")
     terminal.press("!")
     loud = "stop NOT CONFIRMED, may still be turning:"
-    terminal.shows("LATCHED", loud, text)
+    terminal.shows("LATCHED", loud)
     assert terminal.bold(loud)
     assert cable.speed() > 300
     cable.plug_in()
     eventually(lambda: cable.speed() < 1, "a motor at rest", 30)
     terminal.shows_no(loud)
-    go_back(terminal, view)
-    terminal.shows("stop confirmed by all 2 motors", "LATCHED")
+    terminal.shows("the port is back after", "stop confirmed by all 2 motors", "LATCHED", "°C")
 
 
 def test_a_stop_that_is_not_confirmed_at_the_end_is_an_error(cable, watch):
@@ -323,42 +220,13 @@ def test_the_end_waits_for_a_stop_that_is_under_way(bench, watch):
     bench.rests()
 
 
-def test_a_motor_that_becomes_silent_is_said(sim, watch):
-    drives = sim(st=())
-    terminal = watch("-p", f"slcan:{drives.can}")
-    terminal.shows("at rest")
-    drives.process.send_signal(signal.SIGSTOP)
-    try:
-        terminal.shows("NO ANSWER")
-    finally:
-        drives.process.send_signal(signal.SIGCONT)
-    terminal.shows("answers again")
-
-
-def test_the_view_follows_the_size_of_the_terminal(bench, watch):
+def test_the_view_follows_the_size_of_the_terminal_and_a_tiny_one_still_stops_all(bench, watch):
+    bench.turn()
     terminal = watch(*bench.ports)
     terminal.shows("got/asked")
     terminal.resize(200, 60)
     eventually(lambda: len(terminal.lines[1]) > 100, "a wide header")
-    terminal.resize(40, 10)
-    terminal.shows("SPACE STOP ALL", "q quit", ">st0:1")
-    for key in ("?", "r", "enter"):
-        terminal.press(key)
-        terminal.shows_no(">st0:1")
-        terminal.press("esc")
-        terminal.shows(">st0:1")
-    terminal.resize(80, 24)
-    terminal.shows("got/asked", "can0:4")
-    terminal.press("q")
-    assert terminal.wait() == 0
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_a_tiny_terminal_still_stops_all(bench, watch, view):
-    bench.turn()
-    terminal = watch(*bench.ports)
-    text = go_to(terminal, view)
-    for columns, lines in ((200, 60), (20, 5), (1, 1), (20, 5)):
+    for columns, lines in ((40, 10), (20, 5), (1, 1), (20, 5)):
         terminal.resize(columns, lines)
         if lines > 1:
             eventually(lambda: terminal.line_of("SPACE STOP ALL"), "the key of the stop")
@@ -366,17 +234,16 @@ def test_a_tiny_terminal_still_stops_all(bench, watch, view):
     terminal.press("space")
     bench.rests()
     terminal.resize(80, 24)
-    terminal.shows("LATCHED", text)
+    terminal.shows("LATCHED", "got/asked", "can0:4")
     terminal.press("ctrl-c")
     assert terminal.wait() == 0
     eventually(lambda: terminal.is_as_before, "the terminal as before")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_leaves_the_terminal_as_it_was(bench, watch, number):
+def test_a_signal_leaves_the_terminal_as_it_was(bench, watch):
     terminal = watch(*bench.ports)
     terminal.shows("can0:4")
-    terminal.signal(number)
+    terminal.signal(signal.SIGTERM)
     assert terminal.wait() == 0
     eventually(lambda: terminal.is_as_before, "the terminal as before")
 
@@ -386,11 +253,15 @@ def is_suspended(terminal):
         return stat.read().rpartition(")")[2].split()[0] == "T"
 
 
-@pytest.mark.parametrize("how", ["ctrl-z", signal.SIGTSTP])
-def test_it_can_be_suspended(bench, watch, how):
+def test_it_can_be_suspended_and_is_drawn_again_after_a_stop_that_it_cannot_handle(bench, watch):
     terminal = watch(*bench.ports)
     terminal.shows("can0:4")
-    terminal.press(how) if isinstance(how, str) else terminal.signal(how)
+    terminal.signal(signal.SIGSTOP)
+    eventually(lambda: is_suspended(terminal), "a stopped program")
+    terminal.clear()
+    terminal.signal(signal.SIGCONT)
+    terminal.shows("6 motors on 2 ports", "can0:4", "q quit")
+    terminal.press("ctrl-z")
     eventually(lambda: is_suspended(terminal), "a suspended program")
     eventually(lambda: terminal.is_as_before, "the terminal as before")
     terminal.signal(signal.SIGCONT)
@@ -400,16 +271,6 @@ def test_it_can_be_suspended(bench, watch, how):
     terminal.press("q")
     assert terminal.wait() == 0
     eventually(lambda: terminal.is_as_before, "the terminal as before")
-
-
-def test_it_is_drawn_again_after_a_stop_that_it_cannot_handle(bench, watch):
-    terminal = watch(*bench.ports)
-    terminal.shows("can0:4")
-    terminal.signal(signal.SIGSTOP)
-    eventually(lambda: is_suspended(terminal), "a stopped program")
-    terminal.clear()
-    terminal.signal(signal.SIGCONT)
-    terminal.shows("6 motors on 2 ports", "can0:4", "q quit")
 
 
 def test_motors_that_others_started_go_on_when_it_ends_or_is_killed(bench, watch):
@@ -445,10 +306,12 @@ def test_a_port_without_motors_is_an_error(sim, watch):
     assert "\x1b[?1049h".encode() not in terminal.raw
 
 
-@pytest.mark.parametrize("variables, has_colours", [({}, False), ({"NO_COLOR": None}, True)])
-def test_colours_are_left_out_on_request(bench, watch, variables, has_colours):
+def test_colours_are_left_out_on_request(bench, watch):
     bench.sim.do("supply", motor=1, port=f"pty:{bench.st}", volts=5)
-    terminal = watch(*bench.ports, **variables)
-    terminal.shows("FAULT_NOW", "UNDER_VOLT")
-    assert (b"38;5;1" in terminal.raw) == has_colours, terminal.raw
-    assert terminal.bold("UNDER_VOLT")
+    for variables, has_colours in (({}, False), ({"NO_COLOR": None}, True)):
+        terminal = watch(*bench.ports, **variables)
+        terminal.shows("FAULT_NOW", "UNDER_VOLT")
+        assert (b"38;5;1" in terminal.raw) == has_colours, terminal.raw
+        assert terminal.bold("UNDER_VOLT")
+        terminal.press("q")
+        assert terminal.wait() == 0

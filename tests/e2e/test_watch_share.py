@@ -48,18 +48,6 @@ def test_stop_all_stops_and_latches_the_programs_of_the_share(serve, watch):
     eventually(lambda: speed(share) > 300, "a motor that turns")
 
 
-def test_the_latch_of_another_program_is_shown_and_can_be_released(serve, watch):
-    share = serve()
-    terminal = watch(*share.ports)
-    terminal.shows("6 motors on 2 ports")
-    Client(share.path, "ann").ask("latch")
-    terminal.shows("LATCHED (u releases it): every motion is refused since ann stopped all")
-    terminal.press("u")
-    terminal.shows("release the latch of ann")
-    terminal.press("y")
-    terminal.shows_no("LATCHED")
-
-
 def test_the_kill_of_the_share_is_said_and_stop_and_latch_are_repeated_at_the_next_one(serve, watch):
     share = serve()
     tuner = Client(share.path, "tuner")

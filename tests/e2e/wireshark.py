@@ -84,6 +84,15 @@ def sets(motorlink):
     return sets
 
 
+def some(frames, share):
+    """A share of the requests by a fixed seed, each with its reply."""
+    chance, is_taken, taken = random.Random(1), False, []
+    for frame in frames:
+        is_taken = is_taken if frame["answers"] else chance.random() < share
+        taken += [frame] * is_taken
+    return taken
+
+
 def on_can(frames, told=True):
     capture = Capture(SOCKETCAN)
     for frame in frames:

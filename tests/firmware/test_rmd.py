@@ -8,22 +8,13 @@ import test_rmd_can
 from clock import PATIENCE, connect
 from test_rmd_can import (  # noqa: F401  # tests that run here with this file's fixture
     Host,
-    test_a_closed_loop_command_is_answered_as_status_2_is,
-    test_a_motor_at_rest_reports_its_voltage_and_temperature,
-    test_a_position_command_reaches_the_multi_turn_angle,
+    test_a_position_command_turns_no_faster_than_it_says,
     test_a_single_turn_position_is_reached_the_way_that_is_asked,
-    test_a_speed_command_turns_the_motor_at_that_speed,
-    test_an_echoing_reply_echoes_the_null_bytes_too,
-    test_an_unknown_command_is_met_with_silence,
-    test_clear_error_is_answered_with_0x9a_as_printed,
-    test_each_motor_answers_under_its_own_identifier,
-    test_four_torques_in_one_frame_are_answered_lowest_id_first,
-    test_four_torques_turn_four_motors_each_its_way,
+    test_each_motor_answers_under_its_own_identifier_with_the_bytes_of_the_document,
+    test_four_torques_in_one_frame_turn_four_motors_which_answer_lowest_id_first,
     test_frames_of_another_form_or_for_nobody_are_ignored,
+    test_null_bytes_are_ignored_and_an_echoing_reply_echoes_them,
     test_run_resumes_what_stop_interrupted_and_nothing_after_off,
-    test_the_acceleration_limit_is_an_i32_in_data_4_to_7,
-    test_the_gains_are_six_bytes_from_data_2_on,
-    test_the_phase_currents_add_up_to_nothing,
 )
 
 

@@ -9,16 +9,9 @@ from test_st_bytes import (  # noqa: F401  # tests that run here with this file'
     test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
     test_a_frame_in_single_bytes_is_understood,
     test_a_length_over_128_makes_the_drive_deaf_until_the_line_was_silent,
-    test_a_named_motor_stays_the_current_one_until_another_is_named,
     test_a_payload_of_128_bytes_is_taken_and_one_of_128_bytes_comes_back,
-    test_a_refused_segment_leaves_the_old_one,
-    test_a_short_value_leaves_the_bytes_that_it_does_not_carry,
-    test_every_wrong_checksum_is_refused,
-    test_frame_codes_that_table_1_lacks_are_refused,
-    test_motors_have_registers_of_their_own,
     test_noise_never_wedges_the_drive,
-    test_the_checksum_is_checked_before_the_motor_and_the_motor_before_the_frame_code,
-    test_what_a_register_is_not_for_is_refused,
+    test_motors_have_registers_of_their_own_and_refuse_what_these_are_not_for,
 )
 
 SET_REVUP_DATA, START_MOTOR = 0x09, 0x01

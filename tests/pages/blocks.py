@@ -4,7 +4,7 @@ A block is fenced and names its language. A word after the language says how it 
 
 | fence | check |
 |---|---|
-| `sh` | each line runs and ends with 0, or with N where it ends in `# exit N` |
+| `sh` | each line runs, some for a shorter time (`QUICKER`), and ends with 0, or with N where it ends in `# exit N` |
 | `sh skip=REASON` | not run; `REASON` is one of `SKIPS` |
 | `python` | all blocks of a page run in order in one process, beside the guards, shares and nodes that its `sh` blocks start |
 | `python pytest` | runs as a test file |

@@ -3,7 +3,7 @@
 import pytest
 
 import blocks
-from shell import lines, simulated
+from shell import lines
 
 PAGE = """\
 Text.
@@ -45,28 +45,6 @@ def test_blocks_and_code_without_a_fence_are_found(page):
     ]
     assert found[1].text == "a = 1\n"
     assert indented == [16]
-
-
-def test_a_fence_that_is_not_closed_is_an_error(page):
-    page.write_text("```sh\nmotorlink ports\n")
-    with pytest.raises(AssertionError, match="page.md:1: the fence is not closed"):
-        blocks.read(page)
-
-
-def test_lines_have_their_words_and_exit_codes(page):
-    found, _ = blocks.read(page)
-    assert [(words, code) for _, words, code in lines(found[0].text)] == [
-        (["motorlink", "ports"], 0),
-        (["motorlink", "st", "get", "SPEED_MEAS", "--every", "100ms"], 0),
-        (["false"], 1),
-    ]
-
-
-def test_real_devices_become_simulated_ones():
-    assert simulated("-p slcan:/dev/ttyACM1 -p socketcan:can0") == "-p slcan:./can0 -p slcan:./can0"
-    assert simulated("-p /dev/ttyACM0") == "-p ./st0"
-    assert simulated("'serial:/dev/ttyUSB0?baud=9600'") == "'./st0?baud=9600'"
-    assert simulated("/dev/serial/by-id/usb-STLink") == "./st0"
 
 
 def test_a_line_that_fails_is_an_error(shell):

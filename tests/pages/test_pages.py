@@ -1,13 +1,9 @@
 """Every code block of README.md and the pages runs: blocks.py says how."""
 
-import fcntl
 import json
-import os
 import re
-import shutil
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import jsonschema
@@ -35,14 +31,31 @@ def each_page(found):
     return pytest.mark.parametrize("found", found.values(), ids=list(found))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_block_names_its_language_and_its_check(page):
-    found, indented = blocks.read(page)
-    assert not indented, f"{page.name}: code without a fence in the lines {indented}"
-    for block in found:
-        assert block.word in WORDS.get(block.language, ()), (
-            f"{block}: `{block.language} {block.word}` is not one of {WORDS}"
-        )
+def test_every_block_names_its_language_and_its_check():
+    for page in PAGES:
+        found, indented = blocks.read(page)
+        assert not indented, f"{page.name}: code without a fence in the lines {indented}"
+        for block in found:
+            assert block.word in WORDS.get(block.language, ()), (
+                f"{block}: `{block.language} {block.word}` is not one of {WORDS}"
+            )
+
+
+#: Words that make a line quicker, and what it shows no other.
+QUICKER = [
+    (re.compile(r"(motorlink record .*--duration) \d+s"), r"\1 1s"),
+    (re.compile(r"--count \d\d+"), "--count 3"),
+    # Tests of tests/e2e run the whole kit.
+    (re.compile(r"motorlink conformance (st|rmd) "), r"motorlink conformance \1 --only reply "),
+    (re.compile(r"(?<=motorlink conformance host st) "), " --only acknowledge "),
+    (re.compile(r"(?<=motorlink conformance host rmd) "), " --only an_e "),
+]
+
+
+def quicker(line):
+    for slow, quick in QUICKER:
+        line = slow.sub(quick, line)
+    return line
 
 
 @each_page(blocks.by_page("sh", ""))
@@ -50,8 +63,8 @@ def test_shell_lines(found, shell, request):
     if not any(re.search(r"motorlink sim .*:\./(st0|can0) .*&", block.text) for block in found):
         request.getfixturevalue("drives")
     for block in found:
-        for line in lines(block.text):
-            shell.run(*line)
+        for line, words, code in lines(block.text):
+            shell.run(quicker(line), words, code)
 
 
 @each_page(blocks.by_page("python", ""))
@@ -88,102 +101,63 @@ def python(arguments, folder, environment):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@contextmanager
-def alone(name):
-    """Keeps out the other processes of this run."""
-    folder = REPOSITORY / "target/pages"
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / name).open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield folder
+def libraries(*words):
+    """What cargo builds with these words, by the names of the libraries."""
+    build = ["cargo", *words, "--locked", "--message-format=json"]
+    done = subprocess.run(build, cwd=REPOSITORY, check=True, stdout=subprocess.PIPE, text=True, timeout=3600)
+    built = [it for it in map(json.loads, done.stdout.splitlines()) if it["reason"] == "compiler-artifact"]
+    return {
+        it["target"]["name"]: file for it in built for file in it["filenames"] if file.endswith((".rlib", ".a"))
+    }
 
 
-@pytest.fixture(scope="session")
-def compiled_c(tmp_path_factory):
-    """Compiles a program in C against the installed library; gives the path of the program."""
-    with alone("c.lock") as pages:
-        prefix = pages / "c"
-        install = [REPOSITORY / "crates/ffi/packaging/install", prefix]
-        subprocess.run(install, check=True, timeout=3600)
-    folder = tmp_path_factory.mktemp("c")
-
-    def compiled(block):
-        source, program = folder / "page.c", folder / f"page{block.line}"
-        source.write_text(simulated(block.text))
-        subprocess.run(
-            ["gcc", *STRICT, f"-I{prefix}/include", f"-I{REPOSITORY}/crates/ffi/examples",
-             source, "-o", program, f"{prefix}/lib/libmotorlink.a", "-lm", "-lpthread", "-ldl"],
-            check=True, timeout=LIMIT,
-        )
-        return program
-
-    return compiled
+def compiled(source, block, command, libraries=()):
+    """Compiles a program without a warning; gives its path."""
+    source.write_text(simulated(block.text))
+    program = source.with_suffix("")
+    subprocess.run([*command, source, "-o", program, *libraries], check=True, timeout=LIMIT)
+    return program
 
 
-@each(blocks.of("c", ""))
-def test_programs_in_c(block, compiled_c, folder, drives, environment):
-    runs(compiled_c(block), folder, environment)
-
-
-def runs(program, folder, environment):
+def runs(block, program, folder, environment):
     done = subprocess.run(
         [program], cwd=folder, env=environment, capture_output=True, text=True, timeout=LIMIT
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
 
 
-RUST = blocks.of("rust", "")
-CRATES = {
-    "motorlink": "motorlink",
-    "motorlink-testbench": "testbench",
-    "motorlink-proto": "proto",
-    "motorlink-embedded": "embedded",
-}
-MANIFEST = """\
-[workspace]
-[package]
-name = "pages"
-version = "0.0.0"
-edition = "2024"
-[lints.rust]
-warnings = "deny"
-[dependencies]
-signal-hook = "0.4"
-"""
+def test_programs_in_c(tmp_path, folder, drives, environment):
+    built = libraries("rustc", "--package=motorlink-ffi", "--lib", "--features=std", "--crate-type=staticlib")
+    ffi = REPOSITORY / "crates/ffi"
+    for block in blocks.of("c", ""):
+        command = ["gcc", *STRICT, f"-I{ffi}/include", f"-I{ffi}/examples"]
+        library = [built["motorlink_ffi"], "-lm", "-lpthread", "-ldl"]
+        program = compiled(tmp_path / f"c{block.line}.c", block, command, library)
+        runs(block, program, folder, environment)
 
 
-def rust_name(block):
-    return f"{block.page.removesuffix('.md').replace('/', '_').lower()}_{block.line}"
+def test_programs_in_rust(tmp_path, folder, drives, environment):
+    # Those of the program, which other parts need, too.
+    built = libraries("build", "--workspace", "--all-features", "--bin=motorlink")
+    command = ["rustc", "--edition=2024", "-Dwarnings", f"-Ldependency={Path(built['signal_hook']).parent}"]
+    for name in ("motorlink", "motorlink_proto", "motorlink_testbench", "signal_hook"):
+        command.append(f"--extern={name}={built[name]}")
+    for block in blocks.of("rust", ""):
+        program = compiled(tmp_path / f"rust{block.line}.rs", block, command)
+        runs(block, program, folder, environment)
 
 
-@pytest.fixture(scope="session")
-def compiled_rust():
-    """Compiles all programs in Rust at once; gives the folder of the programs."""
-    dependencies = "".join(
-        f'{name} = {{ path = "{REPOSITORY}/crates/{folder}" }}\n' for name, folder in CRATES.items()
-    )
-    target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
-    with alone("rust.lock") as pages:
-        project = pages / "rust"
-        shutil.rmtree(project, ignore_errors=True)
-        (project / "src/bin").mkdir(parents=True)
-        for block in RUST:
-            (project / f"src/bin/{rust_name(block)}.rs").write_text(simulated(block.text))
-        (project / "Cargo.toml").write_text(MANIFEST + dependencies)
-        shutil.copy(REPOSITORY / "Cargo.lock", project)
-        build = ["cargo", "build", "--quiet", "--bins", "--target-dir", target]
-        subprocess.run(build, cwd=project, check=True, timeout=3600)
-    return target / "debug"
+def test_toml_fragments():
+    for block in blocks.of("toml", "fragment"):
+        check(block, tomllib.loads, block.text)
 
 
-@each(RUST)
-def test_programs_in_rust(block, compiled_rust, folder, drives, environment):
-    runs(compiled_rust / rust_name(block), folder, environment)
-
-
-@each(blocks.of("toml", "fragment"))
-def test_toml_fragments(block):
-    tomllib.loads(block.text)
+def check(block, parse, text):
+    """Fails with the place of the block."""
+    try:
+        parse(text)
+    except ValueError as error:
+        pytest.fail(f"{block}: {error}: {text}")
 
 
 @each(blocks.of("toml", "scenario"))
@@ -200,20 +174,19 @@ def test_configurations(block, shell):
     shell.run(*next(lines(f"motorlink sim page.toml {served}")))
 
 
-@pytest.fixture(scope="session")
-def schema():
-    return jsonschema.Draft202012Validator(
-        json.loads((REPOSITORY / "docs/json.schema.json").read_text())
-    )
+def test_json():
+    for block in blocks.of("json", "", "any"):
+        for line in block.text.splitlines():
+            check(block, json.loads, line)
 
 
-@each(blocks.of("json", ""))
-def test_json_lines(block, schema):
-    for line in block.text.splitlines():
-        schema.validate(json.loads(line))
+def test_json_lines():
+    schema = jsonschema.Draft202012Validator(json.loads((REPOSITORY / "docs/json.schema.json").read_text()))
+    wrong = [
+        f"{block}: {error.message}"
+        for block in blocks.of("json", "")
+        for line in block.text.splitlines()
+        for error in schema.iter_errors(json.loads(line))
+    ]
+    assert wrong == []
 
-
-@each(blocks.of("json", "any"))
-def test_json(block):
-    for line in block.text.splitlines():
-        json.loads(line)

@@ -3,7 +3,7 @@ import type { Recorded } from './wire';
 
 vi.mock('./link', () => ({}));
 vi.mock('./parts', () => ({}));
-const { gapsText, isActive, missing, summary } = await import('./record-button');
+const { gapsText, isActive, missing, rateText, summary } = await import('./record-button');
 
 const recording: Recorded = {
   name: '2026-11-23T14-05-09Z.mcap', phase: 'recording', by: 'page 1', began: 0, seconds: 75.3, bytes: 1_234_567,
@@ -28,6 +28,13 @@ describe('the recording in the header', () => {
     expect(missing({ ...recording, lost: 3, silent: ['st0/motor1'], left_out: ['rmd0'] })).toBe(
       '3 lost; no values of st0/1; no motor answered on rmd0',
     );
+  });
+
+  it('says the rate of the slowest motor', () => {
+    expect(rateText(recording)).toBe('–');
+    expect(rateText({ ...recording, rates: [100, 99.96] })).toBe('100.0 of 100.0 Hz');
+    const slowest = { motor: 'st0/motor1', rate: 87.24 };
+    expect(rateText({ ...recording, rates: [100, 98.5], slowest })).toBe('lowest mean 87.2 of 100.0 Hz (st0/1); last second 98.5 Hz');
   });
 
   it('names the motors without values, and for how long', () => {

@@ -1,5 +1,6 @@
 import { readFileSync } from 'node:fs';
-import { describe, expect, it } from 'vitest';
+import { expect, it } from 'vitest';
+import { DARK, LIGHT } from './plot/style';
 
 const css = readFileSync(new URL('style.css', import.meta.url), 'utf8');
 const [light, dark] = [...css.matchAll(/:root \{([^}]*)\}/g)].map(([, body]) =>
@@ -37,16 +38,14 @@ const MARKS: [string, string[]][] = [
   ['stop', ['bg', 'card']],
 ];
 
-describe.each([
-  ['light', light!],
-  ['dark', { ...light!, ...dark! }],
-])('contrast, %s', (_, colours) => {
+it.each([
+  ['light', light!, LIGHT],
+  ['dark', { ...light!, ...dark! }, DARK],
+])('texts have a contrast of at least 4.5, edges and marks of 3, and curves of 4.5: %s', (_, colours, curves) => {
   const pairs = (list: [string, string[]][]) =>
-    list.flatMap(([front, backs]) => backs.map((back) => [front, back] as const));
-  it.each(pairs(TEXT))('of the text %s on %s is at least 4.5', (front, back) => {
-    expect(contrast(colours[front]!, colours[back]!)).toBeGreaterThanOrEqual(4.5);
-  });
-  it.each(pairs(MARKS))('of the mark %s on %s is at least 3', (front, back) => {
-    expect(contrast(colours[front]!, colours[back]!)).toBeGreaterThanOrEqual(3);
-  });
+    list.flatMap(([front, backs]) => backs.map((back) => [colours[front]!, colours[back]!, `${front} on ${back}`] as const));
+  const drawn = curves.flatMap((one) => ['bg', 'card'].map((back) => [one, colours[back]!, `${one} on ${back}`] as const));
+  const below = (least: number, all: (readonly [string, string, string])[]) =>
+    all.filter(([front, back]) => !(contrast(front, back) >= least)).map(([, , name]) => name);
+  expect([...below(4.5, [...pairs(TEXT), ...drawn]), ...below(3, pairs(MARKS))]).toEqual([]);
 });

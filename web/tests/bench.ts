@@ -1,4 +1,5 @@
 // Simulated drives and a monitor for each test, as processes that the test can end, freeze and cut off.
+import AxeBuilder from '@axe-core/playwright';
 import { test as base, expect, type Locator, type Page } from '@playwright/test';
 import { type ChildProcess, spawn, type SpawnOptions } from 'node:child_process';
 import { connect, type Socket } from 'node:net';
@@ -66,6 +67,9 @@ export class Program {
 export const spawnWithTests = (program: string, args: string[], options: SpawnOptions): ChildProcess =>
   spawn('setpriv', ['--pdeathsig', 'KILL', '--', program, ...args], options);
 
+/** When the speed of a motor is looked at again, in ms. */
+const LOOKS = [50];
+
 /** States of an ST drive on the way to RUN. */
 const STARTING = /ALIGN|START|CHARGE|CALIB|CLEAR|SWITCH/;
 
@@ -121,8 +125,8 @@ export class Bench {
     this.viewerUrl = String(this.ready['viewer_url']);
   }
 
-  /** Turns the first ST motor from another program at the share, which stays until the end of the test. */
-  async start() {
+  /** Turns the first ST motor from another program. */
+  start() {
     const command = (id: number, ...bytes: number[]) => ({ id, ask: 'command', line: 'st0', motor: 1, bytes, time_to_live: 10 });
     this.join(
       command(2, 7, 232, 3, 0, 0, 244, 1), // SET_RAMP: to 1000 rpm in 500 ms
@@ -130,24 +134,34 @@ export class Bench {
     );
   }
 
-  /** Reads the speed of the first ST motor from another program, until the end of the test. */
-  async read() {
+  /** What turns the first RMD motor from another program, again and again. */
+  starter() {
+    const ask = this.join();
+    let id = 1;
+    const bytes = [0xa2, 0, 0, 0, ...new Uint8Array(new Int32Array([60_000]).buffer)];
+    return () => ask({ id: (id += 1), ask: 'command', line: 'rmd0', motor: 1, bytes, time_to_live: 10 });
+  }
+
+  /** Reads the speed of the first ST motor from another program. */
+  read() {
     const signals = [{ line: 'st0', motor: 1, name: 'SPEED_MEAS' }];
     this.join({ id: 2, ask: 'subscribe', signals, period: 0.02, queue: 100, drop: 'oldest' });
   }
 
-  /** Another program at the share, until the end of the test. */
+  /** Another program at the share, until the end of the test. Gives what asks for more. */
   join(...requests: object[]) {
     const socket = connect(String(this.ready['at']).replace('unix:', ''));
     this.others.push(socket);
     socket.resume();
-    for (const request of [{ id: 1, ask: 'hello', protocol: 1, name: 'other' }, ...requests]) {
+    const ask = (request: object) => {
       const text = Buffer.from(JSON.stringify(request));
       const header = Buffer.alloc(8);
       header.writeUInt32LE(text.length);
       header[4] = 1;
       socket.write(Buffer.concat([header, text]));
-    }
+    };
+    for (const request of [{ id: 1, ask: 'hello', protocol: 1, name: 'other' }, ...requests]) ask(request);
+    return ask;
   }
 
   /** What a motor does, from outside of its protocol. */
@@ -167,6 +181,16 @@ export class Bench {
     return STARTING.test(String(truth['status'])) ? NaN : Math.abs(Number(truth['speed_rpm']));
   }
 
+  /** Waits until the first motor of a line turns. */
+  turns(line: 'st' | 'rmd' = 'st', message = 'a motor that turns') {
+    return expect.poll(() => this.speed(line, 1), { message, intervals: LOOKS }).toBeGreaterThan(TURNS);
+  }
+
+  /** Waits until it stands still. */
+  rests(line: 'st' | 'rmd' = 'st', message = 'a motor that rests') {
+    return expect.poll(() => this.speed(line, 1), { message, intervals: LOOKS }).toBeLessThan(STILL);
+  }
+
   async end() {
     this.others.forEach((socket) => socket.destroy());
     const code = await this.monitor?.end();
@@ -176,7 +200,7 @@ export class Bench {
   }
 }
 
-export const test = base.extend<{ bench: Bench; live: Page }>({
+export const test = base.extend<{ bench: Bench; live: Page; viewer: Page }>({
   bench: async ({}, use) => {
     if (!existsSync(PROGRAM)) throw new Error(`${PROGRAM} is not there: run \`make browser\``);
     const bench = new Bench();
@@ -193,6 +217,14 @@ export const test = base.extend<{ bench: Bench; live: Page }>({
     await page.goto(bench.url);
     await expect(page.getByRole('article')).toHaveCount(6);
     await use(page);
+  },
+  /** The page of a viewer beside it. */
+  viewer: async ({ bench, browser }, use) => {
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    await page.goto(bench.viewerUrl);
+    await use(page);
+    await context.close();
   },
 });
 
@@ -232,6 +264,12 @@ export async function hold(motor: Locator, press: () => Promise<void>, release: 
 export async function open(page: Page, view: string) {
   await page.getByRole('navigation').getByRole('link', { name: view, exact: true }).click();
   await expect(page.getByRole('heading', { name: view, level: 2 })).toBeVisible();
+}
+
+/** What axe finds. It opens no page for frames, as there are none, and tells of nothing else: both take long. */
+export async function violations(page: Page) {
+  const { violations: found } = await new AxeBuilder({ page }).setLegacyMode().options({ resultTypes: ['violations'] }).analyze();
+  return found.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`);
 }
 
 export { expect };

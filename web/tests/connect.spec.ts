@@ -1,9 +1,8 @@
 // Ports of the computer, and lines that are opened and closed while the server runs.
-import AxeBuilder from '@axe-core/playwright';
 import type { Page } from '@playwright/test';
 import { writeFileSync } from 'node:fs';
 import { type AddressInfo, connect, createServer } from 'node:net';
-import { Bench, card, expect, open, Program, test as base } from './bench';
+import { Bench, card, expect, open, Program, spin, test as base, violations } from './bench';
 
 /** A monitor with the ST drive alone. */
 const test = base.extend<{ bench: Bench }>({
@@ -59,99 +58,39 @@ async function slowBus(drives: number) {
   return { port: (server.address() as AddressInfo).port, close: () => server.close() };
 }
 
-test('a line is opened, turned, and closed, which stops its motors', async ({ bench, page }) => {
+test('a line is opened, turned, and closed, which stops its motors, and a viewer sees it', async ({ bench, page, viewer }) => {
   const port = `slcan:${bench.folder}/can0`;
+  await open(viewer, 'Ports');
   await page.goto(bench.url);
   await expect(page.getByRole('article')).toHaveCount(2);
   await open(page, 'Ports');
   await expect(line(page, 'st0')).toContainText(/0 without reply, \d+ refused, 0 failed, of \d+ exchanges \(searches of empty addresses count\); port never lost/);
   await expect(await enter(page, port, 'rmd')).toContainText('it is the line rmd0');
   await expect(line(page, 'rmd0')).toContainText(port);
+  await expect(line(viewer, 'rmd0')).toContainText('1234');
   await expect(await enter(page, port, 'rmd')).toContainText('is open already: it is the line rmd0');
   await expect(await enter(page, '/dev/null', 'st')).toContainText('is not opened');
-  expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+  expect(await violations(page)).toEqual([]);
   const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   expect(overflow).toBeLessThanOrEqual(0);
   const close = line(page, 'rmd0').getByRole('button', { name: 'Close rmd0' });
   const dialog = page.getByRole('dialog');
   // Axe keeps the page busy, maybe for longer than the deadline of a motor.
   await close.click();
-  expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+  expect(await violations(page)).toEqual([]);
   await dialog.getByRole('button', { name: 'Cancel' }).click();
 
   await open(page, 'Motors');
-  const motor = card(page, 'rmd0/1');
-  await motor.getByRole('spinbutton', { name: /^Target/ }).fill('300');
-  await motor.getByRole('button', { name: 'Run to target' }).click();
-  await expect.poll(() => bench.speed('rmd', 1)).toBeGreaterThan(100);
+  await spin(page, 600, 'rmd0/1');
+  await bench.turns('rmd');
   await open(page, 'Ports');
   await close.click();
   await dialog.getByRole('button', { name: 'Close it' }).click();
   await expect(page.getByText('rmd0 is closed. Stopped before: motor 1.')).toBeVisible();
   await expect(line(page, 'rmd0')).toHaveCount(0);
-  await expect.poll(async () => Math.abs(await bench.speed('rmd', 1))).toBeLessThan(10);
-  await open(page, 'Motors');
-  await expect(page.getByRole('article')).toHaveCount(2);
-  await open(page, 'Ports');
+  await expect(line(viewer, 'rmd0')).toHaveCount(0);
+  await bench.rests('rmd');
   await expect(await enter(page, port, 'rmd')).toContainText('it is the line rmd1');
-});
-
-test('a viewer sees lines come and go, and opens none', async ({ bench, page, browser }) => {
-  await page.goto(bench.url);
-  await open(page, 'Ports');
-  const context = await browser.newContext();
-  try {
-    const viewer = await context.newPage();
-    await viewer.goto(bench.viewerUrl);
-    await open(viewer, 'Ports');
-    await expect(viewer.getByText('Operators open and close lines.')).toBeVisible();
-    await expect(viewer.getByRole('form', { name: 'Open a port' })).toHaveCount(0);
-    await expect(viewer.getByRole('button', { name: /^Close/ })).toHaveCount(0);
-    const reasons = await viewer.evaluate(
-      (port) =>
-        new Promise<string[]>((done) => {
-          const socket = new WebSocket(new URL('ws', location.href.replace(/^http/, 'ws')));
-          const heard: string[] = [];
-          socket.onmessage = ({ data }) => {
-            const text = typeof data === 'string' ? (JSON.parse(data) as { kind: string; reason?: string }) : null;
-            if (text?.kind === 'welcome') {
-              socket.send(JSON.stringify({ id: 1, ask: 'open', port, protocol: 'rmd' }));
-              socket.send(JSON.stringify({ id: 2, ask: 'close', line: 'st0' }));
-            }
-            if (text?.kind === 'refusal') heard.push(String(text.reason));
-            if (heard.length === 2) done(heard);
-          };
-        }),
-      `slcan:${bench.folder}/can0`,
-    );
-    expect(reasons).toEqual(['forbidden', 'forbidden']);
-    await expect(await enter(page, `slcan:${bench.folder}/can0`, 'rmd')).toContainText('it is the line rmd0');
-    await expect(line(viewer, 'rmd0')).toBeVisible();
-    await expect(line(viewer, 'rmd0')).toContainText('1234');
-  } finally {
-    await context.close();
-  }
-});
-
-test('a scan finds an ST drive, and the form opens it', async ({ bench, page }) => {
-  const more = new Bench();
-  try {
-    const port = await more.listen('st');
-    await page.goto(bench.url);
-    await open(page, 'Ports');
-    const form = await fill(page, `tcp:127.0.0.1:${port}`, 'st');
-    await form.getByRole('button', { name: 'Scan' }).click();
-    await expect(form.getByRole('status').first()).toHaveText(/^✓ Found: ST MC SDK 5\.4\.4\. Open opens it as tcp:/);
-    await expect(form.getByRole('list', { name: 'What answered' })).toHaveText('ST MC SDK 5.4.4');
-    await form.getByRole('button', { name: 'Open' }).click();
-    await expect(line(page, 'st1')).toContainText(`tcp:127.0.0.1:${port}`);
-    await form.getByRole('button', { name: 'Scan' }).click();
-    await expect(form.getByRole('status').first()).toContainText('is open already: it is the line st1');
-    await open(page, 'Events');
-    await expect(page.getByText(/asked what answers on tcp:.*ST MC SDK/)).toBeVisible();
-  } finally {
-    await more.end();
-  }
 });
 
 test('a scan finds the bit rate and the motors of a bus, after a question', async ({ bench, page }) => {
@@ -166,7 +105,7 @@ test('a scan finds the bit rate and the motors of a bus, after a question', asyn
     const dialog = page.getByRole('dialog', { name: 'Try other bit rates?' });
     await scan.click();
     await expect(dialog).toBeVisible();
-    expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+    expect(await violations(page)).toEqual([]);
     await dialog.getByRole('button', { name: 'Cancel' }).click();
     await expect(said).toHaveText('No motor answered. Other bit rates were not tried.');
 
@@ -182,7 +121,7 @@ test('a scan finds the bit rate and the motors of a bus, after a question', asyn
       '1000 kbit/ssilence', '800 kbit/ssilence', '500 kbit/smotors 1, 2, 3, 4',
     ]);
     await expect(form.getByRole('textbox', { name: 'Port' })).toHaveValue(/\?bitrate=500000$/);
-    expect((await new AxeBuilder({ page }).analyze()).violations).toEqual([]);
+    expect(await violations(page)).toEqual([]);
     await form.getByRole('button', { name: 'Open' }).click();
     await open(page, 'Motors');
     await expect(card(page, 'rmd0/4')).toBeVisible();
@@ -196,11 +135,12 @@ test('a scan finds the bit rate and the motors of a bus, after a question', asyn
 const liveOnes = async (page: Page, name: string) =>
   (await card(page, name).locator('.value:not(.old) .digits').allInnerTexts()).filter((text) => text !== '–');
 
-test('no old value looks live after the share was started again with other drives', async ({ bench, page }) => {
+test('no old value looks live when the share is another one, and the page says that it outlives the monitor', async ({ bench, page }) => {
+  test.setTimeout(120_000);
   await bench.monitor.end();
   const at = `unix:${bench.folder}/share`;
   const begin = async () => {
-    const share = new Program(['share', '-p', `slcan:${bench.folder}/can0`, '--at', at, '--json'], bench.folder);
+    const share = new Program(['share', '-p', `slcan:${bench.folder}/can0`, '--timeout', '1s', '--at', at, '--json'], bench.folder);
     await share.line(({ event }) => event === 'ready');
     return share;
   };
@@ -231,6 +171,12 @@ test('no old value looks live after the share was started again with other drive
       isBack ||= (await liveOnes(page, 'rmd0/1')).length > 0;
     }
     await expect(card(page, 'rmd0/4').locator('.value.old').first()).toBeVisible();
+
+    await spin(page, 600, 'rmd0/1');
+    await bench.turns('rmd');
+    await bench.monitor.end('SIGKILL');
+    await expect(page.getByText(/the share, which is another process, has stopped the motors of this page/)).toBeVisible();
+    await bench.rests('rmd');
   } finally {
     await first.end();
     await second?.end();

@@ -1,5 +1,4 @@
 // Plots of simulated drives.
-import AxeBuilder from '@axe-core/playwright';
 import type { Page } from '@playwright/test';
 import { readFileSync } from 'node:fs';
 import { expect, open, spin, test } from './bench';
@@ -28,7 +27,7 @@ test.describe.configure({ timeout: 180_000 });
 const SPEED = 'st0/1 SPEED_MEAS';
 const RMD = 'rmd0/1 speed_dps';
 
-test('shows what turns, also while it is paused', async ({ live }) => {
+test('shows what turns, also while it is paused, and says when values are old', async ({ bench, live }) => {
   await choose(live, SPEED, RMD);
   await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
   await open(live, 'Motors');
@@ -44,87 +43,37 @@ test('shows what turns, also while it is paused', async ({ live }) => {
   await live.getByRole('button', { name: 'Back to live' }).click();
   await expect(live.getByText('Live', { exact: true })).toBeVisible();
   expect(await numberIn(live, SPEED, 'Max')).toBeGreaterThanOrEqual(max);
+
+  bench.monitor.process.kill('SIGSTOP');
+  await expect(live.locator('.plot-old [data-is="old"]').first()).toHaveText(/[23] s old/);
+  bench.monitor.process.kill('SIGCONT');
+  await expect(live.locator('.plot-old')).toHaveCount(0);
 });
 
-test('begins with the speeds of the motors, and remembers another choice', async ({ live }) => {
+test('begins with the speeds of the motors, has room for curves, and remembers another choice', async ({ live }) => {
   await open(live, 'Plots');
   await expect(live.getByText('Signals (6)')).toBeVisible();
   await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
-  await expect.poll(() => numberIn(live, 'rmd0/4 speed_dps', 'Now')).toBe(0);
+  await expect.poll(() => numberIn(live, RMD, 'Max')).toBe(0);
+  // The table of curves is beside or below them.
+  for (const [width, most] of [[390, 374], [1280, 440]] as const) {
+    await live.setViewportSize({ width, height: 800 });
+    const legend = live.getByRole('region', { name: 'Curves of Signals' });
+    expect((await legend.boundingBox())!.width).toBeLessThanOrEqual(most);
+    // Nothing is cut off.
+    expect(await legend.evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)).toBe(0);
+  }
   await live.getByText('Signals (6)').click();
   await live.getByRole('button', { name: `Remove ${SPEED}` }).click();
   await live.reload();
   await expect(live.getByText('Signals (5)')).toBeVisible();
 });
 
-for (const [width, most] of [[1280, 440], [390, 374]] as const) {
-  test(`has room for curves beside or above the table of curves, ${width} pixels`, async ({ live }) => {
-    await live.setViewportSize({ width, height: 800 });
-    await open(live, 'Plots');
-    await expect(live.getByText('Signals (6)')).toBeVisible();
-    await expect.poll(() => numberIn(live, RMD, 'Max')).toBe(0);
-    const legend = live.getByRole('region', { name: 'Curves of Signals' });
-    expect((await legend.boundingBox())!.width).toBeLessThanOrEqual(most);
-    // Nothing is cut off.
-    expect(await legend.evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)).toBe(0);
-  });
-}
-
-test('keeps its signals over a reload, and ignores broken settings', async ({ live }) => {
+test('cursors by keys and by mouse: values, difference, the wire; and what is visible as CSV', async ({ live }) => {
   await choose(live, SPEED, RMD);
-  await live.getByLabel('Visible time').selectOption({ label: '1 min' });
-  await live.reload();
-  await expect(live.getByText('Signals (2)')).toBeVisible();
-  await expect(live.getByLabel('Visible time')).toHaveValue('60');
   await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
-  await live.evaluate(() => localStorage.setItem('motorlink.plots', '{"signals":[{"line":7},null],"span":"x"'));
-  await live.reload();
-  await expect(live.getByText('Signals (0)')).toBeVisible();
-});
-
-test('cursors by keys: values, difference, the wire', async ({ live }) => {
-  await choose(live, SPEED);
-  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
-  await live.getByRole('button', { name: 'Pause' }).click();
-  await live.getByRole('application', { name: 'Signals' }).focus();
-  // Cursors begin in the middle of the plot, where there are no values yet. The end is live.
-  for (const key of ['Home', 'ArrowRight', ',', ',', '.', 'Shift+ArrowRight', 'Shift+ArrowRight']) await live.keyboard.press(key);
-  await expect(live.locator('.plot-reading')).toHaveText(/A\s.*B\s.*B\s−\sA\s.*1\/\(B\s−\sA\)\s.*Hz/);
-  await expect(live.locator('.plot [aria-live]')).toHaveText(/st0\/1 SPEED_MEAS/);
-  await live.keyboard.press('Enter');
-  await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
-});
-
-test('cursors by mouse: a click on a curve stays in the view, and Shift selects no text', async ({ live }) => {
-  await choose(live, SPEED);
-  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
-  await live.getByRole('button', { name: 'Pause' }).click();
-  const { x, y, width, height } = (await live.locator('.plot .u-over').boundingBox())!;
-  // A motor at rest: the curve is a line in the middle, at the right.
-  await live.mouse.click(x + width - 8, y + height / 2);
-  await expect(live.locator('.plot-reading')).toHaveText(/^A\s/);
-  await live.keyboard.down('Shift');
-  await live.mouse.click(x + width / 2, y + height / 3);
-  await live.keyboard.up('Shift');
-  await expect(live.locator('.plot-reading')).toHaveText(/B\s/);
-  expect(await live.evaluate(() => String(getSelection()))).toBe('');
-  await expect(live).toHaveURL(/#\/plots$/);
-  await live.getByRole('button', { name: 'Show the wire at A' }).click();
-  await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
-});
-
-test('values that are not present any more are said to be old', async ({ bench, live }) => {
-  await choose(live, SPEED);
-  await expect.poll(() => numberIn(live, SPEED, 'Now')).toBe(0);
-  bench.monitor.process.kill('SIGSTOP');
-  await expect(live.locator('.plot-old [data-is="old"]')).toHaveText(/[23] s old/);
-  bench.monitor.process.kill('SIGCONT');
-  await expect(live.locator('.plot-old')).toHaveCount(0);
-});
-
-test('exports what is visible as CSV', async ({ live }) => {
-  await choose(live, SPEED, RMD);
   await expect.poll(() => numberIn(live, RMD, 'Now')).toBe(0);
+  await live.getByRole('button', { name: 'Pause' }).click();
   const [download] = await Promise.all([
     live.waitForEvent('download'),
     live.getByRole('button', { name: 'Export CSV' }).click(),
@@ -133,17 +82,29 @@ test('exports what is visible as CSV', async ({ live }) => {
   expect(header).toBe(`time,line,line_seconds,${SPEED} (rpm),${RMD} (°/s)`);
   expect(rows.length).toBeGreaterThan(5);
   expect(rows[0]).toMatch(/^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z,(st0|rmd0),\d+\.\d{6},/);
-});
 
-for (const colorScheme of ['light', 'dark'] as const) {
-  test(`with curves and its table is accessible, ${colorScheme}`, async ({ live }) => {
-    await live.emulateMedia({ colorScheme });
-    await choose(live, SPEED, RMD);
-    await live.getByLabel('Division into plots').selectOption('A plot for each unit');
-    await expect.poll(() => numberIn(live, RMD, 'Now')).toBe(0);
-    for (const table of await live.getByText('Values as a table').all()) await table.click();
-    await expect(live.getByRole('table').nth(1).getByRole('row').nth(2)).toBeVisible();
-    const { violations } = await new AxeBuilder({ page: live }).analyze();
-    expect(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`)).toEqual([]);
-  });
-}
+  // Motors at rest: their curves are a line in the middle, at the right.
+  const { x, y, width, height } = (await live.locator('.plot .u-over').boundingBox())!;
+  await live.mouse.click(x + width - 8, y + height / 2);
+  const reading = live.locator('.plot-reading');
+  await expect(reading).toHaveText(/^A\s/);
+  await live.keyboard.down('Shift');
+  await live.mouse.click(x + width / 2, y + height / 3);
+  await live.keyboard.up('Shift');
+  await expect(reading).toHaveText(/B\s/);
+  // A click on a curve stays in the view, and Shift selects no text.
+  expect(await live.evaluate(() => String(getSelection()))).toBe('');
+  await expect(live).toHaveURL(/#\/plots$/);
+  await live.getByRole('button', { name: 'Show the wire at A' }).click();
+  await expect(live).toHaveURL(/#\/wire\?line=(st0|rmd0)&t=\d+\.\d+/);
+
+  await open(live, 'Plots');
+  await live.getByRole('application', { name: 'Signals' }).focus();
+  // Cursors begin in the middle of the plot, where there are no values yet. The end is live.
+  const keys = ['Delete', 'Home', 'ArrowRight', ',', ',', '.', 'Shift+ArrowRight', 'Shift+ArrowRight'];
+  for (const key of keys) await live.keyboard.press(key);
+  await expect(reading).toHaveText(/A\s.*B\s.*B\s−\sA\s.*1\/\(B\s−\sA\)\s.*Hz/);
+  await expect(live.locator('.plot [aria-live]')).toHaveText(/st0\/1 SPEED_MEAS/);
+  await live.keyboard.press('Enter');
+  await expect(live).toHaveURL(/#\/wire\?line=st0&t=\d+\.\d+/);
+});

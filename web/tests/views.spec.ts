@@ -1,28 +1,8 @@
-// Every view, in both colour schemes, at the width of a desk and of a phone (the projects of the config).
-import AxeBuilder from '@axe-core/playwright';
-import { expect, open, test, VIEWS } from './bench';
+// Every view, at the widths and in the colour schemes of the projects of the config.
+import { expect, open, test, VIEWS, violations } from './bench';
 
-for (const colorScheme of ['light', 'dark'] as const) {
-  test.describe(colorScheme, () => {
-    test.use({ colorScheme });
-
-    test('every view is accessible, and as wide as the window', async ({ live }) => {
-      test.setTimeout(120_000);
-      for (const view of VIEWS) {
-        await open(live, view);
-        const { violations } = await new AxeBuilder({ page: live }).analyze();
-        expect(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`), view).toEqual([]);
-        const [wide, width] = await live.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
-        expect(wide, `${view} scrolls sideways`).toBeLessThanOrEqual(width!);
-        const stop = await live.getByRole('button', { name: /STOP ALL/i }).boundingBox();
-        expect(stop!.height, view).toBeGreaterThanOrEqual(48);
-        expect(stop!.y + stop!.height, view).toBeLessThan(live.viewportSize()!.height / 2);
-      }
-    });
-  });
-}
-
-test('no request leaves the machine, and nothing is refused by the policy', async ({ bench, page }) => {
+test('every view is accessible, as wide as the window, and asks nobody but its server @look', async ({ bench, page }) => {
+  test.setTimeout(120_000);
   const urls: string[] = [];
   const complaints: string[] = [];
   page.on('request', (request) => urls.push(request.url()));
@@ -31,16 +11,22 @@ test('no request leaves the machine, and nothing is refused by the policy', asyn
   });
   page.on('pageerror', (error) => complaints.push(error.message));
   await page.goto(bench.url);
-  for (const view of VIEWS) await open(page, view);
+  await expect(page.getByRole('article')).toHaveCount(6);
+  for (const view of VIEWS) {
+    await open(page, view);
+    if (view === 'Plots') {
+      await page.getByLabel('Division into plots').selectOption('A plot for each unit');
+      for (const table of await page.getByText('Values as a table').all()) await table.click();
+      await expect(page.getByRole('table').nth(1).getByRole('row').nth(2)).toBeVisible();
+    }
+    expect(await violations(page), view).toEqual([]);
+    const [wide, width] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+    expect(wide, `${view} scrolls sideways`).toBeLessThanOrEqual(width!);
+    const stop = await page.getByRole('button', { name: /STOP ALL/i }).boundingBox();
+    expect(stop!.height, view).toBeGreaterThanOrEqual(48);
+    expect(stop!.y + stop!.height, view).toBeLessThan(page.viewportSize()!.height / 2);
+  }
   const { host } = new URL(bench.url);
   expect(urls.filter((url) => new URL(url).host !== host)).toEqual([]);
   expect(complaints).toEqual([]);
-});
-
-test('the token is not in the address, and the page needs the cookie', async ({ bench, live, browser }) => {
-  expect(live.url()).not.toContain('token');
-  const stranger = await browser.newContext();
-  const response = await (await stranger.newPage()).goto(new URL('/', bench.url).href);
-  expect(response!.status()).toBe(401);
-  await stranger.close();
 });

@@ -46,8 +46,6 @@ class Drive:
         #: A register without a reply, and how often it was read.
         self.is_deaf_to: int | None = None
         self.unanswered = 0
-        #: Whether it is silent from its first command on.
-        self.dies_at_a_command = False
         #: The number of replies after which it is silent.
         self.answers: int | None = None
         #: Whether it sends each reply twice, the second one after all others.
@@ -93,8 +91,6 @@ class Drive:
                 if request[0] & 0x1F == GET_REG and request[2] == self.is_deaf_to:
                     self.unanswered += 1
                     continue
-                if self.dies_at_a_command and request[0] & 0x1F == EXECUTE:
-                    self.answers = 0
                 if self.answers is not None:
                     if self.answers == 0:
                         continue

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import random
 import socket
 import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from conftest import PATIENT, Served
+from conftest import PATIENT
 
 import motorlink
 from motorlink import aio, rmd
@@ -133,7 +131,7 @@ def test_a_reply_that_came_twice_is_not_confirmed(motors: Motors) -> None:
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-def test_cycles_and_four_torques_return_the_reply_of_each_motor(motors: Motors) -> None:
+def test_cycles_four_torques_and_scans_return_the_reply_of_each_motor(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
             answers = await bus.cycle({2: rmd.set_speed(10), 20: rmd.read_motion_status(), 1: rmd.stop()})
@@ -147,6 +145,8 @@ def test_cycles_and_four_torques_return_the_reply_of_each_motor(motors: Motors) 
             with pytest.raises(motorlink.InvalidValueError, match="motor 5"):
                 await bus.set_torque4([0, 0, 0, 0], expect=[5])
             assert bus.moving == [2, 4], "no reply was expected from 1 and 3"
+            found = await bus.scan(range(6, 13))
+            assert [(one.id, one.kind) for one in found] == [(6, "motor"), (7, "motor"), (8, "motor")]
 
     asyncio.run(asyncio.wait_for(main(), 60))
 
@@ -176,46 +176,6 @@ def test_a_late_reply_to_a_cancelled_exchange_is_dropped(motors: Motors) -> None
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_cancelled_exchanges_do_not_affect_others(motors: Motors, seed: int) -> None:
-    rng = random.Random(seed)
-    motors.delay = lambda id: rng.choice([0, 0.001, 0.004])
-    answered = cancelled = 0
-
-    async def caller(bus: aio.rmd.Client, choice: random.Random) -> None:
-        nonlocal answered, cancelled
-        for _ in range(4):
-            id = choice.randrange(1, 9)
-            task = asyncio.ensure_future(bus.motor(id).motion_status())
-            if choice.random() < 0.4:
-                await asyncio.sleep(choice.random() * 0.004)
-                task.cancel()
-            try:
-                assert (await task).speed_dps == id
-                answered += 1
-            except asyncio.CancelledError:
-                cancelled += 1
-
-    async def main() -> None:
-        before = os.listdir("/proc/self/fd")
-        bus = await aio.rmd.open(motors.port, timeout=10, quarantine=0.02)
-        callers = [caller(bus, random.Random(rng.random())) for _ in range(8)]
-        await asyncio.wait_for(asyncio.gather(*callers), 60)
-        answers = await bus.cycle({id: rmd.read_motion_status() for id in range(1, 9)})
-        told = {
-            id: answer.speed_dps
-            for id, answer in answers.items()
-            if not isinstance(answer, motorlink.ReplyTimeoutError)
-        }
-        assert all(id == speed for id, speed in told.items())
-        await bus.close()
-        motors.hang_up()
-        assert len(os.listdir("/proc/self/fd")) <= len(before)
-
-    asyncio.run(asyncio.wait_for(main(), 60))
-    assert answered and cancelled
-
-
 def test_a_lost_port_is_opened_again(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=5) as bus:
@@ -234,7 +194,7 @@ def test_a_lost_port_is_opened_again(motors: Motors) -> None:
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-@pytest.mark.parametrize("on_close, code", [("stop", 0x81), ("off", 0x80), ("nothing", None)])
+@pytest.mark.parametrize("on_close, code", [("off", 0x80), ("nothing", None)])
 def test_the_end_treats_moving_motors_as_on_close_says(
     motors: Motors, on_close: str, code: int | None
 ) -> None:
@@ -260,47 +220,19 @@ def test_the_end_treats_moving_motors_as_on_close_says(
     assert sorted(told) == ([] if code is None else [(1, code), (2, code)])
 
 
-def test_a_scan_finds_the_motors(motors: Motors) -> None:
+def test_limits_hold_before_a_frame_is_sent() -> None:
     async def main() -> None:
-        async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
-            found = await bus.scan(range(6, 13))
-            assert [(one.id, one.kind) for one in found] == [(6, "motor"), (7, "motor"), (8, "motor")]
-
-    asyncio.run(asyncio.wait_for(main(), 60))
-
-
-def test_a_move_that_could_be_nearly_a_full_turn_is_refused(served: Served) -> None:
-    async def main() -> None:
-        async with aio.rmd.open(served.can, timeout=2) as bus:
-            motor = bus.motor(1)
-            angle = await motor.single_turn_angle()
-            with pytest.raises(motorlink.FullTurnError):
-                await motor.set_single_turn_position(angle)
-            assert bus.moving == []
-            await motor.set_single_turn_position(angle, full_turn=True)
-            assert bus.moving == [1]
-
-    asyncio.run(asyncio.wait_for(main(), 60))
-
-
-def test_served_motors_turn_to_their_target(served: Served) -> None:
-    async def main() -> None:
-        async with aio.rmd.open(served.can, timeout=2) as bus:
+        async with aio.rmd.open("sim:", timeout=PATIENT) as bus:
             motor = bus.motor(2)
             motor.set_limits(speed_limit_dps=400)
             motor.set_limits(current_limit_amps=1)
             with pytest.raises(motorlink.InvalidValueError, match="nothing was sent"):
                 await bus.cycle({1: rmd.set_speed(90), 2: rmd.set_speed(401)})
-            assert bus.moving == []
             with pytest.raises(motorlink.InvalidValueError, match="limit"):
-                await motor.set_position(45, max_speed_dps=401)
+                await motor.set_torque(1.1)
+            assert bus.moving == []
             await motor.set_position(45, max_speed_dps=400)
-            while abs(await motor.multi_turn_angle() - 45) > 1:
-                await asyncio.sleep(0.01)
-            await motor.write_pid_ram((await motor.pid())._replace(speed_kp=50))
-            assert (await motor.pid()).speed_kp == 50
-            with pytest.raises(motorlink.InvalidValueError, match="rom=True"):
-                await motor.raw(bytes([0x19]) + bytes(7))
+            assert bus.moving == [2]
 
     asyncio.run(asyncio.wait_for(main(), 60))
 

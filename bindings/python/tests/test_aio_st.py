@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-import functools
 import os
 import random
-from collections.abc import Awaitable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 from drive import REGISTERS, START, STOP, Drive, value
 
 import motorlink
-from conftest import Served
 from motorlink import aio
 
 T = TypeVar("T")
-Exchange = Awaitable[float]
 
 
 @pytest.fixture
 def drives(tmp_path: Path) -> Iterator[list[Drive]]:
-    """Four drives with different values."""
-    drives = [Drive(tmp_path / f"st{number}", number) for number in range(4)]
+    """Two drives with different values."""
+    drives = [Drive(tmp_path / f"st{number}", number) for number in (2, 3)]
     yield drives
     for drive in drives:
         drive.unplug()
@@ -32,7 +29,7 @@ def drives(tmp_path: Path) -> Iterator[list[Drive]]:
 
 @pytest.fixture
 def drive(drives: list[Drive]) -> Drive:
-    return drives[3]
+    return drives[1]
 
 
 async def within(seconds: float, awaitable: Awaitable[T]) -> T:
@@ -46,45 +43,16 @@ async def asked(bus: aio.st.Client, drive: Drive, choice: random.Random) -> None
     assert await bus.motor(motor).get(name) == value(drive.number, motor, number)
 
 
-def test_each_task_on_four_lines_gets_its_own_replies(
-    drives: list[Drive],
-) -> None:
-    seeds = random.Random(1)
-    for drive in drives:
-        drive.delay = functools.partial(random.Random(drive.number).choice, [0, 0, 0, 0.001])
-
-    async def caller(bus: aio.st.Client, drive: Drive, seed: float) -> None:
-        choice = random.Random(seed)
-        for _ in range(25):
-            await asked(bus, drive, choice)
-
-    async def main() -> None:
-        buses = [await aio.st.open(drive.path) for drive in drives]
-        callers = [
-            caller(bus, drive, seeds.random())
-            for bus, drive in zip(buses, drives)
-            for _ in range(8)
-        ]
-        await within(60, asyncio.gather(*callers))
-        for bus in buses:
-            await bus.close()
-
-    asyncio.run(within(60, main()))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_cancelled_exchanges_do_not_affect_others(
-    drives: list[Drive], seed: int
-) -> None:
+def test_cancelled_exchanges_do_not_affect_others(drives: list[Drive]) -> None:
     """Replies have a delay of up to 8 ms. Tasks are cancelled after up to 6 ms."""
-    rng = random.Random(seed)
+    rng = random.Random(1)
     for drive in drives:
         drive.delay = lambda: rng.choice([0, 0.002, 0.008])
     cancelled = answered = 0
 
     async def caller(bus: aio.st.Client, drive: Drive, choice: random.Random) -> None:
         nonlocal cancelled, answered
-        for _ in range(3):
+        for _ in range(5):
             task = asyncio.ensure_future(asked(bus, drive, choice))
             if choice.random() < 0.4:
                 await asyncio.sleep(choice.random() * 0.006)
@@ -97,12 +65,14 @@ def test_cancelled_exchanges_do_not_affect_others(
 
     async def main() -> None:
         loop = asyncio.get_running_loop()
+        # The first client of a program opens a pair of sockets for signals, which stays.
+        await (await aio.st.open("sim:")).close()
         before = os.listdir("/proc/self/fd")
         buses = [await aio.st.open(drive.path) for drive in drives]
         callers = [
             caller(bus, drive, random.Random(rng.random()))
             for bus, drive in zip(buses, drives)
-            for _ in range(3)
+            for _ in range(4)
         ]
         await within(60, asyncio.gather(*callers))
         for bus, drive in zip(buses, drives):
@@ -118,24 +88,7 @@ def test_cancelled_exchanges_do_not_affect_others(
     assert cancelled and answered
 
 
-def test_cancelling_a_task_that_waits_for_its_turn_sends_nothing(drive: Drive) -> None:
-    drive.delay = lambda: 0.02
-
-    async def main() -> None:
-        async with aio.st.open(drive.path) as bus:
-            first = asyncio.ensure_future(bus.motor(1).get("SPEED_REF"))
-            others = [asyncio.ensure_future(bus.motor(n).get("SPEED_MEAS")) for n in (2, 3, 4)]
-            await asyncio.sleep(0.005)
-            others[1].cancel()
-            assert await first == value(3, 1, REGISTERS["SPEED_REF"])
-            assert await others[0] == value(3, 2, REGISTERS["SPEED_MEAS"])
-            assert await others[2] == value(3, 4, REGISTERS["SPEED_MEAS"])
-            assert others[1].cancelled()
-
-    asyncio.run(within(60, main()))
-
-
-def test_exchanges_run_in_the_order_of_the_calls(drive: Drive) -> None:
+def test_exchanges_run_in_the_order_of_the_calls_and_a_cancelled_call_sends_nothing(drive: Drive) -> None:
     async def main() -> None:
         order: list[int] = []
 
@@ -144,27 +97,15 @@ def test_exchanges_run_in_the_order_of_the_calls(drive: Drive) -> None:
             order.append(motor)
 
         async with aio.st.open(drive.path, on_close="nothing") as bus:
-            await asyncio.gather(*(start(bus, motor) for motor in range(1, 8)))
-        assert order == list(range(1, 8))
-        assert drive.executed == [(motor, START) for motor in range(1, 8)]
+            starts = [asyncio.ensure_future(start(bus, motor)) for motor in range(1, 8)]
+            await asyncio.sleep(0)
+            # It waits for its turn.
+            starts[3].cancel()
+            await asyncio.gather(*starts, return_exceptions=True)
+        assert starts[3].cancelled() and order == [1, 2, 3, 5, 6, 7]
+        assert drive.executed == [(motor, START) for motor in order]
 
     asyncio.run(within(60, main()))
-
-
-def test_the_end_stops_started_motors(drive: Drive) -> None:
-    async def main() -> None:
-        with pytest.raises(ZeroDivisionError):
-            async with aio.st.open(drive.path) as bus:
-                await bus.motor(2).start()
-                await bus.motor(5).start()
-                await bus.motor(5).stop()
-                assert bus.moving == [2]
-                raise ZeroDivisionError
-        with pytest.raises(motorlink.ClosedError):
-            await bus.board_info()
-
-    asyncio.run(within(60, main()))
-    assert drive.executed == [(2, START), (5, START), (5, STOP), (2, STOP)]
 
 
 def test_a_task_that_is_cancelled_repeatedly_still_stops_its_motor(drive: Drive) -> None:
@@ -223,16 +164,14 @@ def test_close_ends_the_exchanges_of_others(drive: Drive) -> None:
 
 
 def test_a_lost_port_is_opened_again(drive: Drive) -> None:
-    beats = 0
-
-    async def heart() -> None:
-        nonlocal beats
+    async def is_right(motor: aio.st.Motor) -> bool:
         while True:
-            await asyncio.sleep(0.001)
-            beats += 1
+            try:
+                return await motor.get("SPEED_REF") == value(3, 1, REGISTERS["SPEED_REF"])
+            except motorlink.PortError:
+                await asyncio.sleep(0.01)
 
     async def main() -> None:
-        heartbeat = asyncio.ensure_future(heart())
         async with aio.st.open(drive.path) as bus:
             motor = bus.motor(1)
             drive.delay = lambda: 5.0
@@ -245,27 +184,15 @@ def test_a_lost_port_is_opened_again(drive: Drive) -> None:
                 await motor.get("SPEED_REF")
             drive.delay = lambda: 0.0
             drive.plug()
-            while True:
-                try:
-                    assert await motor.get("SPEED_REF") == value(3, 1, REGISTERS["SPEED_REF"])
-                    break
-                except motorlink.PortError:
-                    await asyncio.sleep(0.01)
+            assert await is_right(motor)
             # The loss is also detected without an exchange.
             drive.unplug()
             while bus._core.is_open:
                 await asyncio.sleep(0.001)
             drive.plug()
-            while True:
-                try:
-                    await motor.get("SPEED_REF")
-                    break
-                except motorlink.PortError:
-                    await asyncio.sleep(0.01)
-        heartbeat.cancel()
+            assert await is_right(motor)
 
     asyncio.run(within(60, main()))
-    assert beats > 10
 
 
 def test_a_repeated_reply_is_not_confirmed(drive: Drive) -> None:
@@ -285,81 +212,44 @@ def test_a_repeated_reply_is_not_confirmed(drive: Drive) -> None:
     asyncio.run(within(60, main()))
 
 
+def wrong(bus: Any) -> list[Callable[[], Any]]:
+    """Calls that fail, of either API."""
+    motor = bus.motor(1)
+    return [
+        lambda: motor.get("NO_SUCH"),
+        lambda: motor.set_ramp(101, 1),
+        lambda: motor.revup_data(9),
+        lambda: motor.set("SPEED_KP", 1),
+        lambda: motor.set_position(1, 1),
+        lambda: motor.start(),
+        lambda: bus.raw(0x12, bytes(8)),
+        lambda: bus.raw(0x20),
+    ]
+
+
 def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
-    def blocking() -> list[str]:
-        told = []
-        with motorlink.st.open(drive.path, speed_limit_rpm=100) as bus:
-            for call in (
-                lambda: bus.motor(9).get("SPEED_REF"),
-                lambda: bus.motor(1).get("NO_SUCH"),
-                lambda: bus.motor(1).set_ramp(101, 1),
-                lambda: bus.motor(1).revup_data(9),
-                lambda: bus.motor(1).set("SPEED_KP", 1),
-                lambda: bus.motor(1).set_position(1, 1),
-                lambda: bus.motor(1).start(),
-                lambda: bus.raw(0x12, bytes(8)),
-                lambda: bus.raw(0x20),
-            ):
-                with pytest.raises(motorlink.MotorlinkError) as error:
-                    call()
-                told.append(f"{type(error.value).__name__}: {error.value}")
-        return told
+    def text(error: BaseException) -> str:
+        return f"{type(error).__name__}: {error}"
 
     async def awaited() -> list[str]:
         told = []
         async with aio.st.open(drive.path, speed_limit_rpm=100) as bus:
-            for call in (
-                lambda: bus.motor(9).get("SPEED_REF"),
-                lambda: bus.motor(1).get("NO_SUCH"),
-                lambda: bus.motor(1).set_ramp(101, 1),
-                lambda: bus.motor(1).revup_data(9),
-                lambda: bus.motor(1).set("SPEED_KP", 1),
-                lambda: bus.motor(1).set_position(1, 1),
-                lambda: bus.motor(1).start(),
-                lambda: bus.raw(0x12, bytes(8)),
-                lambda: bus.raw(0x20),
-            ):
+            for call in wrong(bus):
                 with pytest.raises(motorlink.MotorlinkError) as error:
                     await call()
-                told.append(f"{type(error.value).__name__}: {error.value}")
+                told.append(text(error.value))
         return told
 
-    assert asyncio.run(awaited()) == blocking()
+    blocking = []
+    with motorlink.st.open(drive.path, speed_limit_rpm=100) as bus:
+        for call in wrong(bus):
+            with pytest.raises(motorlink.MotorlinkError) as error:
+                call()
+            blocking.append(text(error.value))
+    assert asyncio.run(awaited()) == blocking
 
 
-def test_a_start_with_a_fault_raises(served: Served) -> None:
-    async def main() -> None:
-        async with aio.st.open(served.st) as bus:
-            motor = bus.motor(1)
-            served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
-            while not await motor.flags():
-                pass
-            with pytest.raises(motorlink.RefusedError, match="OVER_TEMP"):
-                await motor.start()
-
-    asyncio.run(within(20, main()))
-
-
-def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:", speed_limit_rpm=100) as bus:
-            motor = bus.motor(1)
-            for start in (
-                lambda: motor.start(),
-                lambda: motor.execute("START_STOP"),
-                lambda: bus.raw(0x03, b"\x01", motor=1),
-            ):
-                with pytest.raises(motorlink.InvalidValueError, match="needs a speed ramp"):
-                    await start()
-            assert bus.moving == []
-            await motor.set_ramp(100, 0)
-            await motor.start()
-            assert bus.moving == [1]
-
-    asyncio.run(within(60, main()))
-
-
-def test_a_bus_belongs_to_one_loop(drive: Drive) -> None:
+def test_a_bus_belongs_to_one_loop() -> None:
     async def opened() -> aio.st.Client:
         return await aio.st.open("sim:")
 
@@ -386,52 +276,19 @@ def test_a_cancelled_open_leaves_the_port_free(drive: Drive) -> None:
     asyncio.run(within(10, main()))
 
 
-def test_the_simulated_drive_runs_beside_other_tasks() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:") as bus, aio.st.open("sim:") as other:
-            motor = bus.motor(1)
-            await motor.set_ramp(1000, 0.1)
-            await motor.start()
-
-            async def until_it_runs() -> None:
-                while str(await motor.status()) != "RUN":
-                    pass
-
-            async def meanwhile() -> None:
-                while not running.done():
-                    assert await other.motor(1).get("SPEED_MEAS") == 0
-
-            running = asyncio.ensure_future(until_it_runs())
-            await within(30, asyncio.gather(running, meanwhile()))
-            assert bus.moving == [1] and not await motor.flags()
-
-    asyncio.run(within(60, main()))
-
-
-def test_a_verified_write_is_the_same_as_in_the_blocking_api() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:") as bus:
-            motor = bus.motor(1)
-            assert await motor.set_verified("SPEED_KP", 321) == 1
-            assert await motor.get("SPEED_KP") == 321
-            assert await motor.set_verified("SPEED_KP", -5) == 1
-            with pytest.raises(motorlink.InvalidValueError, match="cannot be verified"):
-                await motor.set_verified("TORQUE_REF", 100)
-            with pytest.raises(motorlink.RefusedError):
-                await bus.motor(7).set_verified("SPEED_KP", 1)
-
-    asyncio.run(within(60, main()))
-
-
 def test_a_verified_write_is_repeated_and_reports_the_value(drive: Drive) -> None:
-    answers = iter([6, 7, 6, 6, 6])
+    answers = iter([6, 7, 6, 6, 6, 0xFFFB])
     drive.reads = lambda register: next(answers)
 
     async def main() -> None:
         async with aio.st.open(drive.path) as bus:
-            assert await bus.motor(1).set_verified("SPEED_KP", 7) == 2
+            motor = bus.motor(1)
+            assert await motor.set_verified("SPEED_KP", 7) == 2
             with pytest.raises(motorlink.RefusedError, match="should be 7 and reads 6"):
-                await bus.motor(1).set_verified("SPEED_KP", 7)
+                await motor.set_verified("SPEED_KP", 7)
+            assert await motor.set_verified("SPEED_KP", -5) == 1
+            with pytest.raises(motorlink.InvalidValueError, match="cannot be verified"):
+                await motor.set_verified("TORQUE_REF", 100)
         assert next(answers, None) is None
 
     asyncio.run(within(60, main()))

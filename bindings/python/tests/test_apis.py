@@ -117,7 +117,6 @@ def test_a_method_of_a_subclass_is_kept() -> None:
         pass
 
     assert Quieter().stubborn(1) == "replaced"
-    assert motorlink.st.Motor.stop.__qualname__ == "Motor.stop"
 
 
 def test_a_read_cannot_be_assigned() -> None:
@@ -141,20 +140,12 @@ def test_a_read_without_brackets_raises() -> None:
             for taken in (
                 lambda read: read == "RUN",
                 lambda read: read != 90,
-                lambda read: read in ("RUN", 1),
                 lambda read: not read,
                 lambda read: f"{read}",
                 lambda read: read > 1,
-                lambda read: 1 <= read,
-                lambda read: read + 1,
                 lambda read: 90 - read,
                 lambda read: read[0],
-                len,
-                abs,
-                round,
                 float,
-                int,
-                str,
             ):
                 with pytest.raises(TypeError, match="is a method: write"):
                     taken(read)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import builtins
-import queue
 import signal
 import subprocess
 import sys
@@ -93,7 +92,7 @@ def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Mot
 def test_an_echo_is_not_a_reply(bus: can.BusABC) -> None:
     with rmd.open(from_python_can(bus), timeout=0.05) as motors:
         with pytest.raises(motorlink.ReplyTimeoutError, match="motor 3"):
-            motors.motor(3).stop()
+            motors.exchange(3, rmd.stop())
 
 
 def test_asyncio_commands_it_too(bus: can.BusABC, motor: Motor) -> None:
@@ -144,48 +143,15 @@ def check(error: BaseException) -> None:
     assert isinstance(error.__cause__, can.CanOperationError)
 
 
-def test_an_exception_of_the_bus_is_the_cause_of_a_lost_line() -> None:
-    bus = Broken(1)
+@pytest.mark.parametrize("frames", [0, 1])
+def test_an_exception_of_the_bus_is_the_cause_of_a_lost_line(frames: int) -> None:
+    bus = Broken(frames)
     with rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
-        with pytest.raises(motorlink.LinkError) as lost:
-            motors.motor(1).motion_status()
-        check(lost.value)
-        # The next request tries again and fails with the same error.
-        with pytest.raises(motorlink.LinkError) as lost:
-            motors.motor(1).motion_status()
-        check(lost.value)
-    bus.shutdown()
-
-
-class Altering(can.bus.BusABC):
-    """A motor that answers at once, with other content than it has to repeat."""
-
-    def __init__(self) -> None:
-        super().__init__(channel="altering")
-        self.channel_info = "altering"
-        self.stops = 0
-        self._replies: queue.Queue[can.Message] = queue.Queue()
-
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        self.stops += msg.data[0] == 0x81
-        data = bytes([msg.data[0], *range(1, 8)])
-        reply = can.Message(arbitration_id=msg.arbitration_id, data=data, is_extended_id=False)
-        self._replies.put(reply)
-
-    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        try:
-            return self._replies.get(timeout=timeout), False
-        except queue.Empty:
-            return None, False
-
-
-def test_stops_that_fail_at_once_are_repeated_with_a_pause() -> None:
-    bus = Altering()
-    with rmd.open(from_python_can(bus), on_close="nothing") as motors:
-        with pytest.raises(motorlink.LinkError, match="another content"):
-            motors.motor(1).stop()
-    # One in 10 ms.
-    assert 4 <= bus.stops <= 210
+        # The second request tries again and fails with the same error.
+        for _ in range(2):
+            with pytest.raises(motorlink.LinkError) as lost:
+                motors.motor(1).motion_status()
+            check(lost.value)
     bus.shutdown()
 
 
@@ -220,17 +186,16 @@ def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> Non
     with rmd.open(from_python_can(flaky), timeout=2) as motors:
         one = motors.motor(7)
         one.set_speed(100)
-        for _ in range(5):
-            flaky.fails_to_send = 1
-            with pytest.raises(motorlink.LinkError, match="no room"):
-                one.motion_status()
-            assert one.motion_status().speed_dps == 7
-            flaky.fails_to_receive = 1
-            eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
-            flaky.fails_to_send = 3
-            one.stop()
-            assert motors.moving == []
-            one.set_speed(100)
+        flaky.fails_to_send = 1
+        with pytest.raises(motorlink.LinkError, match="no room"):
+            one.motion_status()
+        assert one.motion_status().speed_dps == 7
+        flaky.fails_to_receive = 1
+        eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
+        flaky.fails_to_send = 3
+        one.stop()
+        assert motors.moving == []
+        one.set_speed(100)
     assert motor.heard[-1] == 0x81
 
 
@@ -238,12 +203,11 @@ def test_stops_are_sent_if_receiving_fails(flaky: Flaky, motor: Motor) -> None:
     with rmd.open(from_python_can(flaky), timeout=2, on_close="nothing") as motors:
         motors.motor(7).set_speed(100)
         flaky.fails_to_receive = 1_000_000
-        for stop, code in ((motors.motor(7).stop, 0x81), (motors.motor(7).off, 0x80)):
-            motor.heard.clear()
-            with pytest.raises(motorlink.LinkError, match="no room"):
-                stop()
-            # An attempt on a port that may not be opened again yet sends nothing.
-            eventually(lambda: motor.heard.count(code) >= 2, "frames that stop the motor")
+        motor.heard.clear()
+        with pytest.raises(motorlink.LinkError, match="no room"):
+            motors.motor(7).stop()
+        # An attempt on a port that may not be opened again yet sends nothing.
+        eventually(lambda: motor.heard.count(0x81) >= 2, "frames that stop the motor")
 
 
 def test_a_bus_that_failed_once_is_used_again_by_asyncio(flaky: Flaky, motor: Motor) -> None:
@@ -251,18 +215,14 @@ def test_a_bus_that_failed_once_is_used_again_by_asyncio(flaky: Flaky, motor: Mo
         async with aio.rmd.open(from_python_can(flaky), timeout=2) as motors:
             one = motors.motor(7)
             await one.set_speed(100)
-            for _ in range(5):
-                flaky.fails_to_send = 1
-                with pytest.raises(motorlink.LinkError, match="no room"):
-                    await one.motion_status()
-                assert (await one.motion_status()).speed_dps == 7
-                flaky.fails_to_receive = 1
-                while flaky.fails_to_receive:
-                    await asyncio.sleep(0.005)
-                flaky.fails_to_send = 3
-                await one.stop()
-                assert motors.moving == []
-                await one.set_speed(100)
+            flaky.fails_to_send = 1
+            with pytest.raises(motorlink.LinkError, match="no room"):
+                await one.motion_status()
+            assert (await one.motion_status()).speed_dps == 7
+            flaky.fails_to_receive = 1
+            while flaky.fails_to_receive:
+                await asyncio.sleep(0.005)
+            assert (await one.motion_status()).speed_dps == 7
 
     asyncio.run(asyncio.wait_for(main(), 60))
     assert motor.heard[-1] == 0x81
@@ -275,7 +235,7 @@ other = Motor("interrupted", 7)
 with can.Bus("interrupted", interface="virtual") as line:
     try:
         with motorlink.rmd.open(motorlink.can.from_python_can(line), timeout=30.0) as bus:
-            for _ in range(3):
+            for _ in range(2):
                 bus.motor(7).set_speed(100)
                 try:
                     print("asks", flush=True)
@@ -296,7 +256,7 @@ def test_ctrl_c_interrupts_a_wait_and_leaves_the_bus_open() -> None:
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as program:
         assert program.stdout
         try:
-            for line in ["interrupted 7\n"] * 3 + ["True\n"]:
+            for line in ["interrupted 7\n"] * 2 + ["True\n"]:
                 assert program.stdout.readline() == "asks\n"
                 program.send_signal(signal.SIGINT)
                 assert program.stdout.readline() == line
@@ -304,19 +264,6 @@ def test_ctrl_c_interrupts_a_wait_and_leaves_the_bus_open() -> None:
             assert err.splitlines()[-1] == "KeyboardInterrupt"
         finally:
             program.kill()
-
-
-def test_ctrl_c_interrupts_a_wait_in_asyncio() -> None:
-    async def main(bus: can.BusABC) -> None:
-        async with aio.rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
-            with pytest.raises(motorlink.LinkError) as lost:
-                await motors.motor(1).motion_status()
-            check(lost.value)
-
-    for frames in (0, 1):
-        bus = Broken(frames)
-        asyncio.run(asyncio.wait_for(main(bus), 60))
-        bus.shutdown()
 
 
 def test_served_motors_through_python_cans_own_slcan(served: Served) -> None:

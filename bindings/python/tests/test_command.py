@@ -23,20 +23,15 @@ def run(*words: str) -> subprocess.CompletedProcess[str]:
     ("code", "words"),
     [
         (0, ["st", "-p", "sim:", "get", "SPEED_MEAS"]),
-        (0, ["--help"]),
-        (0, ["--version"]),
         (1, ["st", "-p", "sim:", "get", "I_A"]),
-        (2, ["st", "-p", "sim:", "get", "SPEED"]),
         (2, ["fly"]),
-        (2, []),
         (3, ["st", "-p", "/dev/nothing-there", "info"]),
-        (3, ["rmd", "-p", "sim:", "--id", "20", "status"]),
     ],
 )
 def test_it_has_the_exit_codes_of_the_program(command: str, code: int, words: list[str]) -> None:
     done = run(command, *words)
     assert done.returncode == code, done.stderr
-    assert ("error" in done.stderr) == (code > 0 and words != []), done.stderr
+    assert ("error" in done.stderr) == (code > 0), done.stderr
     assert "Traceback" not in done.stderr and "panicked" not in done.stderr
     assert bool(done.stdout) == (code == 0)
 
@@ -44,16 +39,6 @@ def test_it_has_the_exit_codes_of_the_program(command: str, code: int, words: li
 def test_it_is_also_a_module(command: str) -> None:
     done = run(sys.executable, "-m", "motorlink", "--version")
     assert done.stdout == run(command, "--version").stdout == f"motorlink {motorlink.__version__}\n"
-
-
-def test_json_is_written_line_by_line_until_ctrl_c(command: str, served: Served) -> None:
-    words = [command, "st", "-p", served.st, "--json", "get", "STATUS", "--every", "20ms"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:
-        assert loop.stdout
-        assert json.loads(loop.stdout.readline())["values"]["STATUS"]["name"] == "IDLE"
-        loop.send_signal(signal.SIGINT)
-        loop.communicate(timeout=10)
-        assert loop.returncode == 0
 
 
 def test_ctrl_c_ends_a_wait_at_once(command: str, tmp_path: Path) -> None:

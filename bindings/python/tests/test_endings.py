@@ -1,10 +1,9 @@
-"""Motors stop at each end of a client: close, garbage collection, end of the program, fork."""
+"""Motors stop at each end of a client: close, garbage collection, end of the program."""
 
 from __future__ import annotations
 
 import contextlib
 import gc
-import os
 import subprocess
 import sys
 import threading
@@ -39,7 +38,7 @@ OPEN: dict[str, Callable[[sim.Bench], st.Client | rmd.Client]] = {"st": st.open,
 
 @pytest.mark.parametrize("kind", OPEN)
 def test_a_motor_started_during_the_close_does_not_turn(kind: str) -> None:
-    for _ in range(30):
+    for _ in range(8):
         bench = sim.Bench()
         bus = OPEN[kind](bench)
         going = threading.Event()
@@ -113,40 +112,18 @@ def test_a_program_that_ends_without_closing_stops_its_motors(served: Served, sc
     eventually(lambda: abs(speed()) < 1, "a motor at rest")
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_forked_process_leaves_the_line_alone() -> None:
-    bench = sim.Bench()
-    with rmd.open(bench) as bus:
-        bus.motor(1).set_speed(100)
-        child = os.fork()
-        if child == 0:
-            try:
-                try:
-                    bus.motor(1).stop()
-                except motorlink.ClosedError as error:
-                    assert "another process" in str(error)
-                    bus.close()
-                    os._exit(7)
-            finally:
-                os._exit(1)
-        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-        assert bus.moving == [1] and is_turning(bench, "rmd")
-
-
-@pytest.mark.parametrize("kind", OPEN)
-def test_a_signal_handler_may_close_a_client_that_samples(kind: str) -> None:
+def test_a_signal_handler_may_close_a_client_that_samples() -> None:
     script = "\n".join((
-        "import os, signal, sys, threading, time, motorlink",
-        "kind, what = sys.argv[1:]",
-        "bus = getattr(motorlink, kind).open('sim:')",
-        "signal.signal(signal.SIGTERM, lambda *_: bus.close())",
-        "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGTERM)).start()",
-        "try:",
-        "    bus.sample([what], rate=100, seconds=600)",
-        "except motorlink.ClosedError as error:",
-        "    print(len(error.samples) > 0)",
+        "import os, signal, threading, motorlink",
+        "for kind, what in (('st', 'SPEED_MEAS'), ('rmd', 'iq_amps')):",
+        "    bus = getattr(motorlink, kind).open('sim:')",
+        "    signal.signal(signal.SIGTERM, lambda *_: bus.close())",
+        "    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGTERM)).start()",
+        "    try:",
+        "        bus.sample([what], rate=100, seconds=600)",
+        "    except motorlink.ClosedError as error:",
+        "        print(len(error.samples) > 0)",
     ))
-    words = [sys.executable, "-c", script, kind, {"st": "SPEED_MEAS", "rmd": "iq_amps"}[kind]]
+    words = [sys.executable, "-c", script]
     out = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
-    assert out == "True\n"
+    assert out == "True\nTrue\n"

@@ -100,9 +100,11 @@ class Family:
         self.parent.stdout.close()
 
 
-@pytest.mark.parametrize("way", ["fork", "multiprocessing"])
-@pytest.mark.parametrize("script", [BLOCKING, ASYNC], ids=["blocking", "asyncio"])
-@pytest.mark.parametrize("kind", ["pty", "tcp"])
+@pytest.mark.parametrize(
+    ("kind", "script", "way"),
+    [("pty", BLOCKING, "fork"), ("tcp", ASYNC, "multiprocessing")],
+    ids=["pty", "tcp"],
+)
 def test_a_guard_stops_the_motors_of_a_killed_parent(
     guard: Guard, served: Served, kind: str, script: str, way: str
 ) -> None:
@@ -129,6 +131,11 @@ CHILD_ENDS = """
         child = os.fork()
         if child == 0:
             if way == 0:
+                try:
+                    bus.motor(1).stop()
+                    os._exit(1)
+                except motorlink.ClosedError as error:
+                    assert "another process" in str(error)
                 bus.close()
             elif way == 1:
                 del bus

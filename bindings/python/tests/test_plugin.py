@@ -99,14 +99,6 @@ def test_a_bench_that_cannot_be_built_says_why(pytester: pytest.Pytester) -> Non
         def test_of_the_setting(motorlink_bench):
             pass
 
-        @pytest.mark.motorlink("missing.toml")
-        def test_of_a_file(motorlink_bench):
-            pass
-
-        @pytest.mark.motorlink("[[st.motor]]\\npreset = 3")
-        def test_of_a_preset(motorlink_ports):
-            pass
-
         @pytest.mark.motorlink(fault="explode=1")
         def test_of_a_fault(motorlink_bench, motorlink_time):
             pass
@@ -117,12 +109,10 @@ def test_a_bench_that_cannot_be_built_says_why(pytester: pytest.Pytester) -> Non
         """
     )
     outcome = pytester.runpytest("--strict-markers")
-    outcome.assert_outcomes(errors=5)
+    outcome.assert_outcomes(errors=3)
     outcome.stdout.fnmatch_lines(
         [
             "the setting motorlink_config: cannot read*absent.toml*",
-            "the marker motorlink: cannot read*missing.toml*",
-            "the marker motorlink: st.motor 1: the presets are*",
             "the marker motorlink: *explode*",
             "the marker motorlink: *unexpected keyword argument 'sed'",
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import gc
 import os
@@ -9,23 +10,18 @@ import signal
 import subprocess
 import sys
 import textwrap
-import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 
 import motorlink
 from conftest import PATIENT, Served, eventually
 from motorlink import aio, recording, rmd, sim, st
 from motorlink.errors import InvalidValueError, PortError, RecordingError, ReplyTimeoutError
 from motorlink.recording import Recorder, _record
-from test_share import Share
 
 
 def speed(served: Served) -> float:
@@ -70,132 +66,62 @@ def says(process: subprocess.Popen[str], line: str) -> None:
     assert process.stdout.readline() == f"{line}\n"
 
 
-def test_ports_are_recorded_as_others_read_them(served: Served, tmp_path: Path) -> None:
+def test_ports_are_recorded(served: Served, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with rmd.open(served.can, timeout=PATIENT, on_close="nothing") as bus:
-        bus.motor(1).set_position(90, wait=True)
-    ports = [served.st, served.can]
-    with motorlink.record(ports, path, rate=50, timeout=PATIENT, motors=[1], ids=[1, 2]) as recorder:
-        assert recorder.motors == ("st0/motor1", "can0/motor1", "can0/motor2")
+    names = ["SPEED_MEAS", "voltage_volts"]
+    with motorlink.record(
+        [served.st, served.can], path, names, rate=20, timeout=PATIENT, motors=[1], ids=[1, 3], settings=False
+    ) as recorder:
+        assert recorder.motors == ("st0/motor1", "can0/motor1", "can0/motor3")
         recorded(recorder)
         status = recorder.status()
-        assert status.files == (path,) and not status.is_over and status.lost == 0
-        assert status.values > status.rows > 0 and status.frames > 0
+        assert status.files == (path,) and not status.is_over and (status.lost, status.gaps) == (0, {})
+        assert status.values == status.rows > 0 and status.frames > 0
     ended = recorder.status()
     assert ended.is_over and ended.bytes == path.stat().st_size and ended.rows >= status.rows
     run = motorlink.read(path)
     assert run.lost is None and sum(len(table.time_ns) for table in run.values()) == ended.rows
     assert run.about["command"] == f"python {sys.argv[0]}"
-    truth = served.motor("rmd", 1)
-    assert run["can0/motor1"]["multi_turn_angle_degrees"] == pytest.approx(truth["angle_degrees"], abs=0.2)
-    with open(path, "rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        joints = [it for _, _, _, it in reader.iter_decoded_messages(topics=["/joint_states"])]
-    angles = [joint.position[0] for joint in joints if joint.name == ["can0_motor1"]]
-    assert np.degrees(angles) == pytest.approx(run["can0/motor1"]["multi_turn_angle_degrees"])
-
-
-def test_signals_and_rates_are_those_that_are_named(served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    names = ["SPEED_MEAS", "voltage_volts"]
-    sources = [served.st, served.can]
-    with motorlink.record(
-        sources, path, names, rate=20, timeout=PATIENT, motors=[1], ids=[3], settings=False
-    ) as recorder:
-        recorded(recorder, 40)
-    run = motorlink.read(path)
     assert {name: list(table) for name, table in run.items()} == {
         "st0/motor1/signals": ["t", "SPEED_MEAS"],
+        "can0/motor1/signals": ["t", "voltage_volts"],
         "can0/motor3/signals": ["t", "voltage_volts"],
     }
     assert set(run["can0/motor3"]["voltage_volts"]) == {24.0}
     # On a busy machine instants are rarer.
     assert np.median(np.diff(run["st0/motor1"]["t"])) > 0.04
-    assert [drive.settings for drive in run.drives] == [None, None]
+    assert [drive.settings for drive in run.drives] == [None] * 3
 
 
-def test_a_program_drives_a_motor_and_records_it(served: Served, tmp_path: Path) -> None:
+def test_a_program_drives_motors_and_records_them(served: Served, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with st.open(served.st, timeout=PATIENT) as client:
-        with motorlink.record(client, path, rate=100, motors=[1]) as recorder:
+    with st.open(served.st, timeout=PATIENT) as client, rmd.open(served.can, timeout=PATIENT) as bus:
+        with motorlink.record([client, bus], path, rate=100, motors=[1], ids=[2]) as recorder:
+            assert set(recorder.motors) == {"st0/motor1", "can0/motor2"}
             turn(client)
+            bus.motor(2).set_speed(180)
             eventually(lambda: client.motor(1).get("SPEED_MEAS") > 1400, "a motor that turns")
-            recorded(recorder)
-            for digits in range(300):
+            eventually(lambda: bus.motor(2).motion_status().speed_dps > 170, "a motor that turns")
+            recorded(recorder, 40)
+            for digits in range(100):
                 client.motor(1).set("SPEED_KP", digits)
                 assert client.motor(1).get("SPEED_KP") == digits
             client.confirm()
-        # The end of the recording does not stop the motor. That of the client does.
-        assert speed(served) > 1400 and client.moving == [1]
+        # The end of the recording does not stop the motors. That of their clients does.
+        assert speed(served) > 1400 and (client.moving, bus.moving) == ([1], [2])
         assert client.motor(1).get("SPEED_MEAS") > 1400
     eventually(lambda: is_at_rest(served), "a motor that stops")
     run = complete(recorder, path)
-    motor = run["st0/motor1"]
+    motor, other = run["st0/motor1"], run["can0/motor2"]
     assert motor["SPEED_MEAS"][0] == 0 and motor["SPEED_MEAS"].max() == pytest.approx(1500, abs=100)
+    assert other["speed_dps"].max() == pytest.approx(180, abs=20)
     assert (np.diff(motor.time_ns) > 0).all()
-    frames = run.frames()
+    frames = run.frames("st0")
     kinds = [frame.data[0] & 0x1F for frame in frames if frame.direction == "SENT"]
     # SET_REG of the program, and its commands, among the requests of the recording.
-    assert kinds.count(1) >= 300 and kinds.count(3) >= 1 and len(kinds) > 700
+    assert kinds.count(1) >= 100 and kinds.count(3) >= 1 and len(kinds) > 220
     assert {frame.result for frame in frames} <= {"FRAME", "NACK"}
-
-
-def test_rows_have_the_time_of_their_own_requests(served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with st.open(served.st, timeout=PATIENT) as client:
-        ends = threading.Event()
-
-        def use() -> None:
-            while not ends.is_set():
-                client.motor(1).get("BUS_VOLTAGE")
-
-        threads = [threading.Thread(target=use) for _ in range(3)]
-        with motorlink.record(client, path, ["SPEED_MEAS"], rate=100, motors=[1], settings=False) as recorder:
-            for thread in threads:
-                thread.start()
-            recorded(recorder, 50)
-            ends.set()
-        for thread in threads:
-            thread.join()
-    run = motorlink.read(path)
-    table = run["st0/motor1"]
-    # Only the recording reads SPEED_MEAS. A row is in the middle between its request and its reply.
-    speeds = [frame.t for frame in run.frames() if frame.data[:3] == bytes([0x22, 1, 0x1E])]
-    begins = np.array(sorted(speeds))
-    before = begins[np.searchsorted(begins, table["t"], side="right") - 1]
-    assert (table["t"] - before <= table.span_s + 1e-3).all(), (table["t"] - before).max()
-    assert len(run.frames()) > 4 * len(begins)
-
-
-def test_motors_of_a_bus_are_commanded_while_they_are_recorded(served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with rmd.open(served.can, timeout=PATIENT) as bus:
-        with motorlink.record(bus, path, rate=50) as recorder:
-            assert recorder.motors == tuple(f"can0/motor{id}" for id in (1, 2, 3, 4))
-            bus.motor(1).set_position(45, max_speed_dps=360, wait=True, timeout=30)
-            bus.motor(2).set_speed(180)
-            eventually(lambda: bus.motor(2).motion_status().speed_dps > 170, "a motor that turns")
-            recorded(recorder, 40)
-            bus.cycle({id: rmd.read_status() for id in (1, 2, 3, 4)})
-        assert bus.moving
-    eventually(lambda: abs(float(str(served.motor("rmd", 2)["speed_dps"]))) < 2, "a motor that stops")
-    run = complete(recorder, path)
-    assert run["can0/motor1"]["multi_turn_angle_degrees"][-1] == pytest.approx(45, abs=0.5)
-    assert run["can0/motor2"]["speed_dps"].max() == pytest.approx(180, abs=20)
-    commands = {frame.data[0] for frame in run.frames() if frame.direction == "SENT"}
-    assert {0xA4, 0xA2} <= commands
-
-
-def test_clients_and_ports_are_recorded_together(served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with st.open(served.st, timeout=PATIENT) as client:
-        with motorlink.record(
-            [client, served.can], path, rate=20, timeout=PATIENT, motors=[1], ids=[1]
-        ) as recorder:
-            assert set(recorder.motors) == {"st0/motor1", "can0/motor1"}
-            recorded(recorder)
-    run = motorlink.read(path)
-    assert len(run["st0/motor1"]["t"]) and len(run["can0/motor1"]["t"])
+    assert 0xA2 in {frame.data[0] for frame in run.frames("can0") if frame.direction == "SENT"}
 
 
 def test_a_client_can_be_sampled_and_recorded_twice(served: Served, tmp_path: Path) -> None:
@@ -242,17 +168,6 @@ def test_a_recording_keeps_no_client_from_being_collected(served: Served, tmp_pa
         eventually(lambda: is_at_rest(served), "a motor that stops")
 
 
-def test_a_stop_of_another_thread_waits_for_one_exchange_at_most(served: Served, tmp_path: Path) -> None:
-    with st.open(served.st, timeout=PATIENT) as client:
-        with motorlink.record(client, tmp_path / "run.mcap", rate=1000, motors=[1, 2]) as recorder:
-            for _ in range(5):
-                turn(client)
-                recorded(recorder, 5)
-                client.motor(1).stop()
-                assert client.moving == []
-                eventually(lambda: client.motor(1).status() == "IDLE", "a motor that stops")
-
-
 def test_what_cannot_be_recorded_is_refused(served: Served, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
 
@@ -266,14 +181,11 @@ def test_what_cannot_be_recorded_is_refused(served: Served, tmp_path: Path) -> N
         refused(PortError, "st0")
         refused(InvalidValueError, "SPED", client, signals=["SPED"], motors=[1])
         assert client._segments._sampled == set()
-    refused(InvalidValueError, "SPED", signals=["SPED"], motors=[1])
     refused(InvalidValueError, "'SPEED_MEAS' is one name", signals="SPEED_MEAS")
     refused(InvalidValueError, "no port to record", [])
     refused(InvalidValueError, "profile", profile="odd")
     refused(InvalidValueError, "a time between samples", rate=0)
-    refused(InvalidValueError, "max_size of 10 bytes: give 10000 or more", max_size=10)
     refused(InvalidValueError, "not both", rotate_size=10**6, rotate_seconds=5)
-    refused(InvalidValueError, "1 s at least", rotate_seconds=0.1)
     refused(InvalidValueError, "9", motors=[9])
     refused(PortError, "nothing", f"{tmp_path}/nothing")
     with st.open(sim.Bench()) as virtual:
@@ -287,11 +199,9 @@ def test_what_cannot_be_recorded_is_refused(served: Served, tmp_path: Path) -> N
     assert error.errno == errno.ENOENT and error.path == tmp_path / "no" / "run.mcap"
 
 
-def test_a_client_of_asyncio_is_refused(served: Served, tmp_path: Path) -> None:
-    import asyncio
-
+def test_a_client_of_asyncio_is_refused(tmp_path: Path) -> None:
     async def main() -> None:
-        async with aio.st.open(served.st, timeout=PATIENT) as client:
+        async with aio.st.open("sim:") as client:
             with pytest.raises(TypeError, match="give the name of a port, or a blocking client"):
                 motorlink.record(client, tmp_path / "run.mcap")  # type: ignore[arg-type]
 
@@ -307,19 +217,6 @@ def test_a_silent_line_is_a_timeout(tmp_path: Path) -> None:
     finally:
         os.close(ours)
         os.close(theirs)
-
-
-def test_a_motor_without_values_for_a_time_is_named(served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with motorlink.record(served.can, path, timeout=PATIENT, ids=[2]) as recorder:
-        recorded(recorder)
-        assert recorder.status().gaps == {}
-        # A reply within the timeout would have a time in the middle.
-        with served.silent():
-            eventually(lambda: recorder.status().gaps.get("can0/motor2", 0) > 2 * PATIENT, "a gap", within=60)
-        recorded(recorder)
-    (facts,) = (facts for name, facts in motorlink.read(path).metadata if name == "gaps")
-    assert float(facts["can0/motor2"]) > PATIENT and len(facts) == 1
 
 
 def test_a_file_is_overwritten_with_force_only(served: Served, tmp_path: Path) -> None:
@@ -354,7 +251,8 @@ def test_after_an_exception_the_file_is_completed(served: Served, tmp_path: Path
     path = tmp_path / "run.mcap"
     with pytest.raises(ZeroDivisionError):
         with motorlink.record(served.st, path, rate=50, timeout=PATIENT, motors=[1]) as recorder:
-            recorded(recorder)
+            # Some of them are rows of the slower signals.
+            recorded(recorder, 30)
             raise ZeroDivisionError
     assert len(complete(recorder, path)["st0/motor1"]["t"]) >= 20
 
@@ -409,7 +307,7 @@ def test_a_disk_that_is_full_ends_the_recording_and_no_motor(served: Served, tmp
             client.motor(1).start()
             try:
                 with motorlink.record(client, sys.argv[2], rate=100, motors=[1]) as recorder:
-                    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+                    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
                     while not recorder.status().is_over:
                         time.sleep(0.01)
             except motorlink.RecordingError as error:
@@ -430,36 +328,28 @@ def test_a_disk_that_is_full_ends_the_recording_and_no_motor(served: Served, tmp
     assert len(motorlink.read(path)["st0/motor1"]["t"]) > 0
 
 
-BUSY = """
-with motorlink.st.open(sys.argv[1], timeout=5.0) as client:
-    with motorlink.record(client, sys.argv[2], ["SPEED_MEAS"], rate=50, motors=[1]) as recorder:
-        while recorder.status().rows < 5:
-            time.sleep(0.01)
-        print("busy", flush=True)
-        {busy}
-"""
-
-
-@pytest.mark.parametrize(
-    "busy",
-    [
-        # The interpreter changes threads, and does not.
-        "end = time.monotonic() + 2\n        while time.monotonic() < end: pass",
-        "numbers = range(5 * 10**7)\n        while (sum(numbers), recorder.status().rows)[1] < 60: pass",
-    ],
-)
-def test_a_busy_program_costs_no_row(busy: str, served: Served, tmp_path: Path) -> None:
+def test_a_busy_program_costs_no_row(served: Served, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    running = program(BUSY.format(busy=busy), served.st, path)
-    says(running, "busy")
+    running = program(
+        """
+        with motorlink.st.open(sys.argv[1], timeout=5.0) as client:
+            with motorlink.record(client, sys.argv[2], ["SPEED_MEAS"], rate=100, motors=[1]) as recorder:
+                # The interpreter does not change threads during a sum.
+                numbers = range(3 * 10**7)
+                while (sum(numbers), recorder.status().rows)[1] < 50:
+                    pass
+        """,
+        served.st,
+        path,
+    )
     running.communicate(timeout=120)
     assert running.returncode == 0
     t = motorlink.read(path)["st0/motor1"]["t"]
     # A recording that waits for Python would have a row a second.
-    assert len(t) >= 60 and np.median(np.diff(t)) < 0.1
+    assert len(t) >= 50 and np.median(np.diff(t)) < 0.1
 
 
-@pytest.mark.parametrize("ends", ["kill", "interrupt", "exit", "thread"])
+@pytest.mark.parametrize("ends", ["interrupt", "exit"])
 def test_the_end_of_the_program_leaves_a_file_and_no_motor(
     ends: str, served: Served, tmp_path: Path
 ) -> None:
@@ -472,12 +362,11 @@ def test_the_end_of_the_program_leaves_a_file_and_no_motor(
         client.motor(1).start()
         while recorder.status().rows < 30:
             time.sleep(0.01)
-        if sys.argv[3] == "thread":
-            # The interpreter ends while a thread uses both.
-            threading.Thread(target=lambda: [recorder.status() for _ in iter(int, 1)], daemon=True).start()
         print("recording", flush=True)
-        if sys.argv[3] in ("kill", "interrupt"):
+        if sys.argv[3] == "interrupt":
             signal.pause()
+        # The interpreter ends while a thread uses both.
+        threading.Thread(target=lambda: [recorder.status() for _ in iter(int, 1)], daemon=True).start()
         """,
         served.st,
         path,
@@ -485,23 +374,13 @@ def test_the_end_of_the_program_leaves_a_file_and_no_motor(
         stderr=subprocess.DEVNULL,
     )
     says(running, "recording")
-    if ends == "kill":
-        running.kill()
     if ends == "interrupt":
         running.send_signal(signal.SIGINT)
     running.communicate(timeout=60)
-    if ends == "kill":
-        with st.open(served.st, timeout=PATIENT) as client:
-            client.motor(1).stop()
-        with pytest.warns(motorlink.RecordingWarning, match="is not whole"):
-            run = motorlink.read(path)
-    else:
-        assert running.returncode == (-signal.SIGINT if ends == "interrupt" else 0)
-        run = motorlink.read(path)
-        assert run.lost is None
+    assert running.returncode == (-signal.SIGINT if ends == "interrupt" else 0)
     eventually(lambda: is_at_rest(served), "a motor that stops")
-    # A busy machine has written few of them before it was killed.
-    assert len(run["st0/motor1"]["t"]) > 5
+    run = motorlink.read(path)
+    assert run.lost is None and len(run["st0/motor1"]["t"]) > 5
 
 
 def test_a_forked_process_has_no_recording(served: Served, tmp_path: Path) -> None:
@@ -589,25 +468,3 @@ def test_a_signal_handler_uses_the_client_while_it_is_recorded(served: Served, t
                 recorded(recorder, 5)
         finally:
             signal.signal(signal.SIGALRM, before)
-
-
-@pytest.fixture
-def share(command: str, served: Served, tmp_path: Path) -> Any:
-    share = Share(command, served, tmp_path)
-    yield share
-    share.end()
-
-
-@pytest.mark.parametrize("source", ["port", "client"])
-def test_lines_of_a_share_are_recorded(source: str, share: Share, served: Served, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with st.open(share.st) as client:
-        record: Callable[..., Recorder] = motorlink.record
-        with record(share.st if source == "port" else client, path, rate=20, motors=[1]) as recorder:
-            turn(client)
-            eventually(lambda: speed(served) > 1400, "a motor that turns")
-            recorded(recorder)
-        assert client.motor(1).get("SPEED_MEAS") > 1400
-    eventually(lambda: is_at_rest(served), "a motor that stops")
-    run = complete(recorder, path)
-    assert run["st0/motor1"]["SPEED_MEAS"].max() > 1400

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import rlcompleter
 from types import ModuleType
 
 import pytest
@@ -41,12 +40,3 @@ def test_every_public_module_lists_its_names() -> None:
     assert public == {module.__name__ for module in MODULES} | {"motorlink.pytest_plugin"}
     for name in public:
         assert importlib.import_module(name).__all__
-
-
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: str(module.__name__))
-def test_completion_in_a_shell_offers_public_names_only(module: ModuleType) -> None:
-    completer = rlcompleter.Completer({"motorlink": motorlink})
-    offered = completer.attr_matches(f"{module.__name__}.")
-    names = {re.sub(r"\W*$", "", one.removeprefix(f"{module.__name__}.")) for one in offered}
-    # It hides names with underscores until one is typed.
-    assert names == {name for name in module.__all__ if not name.startswith("_")}

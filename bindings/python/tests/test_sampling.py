@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import motorlink
-from conftest import Served, eventually
 from motorlink import aio, rmd, sim, st
 
 
@@ -27,98 +26,53 @@ def test_registers_are_sampled_in_their_units(st_bus: st.Client) -> None:
     data["t"][0] = 0  # The array is the caller's.
 
 
-def test_instants_do_not_drift_and_no_row_is_invented(st_bus: st.Client) -> None:
-    t = st_bus.sample(["SPEED_MEAS"], rate=100, seconds=0.5)["t"]
-    instants = np.floor(t * 100 + 1e-6).astype(int)
-    assert np.all(np.diff(instants) >= 1), "a row an instant at most"
-    assert instants[0] == 0 and instants[-1] <= 49
-    assert np.all(t * 100 - instants < 1)
-
-
-def test_a_slow_line_skips_instants(served: Served) -> None:
-    with st.open(served.st) as bus:
-        data = bus.sample(["SPEED_MEAS"], rate=1_000_000, seconds=0.3)
-    assert 1 <= len(data) < 300_000
-    assert np.all(np.diff(data["t"]) > 0)
-
-
-def test_segments_and_single_reads_have_the_same_values(tmp_path: Any) -> None:
-    config = tmp_path / "bench.toml"
-    config.write_text('profile = "mcsdk-5.4"\n')
+def test_segments_and_single_reads_have_the_same_values() -> None:
     names = ["BUS_VOLTAGE", "SPEED_KP"]
-    # The client uses segments, which this drive refuses.
-    with st.open(f"sim:{config}") as single, st.open("sim:") as many:
-        for bus in (single, many):
+    # The client uses segments, which the first drive refuses.
+    for bench in (sim.Bench('profile = "mcsdk-5.4"'), sim.Bench()):
+        with st.open(bench) as bus:
             bus.motor(1).set("SPEED_KP", 77)
-        one, other = (bus.sample(names, rate=100, seconds=0.3) for bus in (single, many))
-    assert set(one["SPEED_KP"]) == set(other["SPEED_KP"]) == {77}
-    assert set(one["BUS_VOLTAGE"]) == set(other["BUS_VOLTAGE"])
+            data = bus.sample(names, rate=100, seconds=0.3)
+        assert set(data["SPEED_KP"]) == {77} and set(data["BUS_VOLTAGE"]) == {325}
 
 
-def test_more_registers_than_a_segment_has(st_bus: st.Client) -> None:
-    registers = st_bus.motor(1).registers
+def test_more_registers_than_a_segment_has() -> None:
+    bus = sim.Bench().st
+    registers = bus.motor(1).registers
     names = [name for name in registers.get_all()][:40]
-    data = st_bus.sample(names, rate=20, seconds=0.3)
+    data = bus.sample(names, rate=20, seconds=0.3)
     assert data.dtype.names == ("t", *names)
     assert data["SPEED_KP"][0] == registers.SPEED_KP
 
 
-def test_motors_have_columns_of_their_own(st_bus: st.Client) -> None:
-    st_bus.motor(1).set("SPEED_KP", 11)
-    st_bus.motor(2).set("SPEED_KP", 22)
-    asked = {1: ["SPEED_KP", "STATUS"], 2: ["SPEED_KP", "STATUS"]}
-    data = st_bus.sample(asked, rate=50, seconds=0.3)
-    assert data.dtype.names == ("t", "SPEED_KP_1", "STATUS_1", "SPEED_KP_2", "STATUS_2")
-    assert set(data["SPEED_KP_1"]) == {11} and set(data["SPEED_KP_2"]) == {22}
-
-
-def test_raw_samples_are_digits(st_bus: st.Client) -> None:
-    st_bus.motor(1).set("TORQUE_REF", -1234)
-    data = st_bus.sample(["TORQUE_REF", "FLAGS"], rate=50, seconds=0.3, raw=True)
-    assert data.dtype["TORQUE_REF"] == np.int64
-    assert set(data["TORQUE_REF"]) == {-1234} and set(data["FLAGS"]) == {0}
-
-
-def test_currents_are_amperes_where_full_scale_is_known() -> None:
-    with st.open("sim:", full_scale_amps=32.767) as bus:
+def test_motors_have_columns_in_digits_or_units() -> None:
+    with st.open(sim.Bench(), full_scale_amps=32.767) as bus:
         bus.motor(1).set("TORQUE_REF", 1.5)
-        data = bus.sample(["TORQUE_REF"], rate=50, seconds=0.3)
-    assert data["TORQUE_REF"] == pytest.approx(1.5)
+        bus.motor(2).set("TORQUE_REF", -1)
+        asked = {1: ["TORQUE_REF", "STATUS"], 2: ["TORQUE_REF"]}
+        data = bus.sample(asked, rate=50, seconds=0.3)
+        assert data.dtype.names == ("t", "TORQUE_REF_1", "STATUS_1", "TORQUE_REF_2")
+        assert data["TORQUE_REF_1"] == pytest.approx(1.5) and data["TORQUE_REF_2"] == pytest.approx(-1)
+        data = bus.sample(asked, rate=50, seconds=0.3, raw=True)
+        assert data.dtype["TORQUE_REF_2"] == np.int64
+        assert set(data["TORQUE_REF_1"]) == {1500} and set(data["TORQUE_REF_2"]) == {-1000}
 
 
-def test_values_of_motors_are_sampled_in_cycles(rmd_bus: rmd.Client) -> None:
-    motor = rmd_bus.motor(1)
-    motor.set_speed(500)
-    eventually(lambda: motor.motion_status().speed_dps > 400, "400 °/s")
+def test_values_of_motors_are_sampled_in_cycles() -> None:
+    bench = sim.Bench()
+    bench.rmd.motor(1).set_speed(500)
+    bench.run(1)
     asked = {1: ["speed_dps", "multi_turn_angle_degrees", "voltage_volts"], 2: ["speed_dps"]}
-    data = rmd_bus.sample(asked, rate=100, seconds=0.5)
+    data = bench.rmd.sample(asked, rate=100, seconds=0.5)
     names = ("t", "speed_dps_1", "multi_turn_angle_degrees_1", "voltage_volts_1", "speed_dps_2")
     assert data.dtype.names == names
     assert data["speed_dps_1"][-1] > 400 and set(data["speed_dps_2"]) == {0}
     angle = data["multi_turn_angle_degrees_1"]
     assert np.all(np.diff(angle) >= 0) and angle[-1] > angle[0]
     assert data["voltage_volts_1"] == pytest.approx(24, abs=1)
-    every = rmd_bus.sample(rmd.QUANTITIES, rate=100, seconds=0.3, motor=1, raw=True)
+    every = bench.rmd.sample(rmd.QUANTITIES, rate=100, seconds=0.3, motor=1, raw=True)
     assert every.dtype.names == ("t", *rmd.QUANTITIES)
     assert every["voltage_volts"][0] == pytest.approx(240, abs=10)
-
-
-def test_quantities_are_fields_of_replies() -> None:
-    fields = {*rmd.MotionStatus._fields, *rmd.Status._fields, *rmd.PhaseCurrents._fields}
-    assert {*fields, "multi_turn_angle_degrees", "single_turn_angle_degrees"} <= set(rmd.QUANTITIES)
-
-
-def test_an_error_has_the_rows_before_it(served: Served) -> None:
-    with st.open(served.st, timeout=0.05, on_close="nothing") as bus:
-        bus.motor(1).get("STATUS")
-        cut = threading.Timer(0.2, served.end)
-        cut.start()
-        with pytest.raises(motorlink.MotorlinkError) as ended:
-            bus.sample(["SPEED_MEAS", "STATUS"], rate=100, seconds=20)
-        cut.join()
-    assert isinstance(ended.value, (motorlink.LinkError, motorlink.ReplyTimeoutError))
-    assert len(ended.value.samples) > 0
-    assert ended.value.samples.dtype.names == ("t", "SPEED_MEAS", "STATUS")
 
 
 def test_a_silent_motor_can_be_skipped() -> None:
@@ -135,13 +89,12 @@ def test_invalid_arguments_are_refused(st_bus: st.Client, rmd_bus: rmd.Client) -
     cases: list[Callable[[], object]] = [
         lambda: st_bus.sample([], rate=10, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=0, seconds=1),
-        lambda: st_bus.sample(["STATUS"], rate=-1, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=float("nan"), seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=10, seconds=-1),
         lambda: st_bus.sample(["STATUS"], rate=1e9, seconds=10),
         lambda: st_bus.sample(["STATUS", "status"], rate=10, seconds=1),
-        lambda: st_bus.sample(["STATE"], rate=10, seconds=1),
         lambda: st_bus.sample({9: ["STATUS"]}, rate=10, seconds=1),
+        lambda: st_bus.sample({1: "SPEED_MEAS"}, rate=10, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=10, seconds=1, on_error="pray"),
         lambda: rmd_bus.sample({1: ["speed"]}, rate=10, seconds=1),
         lambda: rmd_bus.sample({0: ["iq_amps"]}, rate=10, seconds=1),
@@ -151,20 +104,6 @@ def test_invalid_arguments_are_refused(st_bus: st.Client, rmd_bus: rmd.Client) -
             nonsense()
     with pytest.raises(motorlink.RefusedError):
         st_bus.sample({7: ["STATUS"]}, rate=10, seconds=1)
-
-
-def test_without_pandas_the_error_names_the_package(st_bus: st.Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    data = st_bus.sample(["STATUS"], rate=100, seconds=0.3)
-    plain = importlib.import_module
-
-    def missing(name: str, package: str | None = None) -> Any:
-        if name == "pandas":
-            raise ModuleNotFoundError("No module named 'pandas'", name="pandas")
-        return plain(name, package)
-
-    monkeypatch.setattr(importlib, "import_module", missing)
-    with pytest.raises(ImportError, match="pip install pandas"):
-        motorlink.to_pandas(data)
 
 
 class Frame:
@@ -179,10 +118,8 @@ class Frame:
         return self
 
 
-def test_with_pandas_the_time_is_the_index(
-    st_bus: st.Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    data = st_bus.sample(["STATUS", "SPEED_MEAS"], rate=100, seconds=0.3)
+def test_with_pandas_the_time_is_the_index(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = sim.Bench().st.sample(["STATUS", "SPEED_MEAS"], rate=100, seconds=0.3)
     if importlib.util.find_spec("pandas"):
         frame = motorlink.to_pandas(data)
         assert list(frame.columns) == ["STATUS", "SPEED_MEAS"] and frame.index.name == "t"
@@ -193,58 +130,16 @@ def test_with_pandas_the_time_is_the_index(
     assert list(frame.columns) == ["t", "STATUS", "SPEED_MEAS"] and frame.index == "t"
 
 
-def test_samplings_do_not_use_the_segments_of_others(st_bus: st.Client) -> None:
-    motor = st_bus.motor(1)
+def test_samplings_do_not_use_the_segments_of_others() -> None:
+    bus = sim.Bench().st
+    motor = bus.motor(1)
     motor.configure_segment(3, ["SPEED_KP", "SPEED_KI"])
     here = motor.segment(3)
-    sampled: list[bool] = []
-
-    def look(names: list[str]) -> None:
-        data = st_bus.sample(names, rate=200, seconds=0.3)
-        sampled.append(all(set(data[name]) == {motor.get(name)} for name in names))
-
-    others = [["SPEED_MEAS", "SPEED_REF"], ["BUS_VOLTAGE", "HEATS_TEMP"]]
-    threads = [threading.Thread(target=look, args=[names]) for names in others]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert sampled == [True, True]
-    assert motor.segment(3) == here
-
-
-def test_asyncio_samples_what_the_blocking_api_samples(served: Served) -> None:
-    asked = {1: ["SPEED_KP", "BUS_VOLTAGE"], 2: ["SPEED_KP"]}
-    with st.open(served.st) as bus:
-        bus.motor(1).set("SPEED_KP", 11)
-        bus.motor(2).set("SPEED_KP", 22)
-        plain = bus.sample(asked, rate=50, seconds=0.2, raw=True)
-
-    async def main() -> None:
-        async with aio.st.open(served.st) as bus:
-            data = await bus.sample(asked, rate=50, seconds=0.2, raw=True)
-            assert data.dtype == plain.dtype and len(data) > 0
-            assert all(set(data[name]) == set(plain[name]) for name in plain.dtype.names or () if name != "t")
-            assert bus._segments._sampled == set()
-            t = (await bus.sample(["STATUS"], rate=100, seconds=0.3))["t"]
-            instants = np.floor(t * 100 + 1e-6).astype(int)
-            assert np.all(np.diff(instants) >= 1) and instants[-1] <= 29
-
-    asyncio.run(main())
-
-
-def test_asyncio_samples_without_segments_where_the_drive_has_none(tmp_path: Any) -> None:
-    config = tmp_path / "bench.toml"
-    config.write_text('profile = "mcsdk-5.4"\n')
-
-    async def main() -> None:
-        # The client uses segments, which this drive refuses.
-        async with aio.st.open(f"sim:{config}") as bus:
-            await bus.motor(1).set("SPEED_KP", 77)
-            data = await bus.sample(["BUS_VOLTAGE", "SPEED_KP"], rate=100, seconds=0.2)
-            assert set(data["SPEED_KP"]) == {77}
-
-    asyncio.run(main())
+    samplings = [bus.samples(names, rate=200) for names in (["SPEED_KD", "BUS_VOLTAGE"], ["TORQUE_KP", "HEATS_TEMP"])]
+    for rows in samplings * 2:
+        row = next(rows)
+        assert all(row[name] == motor.get(name) for name in row if name != "t")
+    assert bus._segments._sampled == {1, 2} and motor.segment(3) == here
 
 
 def test_exchanges_of_other_tasks_run_during_a_sampling() -> None:
@@ -253,10 +148,9 @@ def test_exchanges_of_other_tasks_run_during_a_sampling() -> None:
             names = ["SPEED_MEAS", "SPEED_REF"]
             tasks = [
                 asyncio.ensure_future(bus.sample(names, rate=1000, seconds=60)),
-                asyncio.ensure_future(bus.sample(["SPEED_KP", "SPEED_KI"], rate=1000, seconds=60)),
                 asyncio.ensure_future(motors.sample(rmd.QUANTITIES, rate=1000, seconds=60)),
             ]
-            for value in range(50):
+            for value in range(20):
                 await bus.motor(1).set("SPEED_KP", value)
                 assert await bus.motor(1).get("SPEED_KP") == value
                 assert (await motors.motor(2).status()).voltage_volts == pytest.approx(24, abs=1)
@@ -266,7 +160,7 @@ def test_exchanges_of_other_tasks_run_during_a_sampling() -> None:
                 task.cancel()
             done = await asyncio.gather(*tasks, return_exceptions=True)
             assert all(isinstance(one, asyncio.CancelledError) for one in done)
-            assert await bus.motor(1).get("SPEED_KP") == 49
+            assert await bus.motor(1).get("SPEED_KP") == 19
             await bus.motor(1).configure_segment(3, names)
 
     asyncio.run(main())
@@ -303,18 +197,6 @@ def test_asyncio_skips_a_silent_motor() -> None:
     asyncio.run(main())
 
 
-def test_asyncio_refuses_invalid_arguments() -> None:
-    async def main() -> None:
-        async with aio.st.open("sim:") as bus:
-            for names, rate in (([], 10), (["STATUS"], 0), (["STATUS", "status"], 10), (["STATE"], 10)):
-                with pytest.raises(motorlink.InvalidValueError):
-                    await bus.sample(names, rate=rate, seconds=1)
-            with pytest.raises(motorlink.RefusedError):
-                await bus.sample({7: ["STATUS"]}, rate=10, seconds=1)
-
-    asyncio.run(main())
-
-
 def test_names_of_registers_in_asyncio() -> None:
     async def main() -> None:
         async with aio.st.open("sim:", full_scale_amps=10) as bus:
@@ -326,10 +208,3 @@ def test_names_of_registers_in_asyncio() -> None:
                 registers.info("NO_SUCH")
 
     asyncio.run(main())
-
-
-def test_one_name_is_not_taken_for_a_list(st_bus: st.Client) -> None:
-    with pytest.raises(motorlink.InvalidValueError, match="list of names"):
-        st_bus.sample("SPEED_MEAS", rate=10, seconds=0.1)
-    with pytest.raises(motorlink.InvalidValueError, match="'SPEED_MEAS' is one name"):
-        st_bus.sample({1: "SPEED_MEAS"}, rate=10, seconds=0.1)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import motorlink
-from conftest import PATIENT, Served, eventually
+from conftest import PATIENT, eventually
 from drive import EXECUTE, GET_REG, REGISTERS, START, STOP, Drive, value
 from motorlink import aio, rmd, sim, st
 
@@ -53,23 +53,13 @@ def test_replies_that_come_twice_give_no_wrong_value(drive: Drive) -> None:
         assert is_right(next(rows))
         drive.twice = True
         # The last reply before it could come twice, too: the second one belongs to the next request.
-        again = threading.Timer(1, setattr, [drive, "twice", False])
+        again = threading.Timer(0.4, setattr, [drive, "twice", False])
         again.start()
         for row in rows:
             assert is_right(row)
-            if row.t > 2:
+            if row.t > 1:
                 break
         again.join()
-
-
-def test_one_reply_that_comes_twice_is_an_error(drive: Drive) -> None:
-    with st.open(str(drive.path), timeout=0.2, on_close="nothing") as client:
-        rows = client.samples(NAMES, rate=100, raw=True)
-        assert is_right(next(rows))
-        drive.twice = True
-        with pytest.raises(motorlink.LinkError):
-            for row in rows:
-                assert is_right(row)
 
 
 def test_asyncio_gives_no_wrong_value_of_replies_that_come_twice(drive: Drive) -> None:
@@ -85,30 +75,18 @@ def test_asyncio_gives_no_wrong_value_of_replies_that_come_twice(drive: Drive) -
     asyncio.run(main())
 
 
-@pytest.mark.parametrize("fault", ["dup=0.02", "drop=0.02", "dup=0.02,drop=0.02", "delay=0ms..3ms"])
-def test_a_bad_bus_gives_no_wrong_value(fault: str) -> None:
+def test_a_bad_bus_gives_no_wrong_value() -> None:
     bench = sim.Bench()
-    with rmd.open(bench.port(fault=f"{fault},seed=5"), timeout=0.02, quarantine=0.01) as client:
+    port = bench.port(fault="dup=0.02,drop=0.02,seed=5")
+    with rmd.open(port, timeout=0.02, quarantine=0.01) as client:
         asked = {1: ["voltage_volts", "encoder"], 2: ["multi_turn_angle_degrees", "voltage_volts"]}
-        data = client.sample(asked, rate=100, seconds=5, on_error="skip")
+        data = client.sample(asked, rate=100, seconds=3, on_error="skip")
     assert len(data) > 20
     assert set(data["voltage_volts_1"]) == set(data["voltage_volts_2"]) == {24}
     assert set(data["multi_turn_angle_degrees_2"]) == {0}
 
 
-@pytest.mark.parametrize("fault", ["drop=0.001", "insert=0.001", "pause=20ms..80ms@1e-2"])
-def test_a_bad_line_gives_no_wrong_value(fault: str) -> None:
-    bench = sim.Bench()
-    bench.st.motor(1).set("SPEED_KP", 11)
-    with st.open(bench.port(fault=f"{fault},seed=5"), timeout=0.1, on_close="nothing") as client:
-        asked = ["SPEED_KP", "BUS_VOLTAGE"]
-        data = client.sample(asked, rate=50, seconds=10, on_error="skip")
-    assert len(data) > 50
-    assert set(data["SPEED_KP"]) == {11} and set(data["BUS_VOLTAGE"]) == {325}
-
-
-@pytest.mark.parametrize("batch", [False, True])
-def test_a_stop_of_another_thread_goes_ahead_of_all_but_one_exchange(drive: Drive, batch: bool) -> None:
+def test_a_stop_of_another_thread_goes_ahead_of_all_but_one_exchange(drive: Drive) -> None:
     drive.delay = lambda: 0.002
     with st.open(str(drive.path), timeout=PATIENT, on_close="nothing") as client:
         motor = client.motor(1)
@@ -119,15 +97,12 @@ def test_a_stop_of_another_thread_goes_ahead_of_all_but_one_exchange(drive: Driv
         def sample() -> None:
             # The rate is too high for the line, so exchanges follow each other without a pause.
             with pytest.raises(motorlink.ClosedError):
-                if batch:
-                    client.sample(NAMES, rate=10_000, seconds=600)
-                for _ in client.samples(NAMES, rate=10_000):
-                    pass
+                client.sample(NAMES, rate=10_000, seconds=600)
             ended.set()
 
         thread = threading.Thread(target=sample)
         thread.start()
-        for _ in range(20):
+        for _ in range(5):
             seen = len(drive.heard) + 50
             eventually(functools.partial(has_heard, drive, seen), "exchanges")
             before = len(requests(drive.heard))
@@ -147,7 +122,7 @@ def test_a_stop_of_another_task_goes_ahead_of_all_but_one_exchange(drive: Drive)
         async with aio.st.open(str(drive.path), timeout=PATIENT, on_close="nothing") as client:
             motor = client.motor(1)
             sampling = asyncio.ensure_future(client.sample(NAMES, rate=10_000, seconds=600))
-            for _ in range(20):
+            for _ in range(5):
                 seen = len(drive.heard)
                 while len(drive.heard) < seen + 50:
                     await asyncio.sleep(0.001)
@@ -161,29 +136,8 @@ def test_a_stop_of_another_task_goes_ahead_of_all_but_one_exchange(drive: Drive)
     asyncio.run(main())
 
 
-def test_a_motor_on_a_bus_is_stopped_while_it_is_sampled(served: Served) -> None:
-    with rmd.open(served.can, timeout=PATIENT) as client:
-        motor = client.motor(1)
-        motor.set_speed(300)
-        seen = threading.Event()
-
-        def watch() -> None:
-            for row in client.samples({1: ["speed_dps"], 2: ["speed_dps"]}, rate=200):
-                if row["speed_dps_1"] > 100:
-                    seen.set()
-                if seen.is_set() and row["speed_dps_1"] == 0:
-                    return
-
-        thread = threading.Thread(target=watch)
-        thread.start()
-        assert seen.wait(60)
-        motor.stop()
-        thread.join(60)
-        assert not thread.is_alive()
-
-
-def test_a_stop_waits_for_no_motor_in_quarantine_that_is_sampled(served: Served) -> None:
-    with rmd.open(served.can, timeout=1, quarantine=30) as client:
+def test_a_stop_waits_for_no_motor_in_quarantine_that_is_sampled() -> None:
+    with rmd.open("sim:", timeout=1, quarantine=30) as client:
         motor = client.motor(1)
         motor.set_speed(300)
         ended = threading.Event()
@@ -198,7 +152,7 @@ def test_a_stop_waits_for_no_motor_in_quarantine_that_is_sampled(served: Served)
         thread.start()
         began = time.monotonic()
         # A stop may come before the first question to motor 9 has failed, so there are some.
-        while time.monotonic() < began + 3:
+        while time.monotonic() < began + 2:
             before = time.monotonic()
             motor.stop()
             assert time.monotonic() < before + 15
@@ -207,31 +161,15 @@ def test_a_stop_waits_for_no_motor_in_quarantine_that_is_sampled(served: Served)
     assert ended.is_set()
 
 
-def test_a_loop_that_ends_early_leaves_no_thread_and_a_client_to_use(
-    st_bus: st.Client, rmd_bus: rmd.Client
-) -> None:
-    before = threading.active_count()
-    for _ in range(3):
-        for row in st_bus.samples(["SPEED_MEAS", "BUS_VOLTAGE"], rate=1000):
-            assert row["BUS_VOLTAGE"] == st_bus.motor(1).get("BUS_VOLTAGE")
-            break
-        for row in rmd_bus.samples(["voltage_volts"], rate=1000):
-            assert row["voltage_volts"] == pytest.approx(24, abs=1)
-            break
-        assert threading.active_count() == before
-    st_bus.confirm()
-    assert rmd_bus.motor(1).status().voltage_volts == pytest.approx(24, abs=1)
-
-
 def test_rows_go_on_after_a_port_that_was_lost(drive: Drive) -> None:
     with st.open(str(drive.path), timeout=0.2, on_close="nothing") as client:
         rows = client.samples(NAMES, rate=50, on_error="skip", raw=True)
         assert is_right(next(rows))
         drive.unplug()
-        back = threading.Timer(0.5, drive.plug)
+        back = threading.Timer(0.2, drive.plug)
         back.start()
         # Rows that were read before the end may come first.
-        row = next(row for row in rows if row.t > 0.4)
+        row = next(row for row in rows if row.t > 0.25)
         assert is_right(row)
         assert is_right(next(rows))
         back.join()
@@ -243,11 +181,11 @@ def test_asyncio_rows_go_on_after_a_port_that_was_lost(drive: Drive) -> None:
             rows = client.samples(NAMES, rate=50, on_error="skip", raw=True)
             assert is_right(await rows.__anext__())
             drive.unplug()
-            back = threading.Timer(0.5, drive.plug)
+            back = threading.Timer(0.2, drive.plug)
             back.start()
             async for row in rows:
                 assert is_right(row)
-                if row.t > 0.4:
+                if row.t > 0.25:
                     break
             back.join()
 
@@ -259,7 +197,7 @@ def test_a_failure_of_another_thread_ends_no_sampling(drive: Drive) -> None:
         drive.is_deaf_to = 0x20
         rows = client.samples(NAMES, rate=50, raw=True)
         assert is_right(next(rows))
-        for _ in range(3):
+        for _ in range(2):
             with pytest.raises((motorlink.ReplyTimeoutError, motorlink.LinkError)):
                 client.motor(1).get(0x20)
             assert is_right(next(rows))

@@ -6,15 +6,14 @@ import asyncio
 import re
 import select
 import subprocess
-import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import motorlink
-from conftest import PATIENT, Served, eventually
+from conftest import PATIENT, Served
 from motorlink import SettingDifference, SettingsDump, aio, errors, rmd, sim, st
 
 #: Settings of each protocol, in the order of a file, with new values.
@@ -24,8 +23,8 @@ NEW = {
 }
 #: The codes of requests that write.
 WRITES = {"st": ("SET_REG", "SET_REVUP_DATA"), "rmd": (0x31, 0x32, 0x34, 0x91)}
-PROTOCOLS = pytest.mark.parametrize("protocol", ["st", "rmd"])
-APIS = pytest.mark.parametrize("api", ["blocking", "asyncio"])
+#: The steps are the same for both protocols and both APIs. Their exchanges are not.
+EACH = pytest.mark.parametrize(("protocol", "api"), [("st", "asyncio"), ("rmd", "blocking")])
 
 #: What happens to an exchange: its number among the writes, or 0 for another request.
 Meddling = Callable[[int], None]
@@ -118,8 +117,7 @@ def motor(served: Served) -> Callable[[str, str], Motor]:
 MotorOf = Callable[[str, str], Motor]
 
 
-@PROTOCOLS
-@APIS
+@EACH
 def test_a_dump_is_the_file_of_the_command(
     motor: MotorOf, command: str, protocol: str, api: str
 ) -> None:
@@ -136,8 +134,7 @@ def test_a_dump_is_the_file_of_the_command(
     assert ("FLUXWK_BUS" in (*dump, *dump.absent)) == (protocol == "st")
 
 
-@PROTOCOLS
-@APIS
+@EACH
 def test_a_restore_returns_what_it_changed(
     motor: MotorOf, tmp_path: Path, protocol: str, api: str
 ) -> None:
@@ -158,9 +155,8 @@ def test_a_restore_returns_what_it_changed(
     assert one.dump() == before
 
 
-@APIS
-def test_the_rom_is_written_on_request_only(motor: MotorOf, api: str) -> None:
-    one = motor("rmd", api)
+def test_the_rom_is_written_on_request_only(motor: MotorOf) -> None:
+    one = motor("rmd", "blocking")
     before = one.dump()
     text = changed(str(before), {"speed_kp": 95, "encoder_offset": 5})
     for dry_run in (True, False):
@@ -172,22 +168,14 @@ def test_the_rom_is_written_on_request_only(motor: MotorOf, api: str) -> None:
     assert one.dump() == before
 
 
-@PROTOCOLS
-def test_a_motor_that_turns_is_refused(protocol: str) -> None:
-    bench = sim.Bench()
-    opened: Any = {"st": st, "rmd": rmd}[protocol].open(bench)
-    with opened as client:
+def test_a_motor_that_turns_is_refused() -> None:
+    with st.open(sim.Bench()) as client:
         turning = client.motor(1)
-        text = changed(str(turning.settings.dump()), dict([next(iter(NEW[protocol].items()))]))
-        if protocol == "st":
-            turning.start()
-        else:
-            turning.set_speed(360)
-            bench.run(0.5)
+        text = changed(str(turning.settings.dump()), {"SPEED_KP": 950})
+        turning.start()
         with pytest.raises(motorlink.SettingsError, match="nothing was written") as raised:
             turning.settings.restore(text)
         assert str(raised.value).endswith("stop it first, or allow it with running=True")
-        assert len(turning.settings.diff(text)) == 1
         assert len(turning.settings.restore(text, running=True)) == 1
         assert turning.settings.diff(text) == []
 
@@ -213,23 +201,10 @@ def test_limits_apply_before_the_first_write() -> None:
     ("settings", "kind", "said"),
     [
         ("[st]\nprofile = 'spec'\n[st.settings]\nSPEED_KPP = 1\n", ValueError, "line 4: .*SPEED_KP"),
-        ("[rmd]\n[rmd.settings]\nspeed_kp = 1\n", ValueError, "a motor that speaks `rmd`"),
-        ("[st]\nprofile = 'spec'\nmotor = 2\n[st.settings]\n", ValueError, "line 3: .* motor 2"),
-        ("[st]\nprofile = 'spec'\n[st.settings]\nSPEED_KP = 1", ValueError, "cut off"),
         ("motor1.toml", ValueError, r"pathlib.Path\('motor1.toml'\)"),
         (Path("/nothing/there.toml"), FileNotFoundError, "there.toml"),
         (Path("/dev/zero"), ValueError, "1 MiB"),
         (7, TypeError, "pathlib.Path"),
-        (
-            "[st]\nprofile = 'spec'\n[st.settings]\nSPEED_KI_DIV = 128\n",
-            motorlink.SettingsError,
-            "SPEED_KI_DIV is 128 in the file and 256 in the motor",
-        ),
-        (
-            "[st]\nprofile = 'spec'\n[st.settings]\nOBSERVER_CR_C1 = 1\n",
-            motorlink.SettingsError,
-            "OBSERVER_CR_C1 of the file cannot be read: .*remove the line",
-        ),
     ],
 )
 def test_what_is_not_for_this_motor_is_refused(
@@ -249,46 +224,27 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         client.motor(1).settings.diff(file)
 
 
-@PROTOCOLS
-@APIS
-def test_a_lost_line_leaves_the_values_that_the_exception_has(
-    motor: MotorOf, protocol: str, api: str
-) -> None:
-    one, new = motor(protocol, api), NEW[protocol]
+def test_a_lost_line_leaves_the_values_that_the_exception_has(motor: MotorOf) -> None:
+    one, new = motor("st", "blocking"), NEW["st"]
     before = one.dump()
-    text = changed(str(before), new)
-    seen = set()
-    for last in range(1, 1 + len(new)):
-        lost = False
+    lost: list[int] = []
 
-        def cut(write: int, last: int = last) -> None:
-            nonlocal lost
-            lost = lost or write == last
-            if lost:
-                raise motorlink.LinkError("cut")
+    def cut(write: int) -> None:
+        lost.extend([write] * (write == 2))
+        if lost:
+            raise motorlink.LinkError("cut")
 
-        with pytest.raises(motorlink.SettingsError, match="; all others are as before") as raised:
-            one.restore(text, cut, to_rom=True)
-        error = raised.value
-        assert isinstance(error.__cause__, motorlink.LinkError)
-        assert "`motor.settings.diff` shows what differs" in str(error)
-        assert [*error.changed, *error.unknown] == [*new][:last]
-        seen.add((len(error.changed), len(error.unknown)))
-        real = one.dump()
-        for name, value in new.items():
-            allowed = {before[name]} if name not in error.changed else set()
-            allowed |= {value} if name in (*error.changed, *error.unknown) else set()
-            assert real[name] in allowed, name
-        one.restore(before, to_rom=True)
-    assert seen == {(number, 1) for number in range(len(new))}
+    with pytest.raises(motorlink.SettingsError, match="; all others are as before") as raised:
+        one.restore(changed(str(before), new), cut)
+    assert isinstance(raised.value.__cause__, motorlink.LinkError)
+    assert "`motor.settings.diff` shows what differs" in str(raised.value)
+    first, second = (*new,)[:2]
+    assert (raised.value.changed, raised.value.unknown) == ((first,), (second,))
+    assert one.dump()[first] == new[first]
 
 
-@PROTOCOLS
-@APIS
-def test_a_write_that_is_carried_out_and_refused_is_rolled_back(
-    motor: MotorOf, protocol: str, api: str
-) -> None:
-    one, new = motor(protocol, api), NEW[protocol]
+def test_a_write_that_is_carried_out_and_refused_is_rolled_back(motor: MotorOf) -> None:
+    one, new = motor("rmd", "asyncio"), NEW["rmd"]
     before = one.dump()
 
     def refuse(write: int) -> None:
@@ -302,25 +258,7 @@ def test_a_write_that_is_carried_out_and_refused_is_rolled_back(
     assert one.dump() == before
 
 
-@PROTOCOLS
-def test_ctrl_c_puts_the_old_values_back(motor: MotorOf, protocol: str) -> None:
-    one, new = motor(protocol, "blocking"), NEW[protocol]
-    before = one.dump()
-
-    def interrupt(write: int) -> None:
-        if write == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt) as raised:
-        one.restore(changed(str(before), new), interrupt, to_rom=True)
-    assert isinstance(raised.value.__cause__, motorlink.SettingsError)
-    assert raised.value.__cause__.rolled_back == (*new,)[:2]
-    assert "interrupted; rolled back" in str(raised.value.__cause__)
-    assert one.dump() == before
-
-
-@PROTOCOLS
-@APIS
+@EACH
 def test_an_interruption_at_any_exchange_puts_the_old_values_back(
     motor: MotorOf, protocol: str, api: str
 ) -> None:
@@ -369,9 +307,8 @@ def test_an_interruption_at_any_exchange_puts_the_old_values_back(
     assert ended >= 2 * len(new)
 
 
-@PROTOCOLS
-def test_a_second_ctrl_c_ends_the_roll_back(motor: MotorOf, protocol: str) -> None:
-    one, new = motor(protocol, "blocking"), NEW[protocol]
+def test_a_second_ctrl_c_ends_the_roll_back(motor: MotorOf) -> None:
+    one, new = motor("rmd", "blocking"), NEW["rmd"]
     before = one.dump()
 
     def interrupt(write: int) -> None:
@@ -387,12 +324,8 @@ def test_a_second_ctrl_c_ends_the_roll_back(motor: MotorOf, protocol: str) -> No
     assert one.dump()[first] == new[first]
 
 
-@PROTOCOLS
-@pytest.mark.parametrize("replies_at_once", [False, True])
-def test_a_cancelled_restore_puts_the_old_values_back(
-    motor: MotorOf, protocol: str, replies_at_once: bool
-) -> None:
-    one, new = motor(protocol, "asyncio"), NEW[protocol]
+def test_a_cancelled_restore_puts_the_old_values_back_also_if_replies_come_at_once(motor: MotorOf) -> None:
+    one, new = motor("st", "asyncio"), NEW["st"]
     before = one.dump()
     tasks: list[asyncio.Task[Any]] = []
 
@@ -410,7 +343,7 @@ def test_a_cancelled_restore_puts_the_old_values_back(
             return error.__cause__
         return None
 
-    one.replies_at_once = replies_at_once
+    one.replies_at_once = True
     state = one.do(main, cancel)
     one.replies_at_once = False
     assert one.dump() == before
@@ -418,9 +351,8 @@ def test_a_cancelled_restore_puts_the_old_values_back(
     assert state.rolled_back == (*new,)[:2]
 
 
-@PROTOCOLS
-def test_one_motor_has_one_restore_at_a_time(motor: MotorOf, protocol: str) -> None:
-    one, new = motor(protocol, "asyncio"), NEW[protocol]
+def test_one_motor_has_one_restore_at_a_time(motor: MotorOf) -> None:
+    one, new = motor("rmd", "asyncio"), NEW["rmd"]
     before = one.dump()
     text = changed(str(before), new)
 
@@ -459,13 +391,3 @@ def test_other_tasks_use_the_line_during_a_restore(motor: MotorOf) -> None:
         return reads
 
     assert one.do(main) > 3
-
-
-def test_a_drive_that_is_unplugged_is_named(served: Served) -> None:
-    with st.open(served.st) as client:
-        settings = client.motor(1).settings
-        text = changed(str(settings.dump()), NEW["st"])
-        served.end()
-        with pytest.raises(motorlink.SettingsError, match="nothing was written") as raised:
-            settings.restore(text)
-        assert isinstance(raised.value.__cause__, motorlink.LinkError)

@@ -45,40 +45,13 @@ def speed(drives: Served) -> float:
     return float(str(drives.motor("st", 1)["speed_rpm"]))
 
 
-TURNS = """
-import signal, sys, motorlink
-motor = motorlink.st.open(sys.argv[1]).motor(1)
-motor.set_ramp(1500, 0.1)
-motor.start()
-print("turning", flush=True)
-signal.pause()
-"""
-
-
 MOVES = """
 import signal, sys, motorlink
-bus = motorlink.rmd.open(sys.argv[1], on_close=sys.argv[2])
+bus = motorlink.rmd.open(sys.argv[1], on_close="off")
 bus.motor(4).set_speed(100)
 print("moving", flush=True)
 signal.pause()
 """
-
-
-def test_two_programs_use_one_drive_and_each_motor_stops_with_its_program(
-    share: Share, served: Served
-) -> None:
-    with motorlink.st.open(share.st) as watches:
-        words = [sys.executable, "-c", TURNS, share.st]
-        turns = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-        assert turns.stdout and turns.stdout.readline() == "turning\n"
-        eventually(lambda: speed(served) > 1000, "a motor that turns")
-        watches.motor(1).set("SPEED_KP", 111)
-        assert watches.motor(1).get("SPEED_KP") == 111
-        watches.confirm()
-        turns.kill()
-        turns.communicate()
-        eventually(lambda: abs(speed(served)) < 30, "a motor that stops")
-        assert watches.motor(1).get("SPEED_KP") == 111
 
 
 def test_refusals_are_exceptions_with_their_words(share: Share) -> None:
@@ -99,6 +72,9 @@ def test_tasks_use_a_share(share: Share, served: Served) -> None:
     async def main() -> None:
         async with aio.st.open(share.st) as client, aio.rmd.open(share.rmd) as bus:
             motor = client.motor(1)
+            # A busy machine may be late with a reply.
+            values = await client.sample(["SPEED_KP", "BUS_VOLTAGE"], rate=50, seconds=0.5, on_error="skip")
+            assert len(values) > 1 and set(values["BUS_VOLTAGE"]) == {325}
             await motor.set_ramp(1500, 0.1)
             await motor.start()
             for id in (1, 2, 3, 4):
@@ -107,32 +83,12 @@ def test_tasks_use_a_share(share: Share, served: Served) -> None:
             assert len(await bus.scan([1, 2, 3, 4])) == 4
             while await motor.get("SPEED_MEAS") < 1000:
                 await asyncio.sleep(0.01)
+            quantities = {id: ["voltage_volts"] for id in (1, 2, 3, 4)}
+            row = await bus.samples(quantities, rate=50, on_error="skip").__anext__()
+            assert {row[f"voltage_volts_{id}"] for id in quantities} == {24}
             await client.confirm()
             await motor.stop()
         eventually(lambda: abs(speed(served)) < 30, "a motor that stops")
-
-    asyncio.run(asyncio.wait_for(main(), 60))
-
-
-def test_lines_of_a_share_are_sampled(share: Share) -> None:
-    names = ["SPEED_MEAS", "BUS_VOLTAGE"]
-    quantities = {id: ["voltage_volts", "encoder"] for id in (1, 2, 3, 4)}
-    with motorlink.st.open(share.st) as client:
-        values = client.sample(names, rate=50, seconds=0.5, on_error="skip")
-        assert len(values) > 1 and set(values["BUS_VOLTAGE"]) == {325}
-    with motorlink.rmd.open(share.rmd) as bus:
-        # A busy machine may be late with a reply.
-        row = next(bus.samples(quantities, rate=50, on_error="skip"))
-        assert {row[f"voltage_volts_{id}"] for id in quantities} == {24}
-
-    async def main() -> None:
-        async with aio.st.open(share.st) as client, aio.rmd.open(share.rmd) as bus:
-            values, others = await asyncio.gather(
-                client.sample(names, rate=50, seconds=0.5, on_error="skip"),
-                bus.sample(quantities, rate=50, seconds=0.5, on_error="skip"),
-            )
-        assert len(values) > 1 and set(values["BUS_VOLTAGE"]) == {325}
-        assert len(others) > 1 and set(others["voltage_volts_4"]) == {24}
 
     asyncio.run(asyncio.wait_for(main(), 60))
 
@@ -141,28 +97,22 @@ def test_the_end_of_a_program_is_that_of_the_motors_that_it_has(share: Share, se
     def mode(motor: int) -> str:
         return str(served.motor("rmd", motor)["mode"])
 
-    # Another program moves motor 1 meanwhile, and holds a load with it. It also moves motor 2.
+    # Another program moves motor 1 meanwhile, and holds a load with it.
     with motorlink.rmd.open(share.rmd) as other:
         with motorlink.rmd.open(share.rmd, on_close="off") as bus:
-            for motor in (1, 2, 3):
-                bus.motor(motor).set_speed(100)
             for motor in (1, 2):
-                other.motor(motor).set_speed(200)
+                bus.motor(motor).set_speed(100)
+            other.motor(1).set_speed(200)
             other.motor(1).stop()
-        eventually(lambda: mode(3) == "off", "the end of motor 3")
-        assert (mode(1), mode(2)) == ("stopped", "speed")
-    assert mode(2) == "stopped"
+        eventually(lambda: mode(2) == "off", "the end of motor 2")
+        assert mode(1) == "stopped"
     # What a program has declared holds if it is killed, too.
-    for on_close, ends in (("off", "off"), ("stop", "stopped"), ("nothing", "speed")):
-        words = [sys.executable, "-c", MOVES, share.rmd, on_close]
-        moves = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-        assert moves.stdout and moves.stdout.readline() == "moving\n"
-        moves.kill()
-        moves.communicate()
-        if on_close == "nothing":
-            with motorlink.rmd.open(share.rmd) as other:
-                other.motor(4).status()
-        eventually(lambda ends=ends: mode(4) == ends, f"{on_close}: {ends}")  # type: ignore[misc]
+    words = [sys.executable, "-c", MOVES, share.rmd]
+    moves = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert moves.stdout and moves.stdout.readline() == "moving\n"
+    moves.kill()
+    moves.communicate()
+    eventually(lambda: mode(4) == "off", "the end of motor 4")
 
 
 def test_the_end_of_a_share_is_told(share: Share) -> None:

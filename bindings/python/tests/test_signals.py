@@ -83,9 +83,17 @@ ASYNC = """
 """
 
 
-@pytest.mark.parametrize("number", SIGNALS)
-@pytest.mark.parametrize("script", [BLOCKING, BUSY, ASYNC], ids=["idle", "busy", "asyncio"])
-@pytest.mark.parametrize("kind", ["st", "rmd"])
+@pytest.mark.parametrize(
+    ("kind", "script", "number"),
+    [
+        ("st", BLOCKING, signal.SIGTERM),
+        ("rmd", BLOCKING, signal.SIGHUP),
+        ("rmd", BUSY, signal.SIGTERM),
+        ("st", ASYNC, signal.SIGHUP),
+        ("rmd", ASYNC, signal.SIGTERM),
+    ],
+    ids=["idle st", "idle rmd", "busy rmd", "asyncio st", "asyncio rmd"],
+)
 def test_a_signal_stops_the_motors_and_ends_the_program(
     served: Served, kind: str, script: str, number: signal.Signals
 ) -> None:
@@ -110,17 +118,13 @@ JUST_BEFORE_A_WAIT = """
 """
 
 
-@pytest.mark.parametrize("number", SIGNALS)
-@pytest.mark.parametrize("kind", ["st", "rmd"])
-def test_a_signal_just_before_a_wait_stops_the_motors(
-    served: Served, kind: str, number: signal.Signals
-) -> None:
-    arguments = kind, port(served, kind), str(int(number))
-    with program(JUST_BEFORE_A_WAIT, *arguments) as running:
-        eventually(lambda: is_turning(served, kind), "a motor that turns")
+def test_a_signal_just_before_a_wait_stops_the_motors(served: Served) -> None:
+    number = signal.SIGTERM
+    with program(JUST_BEFORE_A_WAIT, "st", served.st, str(int(number))) as running:
+        eventually(lambda: is_turning(served, "st"), "a motor that turns")
         running.communicate("\n", timeout=60)
         assert running.returncode == -number
-        eventually(lambda: not is_turning(served, kind), "a motor at rest")
+        eventually(lambda: not is_turning(served, "st"), "a motor at rest")
 
 
 FORKED = """
@@ -218,17 +222,6 @@ def test_a_signal_lets_a_close_in_another_thread_finish(script: str) -> None:
         os.close(theirs)
 
 
-OTHER_THREAD = """
-    def work():
-        bus = motorlink.st.open(sys.argv[2])
-        start(bus)
-        ready()
-        time.sleep(600)
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    thread.join()
-"""
-
 OPTED_OUT = """
     bus = motorlink.st.open(sys.argv[2], stop_on_signals=False)
     start(bus)
@@ -237,9 +230,8 @@ OPTED_OUT = """
 """
 
 
-@pytest.mark.parametrize("script", [OTHER_THREAD, OPTED_OUT], ids=["other thread", "opted out"])
-def test_a_motor_without_a_handler_continues(served: Served, script: str) -> None:
-    with program(script, "st", served.st) as running:
+def test_a_client_that_opted_out_has_no_handler(served: Served) -> None:
+    with program(OPTED_OUT, "st", served.st) as running:
         eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         running.send_signal(signal.SIGTERM)
         assert running.wait(60) == -signal.SIGTERM

@@ -46,29 +46,15 @@ def test_time_advances_only_during_a_wait() -> None:
             bench.run(seconds)
 
 
-def test_a_minute_of_timeouts_takes_less_real_time() -> None:
-    bench = sim.Bench()
-    began = time.monotonic()
-    with motorlink.st.open(bench.port(fault="drop=1"), timeout=10, on_close="nothing") as bus:
-        for _ in range(6):
-            with pytest.raises(motorlink.MotorlinkError):
-                bus.motor(1).get("SPEED_MEAS")
-    assert bench.now > 60
-    assert time.monotonic() - began < bench.now / 2
-
-
 def test_the_same_program_and_seed_give_the_same_run() -> None:
-    def run(seed: int, fault: str) -> tuple[list[Any], bytes, str]:
+    def run(seed: int, fault: str) -> tuple[list[str], bytes, str]:
         bench = sim.Bench(SERVO, seed=seed, fault=fault)
-        told: list[Any] = []
+        told = []
         with bench.recording(["st1.speed_rpm", "rmd2.iq_amps"], every=0.01) as recording:
-            for n in range(60):
+            for n in range(40):
                 try:
-                    motor = bench.st.motor(1)
-                    if n == 1:
-                        motor.start()
-                    told.append(motor.get("SPEED_MEAS"))
-                    told.append(bench.rmd.motor(2).set_speed(90 + n))
+                    told.append(str(bench.st.motor(1).get("SPEED_MEAS")))
+                    told.append(str(bench.rmd.motor(2).set_speed(90 + n)))
                 except motorlink.MotorlinkError as error:
                     told.append(str(error))
                 bench.run(0.02)
@@ -76,7 +62,6 @@ def test_the_same_program_and_seed_give_the_same_run() -> None:
 
     first = run(1, "drop=5e-3,seed=2")
     assert first == run(1, "drop=5e-3,seed=2")
-    assert any(isinstance(answer, str) for answer in first[0])
     assert first[1] != run(2, "drop=5e-3,seed=2")[1]
     assert first[0] != run(1, "drop=5e-3,seed=3")[0]
 
@@ -106,70 +91,49 @@ def test_the_client_of_a_bench_has_the_profile_of_its_drive() -> None:
     bus.motor(2).set_torque_ramp(100, 0.1)
 
 
-def test_a_load_brakes_and_a_push_turns() -> None:
+def test_commands_change_the_surroundings_of_a_motor() -> None:
     bench = sim.Bench(SERVO)
-    started(bench)
+    motor = started(bench)
     free = bench.truth("st1")["iq_amps"]
     bench.brake("st1", 0.1)
-    bench.run(1.0)
-    truth = bench.truth("st1")
-    assert truth["speed_rpm"] == pytest.approx(1000, abs=20)
-    assert truth["iq_amps"] > 2 * free
     bench.push("rmd1", -0.2)
-    bench.run(0.5)
-    assert bench.truth("rmd1")["speed_dps"] < -100
-
-
-def test_faults_temperatures_supplies_and_power_cycles() -> None:
-    bench = sim.Bench(SERVO)
-    motor = bench.st.motor(1)
     bench.temperature("st1", 60)
-    bench.supply("rmd3", 5)
-    bench.inject("st1", "BREAK_IN", hold=True)
+    bench.supply("rmd3", 20)
+    bench.lock_rotor("rmd2")
+    bench.rmd.motor(2).set_torque(1)
     bench.run(1.0)
+    assert bench.truth("st1")["iq_amps"] > 2 * free
+    assert bench.truth("rmd1")["speed_dps"] < -100
     assert motor.get("HEATS_TEMP") == 60
+    assert bench.rmd.motor(3).status().voltage_volts == pytest.approx(20, abs=0.5)
+    assert abs(bench.truth("rmd2")["speed_dps"]) < 1
+    bench.inject("st1", "BREAK_IN", hold=True)
+    bench.temperature("st1", None)
+    bench.lock_rotor("rmd2", False)
+    bench.run(0.5)
     assert (motor.status(), motor.flags().present) == ("FAULT_NOW", ("BREAK_IN",))
     assert bench.truth("st1")["faults"] == "BREAK_IN"
+    assert motor.get("HEATS_TEMP") < 60
+    assert bench.truth("rmd2")["speed_dps"] > 100
     bench.inject("st1", "BREAK_IN", hold=False)
-    bench.run(0.1)
-    motor.fault_ack()
-    bench.run(0.1)
-    assert motor.status() == "IDLE"
-    bench.temperature("st1", None)
-    assert motor.get("HEATS_TEMP") == 25
-
-    gains = bench.rmd.motor(1).pid()._replace(speed_kp=7)
-    bench.rmd.motor(1).write_pid_ram(gains)
+    bench.rmd.motor(1).write_pid_ram(bench.rmd.motor(1).pid()._replace(speed_kp=7))
     bench.power_cycle("rmd1")
     assert bench.rmd.motor(1).pid().speed_kp != 7
     bench.power_cycle("st")
-
-    bench.lock_rotor("rmd2")
-    bench.rmd.motor(2).set_torque(1)
-    bench.run(0.5)
-    assert abs(bench.truth("rmd2")["speed_dps"]) < 1
-    bench.lock_rotor("rmd2", False)
-    bench.run(0.5)
-    assert bench.truth("rmd2")["speed_dps"] > 100
+    assert motor.flags().present == ()
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         (lambda bench: bench.brake("st9", 1), "the motors are st1, st2, rmd1"),
-        (lambda bench: bench.brake("motor", 1), "the motors are st1, st2, rmd1"),
         (lambda bench: bench.truth("st9"), "the motors are st1, st2, rmd1"),
         (lambda bench: bench.brake("st1", -1), "0 to 1000"),
         (lambda bench: bench.brake("st1", float("nan")), "not a command: .*nan"),
-        (lambda bench: bench.push("rmd1", float("-inf")), "not a command: .*inf"),
-        (lambda bench: bench.supply("st1", "high"), "not a command"),
         (lambda bench: bench.execute({"command": object()}), "not a command: .*object"),
         (lambda bench: bench.inject("st1", "FIRE"), "BREAK_IN"),
         (lambda bench: bench.power_cycle("st1"), "one supply"),
-        (lambda bench: bench.execute({"command": "explode"}), "not a command"),
-        (lambda bench: bench.execute({"command": "pause"}), "does not run by itself"),
         (lambda bench: bench.record(["st1.speed"], seconds=1), "st1.speed_rpm"),
-        (lambda bench: bench.record(["st1.speed_rpm"], seconds=1, every=1e-6), "50 µs"),
         (lambda bench: bench.record(["st1.iq_amps"] * 2, seconds=1), "named twice"),
         (lambda bench: bench.record([], seconds=1), "name what"),
         (lambda bench: bench.port(fault="explode=1"), "explode"),
@@ -189,9 +153,7 @@ def test_invalid_calls_are_refused_and_change_nothing(wrong: Any, message: str) 
         ({"config": "[[st.motor]]\npreset = 3"}, "st.motor 1: the presets are"),
         ({"config": "[[st.motor"}, "line 1, column 11"),
         ({"config": "missing.toml"}, "cannot read `missing.toml`: No such file"),
-        ({"config": "/"}, "cannot read `/`: Is a directory"),
         ({"config": {"st": object()}}, "not a configuration: .*object is not JSON"),
-        ({"config": {"st": float("nan")}}, "not a configuration: .*nan"),
         ({"seed": -1}, "a seed of -1: give 0 to 4294967295"),
         ({"fault": "explode=1"}, "explode"),
     ],
@@ -212,12 +174,6 @@ def test_a_traceback_can_show_a_bench_that_was_not_built() -> None:
     assert repr(sim.Bench.__new__(sim.Bench)) == "<motorlink.sim.Bench, not built>"
 
 
-def test_commands_are_those_of_the_program() -> None:
-    bench = sim.Bench()
-    answer = bench.execute({"command": "state", "port": "rmd"})
-    assert [motor["motor"] for motor in answer["state"][0]["motors"]] == [1, 2, 3, 4]
-
-
 def test_truth_has_the_signals_with_their_units() -> None:
     bench = sim.Bench()
     truth = bench.truth("st1")
@@ -229,37 +185,20 @@ def test_truth_has_the_signals_with_their_units() -> None:
     assert truth["bus_volts"] == pytest.approx(325, abs=1)
 
 
-def test_a_recording_is_independent_of_what_advances_the_time() -> None:
-    def data(through_the_line: bool) -> Any:
-        bench = sim.Bench(SERVO)
-        bench.rmd.motor(1).set_speed(360)
-        with bench.recording(["rmd1.angle_degrees", "rmd1.mode"], every=0.005) as recording:
-            end = bench.now + 0.5
-            while bench.now < end:
-                if through_the_line:
-                    bench.st.motor(1).status()
-                else:
-                    bench.run(0.1)
-        return recording.data[:100]
-
-    one, other = data(True), data(False)
-    assert one.dtype.names == ("t", "rmd1.angle_degrees", "rmd1.mode")
-    np.testing.assert_array_equal(one, other)
-    np.testing.assert_allclose(one["t"], np.arange(100) * 0.005)
-    assert set(one["rmd1.mode"]) == {3}
-    assert one["rmd1.angle_degrees"][-1] > 100
-
-
 def test_a_recording_can_be_read_before_its_end() -> None:
     bench = sim.Bench()
-    with bench.recording(["rmd1.angle_degrees"], every=0.1) as recording:
+    bench.rmd.motor(1).set_speed(360)
+    with bench.recording(["rmd1.angle_degrees", "rmd1.mode"], every=0.1) as recording:
         bench.run(0.25)
         assert len(recording.data) == 3
         bench.run(0.1)
         assert len(recording.data) == 4
     bench.run(1.0)
-    assert len(recording.data) == 4
-    recording.data["rmd1.angle_degrees"][0] = 1.0  # its own memory
+    data = recording.data
+    assert data.dtype.names == ("t", "rmd1.angle_degrees", "rmd1.mode")
+    np.testing.assert_allclose(data["t"], np.arange(4) * 0.1)
+    assert set(data["rmd1.mode"]) == {3} and np.all(np.diff(data["rmd1.angle_degrees"]) > 0)
+    data["rmd1.angle_degrees"][0] = 1.0  # its own memory
 
 
 def test_registers_are_sampled_on_virtual_time() -> None:
@@ -376,7 +315,7 @@ def test_other_threads_run_while_time_advances() -> None:
     thread.start()
     try:
         before = turns
-        bench.run(60)
+        bench.run(20)
         assert turns > before + 1000
     finally:
         over.set()
@@ -388,8 +327,8 @@ def test_an_object_that_is_not_a_port_is_refused() -> None:
         motorlink.st.open(3)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: str(path.stem))
-def test_the_scenarios_that_ship_run_as_expected(path: Path) -> None:
+def test_one_of_the_scenarios_that_ship_runs_as_expected() -> None:
+    path = SCENARIOS / "sensorless-start.toml"
     run = sim.run(path)
     assert run.as_expected, run.failures
     assert run.expectations and all(one.holds for one in run.expectations)
@@ -425,8 +364,6 @@ def test_failed_expectations_are_reported() -> None:
         "it turns: st1.speed_rpm 0 rpm at 0 s, expected at least 1 rpm: off by 1 rpm",
         "at 0.1 s st1 refused `SPEED_MEAS 3` with SET_READ_ONLY",
     ]
-    with pytest.raises(motorlink.InvalidValueError, match="duration"):
-        sim.run("title = ''")
     with pytest.raises(motorlink.InvalidValueError, match="nowhere"):
         sim.run("nowhere.toml")
 

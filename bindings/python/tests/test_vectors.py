@@ -1,4 +1,4 @@
-"""The wire vectors of both protocols: requests are encoded and decoded, replies become values."""
+"""A wire vector of each kind of both protocols: requests are encoded and decoded, replies become values."""
 
 from __future__ import annotations
 
@@ -24,8 +24,18 @@ def vectors(name: str) -> list[Vector]:
     return found
 
 
-ST = vectors("st")
-RMD = vectors("rmd")
+def one_of_each(vectors: list[Vector], *kind: str) -> list[Vector]:
+    """The vector of each kind with the most values that are not 0. The others differ in values only,
+    which `crates/proto/tests` decode.
+    """
+    found: dict[tuple[str, ...], Vector] = {}
+    for vector in sorted(vectors, key=lambda one: -sum(map(bool, one["fields"].values()))):
+        found.setdefault((*(vector[name] for name in kind), *vector.get("answer", {})), vector)
+    return list(found.values())
+
+
+ST = one_of_each(vectors("st"), "code")
+RMD = one_of_each(vectors("rmd"), "dir", "command")
 
 
 def named(vector: Vector) -> str:
@@ -165,16 +175,7 @@ def test_an_rmd_request_encodes_to_its_bytes_and_decodes_from_them(vector: Vecto
     decoded = rmd.Request.decode(data)
     assert (decoded.code, decoded.encode()) == (code, data)
     assert decoded.stem is not None
-    # Values that the document does not allow can be decoded, and not made. So can a max speed of 0.
-    if (
-        abs(frame.digits.get("iq", 0)) > 2000
-        or (code in (0xA5, 0xA6) and frame.digits["angle"] >= 36000)
-        or frame.digits.get("max_speed") == 0
-    ):
-        with pytest.raises(motorlink.InvalidValueError):
-            rmd_request(frame, decoded.stem)
-    elif frame.digits.get("direction", 0) <= 1:
-        assert rmd_request(frame, decoded.stem) == decoded
+    assert rmd_request(frame, decoded.stem) == decoded
 
 
 #: The commands of a motor. 0x280 is a command for four motors.
@@ -214,5 +215,6 @@ def test_an_rmd_reply_decodes_to_its_fields(vector: Vector) -> None:
 
 def test_every_kind_of_vector_was_tested() -> None:
     assert len({vector["code"] for vector in ST}) == 14
+    assert any("error" in vector.get("answer", {}) for vector in ST)
     for direction in ("request", "reply"):
         assert len({v["command"] for v in RMD if v["dir"] == direction}) == len(COMMANDS) + 1

@@ -12,7 +12,7 @@ use motorlink::st::{self, register};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// The time for which a drive is frozen, in ms.
-const PAUSES: [u64; 6] = [100, 300, 900, 1_500, 2_500, 5_000];
+const PAUSES: [u64; 4] = [100, 900, 2_500, 5_000];
 /// The longest that an exchange of either protocol waits for its reply.
 const TIMEOUT: Duration = Duration::from_secs(1);
 /// docs/HOST-FAULTS.md says when a client is back; a loaded machine is given this much more.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::world::{LIMIT, Page, World, rmd, st};
-use motorlink::port::{ByteLink, EventBytes, Evented, FaultBytes, FaultCan, Link, PortError};
+use motorlink::port::{ByteLink, EventBytes, Evented, FaultCan, Link, PortError};
 use motorlink_link::fault::Faults;
 use motorlink_monitor::message::{Answer, Ask};
 use motorlink_proto::rmd::IDENTIFIERS;
@@ -107,11 +107,12 @@ async fn a_reply_that_comes_twice_never_becomes_a_value() {
     }
     repeats.store(true, Ordering::SeqCst);
     let (mut right, end) = (0, Instant::now() + LIMIT);
-    while right < 150 {
+    while right < 60 {
         assert!(Instant::now() < end, "{right} values");
         // Requests of a page overlap.
-        let asks = values.iter().map(|(motor, name, _)| page.ask(read(motor.clone(), name)));
-        let answers = futures(asks.collect()).await;
+        let [a, b, c, d, e] =
+            values.each_ref().map(|(motor, name, _)| page.ask(read(motor.clone(), name)));
+        let answers: [_; 5] = tokio::join!(a, b, c, d, e).into();
         for ((motor, name, value), answer) in values.iter().zip(answers) {
             match answer {
                 Ok(Answer::Read { values }) => {
@@ -127,55 +128,6 @@ async fn a_reply_that_comes_twice_never_becomes_a_value() {
         }
     }
     assert!(!world.rmd_motion(1).iter().any(|frame| frame[0] >= 0xA0));
-}
-
-/// Waits for all, at the same time.
-async fn futures<F: Future>(all: Vec<F>) -> Vec<F::Output> {
-    let mut all: Vec<_> = all.into_iter().map(|one| (Box::pin(one), None)).collect();
-    std::future::poll_fn(|context| {
-        for (one, result) in all.iter_mut().filter(|(_, result)| result.is_none()) {
-            if let std::task::Poll::Ready(value) = one.as_mut().poll(context) {
-                *result = Some(value);
-            }
-        }
-        match all.iter().all(|(_, result)| result.is_some()) {
-            true => std::task::Poll::Ready(()),
-            false => std::task::Poll::Pending,
-        }
-    })
-    .await;
-    all.into_iter().filter_map(|(_, result)| result).collect()
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_reply_that_is_late_never_becomes_a_value() {
-    // Some replies come after the timeout.
-    let mut late: Faults = "delay=0ms..90ms,only=received".parse().unwrap();
-    let world = World::with(
-        "late",
-        (Profile::Spec, Duration::from_millis(80)),
-        move |link| {
-            late.seed += 1;
-            Box::new(FaultBytes::new(link, &late.on_serial().unwrap()))
-        },
-        |link| link,
-    );
-    let page = world.page().await;
-    set(&page, st(1), "SPEED_KP", 81.0).await;
-    set(&page, st(1), "SPEED_KI", 82.0).await;
-    let (mut right, mut refused, end) = (0, 0, Instant::now() + LIMIT);
-    while right < 10 || refused == 0 {
-        assert!(Instant::now() < end, "{right} values");
-        for (name, value) in [("SPEED_KP", 81.0), ("SPEED_KI", 82.0)] {
-            match page.ask(read(st(1), name)).await {
-                Ok(Answer::Read { values }) => {
-                    assert_eq!(values[0].value, Some(value), "{name}");
-                    right += 1;
-                }
-                _ => refused += 1,
-            }
-        }
-    }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -199,7 +151,7 @@ async fn a_restore_that_is_cut_off_says_what_was_written() {
             assert!(Instant::now() < end, "nothing was written");
             tokio::time::sleep(Duration::from_micros(200)).await;
         }
-        world.end();
+        world.share.close();
     };
     let (restored, ()) = tokio::join!(restore, cut);
     let why = restored.unwrap_err();

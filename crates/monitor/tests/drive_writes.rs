@@ -114,11 +114,21 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
     let world = World::new("limits", Profile::Mcsdk54);
     let page = world.page().await;
     let other = world.other(&page).await;
-    page.ask(limit(st(1), Mode::Speed, Some(1000.0))).await.unwrap();
-    page.ask(limit(st(1), Mode::Torque, Some(500.0))).await.unwrap();
-    page.ask(limit(rmd(1), Mode::Speed, Some(100.0))).await.unwrap();
-    page.ask(limit(rmd(1), Mode::Torque, Some(1.0))).await.unwrap();
-    page.ask(limit(rmd(1), Mode::Position, Some(90.0))).await.unwrap();
+    assert_eq!(limits(&other).await, []);
+    // The digits of a limit never exceed it.
+    for (motor, mode, most) in [
+        (rmd(1), Mode::Speed, 100.0),
+        (rmd(1), Mode::Torque, 1.0),
+        (rmd(1), Mode::Position, 90.009),
+        (st(1), Mode::Speed, 1000.0),
+        (st(1), Mode::Torque, 500.0),
+    ] {
+        page.ask(limit(motor.clone(), mode, Some(most))).await.unwrap();
+        let of = (&motor.line, motor.motor, mode);
+        let told = limits(&other).await;
+        let told = told.iter().find(|it| (&it.0, it.1, it.2) == of).unwrap().3;
+        assert!((most - 0.01..=most).contains(&told), "{of:?}: {told}");
+    }
     let ramp = |rpm: f64| act(st(1), "SET_RAMP", &[("speed_rpm", rpm), ("duration_ms", 100.0)]);
     let current =
         |iq: f64, id: f64| act(st(1), "SET_CURRENT_REF", &[("iq_s16a", iq), ("id_s16a", id)]);
@@ -162,6 +172,7 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
     page.drives.reconnected();
     page.refused(act(st(1), "START_MOTOR", &[])).await;
     page.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
+    assert_eq!(limits(&other).await.len(), 4);
     other.act(rmd(1), "set_speed", &[("speed_dps", 200.0)]).await.unwrap();
     // A limit also binds what the motor did before.
     other.act(rmd(1), "stop", &[]).await.unwrap();
@@ -181,25 +192,23 @@ async fn limits_of_one_page_hold_for_all_pages_and_in_every_way() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_dump_restores_what_was_changed() {
-    for profile in Profile::ALL {
-        let world = World::new(&format!("settings-{}", profile.name()), profile);
-        let page = world.page().await;
-        for (motor, name, value) in [(st(2), "SPEED_KI", 77.0), (rmd(3), "torque_kp", 66.0)] {
-            let file = dump(&page, motor.clone()).await;
-            assert!(file.contains(name), "{file}");
-            let before = page.read(motor.clone(), &[name]).await[0].0;
-            written(&page, write(motor.clone(), name, value, false)).await;
-            let diff = Ask::Diff { motor: motor.clone(), text: file.clone() };
-            let Ok(Answer::Diff { differences }) = page.ask(diff).await else { panic!() };
-            assert_eq!(differences.len(), 1);
-            assert_eq!((differences[0].name.as_str(), &differences[0].fixed), (name, &None));
-            assert_eq!(differences[0].now, value.to_string());
-            let restore = Ask::Restore { motor: motor.clone(), text: file.clone(), to_rom: false };
-            let Ok(Answer::Restore { written }) = page.ask(restore).await else { panic!() };
-            assert_eq!(written, differences);
-            assert_eq!(page.read(motor.clone(), &[name]).await[0].0, before);
-            assert_eq!(dump(&page, motor).await, file);
-        }
+    let world = World::new("settings", Profile::Mcsdk54);
+    let page = world.page().await;
+    for (motor, name, value) in [(st(2), "SPEED_KI", 77.0), (rmd(3), "torque_kp", 66.0)] {
+        let file = dump(&page, motor.clone()).await;
+        assert!(file.contains(name), "{file}");
+        let before = page.read(motor.clone(), &[name]).await[0].0;
+        written(&page, write(motor.clone(), name, value, false)).await;
+        let diff = Ask::Diff { motor: motor.clone(), text: file.clone() };
+        let Ok(Answer::Diff { differences }) = page.ask(diff).await else { panic!() };
+        assert_eq!(differences.len(), 1);
+        assert_eq!((differences[0].name.as_str(), &differences[0].fixed), (name, &None));
+        assert_eq!(differences[0].now, value.to_string());
+        let restore = Ask::Restore { motor: motor.clone(), text: file.clone(), to_rom: false };
+        let Ok(Answer::Restore { written }) = page.ask(restore).await else { panic!() };
+        assert_eq!(written, differences);
+        assert_eq!(page.read(motor.clone(), &[name]).await[0].0, before);
+        assert_eq!(dump(&page, motor).await, file);
     }
 }
 
@@ -235,23 +244,4 @@ async fn a_restore_needs_a_motor_at_rest_and_a_file_for_it() {
     let other = file.replace(offset, "encoder_offset = 9");
     let (_, message) = page.refused(restore(rmd(2), &other)).await;
     assert!(message.contains("encoder_offset is in the ROM"), "{message}");
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn every_page_sees_the_limits() {
-    let world = World::new("limits-spec", Profile::Spec);
-    let one = world.page().await;
-    let other = world.other(&one).await;
-    assert_eq!(limits(&other).await, []);
-    one.ask(limit(st(2), Mode::Speed, Some(500.0))).await.unwrap();
-    // The digits of a limit never exceed it.
-    one.ask(limit(rmd(1), Mode::Position, Some(90.009))).await.unwrap();
-    one.ask(limit(rmd(1), Mode::Speed, Some(100.0))).await.unwrap();
-    let (st_line, rmd_line) = (st(2).line, rmd(1).line);
-    let rmd_speed = (rmd_line.clone(), 1, Mode::Speed, 100.0);
-    let rmd_position = (rmd_line, 1, Mode::Position, 90.0);
-    let st_speed = (st_line, 2, Mode::Speed, 500.0);
-    assert_eq!(limits(&other).await, [rmd_speed, rmd_position.clone(), st_speed.clone()]);
-    one.ask(limit(rmd(1), Mode::Speed, None)).await.unwrap();
-    assert_eq!(limits(&other).await, [rmd_position, st_speed]);
 }

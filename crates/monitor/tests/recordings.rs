@@ -45,7 +45,7 @@ impl Desk {
     async fn of(world: World, folder: PathBuf) -> Self {
         motorlink_telemetry::share::port::register();
         let recordings = Arc::new(Recordings::new(folder.clone(), world.share()));
-        let (view, _) = connect(&world.path, PAGE).await;
+        let (view, _) = connect(&world.share.path, PAGE).await;
         Desk { world, folder, recordings, view }
     }
 
@@ -253,6 +253,11 @@ async fn it_goes_on_without_the_page_and_ends_with_the_server() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_recording_that_starts_can_be_ended() {
     let desk = Desk::new("starts").await;
+    for rate in [0.0, -1.0, 1e9, f64::NAN, f64::INFINITY] {
+        let (reason, why) = desk.refused(Ask::Record { rate: Some(rate) }).await;
+        assert_eq!((reason, &*why), (Reason::Usage, "a rate is 0.1 to 1000 Hz"));
+    }
+    assert!(!desk.folder.exists());
     let asked = desk.ask(Ask::Record { rate: None });
     let ended = async {
         desk.told(|told| told.phase == Phase::Starting).await;
@@ -301,16 +306,6 @@ async fn a_folder_that_cannot_be_written_is_said() {
     desk.record().await;
     assert_eq!(desk.end().await.phase, Phase::Ended);
     fs::remove_dir_all(below.parent().unwrap()).unwrap();
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_rate_that_is_not_possible_is_refused() {
-    let desk = Desk::new("rate").await;
-    for rate in [0.0, -1.0, 1e9, f64::NAN, f64::INFINITY] {
-        let (reason, why) = desk.refused(Ask::Record { rate: Some(rate) }).await;
-        assert_eq!((reason, &*why), (Reason::Usage, "a rate is 0.1 to 1000 Hz"));
-    }
-    assert!(!desk.folder.exists());
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -432,5 +427,5 @@ async fn a_removed_file_is_said_and_another_recording_can_begin() {
     desk.record().await;
     desk.told(|told| told.values > 0).await;
     assert_eq!(desk.end().await.phase, Phase::Ended);
-    assert!(desk.world.path.exists());
+    assert!(desk.world.share.path.exists());
 }

@@ -86,6 +86,9 @@ fn a_limit_holds_before_a_byte_leaves() {
     );
     let raw = client.begin_raw(1, 0x07, &[0xE9, 0x03, 0, 0, 0, 0]).unwrap_err();
     assert_eq!(raw.to_string(), refused.to_string());
+    let start = client.begin(1, &Request::ExecuteCommand(Command::StartMotor)).unwrap_err();
+    assert!(start.to_string().contains("a start needs a speed ramp"), "{start}");
+    assert_eq!(client.started().count(), 0);
     drop(client);
     assert_eq!(theirs.read(&mut [0; 8]).unwrap(), 0);
 }

@@ -12,10 +12,8 @@ const CW: SpinDirection = SpinDirection::Clockwise;
 const CCW: SpinDirection = SpinDirection::Counterclockwise;
 
 /// A motor that stands, and its bus.
-fn standing_at(degrees: f64, encoder_bits: u8) -> (Bench, Client) {
-    let config = format!(
-        "[[rmd.motor]]\nid = 1\nplant.angle_degrees = {degrees}\nplant.encoder.bits = {encoder_bits}"
-    );
+fn standing_at(degrees: f64) -> (Bench, Client) {
+    let config = format!("[[rmd.motor]]\nid = 1\nplant.angle_degrees = {degrees}");
     let bench = Bench::new(&BenchConfig::parse(&config).unwrap()).unwrap();
     let bus = Client::over("bench", bench.can(&Faults::NONE), rmd::Options::default());
     (bench, bus)
@@ -53,7 +51,7 @@ fn one_count_past_the_target_is_nearly_a_full_turn_and_refused() {
         (1.5 * COUNT, 359.99, CW, 360.0),
         (359.99 - 1.5 * COUNT, 359.99, CCW, -360.0),
     ] {
-        let (bench, bus) = standing_at(at, 14);
+        let (bench, bus) = standing_at(at);
         let refused = turn(&bus, target, direction, FullTurn::default()).unwrap_err();
         assert!(matches!(refused, Error::FullTurn { .. }), "{refused}");
         assert!(bus.moving().is_empty() && turned(&bench, at).abs() < 0.1, "{at}");
@@ -67,7 +65,7 @@ fn one_count_past_the_target_is_nearly_a_full_turn_and_refused() {
 #[test]
 fn at_the_target_a_move_is_refused() {
     for direction in [CW, CCW] {
-        let (bench, bus) = standing_at(90.01, 14);
+        let (bench, bus) = standing_at(90.01);
         assert_eq!(bus.motor(1).unwrap().single_turn_angle().unwrap(), TurnCentiDegrees(9_000));
         let refused = turn(&bus, 90.0, direction, FullTurn::default()).unwrap_err();
         assert!(matches!(refused, Error::FullTurn { past: TurnCentiDegrees(0), .. }), "{refused}");
@@ -76,40 +74,9 @@ fn at_the_target_a_move_is_refused() {
 }
 
 #[test]
-fn an_encoder_finer_than_the_angle_makes_a_full_turn_from_a_motor_that_reads_its_target() {
-    // 90.003° reads 90.00°, and is two counts of 18 bits past it.
-    let (bench, bus) = standing_at(90.003, 18);
-    assert_eq!(bus.motor(1).unwrap().single_turn_angle().unwrap(), TurnCentiDegrees(9_000));
-    assert!(turn(&bus, 90.0, CW, FullTurn::Refused { tolerance: TurnCentiDegrees(0) }).is_err());
-    turn(&bus, 90.0, CW, FullTurn::Allowed).unwrap();
-    assert!(turned(&bench, 90.003) > 350.0);
-}
-
-#[test]
-fn the_same_move_again_is_refused_at_its_target() {
-    let (bench, bus) = standing_at(10.0, 14);
-    turn(&bus, 90.0, CW, FullTurn::default()).unwrap();
-    assert!((turned(&bench, 10.0) - 80.0).abs() < 0.1);
-    let again = turn(&bus, 90.0, CW, FullTurn::default());
-    assert!(matches!(again, Err(Error::FullTurn { .. })), "{again:?}");
-    assert!((turned(&bench, 10.0) - 80.0).abs() < 0.1);
-}
-
-#[test]
-fn beyond_the_tolerance_a_full_turn_is_what_was_asked_for() {
-    for (at, direction) in [(90.6, CW), (89.4, CCW)] {
-        let (bench, bus) = standing_at(at, 14);
-        let wide = FullTurn::Refused { tolerance: TurnCentiDegrees::from_degrees(0.7) };
-        turn(&bus, 90.0, direction, wide).unwrap_err();
-        turn(&bus, 90.0, direction, FullTurn::default()).unwrap();
-        assert!(turned(&bench, at).abs() > 350.0);
-    }
-}
-
-#[test]
 fn before_the_target_a_short_move_is_made() {
     for (at, direction) in [(89.7, CW), (90.3, CCW)] {
-        let (bench, bus) = standing_at(at, 14);
+        let (bench, bus) = standing_at(at);
         turn(&bus, 90.0, direction, FullTurn::default()).unwrap();
         let way = turned(&bench, at);
         assert!((at + way - 90.0).abs() < 0.1, "{way}");
@@ -118,7 +85,7 @@ fn before_the_target_a_short_move_is_made() {
 
 #[test]
 fn the_error_says_where_the_motor_is_and_that_nothing_moved() {
-    let (_bench, bus) = standing_at(90.034, 14);
+    let (_bench, bus) = standing_at(90.034);
     let error = turn(&bus, 90.0, CW, FullTurn::default()).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -130,7 +97,7 @@ fn the_error_says_where_the_motor_is_and_that_nothing_moved() {
 
 #[test]
 fn what_the_protocol_does_not_allow_is_refused_before_the_motor_is_asked() {
-    let (bench, bus) = standing_at(90.0, 14);
+    let (bench, bus) = standing_at(90.0);
     let motor = bus.motor(1).unwrap();
     let before = bench.now();
     for (target, direction) in [(36_000, CW), (0, SpinDirection::Unknown(2))] {
@@ -147,7 +114,7 @@ fn what_the_protocol_does_not_allow_is_refused_before_the_motor_is_asked() {
 
 #[test]
 fn a_limit_of_the_angle_over_all_turns_does_not_hold_back_a_move_within_the_turn() {
-    let (_bench, bus) = standing_at(10.0, 14);
+    let (_bench, bus) = standing_at(10.0);
     let angle = Some(CentiDegrees::from_degrees(45.0));
     bus.set_limits(bus.motor(1).unwrap().id(), Limits { angle, ..Limits::default() });
     turn(&bus, 90.0, CW, FullTurn::default()).unwrap();

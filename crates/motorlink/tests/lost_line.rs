@@ -73,6 +73,9 @@ fn a_guard_tells_every_motor_of_a_silent_drive_before_it_waits() {
     let mut told: Vec<u8> = wire.sent()[before..].chunks(4).take(3).map(|stop| stop[0]).collect();
     told.sort_unstable();
     assert_eq!(told, [0x23, 0x43, 0x63]);
+    let sent = wire.sent();
+    let again = sent[before..].windows(4).filter(|frame| *frame == STOP).count();
+    assert!(again >= 2, "{again}");
 }
 
 #[test]

@@ -22,14 +22,30 @@ struct Motors {
     coming: Arc<Mutex<VecDeque<(Instant, CanFrame)>>>,
     /// Motor 1 answers somebody else each 20 ms.
     is_shared: bool,
+    /// Motors that are not there.
+    absent: MotorSet,
     /// Replies to 0x92 come twice, the second time after so many ms.
     twice: Option<u32>,
 }
 
 impl Motors {
-    fn new(is_shared: bool) -> Self {
-        let clock = Clock::virtual_time();
-        Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared, twice: None }
+    fn new() -> Self {
+        Motors {
+            clock: Clock::virtual_time(),
+            sent: Arc::default(),
+            coming: Arc::default(),
+            is_shared: false,
+            absent: MotorSet::EMPTY,
+            twice: None,
+        }
+    }
+
+    fn shared() -> Self {
+        Motors { is_shared: true, ..Motors::new() }
+    }
+
+    fn without(absent: MotorSet) -> Self {
+        Motors { absent, ..Motors::new() }
     }
 
     fn bus(&self) -> rmd::Client {
@@ -57,7 +73,7 @@ impl CanLink for Motors {
             Some(id) => id.into(),
             None => MotorSet::TORQUE4,
         };
-        for id in ids {
+        for id in ids.without(self.absent) {
             let mut reply: [u8; 8] = frame.data().try_into().unwrap();
             match frame.data()[0] {
                 _ if frame.id() == 0x280 => reply = [0xA1, 25, 0, 0, 0, 0, 0, 0],
@@ -98,7 +114,7 @@ impl CanLink for Motors {
 
 #[test]
 fn a_cycle_brings_all_its_motors_in_sync_at_once() {
-    let motors = Motors::new(false);
+    let motors = Motors::new();
     let bus = motors.bus();
     let ids = [1, 2, 9].map(|id| MotorId::new(id).unwrap());
     let requests = ids.map(|id| (id, [0x92, 0, 0, 0, 0, 0, 0, 0]));
@@ -114,7 +130,7 @@ fn a_cycle_brings_all_its_motors_in_sync_at_once() {
 
 #[test]
 fn torques_for_four_motors_are_sent_when_all_are_in_sync() {
-    let motors = Motors::new(false);
+    let motors = Motors::new();
     let bus = motors.bus();
     let ids: MotorSet = [1, 2, 4].into_iter().filter_map(MotorId::new).collect();
     let torques = SetTorque4([7; 4].map(IqCommand));
@@ -127,28 +143,8 @@ fn torques_for_four_motors_are_sent_when_all_are_in_sync() {
 
 #[test]
 fn torques_for_four_motors_are_sent_to_those_that_answer() {
-    /// Motor 3 is not there.
-    struct Without3(Motors);
-    impl Link for Without3 {
-        fn clock(&self) -> Option<Clock> {
-            self.0.clock()
-        }
-    }
-
-    impl CanLink for Without3 {
-        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-            if frame.id() == 0x143 {
-                return Ok(());
-            }
-            self.0.send(frame)
-        }
-        fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-            self.0.receive(timeout)
-        }
-    }
-    let motors = Motors::new(false);
-    let bus = rmd::Client::over("bus", Box::new(Without3(motors.clone())), rmd::Options::default());
-    let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
+    let motors = Motors::without(MotorId::new(3).unwrap().into());
+    let replies = motors.bus().set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     let replies = replies.map(|reply| reply.expect("all are expected"));
     assert!(matches!(replies[2], Err(Error::Timeout { .. })), "{replies:?}");
     assert_eq!(replies.iter().filter(|reply| reply.is_ok()).count(), 3, "{replies:?}");
@@ -157,7 +153,7 @@ fn torques_for_four_motors_are_sent_to_those_that_answer() {
 
 #[test]
 fn torques_for_a_motor_that_answers_somebody_else_are_an_error_for_each() {
-    let motors = Motors::new(true);
+    let motors = Motors::shared();
     let replies = motors.bus().set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     let failed = replies.map(|reply| reply.expect("each is told").unwrap_err());
     assert!(failed.iter().all(|error| matches!(error, Error::Shared { .. })), "{failed:?}");
@@ -166,36 +162,20 @@ fn torques_for_a_motor_that_answers_somebody_else_are_an_error_for_each() {
 
 #[test]
 fn torques_for_motors_that_are_all_silent_are_not_sent() {
-    /// A bus on which no motor answers.
-    struct Silence(Motors);
-    impl Link for Silence {
-        fn clock(&self) -> Option<Clock> {
-            self.0.clock()
-        }
-    }
-
-    impl CanLink for Silence {
-        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-            assert_ne!(frame.id(), 0x280);
-            Ok(())
-        }
-        fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-            self.0.receive(timeout)
-        }
-    }
-    let bus =
-        rmd::Client::over("bus", Box::new(Silence(Motors::new(false))), rmd::Options::default());
+    let motors = Motors::without(MotorSet::ALL);
+    let bus = motors.bus();
     for _ in 0..3 {
         let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4);
         let is_error = |reply: Option<Result<_, Error>>| reply.is_some_and(|reply| reply.is_err());
         assert!(replies.is_err() || replies.is_ok_and(|replies| replies.into_iter().all(is_error)));
     }
+    assert!(motors.sent().iter().all(|(_, id, _)| *id != 0x280));
 }
 
 #[test]
 fn a_motor_that_answers_somebody_else_is_told_as_such() {
     for request in [[0x92, 0, 0, 0, 0, 0, 0, 0], [0x80, 0, 0, 0, 0, 0, 0, 0]] {
-        let motors = Motors::new(true);
+        let motors = Motors::shared();
         let shared = motors.bus().raw(MotorId::new(1).unwrap(), request).unwrap_err();
         assert!(matches!(shared, Error::Shared { .. }), "{shared}");
         assert!(motors.clock.now() < Instant(2_500 * MS), "{:?}", motors.clock.now());
@@ -208,7 +188,7 @@ fn a_motor_that_answers_somebody_else_is_told_as_such() {
 #[test]
 fn a_motors_reply_that_came_twice_is_found_by_the_confirmation() {
     for twice in [None, Some(0), Some(1), Some(2)] {
-        let motors = Motors { twice, ..Motors::new(false) };
+        let motors = Motors { twice, ..Motors::new() };
         let (bus, id) = (motors.bus(), MotorId::new(1).unwrap());
         for _ in 0..3 {
             bus.raw(id, [0x92, 0, 0, 0, 0, 0, 0, 0]).unwrap();
@@ -227,7 +207,7 @@ fn a_motors_reply_that_came_twice_is_found_by_the_confirmation() {
 fn a_scan_tells_of_a_motor_that_answers_somebody_else() {
     let mut found = vec![];
     let id = MotorId::new(1).unwrap();
-    Motors::new(true).bus().scan(id.into(), |one| found.push(one), |_| {}).unwrap();
+    Motors::shared().bus().scan(id.into(), |one| found.push(one), |_| {}).unwrap();
     assert_eq!(found, [rmd::ScanResult::Shared(id)]);
 }
 

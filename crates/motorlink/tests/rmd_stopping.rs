@@ -10,7 +10,7 @@ use motorlink::time::{Instant, Micros};
 use motorlink_link::fault::Faults;
 use motorlink_testbench::{Bench, BenchConfig};
 
-const SEEDS: u32 = 20;
+const SEEDS: u32 = 10;
 /// Two of five frames are lost in each direction.
 const BAD: &str = "drop=0.4";
 

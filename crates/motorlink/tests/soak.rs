@@ -121,8 +121,9 @@ fn rmd(exchanges: u32, period: u32) {
 
 #[test]
 fn nothing_grows_in_many_exchanges_and_reconnects() {
-    st(20_000, 2_000);
-    rmd(20_000, 2_000);
+    // Exchanges allocate nothing (allocation.rs); what could grow is what a reconnect leaves.
+    st(4_000, 400);
+    rmd(4_000, 400);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use motorlink_testbench::{Bench, BenchConfig};
 
 /// GET_REG for motor 1 with 127 bytes that never come.
 const CUT_OFF: [u8; 2] = [0x22, 0x7F];
-const SEEDS: u32 = 40;
+const SEEDS: u32 = 20;
 
 fn bench(profile: Profile) -> Bench {
     Bench::new(&BenchConfig { profile, ..BenchConfig::default() }).unwrap()

@@ -1,6 +1,6 @@
 //! The replies, settings and modes of a drive.
 
-use crate::rmd_bench::{Node, motor};
+use crate::rmd_bench::Node;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
@@ -346,35 +346,10 @@ fn silence_for_the_shutdown_time_switches_the_motor_off() {
 }
 
 #[test]
-fn an_echo_repeats_every_byte_including_null_bytes() {
-    let mut node = Node::new(1);
-    for code in COMMANDS.iter().filter(|row| row.echo).map(|row| u8::from(row.code)) {
-        let data = [code, 0xDE, 0xAD, 0xBE, 0xEF, 0x55, 0xAA, 0x33];
-        assert_eq!(node.raw(data), Some(data));
-    }
-}
-
-#[test]
-fn null_bytes_of_other_replies_are_zero() {
-    let mut node = Node::new(1);
-    for row in COMMANDS.iter().filter(|row| !row.echo) {
-        let reply = node.raw([row.code.into(), 1, 2, 3, 4, 5, 6, 7]).unwrap();
-        let used = |byte| {
-            row.reply.iter().any(|field| (field.offset..field.offset + field.len).contains(&byte))
-        };
-        for (index, byte) in (1..).zip(&reply[1..]) {
-            assert!(used(index) || *byte == 0, "{} DATA[{index}]", row.code);
-        }
-    }
-}
-
-#[test]
-fn frames_for_others_and_frames_of_other_kinds_get_no_answer() {
+fn frames_that_a_drive_ignores_are_counted() {
     let mut node = Node::new(5);
     let data = torque(7).encode();
-    for frame in
-        [CanFrame::new(0x141, data), CanFrame::new(0x280, data), CanFrame::new(0x245, data)]
-    {
+    for frame in [CanFrame::new(0x141, data), CanFrame::new(0x280, data)] {
         assert_eq!(node.receive(Instant(1), &frame), None);
     }
     assert_eq!(*node.drive.ignored(), Ignored::default());
@@ -387,6 +362,4 @@ fn frames_for_others_and_frames_of_other_kinds_get_no_answer() {
     }
     assert_eq!(node.raw([0x60, 0, 0, 0, 0, 0, 0, 0]), None);
     assert_eq!(*node.drive.ignored(), Ignored { malformed: 3, unknown: 1 });
-    assert_eq!(node.motor.mode, Mode::Off);
-    assert_eq!(node.drive.config.id, motor(5));
 }

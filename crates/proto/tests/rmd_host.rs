@@ -50,6 +50,25 @@ fn a_reply_that_differs_from_its_request_is_altered() {
 }
 
 #[test]
+fn an_unknown_code_is_sent_and_times_out() {
+    let mut pair = Pair::new(&[1]);
+    pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
+    assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
+}
+
+#[test]
+fn the_reply_to_clear_errors_may_have_either_code() {
+    for clear_reply_0x9b in [false, true] {
+        let mut pair = Pair::new(&[1]);
+        pair.nodes[0].drive.config.clear_reply_0x9b = clear_reply_0x9b;
+        pair.request(1, ClearErrors).unwrap();
+        let reply = pair.run()[0].1.unwrap();
+        assert_eq!(reply[0], if clear_reply_0x9b { 0x9B } else { 0x9A });
+    }
+}
+
+#[test]
 fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
     let mut pair = Pair::new(&[1, 2, 3, 4, 5]);
     let torques = SetTorque4([100, -100, 0, 2000].map(IqCommand));
@@ -235,22 +254,6 @@ fn cancelling_one_motor_cancels_the_four_torques_that_would_reach_it() {
 }
 
 #[test]
-fn the_reply_to_clear_errors_may_have_either_code() {
-    for clear_reply_0x9b in [false, true] {
-        let mut pair = Pair::new(&[1]);
-        pair.nodes[0].drive.config.clear_reply_0x9b = clear_reply_0x9b;
-        pair.request(1, ClearErrors).unwrap();
-        let reply = pair.run()[0].1.unwrap();
-        assert_eq!(reply[0], if clear_reply_0x9b { 0x9B } else { 0x9A });
-    }
-    let mut host = trusted_host();
-    host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
-    assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-    host.receive(Instant(0), &CanFrame::new(0x141, [0x9B; 8]));
-    assert_eq!(host.counters().unasked, 1, "0x9B does not answer 0x9A");
-}
-
-#[test]
 fn frames_without_a_request_are_counted_and_dropped() {
     let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
@@ -300,99 +303,6 @@ fn limits_apply_to_raw_frames_of_their_motor_only() {
     assert_eq!(pair.host.request(pair.now, motor(2), raw), Ok(()));
     assert_eq!(pair.run().len(), 1);
     assert_eq!(pair.log, [0x142, 0x142]);
-}
-
-#[test]
-fn an_unknown_code_is_sent_and_times_out() {
-    let mut pair = Pair::new(&[1]);
-    pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
-    assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
-}
-
-/// A host that sends requests to a motor without pause. Replies carry the number of their request.
-/// From `stop` to `go_on` the motor stalls; then it sends all replies at once.
-struct Standstill {
-    host: Host,
-    now: Instant,
-    stop: Instant,
-    go_on: Instant,
-    coming: Vec<(Instant, CanFrame)>,
-    number: u32,
-}
-
-impl Standstill {
-    fn new(stop: u32, go_on: u32) -> Self {
-        let (stop, go_on) = (Micros::from_millis(stop), Micros::from_millis(go_on));
-        let (stop, go_on) = (Instant(0) + stop, Instant(0) + go_on);
-        let (host, now) = (trusted_host(), Instant(0));
-        Standstill { host, now, stop, go_on, coming: vec![], number: 0 }
-    }
-
-    /// One exchange, from the accepted request on. Returns its number and its result.
-    fn ask(&mut self, code: u8) -> (u32, Result<[u8; 8], Failure>) {
-        self.number += 1;
-        let [a, b, c, d] = self.number.to_le_bytes();
-        let data = [code, 0, 0, 0, a, b, c, d];
-        while let Err(refused) = self.host.request(self.now, motor(1), data) {
-            let RequestError::Quarantined { until, .. } = refused else { panic!("{refused}") };
-            assert!(until > self.now, "refused until now");
-            self.hear(until);
-        }
-        loop {
-            match self.host.poll(self.now) {
-                Output::Transmit(frame) => {
-                    let due = self.now + Micros(800);
-                    let still = (self.stop..self.go_on).contains(&due);
-                    // A motor that answers has a supply voltage, so the frame is not an echo.
-                    let &[code, _, _, _, a, b, c, d] = frame.eight_bytes().unwrap().1;
-                    let reply = CanFrame::new(0x141, [code, 25, 0, 240, a, b, c, d]);
-                    self.coming.push((if still { self.go_on } else { due }, reply));
-                }
-                Output::Done { result, .. } => return (self.number, result),
-                Output::Wait(until) => self.hear(until.expect("an exchange is open")),
-            }
-        }
-    }
-
-    fn hear(&mut self, until: Instant) {
-        let next = self.coming.iter().position(|(at, _)| *at <= until);
-        let Some(next) = next else {
-            self.now = until;
-            return;
-        };
-        let (at, frame) = self.coming.remove(next);
-        self.now = self.now.max(at);
-        self.host.receive(self.now, &frame);
-    }
-}
-
-#[test]
-#[cfg_attr(miri, ignore = "an interpreter takes long")]
-fn late_replies_after_a_stall_are_never_matched_to_a_newer_request() {
-    for code in [0x9C, 0x9A] {
-        for still in [60, 140, 160, 300, 1_000, 30_000] {
-            let mut bench = Standstill::new(100, 100 + still);
-            let (mut failed, mut back) = (0, None);
-            while bench.now < bench.go_on + Micros::from_millis(500) {
-                let (number, result) = bench.ask(code);
-                match result {
-                    Ok(reply) => {
-                        assert_eq!(reply[4..], number.to_le_bytes(), "{still} ms: another's")
-                    }
-                    Err(_) => failed += 1,
-                }
-                if result.is_ok() && bench.now > bench.go_on {
-                    back.get_or_insert(bench.now);
-                }
-                bench.now += Micros::from_millis(7);
-            }
-            assert!(failed > 0, "a stalled motor does not answer");
-            let took = back.expect("the motor is back").since(bench.go_on);
-            let stated = DEFAULT_QUARANTINE + DEFAULT_QUARANTINE + DEFAULT_TIMEOUT;
-            assert!(took <= stated, "{} us to come back from {still} ms", took.0);
-        }
-    }
 }
 
 /// A host after the timeout and the quarantine time of a request with this code to motor 1.

@@ -19,7 +19,8 @@ fn the_slave_answers_every_header_and_length_as_the_model_does() {
         for (first, motors) in FIRST.into_iter().zip([7, 1, 3, 2]) {
             let mut twins = Twins::new(profile, motors);
             for header in 0..=255 {
-                for length in 0..=128 {
+                // Behind 40 bytes only the length matters.
+                for length in (0..=128).filter(|length| first == 0 || !(40..126).contains(length)) {
                     let reply = twins.frame(header, &payload(first, length));
                     let dropped = profile == Profile::Mcsdk54 && length == 128;
                     assert!(dropped || matches!(reply[..], [HEADER_ACK | HEADER_NACK, ..]));
@@ -58,6 +59,8 @@ fn every_register_command_and_segment_does_as_the_model_does() {
                 ask(0x03, &[id]);
                 ask(0x0E, &[id % 5, id]);
                 ask(0x0D, &[id % 5]);
+                ask(0x08, &[id]);
+                ask(0x09, &[id; 9]);
             }
         }
     }

@@ -56,13 +56,6 @@ fn bench(profile: Profile) -> SlaveFixture {
 }
 
 #[test]
-fn a_write_that_reads_back_is_done_in_two_exchanges() {
-    let mut bench = bench(Profile::Spec);
-    assert_eq!(write(&mut bench, (KP, -7), 3, &[]), (Ok(1), 2));
-    assert_eq!(bench.drive.value(1, KP), -7);
-}
-
-#[test]
 fn a_lost_write_is_repeated_and_an_executed_one_is_not() {
     let lost = Some(Trouble::Lost);
     let mut first = bench(Profile::Spec);

@@ -13,7 +13,7 @@ use motorlink_telemetry::rows::Rows;
 use motorlink_telemetry::schedule::CommandId;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Subscription};
-use motorlink_testbench::{Bench, BenchConfig};
+use motorlink_testbench::Bench;
 
 use crate::engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
 use crate::got::Got;
@@ -54,11 +54,11 @@ fn four_motors_are_read_at_100_hz_without_a_gap() {
         })
         .collect();
     let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(Micros(5 * SECOND.0));
+    engine.run(Micros(3 * SECOND.0));
     let got = Got::of(&subscription);
     for signal in &wanted {
         let values = got.values(*signal);
-        assert!((498..=501).contains(&values.len()), "{signal:?}: {}", values.len());
+        assert!((298..=301).contains(&values.len()), "{signal:?}: {}", values.len());
         for pair in values.windows(2) {
             let gap = pair[1].0.since(pair[0].0);
             assert!((5_000..15_000).contains(&gap.0), "{gap:?}");
@@ -67,7 +67,7 @@ fn four_motors_are_read_at_100_hz_without_a_gap() {
     // One exchange for all values of a reply: the temperature comes with the current.
     let polls = engine.acquisition.rates().count();
     assert_eq!(polls, wanted.len());
-    assert!((got.replies() as f64 / 5.0 - 800.0).abs() < 5.0, "{}", got.replies());
+    assert!((got.replies() as f64 / 3.0 - 800.0).abs() < 8.0, "{}", got.replies());
     assert!(engine.acquisition.is_predicted());
     for rate in engine.acquisition.rates() {
         assert_eq!((rate.asked, rate.predicted), (CENTISECOND, CENTISECOND));
@@ -85,9 +85,9 @@ fn two_consumers_of_one_signal_cost_one_exchange() {
     let speed = signals(rmd(1), &["speed_dps"]);
     let fast = engine.subscribe(&speed, CENTISECOND);
     let slow = engine.subscribe(&speed, Micros(100_000));
-    engine.run(Micros(2 * SECOND.0));
+    engine.run(SECOND);
     let (fast, slow) = (Got::of(&fast).replies(), Got::of(&slow).replies());
-    assert!((199..=201).contains(&fast) && (19..=21).contains(&slow), "{fast} {slow}");
+    assert!((99..=101).contains(&fast) && (9..=11).contains(&slow), "{fast} {slow}");
     assert_eq!(engine.acquisition.rates().count(), 1);
 }
 
@@ -106,53 +106,6 @@ fn a_consumer_that_leaves_is_not_read_for_any_more() {
     let rest = std::iter::from_fn(|| subscription.take()).count();
     engine.run(SECOND);
     assert!(rest <= 11 && subscription.take().is_none());
-}
-
-#[test]
-fn registers_of_an_st_drive_are_read_in_one_segment() {
-    let bench = bench();
-    let mut engine = st_engine(&bench, "");
-    let names = ["SPEED_MEAS", "TORQUE_MEAS", "BUS_VOLTAGE", "STATUS", "I_A"];
-    let subscription = engine.subscribe(&signals(st(1), &names), CENTISECOND);
-    engine.run(Micros(3 * SECOND.0));
-    let got = Got::of(&subscription);
-    assert!((297..=301).contains(&got.replies()), "{}", got.replies());
-    let voltage = got.values(signals(st(1), &["BUS_VOLTAGE"])[0]);
-    assert!(voltage.iter().all(|(_, volts)| *volts == 325.0));
-    assert_eq!(voltage.len(), got.replies());
-}
-
-#[test]
-fn shipped_firmware_is_read_register_by_register() {
-    let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
-    let bench = Bench::new(&config).unwrap();
-    let mut engine = st_engine(&bench, "");
-    let wanted = signals(st(1), &["SPEED_MEAS", "BUS_VOLTAGE", "STATUS"]);
-    let subscription = engine.subscribe(&wanted, Micros(20_000));
-    engine.run(Micros(2 * SECOND.0));
-    let got = Got::of(&subscription);
-    for signal in wanted {
-        assert!((99..=101).contains(&got.values(signal).len()));
-    }
-}
-
-#[test]
-fn a_line_that_is_too_slow_says_so_and_slows_all() {
-    let config = BenchConfig { profile: Profile::Mcsdk54, ..BenchConfig::default() };
-    let bench = Bench::new(&config).unwrap();
-    let mut engine = st_engine(&bench, "");
-    let wanted = signals(st(1), &["SPEED_MEAS", "BUS_VOLTAGE", "STATUS", "TORQUE_MEAS"]);
-    engine.subscribe(&wanted, Micros(2_000));
-    engine.run(Micros(100_000));
-    assert!(engine.acquisition.is_predicted());
-    engine.run(Micros(5 * SECOND.0));
-    for rate in engine.acquisition.rates() {
-        let predicted = 1e6 / rate.predicted.0 as f64;
-        assert!(predicted < 300.0, "{predicted}");
-        assert!((rate.achieved / predicted - 1.0).abs() < 0.05, "{} {predicted}", rate.achieved);
-    }
-    let durations = engine.acquisition.load().durations().unwrap();
-    assert!(durations.median.0 > 500 && durations.p99 >= durations.median, "{durations:?}");
 }
 
 #[test]
@@ -227,15 +180,15 @@ fn an_st_motor_is_started_and_stopped_between_the_polls() {
     engine.run(Micros(4 * SECOND.0));
     let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
     let stopped = engine.stop(stop);
-    engine.run(Micros(4 * SECOND.0));
+    engine.run(Micros(2 * SECOND.0));
     assert!(matches!(engine.result(stopped), Some(Ok(_))));
     let got = Got::of(&subscription);
     let rpm: Vec<_> = got.values(speed[0]).into_iter().map(|(_, rpm)| rpm).collect();
     let fastest = rpm.iter().copied().fold(0.0, f64::max);
     assert!((fastest - 1500.0).abs() < 100.0, "{fastest}");
     assert!(rpm.last().unwrap().abs() < 30.0, "{:?}", rpm.last());
-    // 8 s at 100 Hz, and not one instant less for the commands.
-    assert!(rpm.len() >= 797, "{}", rpm.len());
+    // 4 s at 100 Hz, and not one instant less for the commands.
+    assert!(rpm.len() >= 397, "{}", rpm.len());
 }
 
 #[test]
@@ -261,9 +214,9 @@ fn an_absent_motor_is_said_once_and_slows_no_other() {
     let mut wanted = signals(rmd(1), &["speed_dps"]);
     wanted.extend(signals(rmd(9), &["speed_dps"]));
     let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(Micros(10 * SECOND.0));
+    engine.run(Micros(4 * SECOND.0));
     let got = Got::of(&subscription);
-    assert!(got.values(wanted[0]).len() >= 998, "{}", got.values(wanted[0]).len());
+    assert!(got.values(wanted[0]).len() >= 398, "{}", got.values(wanted[0]).len());
     assert!(got.values(wanted[1]).is_empty());
     let silent: Vec<_> = got.events().filter(|what| !is_good(what)).collect();
     assert!(
@@ -287,7 +240,7 @@ fn two_motors_of_a_line_are_confirmed_and_fall_silent_together() {
 
     let mut engine = st_engine(&bench(), "drop=0.02,seed=1");
     let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(Micros(20 * SECOND.0));
+    engine.run(Micros(6 * SECOND.0));
     let got = Got::of(&subscription);
     let of = |wanted: Motor| {
         got.events()
@@ -322,24 +275,22 @@ fn a_latch_refuses_motion_that_waits() {
 
 #[test]
 fn a_stop_gets_through_a_bad_line() {
-    for seed in 0..8 {
+    for seed in 0..3 {
         let bench = bench();
         let mut engine = rmd_engine(&bench, &format!("drop=0.2,seed={seed}"));
-        let wanted = signals(rmd(1), &["speed_dps"]);
-        engine.subscribe(&wanted, CENTISECOND);
+        engine.subscribe(&signals(rmd(1), &["speed_dps"]), CENTISECOND);
         let id = MotorId::new(1).unwrap();
-        engine.run(Micros(500_000));
         let turn = SetSpeed { speed: CentiDps::from_dps(360.0) };
         for _ in 0..5 {
             engine.command(Request::rmd(id, &turn)).unwrap();
         }
         engine.run(SECOND);
-        let stopped = engine.stop(Request::rmd(id, &Stop));
-        engine.run(Micros(3 * SECOND.0));
-        assert!(matches!(engine.result(stopped), Some(Ok(_))), "seed {seed}: {:?}", engine.ended);
         let at = bench.signals().iter().position(|it| it.name == "rmd1.speed_dps").unwrap();
-        let turning = bench.values()[at];
-        assert!(turning.abs() < 5.0, "seed {seed}: {turning}");
+        assert!(bench.values()[at] > 300.0, "seed {seed}: {}", bench.values()[at]);
+        let stopped = engine.stop(Request::rmd(id, &Stop));
+        engine.run(SECOND);
+        assert!(matches!(engine.result(stopped), Some(Ok(_))), "seed {seed}: {:?}", engine.ended);
+        assert!(bench.values()[at].abs() < 5.0, "seed {seed}: {}", bench.values()[at]);
     }
 }
 
@@ -370,27 +321,7 @@ fn a_latch_refuses_commands_whose_effect_is_unknown() {
         let row = Code::from(code).info();
         let is_harmless = row.is_some_and(|row| !row.moves);
         assert_eq!(sent.is_ok(), is_harmless, "{code:#04x}");
-        engine.run(CENTISECOND);
     }
-}
-
-#[test]
-fn a_latch_holds_for_a_command_that_waits() {
-    let bench = bench();
-    let mut engine = rmd_engine(&bench, "");
-    let motor = MotorId::new(1).unwrap();
-    let turn = Request::rmd(motor, &SetSpeed { speed: CentiDps::from_dps(360.0) });
-    let reading = engine.command(Request::rmd(motor, &ReadStatus)).unwrap();
-    let moving = engine.command(turn.clone()).unwrap();
-    engine.latch();
-    engine.run(SECOND);
-    assert!(matches!(engine.result(reading), Some(Ok(_))), "{:?}", engine.ended);
-    let refused = engine.result(moving);
-    assert!(matches!(refused, Some(Err(CommandError::Latched(_)))), "{:?}", engine.ended);
-    engine.acquisition.release(&"operator".into());
-    let moving = engine.command(turn).unwrap();
-    engine.run(SECOND);
-    assert!(matches!(engine.result(moving), Some(Ok(_))), "{:?}", engine.ended);
 }
 
 #[test]

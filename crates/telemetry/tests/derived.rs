@@ -140,10 +140,10 @@ fn a_derived_value_is_computed_from_values_of_its_instant() {
     let mut engine = turning(unchanged);
     let wanted = signals(rmd(1), &["voltage_volts", "iq_amps", PRODUCT]);
     let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(Micros(2 * SECOND.0));
+    engine.run(SECOND);
     let got = Got::of(&subscription);
     let [voltage, current, product] = [0, 1, 2].map(|at| by_instant(&got, wanted[at]));
-    assert!((198..=201).contains(&product.len()), "{}", product.len());
+    assert!((98..=101).contains(&product.len()), "{}", product.len());
     for (instant, value) in &product {
         assert_eq!(*value, voltage[instant] * current[instant], "{instant:?}");
     }
@@ -166,10 +166,10 @@ fn sources_that_nobody_wants_are_read_for_a_derived_value() {
     let mut engine = turning(unchanged);
     let wanted = signals(rmd(1), &[PRODUCT]);
     let subscription = engine.subscribe(&wanted, CENTISECOND);
-    engine.run(Micros(3 * SECOND.0));
+    engine.run(Micros(2 * SECOND.0));
     let got = Got::of(&subscription);
     assert_eq!(got.values(wanted[0]).len(), got.replies());
-    assert!((297..=301).contains(&got.replies()), "{}", got.replies());
+    assert!((197..=201).contains(&got.replies()), "{}", got.replies());
     assert!(engine.acquisition.is_predicted());
     let rates: Vec<_> = engine.acquisition.rates().collect();
     let rate = rates.iter().find(|rate| rate.signal == wanted[0]).unwrap();
@@ -178,34 +178,14 @@ fn sources_that_nobody_wants_are_read_for_a_derived_value() {
 }
 
 #[test]
-fn a_source_that_is_wanted_anyway_is_read_once() {
-    let count = Arc::new(Mutex::new(BTreeMap::<u8, u32>::new()));
-    let seen = Arc::clone(&count);
-    let mut engine = turning(move |over| {
-        if let Ok(Reply::Rmd([code, ..])) = over.result {
-            *seen.lock().unwrap().entry(code).or_default() += 1;
-        }
-    });
-    let source = engine.subscribe(&signals(rmd(1), &["iq_amps"]), CENTISECOND);
-    let derived = signals(rmd(1), &[PRODUCT]);
-    let subscription = engine.subscribe(&derived, CENTISECOND);
-    engine.run(SECOND);
-    let counts = count.lock().unwrap().clone();
-    let reads = [Code::ReadMotionStatus, Code::ReadStatus].map(|code| counts[&code.into()]);
-    assert!(reads.iter().all(|count| (98..=101).contains(count)), "{counts:?}");
-    assert!((98..=101).contains(&Got::of(&source).replies()));
-    assert!((98..=101).contains(&Got::of(&subscription).values(derived[0]).len()));
-}
-
-#[test]
 fn a_derived_value_comes_at_its_rate_beside_faster_sources() {
     let mut engine = turning(unchanged);
     engine.subscribe(&signals(rmd(1), &["speed_dps"]), CENTISECOND);
     let derived = signals(rmd(1), &[PRODUCT]);
     let subscription = engine.subscribe(&derived, Micros(35_000));
-    engine.run(Micros(7 * SECOND.0));
+    engine.run(Micros(2_100_000));
     let values = Got::of(&subscription).values(derived[0]).len();
-    assert!((198..=202).contains(&values), "{values}");
+    assert!((59..=61).contains(&values), "{values}");
 }
 
 #[test]
@@ -215,13 +195,13 @@ fn a_line_that_is_too_slow_gives_derived_values() {
         (1..=4).flat_map(|id| signals(rmd(id), &[PRODUCT, "phase_a_amps"])).collect();
     engine.subscribe(&signals(rmd(1), &["speed_dps"]), Micros(300));
     let subscription = engine.subscribe(&wanted, Micros(700));
-    engine.run(Micros(3 * SECOND.0));
+    engine.run(Micros(2 * SECOND.0));
     while subscription.take().is_some() {}
-    engine.run(SECOND);
+    engine.run(Micros(500_000));
     let got = Got::of(&subscription);
     for rate in engine.acquisition.rates().filter(|rate| wanted.contains(&rate.signal)) {
         let predicted = 1e6 / rate.predicted.0 as f64;
-        let values = got.values(rate.signal).len() as f64;
+        let values = 2.0 * got.values(rate.signal).len() as f64;
         assert!(predicted < 1_300.0, "{predicted}");
         assert!((values / predicted - 1.0).abs() < 0.1, "{values} {predicted}");
     }

@@ -17,46 +17,34 @@ use crate::engine::{Engine, SECOND, bench, rmd, signals, spec, st, st_options};
 /// An engine on a bad line needs no finer steps.
 const STEP: Micros = Micros(500);
 
-/// The rows of a minute, summed over four seeds.
-fn rows(period: Micros, begin: impl Fn(u64) -> (Engine, Vec<Signal>)) -> usize {
-    let of_seed = |seed| {
-        let (mut engine, signals) = begin(seed);
-        engine.step = STEP;
-        let subscription = engine.subscribe(&signals, period);
-        engine.run(Micros(60 * SECOND.0));
-        let mut rows = Rows::new(signals);
-        std::iter::from_fn(|| subscription.take()).for_each(|record| rows.take(&record));
-        let items = std::iter::from_fn(|| rows.next_item());
-        items.filter(|item| matches!(item, Item::Row(_))).count()
-    };
-    (0..4).map(of_seed).sum()
+/// The rows of 20 s.
+fn rows(period: Micros, (mut engine, signals): (Engine, Vec<Signal>)) -> usize {
+    engine.step = STEP;
+    let subscription = engine.subscribe(&signals, period);
+    engine.run(Micros(20 * SECOND.0));
+    let mut rows = Rows::new(signals);
+    std::iter::from_fn(|| subscription.take()).for_each(|record| rows.take(&record));
+    let items = std::iter::from_fn(|| rows.next_item());
+    items.filter(|item| matches!(item, Item::Row(_))).count()
 }
 
 #[test]
 fn a_serial_line_that_loses_bytes_gives_rows_when_it_can() {
-    let rows = |loss: f64| {
-        rows(Micros(100_000), |seed| {
-            let link = bench().bytes(&spec(&format!("drop={loss},seed={seed}")));
-            (Engine::st(link, st_options(Profile::Spec)), signals(st(1), &["BUS_VOLTAGE"]))
-        })
-    };
+    let link = bench().bytes(&spec("drop=0.01,seed=1"));
+    let engine = Engine::st(link, st_options(Profile::Spec));
     // Each lost byte costs the timeout of 1 s and the recovery of the line.
-    let (some, many) = (rows(0.01), rows(0.05));
-    assert!(some > 680, "{some} of 2400");
-    assert!(many > 15, "{many} of 2400");
+    let count = rows(Micros(100_000), (engine, signals(st(1), &["BUS_VOLTAGE"])));
+    assert!(count > 40, "{count} of 200");
 }
 
 #[test]
 fn a_bus_that_loses_frames_gives_rows_when_it_can() {
-    let rows = |period: Micros| {
-        rows(period, |seed| {
-            let link = bench().can(&spec(&format!("drop=0.05,seed={seed}")));
-            (Engine::rmd(link), signals(rmd(1), &["speed_dps", "voltage_volts"]))
-        })
-    };
-    let (slow, fast) = (rows(Micros(100_000)), rows(Micros(10_000)));
-    assert!(slow > 1_350, "{slow} of 2400");
-    assert!(fast > 2_600, "{fast} of 24000");
+    for (period, least) in [(100_000, 100), (10_000, 180)] {
+        let engine = Engine::rmd(bench().can(&spec("drop=0.05,seed=1")));
+        let signals = signals(rmd(1), &["speed_dps", "voltage_volts"]);
+        let count = rows(Micros(period), (engine, signals));
+        assert!(count > least, "{count} in 20 s");
+    }
 }
 
 /// A link on which some reads come a second time, behind the next write.
@@ -114,14 +102,14 @@ type Constant = (&'static str, f64, u32);
 /// Reads these registers on a bad line. Gives how many values were confirmed, and how many doubts there
 /// were. Each register has a period of its own, so that there is no data segment. A wrong value that
 /// is confirmed fails.
-fn judged(mut engine: Engine, constants: &[Constant], line: &str) -> (usize, usize) {
+fn judged(mut engine: Engine, constants: &[Constant], span: Micros, line: &str) -> (usize, usize) {
     let wanted: Vec<Signal> =
         constants.iter().flat_map(|(name, ..)| signals(st(1), &[name])).collect();
     let wants = wanted.iter().zip(constants);
     let wants: Wants = wants.map(|(it, (.., ms))| (*it, Micros::from_millis(*ms))).collect();
     let subscription = Subscription::new(1_000_000, Full::DropNewest);
     engine.acquisition.subscribe(subscription.clone(), wants);
-    engine.run(Micros(5 * SECOND.0));
+    engine.run(span);
     let mut open: Vec<(Instant, bool)> = Vec::new();
     let (mut confirmed, mut doubts) = (0, 0);
     for record in std::iter::from_fn(|| subscription.take()) {
@@ -171,14 +159,14 @@ fn no_wrong_value_is_confirmed_on_a_bad_line() {
         ("drop=0.02", 0.02, 50),
     ];
     for (faults, twice, timeout_ms) in lines {
-        let judged = (0..6).map(|seed| {
+        let judged = (0..3).map(|seed| {
             let mut chance = Rng::with_seed(seed);
             let faults = Faults { seed, ..spec(faults) };
             let engine = bad_line(faults, move |_| chance.f64() < twice, timeout_ms);
-            judged(engine, &constants, &format!("{faults} {twice} {seed}"))
+            judged(engine, &constants, Micros(4 * SECOND.0), &format!("{faults} {twice} {seed}"))
         });
         let (confirmed, doubts) = judged.fold((0, 0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
-        assert!(confirmed > 200, "{faults} {twice}: {confirmed}");
+        assert!(confirmed > 80, "{faults} {twice}: {confirmed}");
         assert!(doubts > 0 || twice == 0.0, "{faults} {twice}");
     }
 }
@@ -194,8 +182,9 @@ fn a_size_of_the_other_profile_confirms_no_value_before_it() {
             seen += u32::from(is_voltage);
             is_voltage && seen == nth
         };
+        let engine = bad_line(Faults::NONE, comes_again, 100);
         let (confirmed, doubts) =
-            judged(bad_line(Faults::NONE, comes_again, 100), &constants, &format!("{nth}"));
-        assert!(confirmed > 200 && doubts > 0, "{nth}: {confirmed} {doubts}");
+            judged(engine, &constants, Micros(2 * SECOND.0), &format!("{nth}"));
+        assert!(confirmed > 10 && doubts > 0, "{nth}: {confirmed} {doubts}");
     }
 }

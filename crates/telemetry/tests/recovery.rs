@@ -105,19 +105,24 @@ impl Engine {
         self.acquisition.command(&"test".into(), request, time_to_live).unwrap()
     }
 
-    fn end_of(&self, id: CommandId) -> &Result<Reply, CommandError> {
+    /// Runs until it is over.
+    fn end_of(&mut self, id: CommandId) -> &Result<Reply, CommandError> {
+        for _ in 0..5_000 {
+            if self.result(id).is_some() {
+                break;
+            }
+            self.run(Micros(1_000));
+        }
         self.result(id).unwrap_or_else(|| panic!("{id:?} is not over: {:?}", self.ended))
     }
 
     /// A reply is lost. It may still come, so the client recovers the line with the next request.
     fn lose_line(&mut self, wire: &Wire, read: Request) {
         let synced = self.send(read.clone(), SECOND);
-        self.run(Micros(5 * SECOND.0));
-        assert!(self.end_of(synced).is_ok(), "{:?}", self.ended);
+        assert!(self.end_of(synced).is_ok());
         wire.mute(true);
         let lost = self.send(read, SECOND);
-        self.run(Micros(5 * SECOND.0));
-        assert!(self.end_of(lost).is_err(), "{:?}", self.ended);
+        assert!(self.end_of(lost).is_err());
         wire.mute(false);
     }
 }
@@ -145,18 +150,18 @@ fn a_start_is_not_sent_after_its_time_to_live_when_a_line_was_recovered() {
     engine.lose_line(&wire, read_status(1));
     let events = engine.subscribe(&[], SECOND);
     let start = engine.send(execute(Command::StartMotor), Micros(2_000));
-    engine.run(Micros(5 * SECOND.0));
     assert!(matches!(engine.end_of(start), Err(CommandError::Expired)), "{:?}", engine.ended);
-    assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
     // No event says that it was sent.
     while let Some(record) = events.take() {
         let Record::Event(event) = record else { continue };
         assert!(!matches!(event.what, What::Commanded(..)), "{event:?}");
     }
-    // The line has been recovered.
+    // When the line has been recovered.
+    let read = engine.send(read_status(1), Micros(5 * SECOND.0));
+    assert!(engine.end_of(read).is_ok(), "{:?}", engine.ended);
     let start = engine.send(execute(Command::StartMotor), Micros(2_000));
-    engine.run(SECOND);
     assert!(engine.end_of(start).is_ok(), "{:?}", engine.ended);
+    assert_eq!(wire.times(&frame_of(Command::StartMotor)).len(), 1);
 }
 
 #[test]
@@ -164,13 +169,12 @@ fn commands_that_expire_do_not_keep_a_line_from_being_recovered() {
     let (mut engine, wire) = st_engine();
     engine.lose_line(&wire, read_status(1));
     let ramp = Ramp { speed_rpm: 900, duration_ms: 100 };
-    let mut last = None;
-    for _ in 0..3_000 {
-        last = Some(engine.send(Request::st(1, St::SetRamp(ramp)), Micros(1_000)));
+    let is_carried_out = (0..3_000).any(|_| {
+        let last = engine.send(Request::st(1, St::SetRamp(ramp)), Micros(1_000));
         engine.run(Micros(2_000));
-    }
-    engine.run(SECOND);
-    assert!(engine.end_of(last.unwrap()).is_ok(), "{:?}", engine.ended.last());
+        engine.result(last).is_some_and(Result::is_ok)
+    });
+    assert!(is_carried_out, "{:?}", engine.ended.last());
 }
 
 #[test]
@@ -183,10 +187,9 @@ fn a_stop_does_not_wait_for_the_recovery_of_a_poll() {
     engine.run(Micros(1_000));
     let asked = engine.clock.now();
     let stop = engine.stop(execute(Command::StopMotor));
-    engine.run(Micros(5 * SECOND.0));
+    assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
     let first = wire.times(&frame_of(Command::StopMotor))[0];
     assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
-    assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
     assert!(matches!(engine.end_of(start), Err(CommandError::Overtaken)), "{:?}", engine.ended);
     assert!(engine.end_of(other).is_ok(), "{:?}", engine.ended);
     assert_eq!(wire.times(&frame_of(Command::StartMotor)), []);
@@ -200,10 +203,10 @@ fn a_read_that_was_not_sent_gives_way_to_a_stop() {
     engine.run(Micros(1_000));
     let asked = engine.clock.now();
     engine.stop(execute(Command::StopMotor));
-    engine.run(Micros(5 * SECOND.0));
+    assert!(matches!(engine.end_of(read), Err(CommandError::Overtaken)), "{:?}", engine.ended);
+    engine.run(Micros(1_000));
     let first = wire.times(&frame_of(Command::StopMotor))[0];
     assert!(first.since(asked) <= Micros(1_000), "{:?}", first.since(asked));
-    assert!(matches!(engine.end_of(read), Err(CommandError::Overtaken)), "{:?}", engine.ended);
 }
 
 #[test]
@@ -215,7 +218,6 @@ fn a_request_that_no_line_takes_is_over_at_once() {
     let refused =
         [Request::rmd(id, &turn), Request::st(9, St::ExecuteCommand(Command::StartMotor))];
     let refused = refused.map(|request| engine.send(request, SECOND));
-    engine.run(Micros(5 * SECOND.0));
     for id in refused {
         assert!(matches!(engine.end_of(id), Err(CommandError::Line(_))), "{:?}", engine.ended);
     }
@@ -229,18 +231,14 @@ fn motion_is_not_sent_after_its_time_to_live_when_a_motor_was_silent() {
     let turn = Request::rmd(id, &SetSpeed { speed: CentiDps::from_dps(360.0) });
     wire.mute(true);
     let lost = engine.send(Request::rmd(id, &ReadStatus), SECOND);
-    engine.run(Micros(200_000));
     assert!(engine.end_of(lost).is_err());
     wire.mute(false);
     let late = engine.send(turn.clone(), Micros(100));
-    engine.run(Micros(5 * SECOND.0));
     assert!(matches!(engine.end_of(late), Err(CommandError::Expired)), "{:?}", engine.ended);
-    assert_eq!(wire.times(&[Code::SetSpeed.into()]), []);
     let again = engine.send(turn, SECOND);
-    engine.run(SECOND);
     assert!(engine.end_of(again).is_ok(), "{:?}", engine.ended);
+    assert_eq!(wire.times(&[Code::SetSpeed.into()]).len(), 1);
     let stop = engine.stop(Request::rmd(id, &Stop));
-    engine.run(SECOND);
     assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
 }
 
@@ -253,12 +251,60 @@ fn each_motor_of_a_lost_line_gets_its_stop_at_once() {
     let asked = engine.clock.now();
     let stops =
         [1, 2].map(|motor| engine.stop(Request::st(motor, St::ExecuteCommand(Command::StopMotor))));
-    engine.run(Micros(5 * SECOND.0));
+    for stop in stops {
+        assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
+    }
     for motor in [1, 2] {
         let first = wire.times(&frame_to(motor, Command::StopMotor))[0];
         assert!(first.since(asked) <= Micros(1_000), "{motor}: {:?}", first.since(asked));
     }
-    for stop in stops {
-        assert!(engine.end_of(stop).is_ok(), "{:?}", engine.ended);
+}
+
+struct Paused<L> {
+    link: L,
+    clock: Clock,
+    writes: u32,
+    at: u32,
+    pause: Micros,
+}
+
+impl<L: Link> Link for Paused<L> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
+impl<L: ByteLink> ByteLink for Paused<L> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.writes += 1;
+        self.link.write(bytes)?;
+        if self.writes == self.at {
+            self.clock.wait(self.clock.now() + self.pause);
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.link.read(buffer, timeout)
+    }
+}
+
+#[test]
+fn tmp_paused() {
+    for (at, pause) in (1..=10).map(|at| (at, 30)) {
+        let bench = bench();
+        let link = bench.bytes(&spec(""));
+        let pause = Micros(pause * SECOND.0);
+        let link = Paused { clock: link.clock().unwrap(), link, writes: 0, at, pause };
+        let mut engine = Engine::st(link, st_options(Profile::Spec));
+        let subscription = engine.subscribe(&signals(st(1), &["SPEED_MEAS"]), Micros(20_000));
+        let count = || std::iter::from_fn(|| subscription.take()).filter(|r| matches!(r, Record::Values(_))).count();
+        engine.run(Micros(3 * SECOND.0));
+        let mut counts = vec![count()];
+        for _ in 0..8 {
+            engine.run(Micros(10 * SECOND.0));
+            counts.push(count());
+        }
+        println!("TMP {at} {pause:?}: {counts:?}");
     }
 }

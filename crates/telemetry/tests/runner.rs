@@ -160,24 +160,6 @@ fn motors_stop_when_a_task_panics() {
 }
 
 #[test]
-fn a_stop_and_a_latch_hold_for_every_sender() {
-    let drives = Drives::new("latched");
-    let runner = drives.rmd();
-    let remote = runner.remote();
-    remote.command(&by("arm"), turn(2, 360.0), MINUTE).unwrap();
-    assert!(drives.is_reached(|dps| dps > 300.0, "rmd2.speed_dps"));
-    remote.latch(&by("operator")).unwrap();
-    remote.stop(&by("operator"), Request::rmd(id(2), &Stop)).unwrap();
-    assert!(drives.is_reached(|dps| dps.abs() < 5.0, "rmd2.speed_dps"));
-    for sender in ["arm", "operator"] {
-        let refused = remote.command(&by(sender), turn(2, 360.0), MINUTE);
-        assert!(matches!(refused, Err(CommandError::Latched(_))), "{refused:?}");
-    }
-    remote.release(&by("operator")).unwrap();
-    remote.command(&by("arm"), turn(2, 360.0), MINUTE).unwrap();
-}
-
-#[test]
 fn a_port_that_goes_away_and_comes_back_is_used_again() {
     let mut drives = Drives::new("away");
     let runner = drives.st();

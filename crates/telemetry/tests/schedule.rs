@@ -144,18 +144,20 @@ impl<F: FnMut(Instant, Lane, &Job<&'static str>) -> (Micros, Outcome)> Line<F> {
 }
 
 #[test]
-fn instants_do_not_drift_in_an_hour() {
+fn instants_do_not_drift() {
     let mut line = Line::new(SERIAL, taking(1_700));
     line.polls(&[(1, 0, 10), (2, 0, 10), (3, 0, 7)]);
-    line.run(3_600 * SECOND);
+    line.run(1_200 * SECOND + 10 * MILLISECOND);
     let times = line.times(1);
-    assert_eq!(times.len(), 36_001);
+    assert_eq!(times.len(), 12_001);
     for (k, (_, instant)) in times.iter().enumerate() {
         assert_eq!(instant.0, k as u64 * 100 * MILLISECOND);
     }
+    // Polls of a group are read at the same instants.
+    assert!(line.times(2).iter().zip(&times).all(|(one, other)| one.1 == other.1));
     let late = times.iter().map(|(at, instant)| at.since(*instant)).max().unwrap();
     assert!(late.0 <= 2 * 1_700, "{late:?}");
-    assert_eq!(line.count(3), 3_600 * SECOND as usize / (SECOND as usize / 7) + 1);
+    assert_eq!(line.count(3), 1_200 * SECOND as usize / (SECOND as usize / 7) + 1);
     assert_eq!(line.schedule.skipped(), 0);
 }
 
@@ -172,17 +174,6 @@ fn a_poll_that_is_given_up_is_begun_anew_for_its_instant() {
     line.run(10_000);
     let begun: Vec<_> = line.times(1).into_iter().skip(1).map(|(at, it)| (at.0, it.0)).collect();
     assert_eq!(begun, [(10_000, 10_000), (14_000, 10_000), (20_000, 20_000)]);
-}
-
-#[test]
-fn polls_of_a_group_are_read_at_the_same_instants() {
-    let mut line = Line::new(SERIAL, taking(1_000));
-    line.polls(&[(1, 0, 50), (2, 0, 50), (3, 0, 50)]);
-    line.run(SECOND - 1);
-    let instants =
-        |poll| line.times(poll).into_iter().map(|(_, instant)| instant).collect::<Vec<_>>();
-    assert_eq!(instants(1), instants(2));
-    assert_eq!(instants(2), instants(3));
 }
 
 #[test]
@@ -224,26 +215,16 @@ fn a_line_that_answers_late_at_first_is_predicted_with_its_first_answer() {
 }
 
 #[test]
-fn a_line_that_carries_everything_is_not_slowed() {
-    let mut line = Line::new(SERIAL, taking(900));
-    line.polls(&[(1, 0, 1_000)]);
-    line.run(SECOND);
-    assert_eq!(line.schedule.load().stretch(), 1.0);
-    assert!((line.schedule.load().demand() - 0.9).abs() < 0.01);
-    assert_eq!(line.count(1), 1_001);
-}
-
-#[test]
 fn motors_on_a_bus_are_asked_at_the_same_time() {
     // 16 motors x 2 exchanges x 100 Hz: 0.8 of the bus, 1.76 if each waited for the one before.
     let mut line = Line::new(BUS, bus());
     let polls: Vec<_> =
         (0..16).flat_map(|m| [(2 * m, m as u8, 100), (2 * m + 1, m as u8, 100)]).collect();
     line.polls(&polls);
-    line.run(10 * SECOND - 1);
+    line.run(3 * SECOND - 1);
     assert_eq!(line.schedule.load().stretch(), 1.0);
     for poll in 0..32 {
-        assert_eq!(line.count(poll), 1_000, "poll {poll}");
+        assert_eq!(line.count(poll), 300, "poll {poll}");
     }
 }
 
@@ -256,10 +237,10 @@ fn the_load_of_a_bus_counts_what_overlaps() {
     let demand = line.schedule.load().demand();
     assert!((1.5..1.75).contains(&demand), "{demand}");
     line.events.clear();
-    line.run(10 * SECOND);
+    line.run(3 * SECOND);
     let counts: Vec<_> = (0..32).map(|poll| line.count(poll)).collect();
     let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
-    assert!(most - least <= 2 && (1_080..1_260).contains(most), "{counts:?}");
+    assert!(most - least <= 2 && (324..378).contains(most), "{counts:?}");
 }
 
 #[test]
@@ -362,20 +343,27 @@ fn a_stop_on_a_bus_replaces_the_exchange_of_its_motor() {
 }
 
 #[test]
-fn a_stop_is_repeated_until_it_is_confirmed() {
-    let stops = |lost: usize| {
+fn a_stop_is_repeated_until_it_is_confirmed_or_refused() {
+    let stops_by = |quiet: Option<Quiet>, lost: usize, outcome: Outcome| {
         let mut asked = 0;
         let mut line = Line::new(SERIAL, move |_, _, _: &Job<_>| {
             asked += 1;
-            let outcome = if asked > lost { Outcome::Answered } else { Outcome::Failed };
-            (Micros(1_000), outcome)
+            (Micros(1_000), if asked > lost { outcome } else { Outcome::Failed })
         });
-        let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| false);
+        let (now, lane, stop) = (Instant(0), Lane(0), "stop");
+        let id = match quiet {
+            Some(quiet) => line.schedule.stop_quietly(now, lane, stop, is(stop), quiet),
+            None => line.schedule.stop(now, lane, stop, is(stop), |_| false).0,
+        };
         line.run(10 * SECOND);
         let sent = line.events.iter().filter(|(_, _, event)| *event == Event::Stop(None)).count();
         let confirmed = line.at(&Event::Over(Verdict::Stopped(vec![id])));
         (sent, confirmed, line.at(&Event::Over(Verdict::StopFailed(vec![id]))))
     };
+    assert_eq!(stops_by(None, 0, Outcome::Refused), (1, None, Some(Instant(1_000))));
+    let (sent, confirmed, _) = stops_by(Some(Quiet::Precaution), 10, Outcome::Answered);
+    assert!(sent == 11 && confirmed.is_some());
+    let stops = |lost| stops_by(None, lost, Outcome::Answered);
     assert_eq!(stops(0), (1, Some(Instant(1_000)), None));
     assert_eq!(stops(10), (11, Some(Instant(11_000 + 10 * 10_000)), None));
     let (sent, confirmed, failed) = stops(usize::MAX);
@@ -502,52 +490,25 @@ fn a_stop_that_is_pressed_without_an_end_leaves_others_their_turns_and_ends_for_
 }
 
 #[test]
-fn a_precaution_is_repeated_until_it_is_confirmed() {
-    let (sent, mut lost) = (RefCell::default(), 10);
-    let mut line = Line::new(
-        SERIAL,
-        stops(&sent, |_| {
-            lost -= 1;
-            (Micros(1_000), if lost < 0 { Outcome::Answered } else { Outcome::Failed })
-        }),
-    );
-    let quiet = Quiet::Precaution;
-    let id = line.schedule.stop_quietly(line.now, Lane(0), "other", is("other"), quiet);
-    line.run(SECOND);
-    assert!(line.at(&Event::Over(Verdict::Stopped(vec![id]))).is_some(), "{:?}", line.events);
-    drop(line);
-    assert_eq!(sent.into_inner().len(), 11);
-}
-
-#[test]
-fn a_refused_stop_is_not_repeated() {
-    let mut line = Line::new(SERIAL, |_, _, _: &Job<_>| (Micros(1_000), Outcome::Refused));
-    let (id, _) = line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| false);
-    line.run(SECOND);
-    assert_eq!(line.at(&Event::Over(Verdict::StopFailed(vec![id]))), Some(Instant(1_000)));
-    assert_eq!(line.events.len(), 2);
-}
-
-#[test]
 fn a_silent_motor_does_not_slow_the_others() {
     let mut bus = bus();
     let is_silent =
-        |now: Instant, lane: Lane| lane == Lane(3) && (SECOND..60 * SECOND).contains(&now.0);
+        |now: Instant, lane: Lane| lane == Lane(3) && (SECOND..15 * SECOND).contains(&now.0);
     let mut line = Line::new(BUS, move |now, lane, job: &Job<_>| match is_silent(now, lane) {
         true => (Micros(100_000), Outcome::Failed),
         false => bus(now, lane, job),
     });
-    line.polls(&(0..16).map(|m| (m, m as u8, 100)).collect::<Vec<_>>());
-    line.run(60 * SECOND);
-    assert_eq!(line.count(0), 6_001);
-    assert_eq!(line.count(15), 6_001);
+    line.polls(&(0..8).map(|m| (m, m as u8, 100)).collect::<Vec<_>>());
+    line.run(15 * SECOND);
+    assert_eq!(line.count(0), 1_501);
+    assert_eq!(line.count(7), 1_501);
     // A second at 100 Hz, then 2 s without a pause, then a pause of 500 ms before each poll.
     let asked = line.count(3) - 100;
-    assert!((110..120).contains(&asked), "{asked}");
+    assert!((35..45).contains(&asked), "{asked}");
     line.events.clear();
-    line.run(10 * SECOND);
-    assert!(line.count(3) >= 930, "{}", line.count(3));
-    assert_eq!(line.count(0), 1_000);
+    line.run(3 * SECOND);
+    assert!(line.count(3) >= 230, "{}", line.count(3));
+    assert_eq!(line.count(0), 300);
 }
 
 #[test]

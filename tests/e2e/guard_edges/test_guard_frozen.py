@@ -5,21 +5,15 @@ import signal
 
 import pytest
 
-from guarded import PORT, PTY, is_told_to_stop, rests, turns, where
+from guarded import PORT, is_told_to_stop, rests, turns, where
 
 
-@pytest.mark.parametrize("serve", ["pty", "unix-listen", "tcp-listen"])
-@pytest.mark.parametrize("protocol", PORT)
+@pytest.mark.parametrize(["protocol", "serve"], [("st", "pty"), ("rmd", "unix-listen")])
 def test_a_program_that_continues_turns_no_motor_and_gets_an_error(
     bench, start, client, tmp_path, protocol, serve
 ):
     drives = bench(protocol)
-    name = {
-        "pty": f"{PTY[protocol]}:{tmp_path}/held",
-        "unix-listen": f"unix-listen:{tmp_path}/held.sock",
-        "tcp-listen": "tcp-listen:127.0.0.1:0",
-    }[serve]
-    words = ["-p", PORT[protocol](drives), "--serve", name, "--silence", "500ms", "--json"]
+    words = ["-p", PORT[protocol](drives), "--serve", f"{serve}:{tmp_path}/held", "--silence", "500ms", "--json"]
     process = start("guard", protocol, *words)
     port = where(json.loads(process.line(0)))
     program = client(protocol, port, "command")

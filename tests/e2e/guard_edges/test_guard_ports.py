@@ -7,20 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from guarded import PORT, PTY
 from program import Sim
 
 
-@pytest.mark.parametrize("serve", ["pty", "unix-listen", "tcp-listen"])
-@pytest.mark.parametrize("protocol", PORT)
+@pytest.mark.parametrize(["protocol", "serve"], [("st", "pty"), ("rmd", "unix-listen"), ("st", "tcp-listen")])
 def test_what_a_dead_program_left_does_not_delay_the_stop(slow, guard, client, tmp_path, protocol, serve):
     line = slow(protocol)
-    name = {
-        "pty": f"{PTY[protocol]}:{tmp_path}/held",
-        "unix-listen": f"unix-listen:{tmp_path}/held.sock",
-        "tcp-listen": "tcp-listen:127.0.0.1:0",
-    }[serve]
-    process = guard(protocol, line, serve=name)
+    at = "127.0.0.1:0" if serve == "tcp-listen" else f"{tmp_path}/held"
+    process = guard(protocol, line, serve=f"{serve}:{at}")
     program = client(protocol, process.port, "flood")
     line.flooded()
     program.kill()
@@ -92,9 +86,8 @@ def test_a_link_does_not_lead_to_the_drive_of_another_server(sim, motorlink, run
         second.end()
 
 
-@pytest.mark.parametrize("target", ["gone", "/dev/ttyUSB99"])
-def test_a_link_of_the_users_own_is_never_deleted(run, tmp_path, target):
-    link = tmp_path / "drive"
+def test_a_link_of_the_users_own_is_never_deleted(run, tmp_path):
+    link, target = tmp_path / "drive", "/dev/ttyUSB99"
     link.symlink_to(target)
     for words in (["sim", "--stdin", "--st", f"pty:{link}"], ["sim", "--stdin", "--st", f"unix-listen:{link}"]):
         assert "remove it or choose another path" in run(*words).ended(3).err

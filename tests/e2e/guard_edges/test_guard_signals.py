@@ -1,21 +1,23 @@
 """Signals that a guard gets."""
 
+import os
+import re
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 
-from guarded import ENDING, PORT, SUSPENDING, rests, turns
+from guarded import ENDING, SUSPENDING, rests, turns
 from program import environment, says_halted
 
 
-@pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
-@pytest.mark.parametrize("protocol", PORT)
+@pytest.mark.parametrize(["protocol", "second"], [("st", signal.SIGTERM), ("rmd", signal.SIGINT)])
 def test_a_second_signal_does_not_keep_the_motors_from_being_stopped(
     bench, guard, client, protocol, second
 ):
-    for gap in (0, 0.0005, 0.002):
+    for gap in (0, 0.002):
         drives = bench(protocol)
         process = guard(protocol, drives)
         client(protocol, process.port)
@@ -30,24 +32,27 @@ def test_a_second_signal_does_not_keep_the_motors_from_being_stopped(
         drives.end()
 
 
-@pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
-def test_every_signal_that_would_end_a_guard_stops_the_motors(bench, guard, client, number):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGRTMAX])
+def test_every_signal_that_would_end_a_guard_stops_the_motors(bench, guard, client, tmp_path, number):
     drives = bench("st")
     process = guard("st", drives)
     client("st", process.port)
     turns(drives, "st")
+    # The system says which signals the guard handles.
+    (caught,) = re.findall("SigCgt:\t(.*)", Path(f"/proc/{process.process.pid}/status").read_text())
+    assert all(int(caught, 16) >> (it - 1) & 1 for it in (*ENDING, *SUSPENDING)), caught
     process.process.send_signal(number)
     assert process.wait() == 0
     rests(drives, "st")
+    assert not os.path.lexists(tmp_path / "held")
 
 
-@pytest.mark.parametrize("number", SUSPENDING, ids=lambda number: number.name)
-def test_a_guard_is_not_suspended(bench, guard, client, number):
+def test_a_guard_is_not_suspended(bench, guard, client):
     drives = bench("st")
     process = guard("st", drives)
     program = client("st", process.port)
     turns(drives, "st")
-    process.process.send_signal(number)
+    process.process.send_signal(signal.SIGTSTP)
     process.says("not suspended")
     program.kill()
     rests(drives, "st")

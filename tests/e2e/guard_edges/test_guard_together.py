@@ -16,7 +16,7 @@ from program import eventually
 from unread import UNREAD, Mute
 
 #: Random combinations of each protocol.
-RUNS = int(os.environ.get("GUARD_RUNS", "6"))
+RUNS = int(os.environ.get("GUARD_RUNS", "3"))
 
 
 @pytest.mark.parametrize("protocol", PORT)

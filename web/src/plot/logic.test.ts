@@ -8,7 +8,7 @@ import { rows, rowsBefore } from './rows';
 import { BREAK, Samples } from './samples';
 import { candidates } from './search';
 import { DEFAULTS, load, MOST_SIGNALS, parse, remembers, save, usual } from './settings';
-import { DARK, DASHES, LIGHT, numbered, styleOf } from './style';
+import { DASHES, numbered, styleOf } from './style';
 import { random } from './testing';
 import { Window } from './window';
 
@@ -266,9 +266,10 @@ describe('csv', () => {
 
   it('pauses for other work', async () => {
     let pauses = 0;
-    const points = Array.from({ length: 200_000 }, (_, index): [number, number] => [index, index]);
+    const points = Array.from({ length: 40_000 }, (_, index): [number, number] => [index, index]);
     const parts = await csv([trace('A', '', points)], 0, 1e9, { header: [], times: () => [] }, async () => void (pauses += 1));
-    expect(parts.join('').length).toBeGreaterThan(1e6);
+    expect(parts.join('').split('\r\n')).toHaveLength(40_002);
+    expect(pauses).toBeGreaterThan(1);
     expect(pauses).toBe(parts.length - 2);
   });
 });
@@ -359,20 +360,4 @@ describe('curves', () => {
     const first = numbered(['a', 'b', 'c'], new Map());
     expect(numbered(['d', 'c', 'b'], first)).toEqual(new Map([['c', 2], ['b', 1], ['d', 0]]));
   });
-
-  const luminance = (colour: string) => {
-    const part = (at: number) => {
-      const share = parseInt(colour.slice(at, at + 2), 16) / 255;
-      return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
-    };
-    return 0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5);
-  };
-  const contrast = (one: string, other: string) => {
-    const [dark, light] = [luminance(one), luminance(other)].sort((a, b) => a - b) as [number, number];
-    return (light + 0.05) / (dark + 0.05);
-  };
-  it.each([
-    ...LIGHT.flatMap((colour) => ['#f5f6f8', '#ffffff'].map((back) => [colour, back])),
-    ...DARK.flatMap((colour) => ['#0e1216', '#171c22'].map((back) => [colour, back])),
-  ])('%s is seen on %s', (colour, back) => expect(contrast(colour!, back!)).toBeGreaterThanOrEqual(4.5));
 });

@@ -81,7 +81,7 @@ function settles(response: (t: number) => number, band: number, length: number):
 }
 
 describe('second-order responses', () => {
-  it.each([0.2, 0.4, 0.5, 0.7, 0.9])('of damping %d', (damping) => {
+  it.each([0.2, 0.5, 0.9])('of damping %d', (damping) => {
     const w = 60;
     const length = 2;
     const response = secondOrder(damping, w);

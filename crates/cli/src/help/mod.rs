@@ -5,6 +5,8 @@ mod fish;
 mod manual;
 mod parts;
 mod suggestions;
+#[cfg(test)]
+mod tests;
 mod tips;
 
 use clap::Command;

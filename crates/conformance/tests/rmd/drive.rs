@@ -184,7 +184,7 @@ impl Setup {
         Setup {
             motors,
             allowed: &EVERYTHING,
-            behaviour: honest(),
+            behaviour: Box::new(Motors::pass),
             suite: suite(),
             port,
             interrupted: None,
@@ -217,9 +217,4 @@ impl Setup {
         bus.station().motors.bus.advance_to(now + Micros::from_millis(1_000));
         Tested { report, bus }
     }
-}
-
-/// The unchanged behaviour.
-pub fn honest() -> Behaviour {
-    Box::new(Motors::pass)
 }

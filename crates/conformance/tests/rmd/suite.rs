@@ -1,5 +1,8 @@
 //! Simulated motors pass, and are restored.
 
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+
 use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
 use motorlink_proto::can::CanFrame;
@@ -16,7 +19,6 @@ fn names(report: &Report, verdict: &str) -> Vec<String> {
 
 #[test]
 fn an_interrupted_run_leaves_the_motor_off_and_restored() {
-    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     let mut suite = suite();
     suite.retain(|case| {
         case.name == "a_speed_is_reached_either_way" || case.name == "status_2_can_be"
@@ -27,7 +29,7 @@ fn an_interrupted_run_leaves_the_motor_off_and_restored() {
     let tested = Setup { suite, interrupted, ..Setup::new(vec![motor(1)]) }.run();
     assert!(tested.station(|station| station.fastest > 40.0));
     assert_eq!((tested.report.count("not run"), tested.report.lost()), (2, "interrupted"));
-    assert_eq!(settings(&tested), settings(&before));
+    assert_eq!(settings(&tested), untouched());
 }
 
 /// A fault of the bus while the motor turns.
@@ -68,17 +70,14 @@ fn a_turning_motor_is_switched_off_on_a_faulty_bus() {
 
 #[test]
 fn settings_are_restored_on_a_bus_that_loses_commands() {
-    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
-    for every in [11, 13, 17] {
-        let mut count = 0;
-        let behaviour: Behaviour = Box::new(move |motors, event| {
-            count += u32::from(matches!(event, Event::Frame(_)));
-            if count % every == 0 { Vec::new() } else { motors.pass(event) }
-        });
-        let tested = Setup { behaviour, ..Setup::new(vec![motor(1)]) }.run();
-        assert!(tested.report.failed().count() > 5, "one in {every}");
-        assert_eq!(settings(&tested), settings(&before), "one in {every}");
-    }
+    let mut count = 0;
+    let behaviour: Behaviour = Box::new(move |motors, event| {
+        count += u32::from(matches!(event, Event::Frame(_)));
+        if count % 13 == 0 { Vec::new() } else { motors.pass(event) }
+    });
+    let tested = Setup { behaviour, ..Setup::new(vec![motor(1)]) }.run();
+    assert!(tested.report.failed().count() > 5);
+    assert_eq!(settings(&tested), untouched());
 }
 
 fn passes(tested: &Tested) {
@@ -90,7 +89,7 @@ fn passes(tested: &Tested) {
 
 #[test]
 fn motors_of_every_encoder_width_pass() {
-    for encoder_bits in [12, 14, 16, 18] {
+    for encoder_bits in [12, 18] {
         let mut config = motor(1);
         config.plant.encoder.bits = encoder_bits;
         let tested = Setup::new(vec![config]).run();
@@ -126,9 +125,9 @@ fn a_motor_with_another_id_passes() {
 
 #[test]
 fn a_motor_is_restored_after_the_run() {
-    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     let after = Setup::new(vec![motor(1)]).run();
-    assert_eq!(settings(&after), settings(&before));
+    assert_eq!(settings(&after), untouched());
+    passes(&after);
     assert_eq!(settings(&after).2, Mode::Off);
     let writes = after.station(|station| station.motors.first().motor().rom_writes());
     assert_eq!(writes, ROM_WRITES, "the number of ROM writes changed");
@@ -140,6 +139,11 @@ pub fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
         let drive = station.motors.first().drive();
         (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())
     })
+}
+
+/// Those of a motor that no case ran on.
+pub fn untouched() -> (Settings, Settings, Mode, Errors) {
+    settings(&Setup { suite: Vec::new(), ..Setup::new(vec![motor(1)]) }.run())
 }
 
 /// Eleven cases write a ROM: most of them once, an echo and one about zero three times, two more
@@ -164,4 +168,23 @@ fn without_permission_no_motor_is_energised_and_no_rom_is_written() {
         |name: &str| names(&tested.report, "skipped").iter().any(|skipped| skipped == name);
     assert!(needed("a_speed_is_reached_either_way") && needed("a_written_offset_applies_at_once"));
     assert!(tested.report.count("passed") > 30);
+}
+
+#[test]
+fn a_motor_that_turns_or_does_not_answer_is_asked_for_its_status_only() {
+    for (dps, why) in [(Some(180), "turns at 180 °/s"), (None, "motor 1 does not answer")] {
+        let heard = Arc::new(Mutex::new(BTreeSet::new()));
+        let codes = heard.clone();
+        let behaviour: Behaviour = Box::new(move |_, event| {
+            let Event::Frame(frame) = event else { return Vec::new() };
+            codes.lock().unwrap().insert(frame.data()[0]);
+            let speed = dps.filter(|_| frame.data()[0] == 0x9C);
+            let reply = |dps| CanFrame::new(0x141, [0x9C, 25, 0, 0, dps, 0, 0, 0]);
+            speed.map(reply).into_iter().collect()
+        });
+        let report = Setup { behaviour, ..Setup::new(vec![motor(1)]) }.run().report;
+        assert_eq!(report.count("not run"), report.outcomes.len());
+        assert!(report.lost().contains(why), "{}", report.lost());
+        assert!(heard.lock().unwrap().is_subset(&BTreeSet::from([0x9A, 0x9C])));
+    }
 }

@@ -1,7 +1,7 @@
 //! The drive under test: a simulated drive on virtual time, unchanged or with one deviation.
 
 use motorlink_conformance::st::{self, Harness, Options};
-use motorlink_conformance::{Need, Report, Unavailable, World, run};
+use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
 use motorlink_link::serve::{self, Station as _};
 use motorlink_proto::st::register::Features;
 use motorlink_proto::st::{Flags, Frame, MotorNumber, Profile, RegisterId};
@@ -179,18 +179,19 @@ pub fn wire(peer: Peer) -> Wire {
 
 /// Runs the whole suite on the drive on a wire. Differences from readings are failures.
 pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
-    test_apart(wire, motor, allowed).strict()
+    let suite = st::suite(wire.station().station.profile());
+    test_cases(&suite, wire, motor, allowed).strict()
 }
 
-/// The same, but differences from readings are not failures.
-pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
+/// Runs these cases. Differences from readings are not failures.
+pub fn test_cases(cases: &[Case<Harness>], wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     let profile = wire.station().station.profile();
     let motor = MotorNumber::new(motor).expect("1 to 7");
     let byte_time = Micros(0);
     let options = Options { profile, motor, allowed: allowed.to_vec(), byte_time };
     let world = Box::new(Hands(wire.clone()));
     let mut harness = Harness::new(wire.line(), world, options);
-    run(&st::suite(profile), &mut harness, |_| {})
+    run(cases, &mut harness, |_| {})
 }
 
 /// The current motor, the value of every register of a motor, and its rev-up phases.

@@ -3,35 +3,27 @@
 
 use std::collections::BTreeSet;
 
-use motorlink_conformance::Report;
+use motorlink_conformance::st;
 use motorlink_proto::st::{ErrorCode, HEADER_ACK, HEADER_NACK, Profile, RegisterId, Status};
 use motorlink_sim::st::MotorConfig;
 
 use crate::mutants::{ack, answers, gives, nack, parsed, says};
-use crate::peer::{ALL, Deviation, Peer, frame, test_apart, wire};
+use crate::peer::{ALL, Deviation, Peer, frame, test_cases, wire};
 
 const SET: u8 = 0x01;
 const GET: u8 = 0x02;
 
 /// The rows that a drive differs from. Checks that no case failed.
 fn rows(make: Deviation) -> BTreeSet<&'static str> {
-    let report = test_apart(&wire(Peer::new(Profile::Spec, &MotorConfig::demo(), make)), 1, &ALL);
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), make));
+    let report = test_cases(&st::suite(Profile::Spec), &wire, 1, &ALL);
     let failed: Vec<_> = report.failed().collect();
     assert!(report.is_clean(), "{failed:#?} {}", report.lost());
-    let rows = differences(&report);
-    let strict = report.strict();
-    assert_eq!(strict.is_clean(), rows.is_empty());
-    rows
-}
-
-fn differences(report: &Report) -> BTreeSet<&'static str> {
     let findings = report.outcomes.iter().flat_map(|outcome| &outcome.differences);
-    findings.filter_map(|finding| finding.reading).map(|reading| reading.row).collect()
-}
-
-#[test]
-fn a_correct_drive_differs_from_no_reading() {
-    assert!(rows(Deviation::default()).is_empty());
+    let readings = findings.filter_map(|finding| finding.reading);
+    let rows: BTreeSet<_> = readings.map(|reading| reading.row).collect();
+    assert_eq!(report.strict().is_clean(), rows.is_empty());
+    rows
 }
 
 #[test]

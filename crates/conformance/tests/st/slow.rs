@@ -28,12 +28,12 @@ struct Uart {
 }
 
 /// The kit at a UART.
-fn kit(profile: Profile, baud: u64, pauses: usize) -> Harness {
+fn kit(profile: Profile, baud: u64, allowed: &[Need], pauses: usize) -> Harness {
     let byte_time = Micros(10_000_000 / baud);
     let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
     let (outward, inward) = Default::default();
     let uart = Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward, pauses };
-    let allowed = vec![Need::Spin];
+    let allowed = allowed.to_vec();
     let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
     Harness::new(Box::new(uart), Box::new(()), options)
 }
@@ -112,13 +112,13 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
         "invalid_registers_of_a_data_segment_are_refused",
         "a_reply_may_have_128_bytes",
     ];
-    let lines = [
-        (Profile::Spec, 9_600, too_long),
-        (Profile::Spec, 57_600, &[]),
-        (Profile::Mcsdk54, 9_600, &[]),
+    let lines: [(_, _, &[Need], _); 3] = [
+        (Profile::Spec, 9_600, &[Need::Spin], too_long),
+        (Profile::Spec, 57_600, &[], &[]),
+        (Profile::Mcsdk54, 9_600, &[], &[]),
     ];
-    for (profile, baud, skipped) in lines {
-        let mut harness = kit(profile, baud, 0);
+    for (profile, baud, allowed, skipped) in lines {
+        let mut harness = kit(profile, baud, allowed, 0);
         let report = run(&st::suite(profile), &mut harness, |_| {}).strict();
         assert!(report.is_clean(), "{baud}: {:#?}", report.failed().collect::<Vec<_>>());
         let slow = report.outcomes.iter().filter(
@@ -133,7 +133,7 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
 fn a_host_that_pauses_in_a_frame_tries_again() {
     let name = "a_frame_within_25_ms_is_accepted";
     for pauses in 0..=10 {
-        let mut harness = kit(Profile::Spec, 57_600, pauses);
+        let mut harness = kit(Profile::Spec, 57_600, &[], pauses);
         let cases: Vec<_> =
             st::suite(Profile::Spec).into_iter().filter(|case| case.name == name).collect();
         assert_eq!(cases.len(), 1);

@@ -1,11 +1,11 @@
 //! What a failed case says about the request that it sent.
 
-use motorlink_conformance::{Finding, Verdict};
+use motorlink_conformance::{Finding, Verdict, st};
 use motorlink_proto::st::{ErrorCode, Profile, RegisterId};
 use motorlink_sim::st::MotorConfig;
 
 use crate::mutants::{answers, nack};
-use crate::peer::{Peer, test, wire};
+use crate::peer::{Peer, test_cases, wire};
 
 /// The finding of a case with a drive that refuses the messages with this frame code and this beginning
 /// of the payload.
@@ -14,9 +14,11 @@ fn finding(case: &str, code: u8, beginning: &'static [u8]) -> Finding {
         let is_meant = header & 0x1F == code && payload.starts_with(beginning);
         is_meant.then(|| nack(ErrorCode::WrongSet))
     });
-    let report = test(&wire(Peer::new(Profile::Spec, &MotorConfig::demo(), refuses)), 1, &[]);
-    let failed = report.failed().find(|outcome| outcome.name == case);
-    match failed.map(|outcome| &outcome.verdict) {
+    let mut cases = st::suite(Profile::Spec);
+    cases.retain(|known| known.name == case);
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), refuses));
+    let report = test_cases(&cases, &wire, 1, &[]).strict();
+    match report.failed().next().map(|outcome| &outcome.verdict) {
         Some(Verdict::Failed(finding)) => (**finding).clone(),
         _ => panic!("{case} did not fail"),
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* What exceeds a limit of a master is never sent, whatever function it comes from. */
+/* What exceeds a limit of a master is never sent. proto tests which requests that are. */
 #include "check.h"
 
 static motorlink_st_master master;
@@ -54,48 +54,26 @@ static motorlink_error ramp(uint8_t motor, int32_t speed_rpm) {
   return motorlink_st_master_set_ramp(&master, motor, speed_rpm, 100);
 }
 
-static motorlink_error write(motorlink_st_reg reg, int32_t value) {
-  return motorlink_st_master_set_register(&master, 1, reg, value);
-}
-
 static motorlink_error raw(motorlink_st_frame_code code, const uint8_t *payload, size_t size) {
   return motorlink_st_master_raw(&master, 1, code, payload, size);
 }
 
-static void speeds(void) {
+static void values(void) {
   const uint8_t over[6] = {0xE9, 0x03, 0, 0, 0, 0};
-  motorlink_st_revup_phase phase = {1001, 0, 0};
   subject = "speed";
   begin(MOTORLINK_ST_PROFILE_MCSDK54, 1000, MOTORLINK_NO_LIMIT);
   exceeds(ramp(1, 1001));
-  exceeds(ramp(1, -1001));
-  exceeds(ramp(1, INT32_MIN));
-  exceeds(write(MOTORLINK_ST_REG_RAMP_FINAL_SPEED, 1001));
-  exceeds(motorlink_st_master_set_revup_data(&master, 1, 0, &phase));
-  exceeds(motorlink_st_master_set_position(&master, 1, 0.1f, 10));
+  exceeds(motorlink_st_master_set_register(&master, 1, MOTORLINK_ST_REG_RAMP_FINAL_SPEED, 1001));
   exceeds(raw(MOTORLINK_ST_FRAME_CODE_SET_RAMP, over, 6));
-  exceeds(raw(MOTORLINK_ST_FRAME_CODE_SET_RAMP, over, 1));
   done(ramp(1, 1000));
-  done(write(MOTORLINK_ST_REG_RAMP_FINAL_SPEED, -1000));
-  done(motorlink_st_master_set_torque_ramp(&master, 1, 32767, 0));
-  limit(MOTORLINK_NO_LIMIT, MOTORLINK_NO_LIMIT);
-  done(ramp(1, INT32_MIN));
-  done(start(1));
-}
-
-static void currents(void) {
-  motorlink_st_revup_phase phase = {0, -501, 0};
+  done(motorlink_st_master_set_current_reference(&master, 1, 501, 0));
   subject = "current";
   begin(MOTORLINK_ST_PROFILE_MCSDK54, MOTORLINK_NO_LIMIT, 500);
   exceeds(motorlink_st_master_set_current_reference(&master, 1, 501, 0));
-  exceeds(motorlink_st_master_set_current_reference(&master, 1, 0, -501));
-  exceeds(motorlink_st_master_set_torque_ramp(&master, 1, -501, 0));
-  exceeds(motorlink_st_master_set_revup_data(&master, 1, 0, &phase));
-  exceeds(write(MOTORLINK_ST_REG_TORQUE_REF, 501));
-  exceeds(write(MOTORLINK_ST_REG_FLUX_REF, -501));
-  exceeds(write(MOTORLINK_ST_REG_IQ_SPEEDMODE, 501));
-  done(motorlink_st_master_set_current_reference(&master, 1, 500, -500));
   done(ramp(1, 100000));
+  subject = "none";
+  limit(MOTORLINK_NO_LIMIT, MOTORLINK_NO_LIMIT);
+  done(motorlink_st_master_set_current_reference(&master, 1, 501, 0));
   done(start(1));
 }
 
@@ -104,25 +82,14 @@ static void starts(void) {
   subject = "start";
   begin(MOTORLINK_ST_PROFILE_SPEC, 1000, MOTORLINK_NO_LIMIT);
   exceeds(start(1));
-  exceeds(motorlink_st_master_execute(&master, 1, MOTORLINK_ST_COMMAND_START_STOP));
   exceeds(raw(MOTORLINK_ST_FRAME_CODE_EXECUTE_CMD, acknowledge, 0));
   done(ramp(1, 1000));
   exceeds(start(2));
   done(start(1));
-  done(motorlink_st_master_execute(&master, 1, MOTORLINK_ST_COMMAND_STOP_MOTOR));
-  done(start(1));
-
-  subject = "start behind something else";
   CHECK(answered(ramp(1, 900), refusal, sizeof refusal) == MOTORLINK_ERROR_REFUSED);
   exceeds(start(1));
-  done(ramp(1, 1000));
-  done(motorlink_st_master_set_current_reference(&master, 1, 1, 1));
-  exceeds(start(1));
-  done(ramp(1, 1000));
-  done(write(MOTORLINK_ST_REG_CONTROL_MODE, MOTORLINK_ST_CONTROL_MODE_SPEED));
-  exceeds(start(1));
 
-  subject = "start on another line";
+  subject = "start on another line, and under another limit";
   done(ramp(1, 1000));
   OK(motorlink_st_master_lost(&master));
   OK(motorlink_st_master_trust_line(&master));
@@ -131,22 +98,13 @@ static void starts(void) {
   OK(motorlink_st_master_reopened(&master));
   OK(motorlink_st_master_trust_line(&master));
   exceeds(start(1));
-
-  subject = "start behind a ramp of another limit";
   done(ramp(1, 1000));
   limit(500, MOTORLINK_NO_LIMIT);
-  exceeds(start(1));
-  OK(ramp(1, 500));
-  next(MOTORLINK_OUTPUT_TRANSMIT);
-  limit(400, MOTORLINK_NO_LIMIT);
-  OK(motorlink_st_master_receive(&master, 0, acknowledge, sizeof acknowledge));
-  OK(next(MOTORLINK_OUTPUT_DONE).result);
   exceeds(start(1));
 }
 
 int main(void) {
-  speeds();
-  currents();
+  values();
   starts();
   printf("limits: kept\n");
   return 0;

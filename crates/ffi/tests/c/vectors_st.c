@@ -1,85 +1,8 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* vectors_st st.json: each vector through the master and through the slave. */
+/* vectors_st st.json: each vector through the master. */
 #include "vectors.h"
 
 static motorlink_st_master master;
-
-/* What the drive was told, and what it answers. */
-static struct {
-  uint8_t motor, number;
-  int32_t first, second;
-  float angle, duration;
-  int calls;
-  int32_t values[256];
-  motorlink_st_revup_phase revup;
-} told;
-
-static void tell(uint8_t motor, uint8_t what, int32_t first, int32_t second) {
-  told.motor = motor;
-  told.number = what;
-  told.first = first;
-  told.second = second;
-  told.calls++;
-}
-
-static uint16_t features(void *context, uint8_t motor) {
-  (void)context;
-  (void)motor;
-  return (uint16_t)(0xFFFF & ~MOTORLINK_ST_FEATURE_PROFILER);
-}
-
-static int32_t read_register(void *context, uint8_t motor, motorlink_st_reg reg) {
-  (void)context;
-  tell(motor, reg, 0, 0);
-  return told.values[reg];
-}
-
-static motorlink_st_error_code write_register(void *context, uint8_t motor, motorlink_st_reg reg,
-                                              int32_t value) {
-  (void)context;
-  tell(motor, reg, value, 0);
-  return MOTORLINK_ST_ERROR_CODE_NONE;
-}
-
-static void execute(void *context, uint8_t motor, motorlink_st_command command) {
-  (void)context;
-  tell(motor, command, 0, 0);
-}
-
-static void ramp(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms) {
-  (void)context;
-  tell(motor, 0, speed_rpm, duration_ms);
-}
-
-static void revup(void *context, uint8_t motor, uint8_t phase, motorlink_st_revup_phase *data) {
-  (void)context;
-  tell(motor, phase, 0, 0);
-  *data = told.revup;
-}
-
-static void set_revup(void *context, uint8_t motor, uint8_t phase,
-                      const motorlink_st_revup_phase *data) {
-  (void)context;
-  tell(motor, phase, 0, 0);
-  told.revup = *data;
-}
-
-static void current(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a) {
-  (void)context;
-  tell(motor, 0, iq_s16a, id_s16a);
-}
-
-static void torque_ramp(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms) {
-  (void)context;
-  tell(motor, 0, torque_s16a, duration_ms);
-}
-
-static void position(void *context, uint8_t motor, float angle_rad, float duration_s) {
-  (void)context;
-  tell(motor, 0, 0, 0);
-  told.angle = angle_rad;
-  told.duration = duration_s;
-}
 
 static int32_t little_endian(struct bytes bytes, size_t from, size_t size) {
   uint32_t value = 0;
@@ -255,165 +178,30 @@ static void through_the_master(const json_t *vector, motorlink_st_profile profil
   }
 }
 
-/* Shipped firmware keeps speeds in steps of 6 rpm. */
-static int32_t kept(motorlink_st_profile profile, int32_t speed_rpm) {
-  return profile == MOTORLINK_ST_PROFILE_MCSDK54 ? speed_rpm / 6 * 6 : speed_rpm;
-}
-
-/* What the drive was told is what the fields say. */
-static void carried_out(const char *code, motorlink_st_profile profile, const json_t *f) {
-  int32_t speed = has(f, "speed") ? kept(profile, (int32_t)number(f, "speed")) : 0;
-  if (strcmp(code, "SET_REG") == 0) {
-    struct bytes value = hex(f, "value");
-    /* A drive takes tenths of a percent. */
-    int tens = told.number == MOTORLINK_ST_REG_FLUXWK_BUS && profile == MOTORLINK_ST_PROFILE_SPEC;
-    int32_t written = little_endian(value, 0, value.size);
-    if (told.number == MOTORLINK_ST_REG_RAMP_FINAL_SPEED) {
-      written = kept(profile, written);
-    }
-    CHECK(told.number == (uint8_t)number(f, "register"));
-    CHECK(told.first == written * (tens ? 10 : 1));
-  } else if (strcmp(code, "GET_REG") == 0) {
-    CHECK(told.number == (uint8_t)number(f, "register"));
-  } else if (strcmp(code, "EXECUTE_CMD") == 0) {
-    int64_t command = number(f, "command");
-    if (command == MOTORLINK_ST_COMMAND_SC_STOP) {
-      command = MOTORLINK_ST_COMMAND_STOP_MOTOR;
-    }
-    CHECK(told.number == command);
-  } else if (strcmp(code, "SET_RAMP") == 0) {
-    CHECK(told.first == speed && told.second == (int32_t)number(f, "duration"));
-  } else if (strcmp(code, "GET_REVUP_DATA") == 0) {
-    CHECK(told.number == (uint8_t)number(f, "phase"));
-  } else if (strcmp(code, "SET_REVUP_DATA") == 0) {
-    motorlink_st_revup_phase expected = phase_of(f);
-    expected.speed_rpm = speed;
-    CHECK(told.number == (uint8_t)number(f, "phase"));
-    CHECK(memcmp(&told.revup, &expected, sizeof expected) == 0);
-  } else if (strcmp(code, "SET_CURRENT_REF") == 0) {
-    CHECK(told.first == (int32_t)number(f, "iq") && told.second == (int32_t)number(f, "id"));
-  } else if (strcmp(code, "SET_TORQUE_RAMP") == 0) {
-    CHECK(told.first == (int32_t)number(f, "torque"));
-    CHECK(told.second == (int32_t)number(f, "duration"));
-  } else if (strcmp(code, "SET_POSITION_CMD") == 0) {
-    CHECK(told.angle == (float)real(f, "angle") && told.duration == (float)real(f, "duration"));
-  }
-}
-
-/* Whether it is not the slave alone that answers. */
-static int reaches_the_drive(const char *code, const json_t *f) {
-  if (strcmp(code, "EXECUTE_CMD") == 0) {
-    switch (number(f, "command")) {
-      case MOTORLINK_ST_COMMAND_RESET:
-      case MOTORLINK_ST_COMMAND_PING:
-      case MOTORLINK_ST_COMMAND_SC_START:
-        return 0;
-      default:
-        return 1;
-    }
-  }
-  return strcmp(code, "GET_BOARD_INFO") != 0 && strcmp(code, "GET_FW_VERSION") != 0 &&
-         strcmp(code, "GET_MP_INFO") != 0 && strcmp(code, "CONFIG_DYN_STRUCT") != 0;
-}
-
-/* Whether a drive of ours gives this reply: not those of other firmware, nor errors at will. */
-static int ours(const json_t *vector) {
-  const json_t *answer = json_object_get(vector, "answer");
-  const char *name = text(vector, "name");
-  return answer != NULL && strstr(name, "refused with") == NULL && strstr(name, "NUL") == NULL;
-}
-
-/* Has the drive read what the answer says. */
-static void prepare(const char *code, const json_t *vector) {
-  const json_t *answer = json_object_get(vector, "answer");
-  memset(&told, 0, sizeof told);
-  if (answer == NULL || has(answer, "error")) {
-    return;
-  }
-  if (strcmp(code, "GET_REG") == 0) {
-    uint8_t reg = (uint8_t)number(member(vector, "fields"), "register");
-    told.values[reg] = (int32_t)number(answer, "bits");
-  } else if (strcmp(code, "GET_REVUP_DATA") == 0) {
-    told.revup = phase_of(answer);
-  } else if (strcmp(code, "GET_DATA_ELEMENT") == 0) {
-    /* The registers that the vector before it chose. */
-    struct bytes values = hex(answer, "values");
-    told.values[MOTORLINK_ST_REG_STATUS] = little_endian(values, 0, 1);
-    told.values[MOTORLINK_ST_REG_SPEED_MEAS] = little_endian(values, 1, 4);
-    told.values[MOTORLINK_ST_REG_I_Q] = little_endian(values, 5, 2);
-  }
-}
-
-/* Bytes to callbacks, values to a reply; tells whether the reply could be compared. */
-static int through_the_slave(const json_t *vector, motorlink_st_slave *slave,
-                             motorlink_st_profile profile) {
-  const char *code = text(vector, "code");
-  struct bytes request = hex(vector, "request");
-  uint8_t motor = (uint8_t)number(vector, "motor");
-  motorlink_bytes reply;
-  size_t at;
-  prepare(code, vector);
-  for (at = 0; at < request.size; at++) {
-    OK(motorlink_st_slave_receive(slave, 0, request.data[at], &reply));
-    CHECK((reply.size > 0) == (at + 1 == request.size));
-  }
-  CHECK((told.calls > 0) == reaches_the_drive(code, member(vector, "fields")));
-  if (told.calls > 0) {
-    CHECK(motor == 0 || told.motor == motor);
-    carried_out(code, profile, member(vector, "fields"));
-  }
-  if (!ours(vector)) {
-    return 0;
-  }
-  CHECK(same(reply, hex(vector, "reply")));
-  return 1;
-}
-
 int main(int argc, char **argv) {
   static const motorlink_st_profile profiles[2] = {MOTORLINK_ST_PROFILE_SPEC,
                                                    MOTORLINK_ST_PROFILE_MCSDK54};
-  static motorlink_st_slave slaves[2];
-  static motorlink_st_motor_control drive;
   json_t *vectors;
   const json_t *vector;
   size_t index;
-  int count = 0, replies = 0;
+  int count = 0;
   int at;
 
   CHECK(argc == 2);
   vectors = load(argv[1]);
-  drive.version.name = "ST MC SDK";
-  drive.version.major = 5;
-  drive.version.minor = 4;
-  drive.version.patch = 3;
-  drive.features = features;
-  drive.get_register = read_register;
-  drive.set_register = write_register;
-  drive.execute = execute;
-  drive.set_ramp = ramp;
-  drive.get_revup_data = revup;
-  drive.set_revup_data = set_revup;
-  drive.set_current_reference = current;
-  drive.set_torque_ramp = torque_ramp;
-  drive.set_position = position;
-  for (at = 0; at < 2; at++) {
-    OK(motorlink_st_slave_init(&slaves[at], sizeof slaves[at], profiles[at], 7, &drive));
-  }
   json_array_foreach(vectors, index, vector) {
     const char *spoken = text(vector, "profile");
     subject = text(vector, "name");
     for (at = 0; at < 2; at++) {
-      const motorlink_st_profile profile = profiles[at];
-      const char *other = profile == MOTORLINK_ST_PROFILE_SPEC ? "mcsdk-5.4" : "spec";
+      const char *other = profiles[at] == MOTORLINK_ST_PROFILE_SPEC ? "mcsdk-5.4" : "spec";
       if (strcmp(spoken, other) != 0) {
-        through_the_master(vector, profile);
-        replies += through_the_slave(vector, &slaves[at], profile);
+        through_the_master(vector, profiles[at]);
+        count++;
       }
     }
-    count++;
   }
-  CHECK(count == (int)json_array_size(vectors));
-  printf("st: %d vectors, %d replies from a slave\n", count, replies);
+  CHECK(count > (int)json_array_size(vectors));
+  printf("st: %d times a vector\n", count);
   json_decref(vectors);
   return 0;
 }

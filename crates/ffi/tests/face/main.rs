@@ -1,6 +1,7 @@
 //! Calls the C interface as C does. Also runs in Miri.
 #![allow(clippy::undocumented_unsafe_blocks, reason = "every call here is one of C's")]
 
+mod misuse;
 mod objects;
 mod rmd;
 mod st;

@@ -35,20 +35,74 @@ fn the_moment_to_ask_again_is_known_after_an_exchange_in_quarantine() {
     assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, 0xA1));
 }
 
+#[derive(Default)]
+struct Told {
+    motions: Vec<motorlink_rmd_motion>,
+    settings: Vec<motorlink_rmd_settings>,
+}
+
 #[test]
-fn an_rmd_drive_does_not_answer_before_power_on() {
-    let motor = motorlink_rmd_motor_control { set_mode: Some(set_no_mode), ..zeroed() };
+fn a_motor_is_told_what_its_drive_is_commanded() {
+    extern "C" fn set_mode(context: *mut c_void, motion: *const motorlink_rmd_motion) {
+        let motion = unsafe { *motion };
+        unsafe { (*context.cast::<Told>()).motions.push(motion) };
+    }
+    extern "C" fn keep(context: *mut c_void, settings: *const motorlink_rmd_settings) {
+        let settings = unsafe { *settings };
+        unsafe { (*context.cast::<Told>()).settings.push(settings) };
+    }
+    let told: *mut Told = Box::into_raw(Box::default());
+    let motor = motorlink_rmd_motor_control {
+        context: told.cast(),
+        set_mode: Some(set_mode),
+        configure: Some(keep),
+        sense: None,
+        save: Some(keep),
+    };
     let config = motorlink_rmd_drive_config { id: 1, ..zeroed() };
+    let rom = motorlink_rmd_settings { acceleration_dps2: 700, ..zeroed() };
+    let pid = motorlink_rmd_pid { position_kp: 9, ..zeroed() };
     let mut drive: motorlink_rmd_drive = zeroed();
-    let mut reply: motorlink_can_frame = zeroed();
-    let speed = motorlink_rmd_set_speed(36_000).bytes;
-    let frame = motorlink_can_frame { id: 0x141, size: 8, data: speed, ..reply };
-    gives!(Ok, motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), &motor));
-    gives!(Ok, motorlink_rmd_drive_receive(&mut drive, 0, &frame, &mut reply));
-    assert_eq!(reply.id, MOTORLINK_NO_FRAME);
+    let mut frame: motorlink_can_frame = zeroed();
+    (frame.id, frame.size) = (0x141, 8);
+    let mut reply = frame;
+    gives!(Ok, motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, &rom, &motor));
     gives!(Ok, motorlink_rmd_drive_power_on(&mut drive, 0));
-    gives!(Ok, motorlink_rmd_drive_receive(&mut drive, 0, &frame, &mut reply));
-    assert_eq!(reply.id, 0x141);
+    for request in [
+        motorlink_rmd_write_pid_rom(pid),
+        motorlink_rmd_set_torque(-5),
+        motorlink_rmd_set_speed(-36_000),
+        motorlink_rmd_set_position(9_000),
+        motorlink_rmd_set_position_limited(-9_000, 360),
+        motorlink_rmd_set_single_turn_position(0, 9_000),
+        motorlink_rmd_stop(),
+    ] {
+        frame.data = request.bytes;
+        gives!(Ok, motorlink_rmd_drive_receive(&mut drive, 0, &frame, &mut reply));
+        assert_eq!(reply.id, 0x141);
+    }
+    let motion = |kind| motorlink_rmd_motion { kind, ..zeroed() };
+    let position = |target_counts, max_speed_dps, within_max_angle| motorlink_rmd_motion {
+        target_counts,
+        max_speed_dps,
+        within_max_angle,
+        ..motion(motorlink_rmd_mode::Position)
+    };
+    let Told { motions, settings } = *unsafe { Box::from_raw(told) };
+    assert_eq!(
+        motions,
+        [
+            motion(motorlink_rmd_mode::Off),
+            motorlink_rmd_motion { iq_16ma: -5, ..motion(motorlink_rmd_mode::Torque) },
+            motorlink_rmd_motion { speed_centidps: -36_000, ..motion(motorlink_rmd_mode::Speed) },
+            position(4_096, -1, 1),
+            position(-4_096, 360, 1),
+            position(4_096, -1, 0),
+            motion(motorlink_rmd_mode::Stopped),
+        ]
+    );
+    let new = motorlink_rmd_settings { pid, ..rom };
+    assert_eq!(settings, [rom, new, new], "power-on, and what is used and saved");
 }
 
 /// An adapter in between, so that a request is a frame, a line, a frame and back.

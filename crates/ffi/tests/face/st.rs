@@ -12,6 +12,10 @@ use crate::{Error, OK, bytes, execute_nothing, gives, zeroed};
 struct Fan {
     rpm: i32,
     commands: Vec<u8>,
+    /// Register and value.
+    writes: Vec<(u8, i32)>,
+    /// Motor and values: of a current reference, a torque ramp, a move.
+    setpoints: Vec<(u8, f32, f32)>,
     revup: Option<motorlink_st_revup_phase>,
     slave: Option<*mut motorlink_st_slave>,
 }
@@ -36,7 +40,8 @@ extern "C" fn read(context: *mut c_void, _: u8, _: u8) -> i32 {
     fan.rpm
 }
 
-extern "C" fn write(_: *mut c_void, _: u8, _: u8, value: i32) -> u8 {
+extern "C" fn write(context: *mut c_void, _: u8, register: u8, value: i32) -> u8 {
+    fan(context).writes.push((register, value));
     if value == 13 { 0x05 } else { 0 }
 }
 
@@ -46,6 +51,18 @@ extern "C" fn execute(context: *mut c_void, _: u8, command: u8) {
 
 extern "C" fn ramp(context: *mut c_void, _: u8, speed_rpm: i32, _: u16) {
     fan(context).rpm = speed_rpm;
+}
+
+extern "C" fn current(context: *mut c_void, motor: u8, iq_s16a: i16, id_s16a: i16) {
+    fan(context).setpoints.push((motor, iq_s16a.into(), id_s16a.into()));
+}
+
+extern "C" fn torque(context: *mut c_void, motor: u8, torque_s16a: i32, duration_ms: u16) {
+    fan(context).setpoints.push((motor, torque_s16a as f32, duration_ms.into()));
+}
+
+extern "C" fn position(context: *mut c_void, motor: u8, angle_rad: f32, duration_s: f32) {
+    fan(context).setpoints.push((motor, angle_rad, duration_s));
 }
 
 extern "C" fn revup(context: *mut c_void, _: u8, _: u8, data: *mut motorlink_st_revup_phase) {
@@ -110,32 +127,6 @@ impl StBench {
         }
         (output, bytes(&output.bytes))
     }
-
-    /// Brings the line in sync and conducts the exchange that was begun; gives its result and the
-    /// headers of the frames that were sent.
-    ///
-    /// A loop that hands in what came before it polls may have the answer before the poll that follows
-    /// the question.
-    fn done_in_time(&mut self) -> (Error, Vec<u8>) {
-        let StBench { master, slave } = self;
-        let (mut output, mut reply): (motorlink_st_output, motorlink_bytes) = (zeroed(), zeroed());
-        let (mut now, mut headers) = (0, Vec::new());
-        loop {
-            gives!(Ok, motorlink_st_master_poll(master, now, &mut output));
-            match output.kind {
-                motorlink_output::Done => return (output.result, headers),
-                motorlink_output::Wait => now = output.until_us,
-                motorlink_output::Transmit => {
-                    let sent = bytes(&output.bytes);
-                    headers.push(sent[0]);
-                    for byte in sent {
-                        gives!(Ok, motorlink_st_slave_receive(slave, now, byte, &mut reply));
-                    }
-                    gives!(Ok, motorlink_st_master_receive(master, now, reply.data, reply.size));
-                }
-            }
-        }
-    }
 }
 
 fn drive(context: &mut Fan) -> motorlink_st_motor_control {
@@ -151,6 +142,9 @@ fn drive(context: &mut Fan) -> motorlink_st_motor_control {
     drive.get_revup_data = Some(revup);
     drive.set_revup_data = Some(set_revup);
     drive.profiler_step = Some(profiler_step);
+    drive.set_current_reference = Some(current);
+    drive.set_torque_ramp = Some(torque);
+    drive.set_position = Some(position);
     drive
 }
 
@@ -172,9 +166,9 @@ fn a_master_and_a_slave_understand_each_other() {
     assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, -2)).0.result, OK);
     let refused = exchange!(bench, motorlink_st_master_set_register(0x05, 13)).0;
     assert_eq!((refused.result, refused.error_code), (Error::Refused, 0x05));
-    assert_eq!(exchange!(bench, motorlink_st_master_set_current_reference(1, 2)).0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_set_torque_ramp(1, 2)).0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_set_position(1.0, 2.0)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_current_reference(1, -2)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_torque_ramp(-3, 4)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_position(-0.5, 0.25)).0.result, OK);
 
     let phase = motorlink_st_revup_phase { speed_rpm: 600, torque_s16a: -7, duration_ms: 9 };
     assert_eq!(exchange!(bench, motorlink_st_master_set_revup_data(0, &phase)).0.result, OK);
@@ -195,7 +189,8 @@ fn a_master_and_a_slave_understand_each_other() {
     let steps = [0, 1];
     let (_, payload) = exchange!(bench, motorlink_st_master_get_profiler_info(steps.as_ptr(), 2));
     assert_eq!(payload, [0, 2, 0x66, 0x67]);
-    assert_eq!(fan.commands, [1]);
+    assert_eq!((fan.commands, fan.writes), (vec![1], vec![(0x05, -2), (0x05, 13)]));
+    assert_eq!(fan.setpoints, [(1, 1.0, -2.0), (1, -3.0, 4.0), (1, -0.5, 0.25)]);
 }
 
 #[test]
@@ -227,57 +222,6 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
         motorlink_st_master_raw(master, 0, 1, null(), 0),
     );
     assert_eq!(bench.done(begun).0.value, 1500);
-}
-
-#[test]
-fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
-    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
-    let mut bench = StBench::new(0, &nothing);
-    let master: *mut motorlink_st_master = &mut bench.master;
-    gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_get_register(master, 1, 2));
-    assert_eq!(bench.done_in_time(), (OK, vec![0x06, 0x22]));
-}
-
-#[test]
-fn three_questions_bring_a_just_opened_line_in_sync() {
-    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
-    let mut bench = StBench::new(0, &nothing);
-    let master: *mut motorlink_st_master = &mut bench.master;
-    let mut lost = 0;
-    gives!(
-        Ok,
-        motorlink_st_master_reopened(master),
-        motorlink_st_master_is_lost(master, &mut lost),
-        motorlink_st_master_get_register(master, 1, 2),
-    );
-    assert_eq!(lost, 1);
-    assert_eq!(bench.done_in_time(), (OK, vec![0x06, 0x02, 0x02, 0x22]));
-}
-
-#[test]
-fn a_stop_is_sent_at_once_to_a_drive_that_does_not_answer() {
-    let mut master: motorlink_st_master = zeroed();
-    let raw_stop = 2;
-    for is_raw in [false, true] {
-        let mut output: motorlink_st_output = zeroed();
-        gives!(Ok, motorlink_st_master_init(&mut master, size_of_val(&master), null()));
-        gives!(Ok, motorlink_st_master_trust_line(&mut master));
-        gives!(Ok, motorlink_st_master_execute(&mut master, 1, 1));
-        while output.kind != motorlink_output::Done {
-            let now = output.until_us;
-            gives!(Ok, motorlink_st_master_poll(&mut master, now, &mut output));
-        }
-        assert_eq!(output.result, Error::Timeout);
-        if is_raw {
-            gives!(Ok, motorlink_st_master_raw(&mut master, 1, 3, &raw_stop, 1));
-        } else {
-            gives!(Ok, motorlink_st_master_execute(&mut master, 1, 2));
-        }
-        gives!(Ok, motorlink_st_master_poll(&mut master, 2_000_000, &mut output));
-        assert_eq!(bytes(&output.bytes), [0x23, 0x01, 0x02, 0x26]);
-        gives!(Ok, motorlink_st_master_poll(&mut master, 2_000_000, &mut output));
-        assert_eq!(output.kind, motorlink_output::Wait);
-    }
 }
 
 fn confirm(bench: &mut StBench) -> (motorlink_st_output, Vec<u8>) {
@@ -362,27 +306,6 @@ fn an_abandoned_confirmation_does_not_affect_the_next_exchange() {
     gives!(Busy, motorlink_st_master_confirm(master));
     gives!(Ok, motorlink_st_master_abandon(master), motorlink_st_master_trust_line(master));
     assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
-}
-
-#[test]
-fn a_line_that_echoes_is_no_drive() {
-    let nothing = motorlink_st_motor_control { execute: Some(execute_nothing), ..zeroed() };
-    let mut bench = StBench::new(0, &nothing);
-    let master: *mut motorlink_st_master = &mut bench.master;
-    gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_execute(master, 1, 1));
-    let (mut output, mut now): (motorlink_st_output, u64) = (zeroed(), 0);
-    loop {
-        gives!(Ok, motorlink_st_master_poll(master, now, &mut output));
-        match output.kind {
-            motorlink_output::Done => break,
-            motorlink_output::Wait => now = output.until_us,
-            motorlink_output::Transmit => {
-                let sent = bytes(&output.bytes);
-                gives!(Ok, motorlink_st_master_receive(master, now, sent.as_ptr(), sent.len()));
-            }
-        }
-    }
-    assert_eq!(output.result, Error::Echo);
 }
 
 #[test]

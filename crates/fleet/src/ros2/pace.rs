@@ -148,10 +148,9 @@ mod tests {
 
     #[test]
     fn clocks_that_drift_are_followed() {
-        let pace = settled();
-        for drift in [-300e-6, 0.0, 300e-6] {
-            let mut pace = pace.clone();
-            for number in 20..200_000 {
+        for drift in [-300e-6, 300e-6] {
+            let mut pace = settled();
+            for number in 20..50_000 {
                 let now = on_time(number) * (1.0 + drift);
                 assert_eq!(pace.take(now, &sample(number), LIVE), Ok(()), "{number}");
             }

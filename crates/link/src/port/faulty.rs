@@ -292,13 +292,6 @@ mod tests {
     }
 
     #[test]
-    fn lost_bytes_never_come() {
-        let mut port = bytes("drop=1");
-        port.write(&[1, 2, 3]).unwrap();
-        assert_eq!(port.read(&mut [0; 8], Some(Duration::from_millis(1))).unwrap(), 0);
-    }
-
-    #[test]
     fn frames_are_late_and_come_twice() {
         let faults = "delay=1s,dup=1,only=sent".parse().unwrap();
         let mut port = FaultCan::new(Loopback::new(), &faults, Identifiers::default());

@@ -208,7 +208,7 @@ fn a_station_is_polled_at_its_deadline() -> Outcome {
 fn a_tcp_line_has_one_client_and_takes_the_next_when_it_left() -> Outcome {
     let server = Running::bytes("tcp-listen:127.0.0.1:0")?;
     let port = format!("tcp:{}", server.served.path);
-    for _ in 0..20 {
+    for _ in 0..3 {
         let mut line = open_line(&port)?;
         line.write(b"hello")?;
         assert_eq!(gather(&mut *line, 5)?, b"hello");

@@ -5,24 +5,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{Direction, EventBytes, EventCan, PortName, TapBytes, TapCan};
-use motorlink::{rmd, st};
+use crate::shared::Share;
+use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
 use motorlink_monitor::drive::{Drives, Motion};
 use motorlink_monitor::message::{Answer, Ask, Ran};
 use motorlink_proto::st::{Frame, Parse, Profile};
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::share::address::{Address, Local};
-use motorlink_telemetry::share::hub::Held;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
-use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::server::Server;
-use motorlink_telemetry::share::wire::Tap;
-use motorlink_telemetry::share::words::Speaks;
-use motorlink_testbench::{Bench, BenchConfig, Serving};
 
-pub const LIMIT: Duration = Duration::from_secs(30);
+pub use crate::drives::path;
+pub use crate::shared::LIMIT;
+
 /// A busy machine may be late with a reply.
 pub const PATIENT: Duration = Duration::from_secs(2);
 
@@ -31,13 +25,9 @@ pub type Sent = (u8, Vec<u8>);
 
 /// A share with the line st0 and the line rmd0.
 pub struct World {
-    pub bench: Bench,
-    pub path: PathBuf,
+    pub share: Share,
     pub st: Arc<Mutex<Vec<Sent>>>,
     pub rmd: Arc<Mutex<Vec<Sent>>>,
-    ends: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
-    _serving: Serving,
 }
 
 /// A page at the share, and the drives of its server.
@@ -66,11 +56,6 @@ pub fn rmd(motor: u8) -> MotorName {
     MotorName { line: "rmd0".to_owned(), motor }
 }
 
-pub fn path(name: &str, kind: &str) -> PathBuf {
-    let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
-    folder.join(format!("{name}-{kind}-{}", std::process::id()))
-}
-
 impl World {
     pub fn new(name: &str, profile: Profile) -> Self {
         Self::with(name, (profile, PATIENT), |link| link, |link| link)
@@ -84,20 +69,10 @@ impl World {
         mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
         mut around_bus: impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
     ) -> Self {
-        let config = BenchConfig { profile, ..BenchConfig::default() };
-        let bench = Bench::new(&config).unwrap();
-        let [st_path, rmd_path] = ["st", "rmd"].map(|it| path(name, it).display().to_string());
-        let port = |name: String| Some(name.parse().unwrap());
-        let serving =
-            bench.serve(port(format!("pty:{st_path}")), port(format!("slcan-pty:{rmd_path}")));
-        let serving = serving.unwrap();
-
-        let (st_tap, rmd_tap) = (Tap::default(), Tap::default());
-        let (st_around, rmd_around) = (st_tap.clone(), rmd_tap.clone());
-        let st_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
-        let wire = Arc::clone(&st_sent);
-        let wrap = move |link| {
-            let wire = Arc::clone(&wire);
+        let [st, rmd] = [(); 2].map(|()| Arc::<Mutex<Vec<Sent>>>::default());
+        let (st_wire, rmd_wire) = (Arc::clone(&st), Arc::clone(&rmd));
+        let observed = move |link| -> Box<dyn EventBytes> {
+            let wire = Arc::clone(&st_wire);
             let mut stream = Vec::new();
             let observer = move |direction, _, bytes: &[u8]| {
                 if direction == Direction::Received {
@@ -110,63 +85,31 @@ impl World {
                     stream.drain(..size);
                 }
             };
-            st_around.around_line(Box::new(TapBytes::new(around(link), observer)))
+            Box::new(TapBytes::new(around(link), observer))
         };
-        let options = st::Options { profile, timeout, ..st::Options::default() };
-        let client = st::EventClient::open_wrapped(&st_path.parse().unwrap(), wrap, options);
-        let line = StLine::new(client.unwrap());
-        let engine = Acquisition::new(Box::new(line));
-        let (port, speaks) = (st_path.parse().unwrap(), Speaks::St(profile));
-        let st_held = Held::start("st0", Opened { port, speaks, engine, tap: st_tap }).unwrap();
-
-        let rmd_sent: Arc<Mutex<Vec<Sent>>> = Arc::default();
-        let wire = Arc::clone(&rmd_sent);
-        let wrap = move |link| {
-            let wire = Arc::clone(&wire);
+        let observed_bus = move |link| -> Box<dyn EventCan> {
+            let wire = Arc::clone(&rmd_wire);
             let observer = move |direction, _, frame: &motorlink_proto::can::CanFrame| {
                 if direction == Direction::Sent {
                     let motor = (frame.id() - 0x140) as u8;
                     wire.lock().unwrap().push((motor, frame.data().to_vec()));
                 }
             };
-            rmd_around.around_bus(Box::new(TapCan::new(around_bus(link), observer)))
+            Box::new(TapCan::new(around_bus(link), observer))
         };
-        let options = rmd::Options { timeout, ..Default::default() };
-        let port: PortName = format!("slcan:{rmd_path}").parse().unwrap();
-        let client = rmd::EventClient::open_wrapped(&port, wrap, options).unwrap();
-        let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-        let opened = Opened { port, speaks: Speaks::Rmd, engine, tap: rmd_tap };
-        let rmd_held = Held::start("rmd0", opened).unwrap();
-
-        let socket = path(name, "socket");
-        let mut server = Server::open(&socket, "test", vec![st_held, rmd_held]).unwrap();
-        let ends = Arc::new(AtomicBool::new(false));
-        let has_ended = Arc::clone(&ends);
-        let thread = std::thread::spawn(move || {
-            while !has_ended.load(Ordering::SeqCst) {
-                server.turn().unwrap();
-            }
-            server.end("the test is over");
-        });
-        World {
-            bench,
-            path: socket,
-            st: st_sent,
-            rmd: rmd_sent,
-            ends,
-            thread: Some(thread),
-            _serving: serving,
-        }
+        let around = (observed, observed_bus);
+        let share = Share::of(name, profile, (timeout, timeout), None, around);
+        World { share, st, rmd }
     }
 
     /// A page, with the drives of a server of its own.
     pub async fn page(&self) -> Page {
-        let (view, _) = connect(&self.path, "page").await;
+        let (view, _) = connect(&self.share.path, "page").await;
         let Ok(share::Answer::Lines { lines, .. }) = view.ask(share::Ask::Lines).await else {
             panic!("no lines")
         };
         let drives = Drives::new(lines);
-        Page { drives, view, drive: Drive::new(&self.path) }
+        Page { drives, view, drive: Drive::new(&self.share.path) }
     }
 
     /// Another page of the same server.
@@ -174,15 +117,10 @@ impl World {
         Page { drives: page.drives.clone(), ..self.page().await }
     }
 
-    pub fn signal(&self, signal: &str) -> f64 {
-        let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
-        self.bench.values()[at]
-    }
-
     pub async fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
         let end = Instant::now() + LIMIT;
-        while !what(self.signal(signal)) {
-            assert!(Instant::now() < end, "{signal} is {}", self.signal(signal));
+        while !what(self.share.value(signal)) {
+            assert!(Instant::now() < end, "{signal} is {}", self.share.value(signal));
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
     }
@@ -207,27 +145,13 @@ impl World {
 
     /// The share, for programs.
     pub fn share(&self) -> Arc<dyn Address> {
-        Arc::new(Local(self.path.clone()))
-    }
-
-    /// Ends the share.
-    pub fn end(&self) {
-        self.ends.store(true, Ordering::SeqCst);
+        Arc::new(Local(self.share.path.clone()))
     }
 
     /// Executes a command of the bench, as JSON.
     pub fn execute(&self, json: &str) {
         let command = motorlink_testbench::Command::read(json).unwrap();
-        self.bench.execute(&command).unwrap();
-    }
-}
-
-impl Drop for World {
-    fn drop(&mut self) {
-        self.end();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        self.share.bench.execute(&command).unwrap();
     }
 }
 

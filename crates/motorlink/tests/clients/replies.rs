@@ -1,4 +1,4 @@
-//! Replies that are late, come twice, or answer something else.
+//! Replies that come twice, or answer something else.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,44 +9,6 @@ use motorlink::rmd::{self, MotorId};
 use motorlink::st::{self, register};
 
 use crate::wire::Fresh;
-
-/// A motor whose reply to the first request comes when the second has been made.
-#[derive(Default)]
-struct Tardy(Vec<CanFrame>);
-
-impl Link for Tardy {}
-
-impl CanLink for Tardy {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        let mut reply = [0; 8];
-        reply.copy_from_slice(frame.data());
-        reply[7] = self.0.len() as u8 + 1;
-        self.0.push(CanFrame::new(0x141, reply));
-        Ok(())
-    }
-
-    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        // The first wait is for the first reply, which is late.
-        if self.0.len() == 1 && timeout.is_some_and(|timeout| !timeout.is_zero()) {
-            std::thread::sleep(timeout.unwrap_or_default());
-            return Ok(None);
-        }
-        let unread = self.0.iter().position(|frame| frame.data()[0] != 0);
-        Ok(unread.map(|place| std::mem::replace(&mut self.0[place], CanFrame::new(0, [0; 8]))))
-    }
-}
-
-#[test]
-fn a_reply_that_waited_in_the_port_is_not_taken_for_the_next_one() {
-    let ms = Duration::from_millis;
-    let options = rmd::Options { timeout: ms(5), quarantine: ms(5), ..rmd::Options::default() };
-    let bus = rmd::Client::over("tardy", Box::new(Fresh(Tardy::default())), options);
-    let ask = || bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
-    assert!(matches!(ask(), Err(rmd::Error::Timeout { .. })));
-    std::thread::sleep(ms(20));
-    assert_eq!(ask().unwrap()[7], 2, "the second request's reply");
-    assert_eq!(bus.counters().late, 1);
-}
 
 /// Says everything twice; the copy waits in the port until it is read. Replies are numbered.
 struct Twice<T> {

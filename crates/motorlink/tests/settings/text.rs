@@ -141,6 +141,9 @@ fn a_file_that_was_cut_off_is_refused() {
     for whole in ["SPEED_KP = 12\n", "SPEED_KP = 12 # s", "SPEED_KP = 12 "] {
         SettingsFile::parse(&format!("{begin}{whole}"), &motor.tuning()).unwrap();
     }
+    // Line ends and the mark of other editors.
+    let text = format!("\u{feff}{begin}SPEED_KP = 12\n").replace('\n', "\r\n");
+    SettingsFile::parse(&text, &motor.tuning()).unwrap();
 }
 
 #[test]

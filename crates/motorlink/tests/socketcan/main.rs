@@ -12,7 +12,7 @@ use motorlink::can::CanFrame;
 use motorlink::list;
 use motorlink::port::{CanLink, PortError, PortName};
 use motorlink::rmd::{
-    self, CentiDps, Client, Error, IqCommand, MotorId, MotorSet, Pid, ScanResult, SetTorque4,
+    self, CentiDps, Client, Error, IqCommand, MotorSet, Pid, ScanResult, SetTorque4,
 };
 use motorlink::time::Instant;
 use motorlink::{BackOff, LinkState};
@@ -62,10 +62,6 @@ fn refusal(interface: &str) -> PortError {
     port(interface).open_can().err().expect("it cannot be opened")
 }
 
-fn id(number: u8) -> MotorId {
-    MotorId::new(number).expect("1 to 32")
-}
-
 /// Everything a host does, with simulated motors 1 to 4 at the other end.
 fn drive(host: &str, drives: &str) {
     let mut motors = Served::on(drives, 4);
@@ -91,12 +87,6 @@ fn drive(host: &str, drives: &str) {
     let replies = bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4).expect("the port");
     assert!(replies.iter().all(|reply| matches!(reply, Some(Ok(_)))), "{replies:?}");
     assert_eq!(motors.state().matches("\"mode\":\"torque\"").count(), 4);
-}
-
-#[test]
-#[ignore = "needs CAN: make test-socketcan"]
-fn motors_are_driven_on_one_virtual_interface() {
-    drive("vcan0", "vcan0");
 }
 
 #[test]
@@ -443,38 +433,4 @@ fn a_flood_of_other_frames_is_survived() {
     until("some exchanges get through", || (0..20).filter(|_| motor.status().is_ok()).count() > 10);
     drop(flood);
     until("every exchange gets through", || (0..20).all(|_| motor.status().is_ok()));
-}
-
-#[test]
-#[ignore = "needs CAN: make test-socketcan"]
-fn a_late_reply_that_waited_in_the_socket_is_not_taken_for_the_next_one() {
-    let witness = neighbour("vcan0");
-    let bus = bus_within(Duration::from_secs(1), "vcan0");
-    let asked = std::thread::scope(|scope| {
-        let first = scope.spawn(|| bus.raw(id(1), [0x9C, 0, 0, 0, 0, 0, 0, 0]));
-        for question in [0x9A, 0x9C] {
-            assert_eq!(witness.read_frame().expect("a question").data()[0], question);
-            let data = [question, 25, 0, 240, 0, 0, 0, 0];
-            let answer = CanDataFrame::new(StandardId::new(0x141).expect("11 bits"), &data);
-            witness.write_frame(&answer.expect("8 bytes")).expect("room");
-            assert_eq!(witness.read_frame().expect("our own answer").data(), data);
-        }
-        first.join().expect("no panic")
-    });
-    assert!(matches!(asked, Err(Error::Timeout { .. })));
-    let request = witness.read_frame().expect("the request");
-    let reply = |number: u8| {
-        let data = [0x9C, number, 0, 0, 0, 0, 0, 0];
-        CanDataFrame::new(StandardId::new(0x141).expect("11 bits"), &data).expect("8 bytes")
-    };
-    assert_eq!(request.data(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
-    witness.write_frame(&reply(1)).expect("room");
-    let answered = std::thread::scope(|scope| {
-        let second = scope.spawn(|| bus.raw(id(1), [0x9C, 0, 0, 0, 0, 0, 0, 0]));
-        assert_eq!(witness.read_frame().expect("our own late reply").data()[1], 1);
-        assert_eq!(witness.read_frame().expect("the request").data()[1], 0);
-        witness.write_frame(&reply(2)).expect("room");
-        second.join().expect("no panic")
-    });
-    assert_eq!(answered.expect("the second reply")[1], 2);
 }

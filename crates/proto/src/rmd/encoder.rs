@@ -145,17 +145,6 @@ mod tests {
 
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn the_single_turn_angle_is_the_multi_turn_angle_modulo_a_turn() {
-        for bits in widths() {
-            for counts in (-3_000_000..3_000_000).step_by(9973) {
-                let multi = bits.multi_turn(counts).0.rem_euclid(36_000);
-                assert_eq!(i64::from(bits.circle(counts).0), multi);
-            }
-        }
-    }
-
-    #[test]
-    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn an_angle_turned_into_counts_and_back_is_off_by_no_more_than_a_count() {
         for bits in widths() {
             let count = 36_000 / (1 << bits.bits()) + 1;

@@ -84,7 +84,7 @@ impl Payload for SetTorque4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rmd::command::{Command, SetPositionLimited, SetSingleTurnPosition, SetTorque};
+    use crate::rmd::command::{Command, SetPositionLimited};
     use crate::units::{CentiDegrees, SpeedLimit};
 
     #[test]
@@ -94,22 +94,6 @@ mod tests {
         let data = [0xA4, 0x00, 0xF4, 0x01, 0x60, 0x73, 0xFF, 0xFF];
         assert_eq!(command.encode(), data);
         assert_eq!(SetPositionLimited::decode(&data), command);
-    }
-
-    #[test]
-    fn null_bytes_of_a_request_are_ignored_and_sent_as_zero() {
-        let stale = [0xA1, 0x55, 0x55, 0x55, 0x64, 0x00, 0x55, 0x55];
-        let command = SetTorque::decode(&stale);
-        assert_eq!(command.iq, IqCommand(100));
-        assert_eq!(command.encode(), [0xA1, 0, 0, 0, 0x64, 0, 0, 0]);
-    }
-
-    #[test]
-    fn an_unknown_direction_survives() {
-        let data = [0xA5, 0x02, 0, 0, 0x28, 0x23, 0, 0];
-        let command = SetSingleTurnPosition::decode(&data);
-        assert_eq!(command.direction, SpinDirection::Unknown(0x02));
-        assert_eq!(command.encode(), data);
     }
 
     #[test]

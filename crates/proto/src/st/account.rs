@@ -162,7 +162,7 @@ fn segment_bit(segment: u8) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::st::{Command, CurrentReference, Ramp};
+    use crate::st::{Command, ControlMode, CurrentReference, Ramp, RegisterId, TorqueRamp};
 
     const LIMITS: Limits = Limits { speed_rpm: Some(1000), current_s16a: None };
     const START: Request<'_> = Request::ExecuteCommand(Command::StartMotor);
@@ -195,12 +195,29 @@ mod tests {
         assert!(starts(&mut account, 0));
         account.sent(1, Effect::Ramps);
         assert!(!starts(&mut account, 1), "the ramp was not acknowledged");
-        let torque = CurrentReference { iq_s16a: 1, id_s16a: 0 };
         done(&mut account, 1, &RAMP);
-        done(&mut account, 1, &Request::SetCurrentReference(torque));
-        assert!(!starts(&mut account, 1));
         done(&mut account, 1, &Request::ExecuteCommand(Command::StopMotor));
+        assert!(starts(&mut account, 1));
         assert!(Account::default().check(NEW, 1, &START).is_ok());
+    }
+
+    #[test]
+    fn a_ramp_does_not_count_behind_another_setpoint_or_a_reset() {
+        let write = |register, value| Request::SetRegister { register, value };
+        for later in [
+            Request::SetCurrentReference(CurrentReference { iq_s16a: 1, id_s16a: 0 }),
+            Request::SetTorqueRamp(TorqueRamp { torque_s16a: 1, duration_ms: 0 }),
+            write(RegisterId::TORQUE_REF, &[1, 0]),
+            write(RegisterId::CONTROL_MODE, &[u8::from(ControlMode::Torque)]),
+            // Firmware makes this a ramp to a reference of its own.
+            write(RegisterId::CONTROL_MODE, &[u8::from(ControlMode::Speed)]),
+            Request::ExecuteCommand(Command::Reset),
+        ] {
+            let mut account = Account::new(LIMITS);
+            done(&mut account, 1, &RAMP);
+            done(&mut account, 1, &later);
+            assert!(!starts(&mut account, 1), "{later:?}");
+        }
     }
 
     #[test]

@@ -222,7 +222,7 @@ impl core::error::Error for LimitError {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::st::{CurrentReference, PositionMove, Ramp, TorqueRamp};
+    use crate::st::{CurrentReference, PositionMove, Ramp, RevupPhase, TorqueRamp};
 
     const SPEED: Limits = Limits { speed_rpm: Some(1000), current_s16a: None };
     const CURRENT: Limits = Limits { speed_rpm: None, current_s16a: Some(500) };
@@ -248,6 +248,33 @@ mod tests {
         let part = Err(LimitError::Part(RegisterId::TORQUE_REF));
         assert_eq!(limits.check(&torque(&[0xFF])), part);
         assert!(Limits::default().check(&ramp(i32::MIN)).is_ok());
+    }
+
+    #[test]
+    fn each_request_with_a_speed_or_a_current_is_limited() {
+        let write = |register, value| Request::SetRegister { register, value };
+        let phase = |speed_rpm, torque_s16a| {
+            Request::SetRevupData(0, RevupPhase { speed_rpm, torque_s16a, duration_ms: 0 })
+        };
+        let fast = 1001i32.to_le_bytes();
+        for request in [
+            Request::SetRamp(Ramp { speed_rpm: 1001, duration_ms: 0 }),
+            write(RegisterId::RAMP_FINAL_SPEED, &fast),
+            phase(-1001, 0),
+        ] {
+            assert!(SPEED.check(&request).is_err() && CURRENT.check(&request).is_ok());
+        }
+        let strong = (-501i16).to_le_bytes();
+        for request in [
+            Request::SetCurrentReference(CurrentReference { iq_s16a: 501, id_s16a: 0 }),
+            Request::SetTorqueRamp(TorqueRamp { torque_s16a: -501, duration_ms: 0 }),
+            write(RegisterId::TORQUE_REF, &strong),
+            write(RegisterId::FLUX_REF, &strong),
+            write(RegisterId::IQ_SPEEDMODE, &strong),
+            phase(0, -501),
+        ] {
+            assert!(CURRENT.check(&request).is_err() && SPEED.check(&request).is_ok());
+        }
     }
 
     #[test]

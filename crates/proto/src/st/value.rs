@@ -306,6 +306,7 @@ mod tests {
         assert_eq!(shown(RegisterId::SPEED_MEAS, -1500, spec), "-1500 rpm");
         assert_eq!(shown(RegisterId::STATUS, 6, spec), "RUN");
         assert_eq!(shown(RegisterId::STATUS, 99, spec), "0x63");
+        assert_eq!(Status::from(99).doc(), "no document names this number");
         assert_eq!(shown(RegisterId::FLAGS, 0x0002_0042, spec), "OVER_VOLT (present), BREAK_IN");
         assert_eq!(shown(RegisterId::PFC_ACBUS_FREQ, 501, spec), "50.1 Hz");
         assert_eq!(shown(RegisterId::FLUXWK_BUS, 98, spec), "98 %");

@@ -5,12 +5,11 @@ use std::collections::HashMap;
 use motorlink_proto::st::*;
 use motorlink_proto::time::Instant;
 
-/// Registers are plain memory. All other commands are logged.
+/// Registers are plain memory. Commands are logged.
 #[derive(Default)]
 pub struct Memory {
     pub features: Option<Features>,
     pub registers: HashMap<(u8, u8), i32>,
-    pub revup: [RevupPhase; REVUP_PHASES as usize],
     pub log: Vec<String>,
 }
 
@@ -61,29 +60,12 @@ impl MotorControl for Memory {
     fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.log.push(format!("{command} {}", motor.number()));
     }
-    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
-        self.log.push(format!("ramp {} {} {}", motor.number(), ramp.speed_rpm, ramp.duration_ms));
+    fn set_ramp(&mut self, _: MotorNumber, _: Ramp) {}
+    fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
+        RevupPhase::default()
     }
-    fn get_revup_data(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
-        self.revup[usize::from(phase)]
-    }
-    fn set_revup_data(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
-        self.revup[usize::from(phase)] = data;
-    }
-    fn set_current_reference(&mut self, motor: MotorNumber, r: CurrentReference) {
-        self.log.push(format!("current {} {} {}", motor.number(), r.iq_s16a, r.id_s16a));
-    }
-    fn set_torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
-        let TorqueRamp { torque_s16a, duration_ms } = ramp;
-        self.log.push(format!("torque ramp {} {torque_s16a} {duration_ms}", motor.number()));
-    }
-    fn set_position(&mut self, motor: MotorNumber, target: PositionMove) {
-        let PositionMove { angle_rad, duration_s } = target;
-        self.log.push(format!("position {} {angle_rad} {duration_s}", motor.number()));
-    }
-    fn profiler_step(&self, _: MotorNumber, step: u8) -> &[u8] {
-        if step == 1 { &[0x66, 0x67] } else { &[] }
-    }
+    fn set_revup_data(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+    fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
 }
 
 /// A slave and its drive, on a line without transmission time.
@@ -108,13 +90,7 @@ impl SlaveFixture {
         replies
     }
 
-    /// The reply to a raw frame: an ACK's payload or a NACK's code.
-    pub fn raw(&mut self, header: u8, payload: &[u8]) -> Result<Vec<u8>, ErrorCode> {
-        let mut out = [0; MAX_FRAME];
-        let frame = Frame { header, payload }.encode(&mut out).unwrap().to_vec();
-        answer(&self.bytes(&frame))
-    }
-
+    /// The reply to a request: an ACK's payload or a NACK's code.
     pub fn ask(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, ErrorCode> {
         let mut out = [0; MAX_FRAME];
         let frame = Frame::command(motor, &request, &mut out).unwrap().to_vec();

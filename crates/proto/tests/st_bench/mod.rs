@@ -10,6 +10,31 @@ use super::common::Memory;
 pub const MS: u64 = 1_000;
 pub const STATUS: Request<'static> = Request::GetRegister(RegisterId::STATUS);
 
+/// Requests whose replies differ from each other.
+pub const REQUESTS: [Request<'static>; 7] = [
+    Request::GetRegister(RegisterId::SPEED_KP),
+    Request::GetRegister(RegisterId::SPEED_KI),
+    STATUS,
+    Request::GetBoardInfo,
+    Request::GetFirmwareVersion,
+    Request::GetRevupData(0),
+    Request::SetRegister { register: RegisterId::TORQUE_KI, value: &[1, 0] },
+];
+
+/// Gives a drive the values that they read.
+pub fn prepare(drive: &mut Memory) {
+    drive.set(1, RegisterId::SPEED_KP, 0x1234);
+    drive.set(1, RegisterId::SPEED_KI, 0x5678);
+    drive.set(1, RegisterId::STATUS, 6);
+}
+
+/// The results of these requests on a line without faults.
+pub fn expected() -> [Result<Vec<u8>, ExchangeError>; REQUESTS.len()] {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    prepare(&mut pair.drive);
+    REQUESTS.map(|request| pair.exchange(1, request))
+}
+
 /// A master on a line without former masters.
 pub fn master(recovery: Recovery) -> Master {
     let mut master = Master::new(MasterConfig { recovery, ..MasterConfig::default() });

@@ -213,35 +213,18 @@ fn frame(stamp: Time, way: captured::Direction, bytes: &[u8], piece: &Piece<'_>)
 mod tests {
     use super::*;
 
-    const REQUEST: [u8; 4] = [0x22, 1, 2, 0x25];
     const REPLY: [u8; 4] = [0xF0, 1, 6, 0xF7];
     const NACK: [u8; 4] = [0xFF, 1, 3, 0x04];
 
-    fn split(seen: &[(Way, &[u8])]) -> Vec<(Direction, FrameResult, Vec<u8>)> {
+    fn results(received: &[&[u8]]) -> Vec<(FrameResult, usize)> {
         let (mut splitter, mut frames) = (Splitter::default(), Vec::new());
-        let mut put = |frame: Frame| frames.push((frame.direction, frame.result, frame.data));
-        for (way, bytes) in seen {
+        let mut put = |frame: Frame| frames.push((frame.result, frame.data.len()));
+        for bytes in received {
             let what = Wire::Bytes((*bytes).into());
-            splitter.take(Seen::new(Time(0), *way, Duration::ZERO, what), &mut put);
+            splitter.take(Seen::new(Time(0), Way::Received, Duration::ZERO, what), &mut put);
         }
         splitter.end(&mut put);
         frames
-    }
-
-    fn results(bytes: &[&[u8]]) -> Vec<(FrameResult, usize)> {
-        let seen: Vec<_> = bytes.iter().map(|bytes| (Way::Received, *bytes)).collect();
-        split(&seen).into_iter().map(|(_, result, data)| (result, data.len())).collect()
-    }
-
-    #[test]
-    fn a_request_and_its_reply_are_a_frame_each() {
-        let seen =
-            [(Way::Sent, &REQUEST[..]), (Way::Received, &REPLY[..2]), (Way::Received, &REPLY[2..])];
-        let expected = [
-            (Direction::Sent, FrameResult::Frame, REQUEST.to_vec()),
-            (Direction::Received, FrameResult::Frame, REPLY.to_vec()),
-        ];
-        assert_eq!(split(&seen), expected);
     }
 
     #[test]
@@ -253,15 +236,5 @@ mod tests {
         wrong[3] ^= 1;
         assert_eq!(results(&[&[wrong, NACK].concat()]), [(Damaged, 4), (Nack, 4)]);
         assert_eq!(results(&[&[0xF0, 200], &REPLY]), [(Damaged, 2), (Frame, 4)]);
-    }
-
-    #[test]
-    fn a_reply_without_its_end_is_kept_when_the_next_request_is_sent() {
-        let seen = [(Way::Received, &REPLY[..3]), (Way::Sent, &REQUEST[..])];
-        let results: Vec<_> =
-            split(&seen).into_iter().map(|(way, result, _)| (way, result)).collect();
-        let expected =
-            [(Direction::Received, FrameResult::Damaged), (Direction::Sent, FrameResult::Frame)];
-        assert_eq!(results, expected);
     }
 }

@@ -1,9 +1,8 @@
 //! Friction, gear and loads.
 
-use motorlink_sim::angle;
 use motorlink_sim::plant::{
-    Bridge, Feed, Flow, GearConfig, LoadConfig, Machine, MachineConfig, PendulumConfig, Plant,
-    PlantConfig, SpringConfig, StopsConfig,
+    Bridge, Feed, Flow, LoadConfig, Machine, MachineConfig, PendulumConfig, Plant, PlantConfig,
+    SpringConfig, StopsConfig,
 };
 use motorlink_sim::preset;
 use motorlink_sim::vector::Vector;
@@ -25,15 +24,6 @@ fn output_radians(plant: &Plant) -> f64 {
 }
 
 #[test]
-fn a_torque_accelerates_the_inertia_of_rotor_and_load() {
-    let mut plant = with_load(LoadConfig { torque: -0.02, inertia: 1e-4, ..LoadConfig::default() });
-    run(&mut plant, 0.05);
-    // 0.02 Nm on 2e-4 kg m² for 50 ms.
-    assert!((plant.machine().speed() - 5.0).abs() < 0.01, "{} rad/s", plant.machine().speed());
-    assert!((output_radians(&plant) - 0.125).abs() < 1e-3);
-}
-
-#[test]
 fn a_positive_load_torque_opposes_motion_towards_growing_angles() {
     let mut plant = with_load(LoadConfig { torque: 0.02, ..LoadConfig::default() });
     assert_eq!(plant.truth().load_torque, 0.02);
@@ -47,7 +37,7 @@ fn a_positive_load_torque_opposes_motion_towards_growing_angles() {
 
 #[test]
 fn a_flywheel_gains_speed_however_slowly() {
-    for inertia in [0.01, 0.1, 1.0, 10.0] {
+    for inertia in [0.01, 10.0] {
         let machine = MachineConfig { inertia, ..plain().machine };
         let load = LoadConfig { torque: -1.0, ..LoadConfig::default() };
         let mut flywheel = Machine::new(machine, load, 50e-6);
@@ -166,39 +156,6 @@ fn cogging_holds_a_rotor_in_its_nearest_place() {
     run(&mut plant, 2.0);
     let angle = plant.truth().angle_degrees;
     assert!(angle.abs() < 1.0 && plant.machine().speed() == 0.0, "{angle}° of 15° a period");
-}
-
-#[test]
-fn a_gear_turns_torque_up_and_loses_its_share_both_ways() {
-    let machine = MachineConfig {
-        gear: GearConfig { ratio: 6.0, efficiency: 0.8, back_efficiency: None },
-        ..plain().machine
-    };
-    let output = |push: f32, speed_up: f32| {
-        let load = LoadConfig { torque: -speed_up, ..LoadConfig::default() };
-        let mut plant = Plant::new(PlantConfig { machine, load, ..plain() });
-        run(&mut plant, 0.02);
-        let before = plant.machine().speed();
-        plant.change_load(|load| load.torque = -push);
-        run(&mut plant, 0.01);
-        (plant.machine().speed() - before) / 0.01 * 1e-4 * 6.0
-    };
-    // Turning forwards, against a load: it costs 1/0.8 of its torque.
-    assert!((output(-0.6, 1.0) + 0.75).abs() < 0.01, "{}", output(-0.6, 1.0));
-    // Pushed by the load: 0.75 of it gets through.
-    assert!((output(0.6, 1.0) - 0.45).abs() < 0.01, "{}", output(0.6, 1.0));
-}
-
-#[test]
-fn a_locked_rotor_stays() {
-    let mut plant = with_load(LoadConfig { torque: -1.0, ..LoadConfig::default() });
-    plant.lock(true);
-    run(&mut plant, 0.1);
-    assert_eq!((plant.machine().speed(), plant.machine().position()), (0.0, 0));
-    plant.lock(false);
-    run(&mut plant, 0.1);
-    assert!(plant.machine().speed() > 0.0);
-    assert_eq!(angle::TURN, 1 << 32);
 }
 
 #[test]

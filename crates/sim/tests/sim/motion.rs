@@ -9,7 +9,7 @@ use crate::{rmd_bench, st_bench};
 
 /// What a drive does: its state, its mode, and the reference of this mode.
 fn doing(line: &mut st_bench::NodeFixture) -> (Status, ControlMode, f32) {
-    line.wait(50);
+    line.wait(20);
     let mode = ControlMode::from(line.get(register::CONTROL_MODE));
     let truth = line.truth();
     let reference = match mode {
@@ -23,13 +23,13 @@ fn doing(line: &mut st_bench::NodeFixture) -> (Status, ControlMode, f32) {
 fn frames() -> Vec<(u8, Vec<u8>)> {
     let mut frames = Vec::new();
     for code in 0..=0x1F {
-        for size in 0..=8 {
-            frames.extend([0, 1, 2, 60].map(|byte| (code, vec![byte; size])));
+        for size in [0, 1, 2, 4, 6, 8] {
+            frames.extend([0, 1, 60].map(|byte| (code, vec![byte; size])));
         }
     }
     frames.extend(Command::ALL.iter().map(|command| (3, vec![command.number()])));
     for id in RegisterId::all() {
-        for size in [1, 2, 4] {
+        for size in [2, 4] {
             for value in [0, 0x0140, i32::MAX] {
                 frames.push((1, [&[id.0][..], &value.to_le_bytes()[..size]].concat()));
             }
@@ -86,7 +86,7 @@ fn every_request_that_changes_the_motion_of_an_rmd_motor_is_known() {
     running.ask(SetSpeed { speed: CentiDps(36_000) });
     running.wait(500);
     let doing = |mut bus: rmd_bench::NodeFixture| {
-        bus.wait(50);
+        bus.wait(20);
         bus.truth().mode
     };
     let mut changing = 0;

@@ -16,21 +16,6 @@ fn speed(dps: f64) -> SetSpeed {
 }
 
 #[test]
-fn torque_accelerates_the_rotor() {
-    let mut bench = NodeFixture::new([RmdConfig::x8()]);
-    bench.ask(SetTorque { iq: IqCommand::from_amps(1.6) });
-    bench.wait(50);
-    let status = bench.ask(ReadMotionStatus);
-    assert!((status.iq.amps() - 1.6).abs() < 0.05, "{} A", status.iq.amps());
-    // 0.31 Nm after friction and iron on 2.6e-4 kg m² are 1170 rad/s² for 50 ms.
-    let speed = bench.truth().speed_dps;
-    assert!((3200.0..3500.0).contains(&speed), "{speed} °/s");
-    bench.ask(SetTorque { iq: IqCommand::from_amps(-1.6) });
-    bench.wait(150);
-    assert!(bench.truth().speed_dps < -1000.0);
-}
-
-#[test]
 fn torque_is_the_torque_constant_times_the_current() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         for amps in [0.5, -2.0, 5.0] {
@@ -143,60 +128,42 @@ fn an_acceleration_of_0_or_less_is_no_limit() {
 }
 
 #[test]
-fn the_acceleration_limit_makes_a_trapezoid() {
-    for config in [RmdConfig::default(), RmdConfig::x8()] {
-        let mut bench = NodeFixture::new([config]);
-        bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(2000) }));
-        bench.ask(speed(1000.0));
-        for ms in (50..500).step_by(50) {
-            bench.wait(50);
-            let (now, due) = (bench.truth().speed_dps, 2.0 * ms as f32);
-            assert!((now - due).abs() < 20.0, "{now} °/s after {ms} ms");
-        }
-        bench.wait(300);
-        assert!((bench.mean_speed(300) - 1000.0).abs() < 2.0);
-    }
-}
-
-#[test]
 fn a_move_is_a_trapezoid_that_never_goes_back() {
-    for config in [RmdConfig::default(), RmdConfig::x8()] {
-        for (angle, acceleration) in [(90.0, 3000), (-720.0, 20_000)] {
-            let mut bench = NodeFixture::new([config]);
-            let acceleration = Acceleration { acceleration: DpsPerSecond(acceleration) };
-            bench.ask(WriteAccelerationRam(acceleration));
-            let max_speed = SpeedLimit(400);
-            let target = CentiDegrees::from_degrees(angle);
-            bench.ask(SetPositionLimited { max_speed, angle: target });
-            let limit = acceleration.acceleration.0 as f32;
-            let (mut last_speed, mut last, mut cruised) = (0.0, 0.0, 0);
-            let mut ms = 0;
-            while ms < 3000 {
-                ms += 10;
-                bench.wait(10);
-                let truth = bench.truth();
-                let way = truth.plant.angle_degrees * angle.signum();
-                assert!(way >= last - 0.01, "from {last}° back to {way}°");
-                let speed = truth.speed_dps * angle.signum() as f32;
-                // Cogging and stiction at the start cause 50 °/s.
-                assert!(speed < 450.0, "{speed} °/s");
-                let change = (speed - last_speed).abs() - 50.0;
-                assert!(change < limit * 0.01, "{change} °/s in 10 ms");
-                cruised += i32::from((380.0..420.0).contains(&speed));
-                (last, last_speed) = (way, speed);
-            }
-            assert!(cruised > 5, "{cruised}");
-            let off = (bench.truth().plant.output_degrees
-                - angle / f64::from(config.plant.machine.gear.ratio))
-            .abs();
-            assert!(off < 0.05, "{off}° at the output");
+    for (config, angle, acceleration) in
+        [(RmdConfig::default(), 90.0, 3000), (RmdConfig::x8(), -720.0, 20_000)]
+    {
+        let mut bench = NodeFixture::new([config]);
+        let acceleration = Acceleration { acceleration: DpsPerSecond(acceleration) };
+        bench.ask(WriteAccelerationRam(acceleration));
+        let max_speed = SpeedLimit(400);
+        let target = CentiDegrees::from_degrees(angle);
+        bench.ask(SetPositionLimited { max_speed, angle: target });
+        let limit = acceleration.acceleration.0 as f32;
+        let (mut last_speed, mut last, mut cruised) = (0.0, 0.0, 0);
+        for _ in 0..300 {
+            bench.wait(10);
+            let truth = bench.truth();
+            let way = truth.plant.angle_degrees * angle.signum();
+            assert!(way >= last - 0.01, "from {last}° back to {way}°");
+            let speed = truth.speed_dps * angle.signum() as f32;
+            // Cogging and stiction at the start cause 50 °/s.
+            assert!(speed < 450.0, "{speed} °/s");
+            let change = (speed - last_speed).abs() - 50.0;
+            assert!(change < limit * 0.01, "{change} °/s in 10 ms");
+            cruised += i32::from((380.0..420.0).contains(&speed));
+            (last, last_speed) = (way, speed);
         }
+        assert!(cruised > 5, "{cruised}");
+        let off = (bench.truth().plant.output_degrees
+            - angle / f64::from(config.plant.machine.gear.ratio))
+        .abs();
+        assert!(off < 0.05, "{off}° at the output");
     }
 }
 
 #[test]
 fn a_position_is_reached_within_a_tenth_of_a_degree_without_swinging() {
-    for bits in 12..=18 {
+    for bits in [12, 14, 18] {
         for degrees in [0.5, 90.0, -3600.0, 36_000.0] {
             let config = with_bits(bits);
             let mut bench = NodeFixture::new([config]);
@@ -235,32 +202,6 @@ fn the_drives_own_limits_hold_a_position_command() {
     bench.ask(SetSingleTurnPosition { direction, angle });
     bench.wait(3000);
     assert!((bench.angle() + 270.0).abs() < 0.1, "Max Angle is not for single-turn commands");
-}
-
-#[test]
-fn a_single_turn_position_is_reached_in_the_commanded_direction() {
-    let mut bench = NodeFixture::one();
-    let circle = |degrees, direction| SetSingleTurnPosition {
-        direction,
-        angle: TurnCentiDegrees::from_degrees(degrees),
-    };
-    bench.ask(circle(90.0, SpinDirection::Clockwise));
-    bench.wait(1500);
-    assert!((bench.angle() - 90.0).abs() < 0.1);
-    bench.ask(circle(45.0, SpinDirection::Clockwise));
-    bench.wait(1500);
-    assert!((bench.angle() - 405.0).abs() < 0.1, "on beyond zero: {}°", bench.angle());
-    let slow = SetSingleTurnPositionLimited {
-        direction: SpinDirection::Counterclockwise,
-        max_speed: SpeedLimit(100),
-        angle: TurnCentiDegrees::from_degrees(50.0),
-    };
-    bench.ask(slow);
-    let seen = bench.watch(2000);
-    assert!((95.0..130.0).contains(&seen.speed), "{} °/s", seen.speed);
-    bench.wait(2500);
-    assert!((bench.angle() - 50.0).abs() < 0.1, "{}°", bench.angle());
-    assert!((bench.ask(ReadSingleTurnAngle).angle.degrees() - 50.0).abs() < 0.1);
 }
 
 /// The response of a motor with these gains to a command, after `ms`.
@@ -320,27 +261,6 @@ fn each_gain_acts() {
         let (angle, ..) = follow(dead, 500, |bench| _ = bench.ask(position(90.0)));
         assert_eq!(angle, 0.0, "without gains nothing moves");
     }
-}
-
-#[test]
-fn stop_brakes_the_rotor_and_off_lets_it_coast() {
-    let coasting = |stop: bool| {
-        let mut bench = NodeFixture::new([RmdConfig::x8()]);
-        bench.ask(speed(3000.0));
-        bench.wait(500);
-        if stop {
-            bench.ask(Stop);
-        } else {
-            bench.ask(Off);
-        }
-        bench.wait(100);
-        (bench.truth().speed_dps, bench.truth().plant.iq)
-    };
-    let (stopped, _) = coasting(true);
-    assert!(stopped.abs() < 30.0, "{stopped} °/s");
-    let (off, current) = coasting(false);
-    assert!(off > 2000.0, "{off} °/s");
-    assert_eq!(current, 0.0);
 }
 
 #[test]

@@ -9,25 +9,6 @@ use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use crate::rmd_bench::NodeFixture;
 
 #[test]
-fn gains_survive_a_power_cycle_only_in_rom() {
-    let mut bench = NodeFixture::one();
-    let ram = Pid { position_kp: 1, position_ki: 2, ..bench.ask(ReadPid) };
-    let rom = Pid { speed_kp: 3, torque_ki: 4, ..ram };
-    bench.ask(WritePidRam(ram));
-    assert_eq!(bench.ask(ReadPid), ram);
-    bench.power_cycle();
-    assert_eq!(bench.ask(ReadPid), RmdConfig::default().factory_rom().gains);
-
-    bench.ask(WritePidRom(rom));
-    bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(700) }));
-    bench.power_cycle();
-    assert_eq!(bench.ask(ReadPid), rom);
-    assert_eq!(bench.ask(ReadAcceleration).acceleration, DpsPerSecond(0));
-    assert_eq!(bench.world().rom_writes(), 1);
-    assert_eq!(bench.node().drive().rom().gains, rom);
-}
-
-#[test]
 fn a_zero_position_takes_effect_with_the_next_power_on() {
     let mut bench = NodeFixture::one();
     bench.ask(SetPosition { angle: CentiDegrees::from_degrees(1000.0) });
@@ -48,23 +29,6 @@ fn turns_are_counted_until_power_off() {
     assert!((bench.angle() + 2000.0).abs() < 0.1);
     bench.power_cycle();
     assert!((bench.angle() - 160.0).abs() < 0.1, "-2000° are 160° in the turn");
-}
-
-#[test]
-fn stop_and_run_resume_a_motion_and_off_discards_it() {
-    let mut bench = NodeFixture::one();
-    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
-    bench.wait(300);
-    bench.ask(Stop);
-    bench.wait(300);
-    assert!(bench.truth().speed_dps.abs() < 1.0);
-    bench.ask(Run);
-    bench.wait(300);
-    assert!((bench.mean_speed(200) - 500.0).abs() < 1.0);
-    bench.ask(Off);
-    bench.ask(Run);
-    bench.wait(3000);
-    assert_eq!(bench.truth().speed_dps, 0.0);
 }
 
 #[test]
@@ -151,17 +115,6 @@ fn frames_for_other_motors_get_no_reply() {
     assert!(bench.send(&CanFrame::new(0x142, ReadStatus.encode())).is_empty());
     assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());
     assert!(bench.send(&CanFrame::data_frame(0x141, false, &[0x9A])).is_empty());
-}
-
-#[test]
-fn every_command_is_answered_with_its_code() {
-    let mut bench = NodeFixture::one();
-    for command in COMMANDS {
-        let code = u8::from(command.code);
-        let reply = bench.raw([code, 0, 0, 0, 0, 0, 0, 0]);
-        let printed = if code == 0x9B { 0x9A } else { code };
-        assert_eq!(reply[0], printed, "{code:#04x}");
-    }
 }
 
 #[test]

@@ -243,30 +243,6 @@ fn a_ramp_beyond_the_highest_speed_ends_there() {
     assert!((line.truth().speed_rpm - 6000.0).abs() < 10.0);
 }
 
-/// Milliseconds from 1500 rpm to 90 % of a step to 2000 rpm.
-fn rise_time(divisor: i16) -> u32 {
-    let mut line = NodeFixture::sensorless();
-    line.run();
-    line.wait(3000);
-    let (kp, ki) = (line.get(SPEED_KP), line.get(SPEED_KI));
-    line.set(SPEED_KP, kp / divisor);
-    line.set(SPEED_KI, ki / divisor / divisor);
-    line.ramp(2000, 0);
-    (0..5000)
-        .find(|_| {
-            line.wait(1);
-            line.truth().speed_rpm >= 1950.0
-        })
-        .expect("the step is followed")
-}
-
-#[test]
-fn the_speed_gains_change_the_rise_time() {
-    let (shipped, slower, slowest) = (rise_time(1), rise_time(3), rise_time(8));
-    assert!(slower > shipped * 2, "{slower} ms with a third of Kp, {shipped} ms as shipped");
-    assert!(slowest > slower * 2, "{slowest} ms with an eighth, {slower} ms with a third");
-}
-
 #[test]
 fn without_ki_a_load_leaves_a_speed_error() {
     let error = |ki| {

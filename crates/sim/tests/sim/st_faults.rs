@@ -89,20 +89,6 @@ fn injected_faults_happen_once_or_last() {
 }
 
 #[test]
-fn a_load_beyond_the_rev_up_torque_is_a_start_up_fault() {
-    let mut line = NodeFixture::sensorless();
-    line.brake(0.9);
-    line.execute(Command::StartMotor);
-    line.until(Status::FaultNow, 2000);
-    line.wait(1);
-    assert_eq!(line.flags(), Flags::new(Flags::START_UP, 0), "2 A make 0.74 Nm");
-    line.brake(0.3);
-    line.execute(Command::FaultAck);
-    line.until(Status::Idle, 10);
-    line.run();
-}
-
-#[test]
 fn a_rotor_that_is_locked_in_run_loses_its_feedback() {
     let mut line = running();
     line.plant().lock(true);
@@ -208,15 +194,6 @@ fn a_pfc_whose_gains_run_away_switches_itself_off() {
     let faults = Flags(line.get(PFC_FAULTS)).occurred();
     assert_ne!(faults & (pfc_fault::OVER_CURRENT | pfc_fault::BUS_HIGH), 0, "{faults:#x}");
     assert!(line.truth().plant.bus_voltage < 500.0, "{} V", line.truth().plant.bus_voltage);
-}
-
-#[test]
-fn a_pfc_reference_that_is_too_high_trips_the_motor() {
-    let mut line = running();
-    line.set(PFC_DCBUS_REF, 440);
-    line.execute(Command::PfcEnable);
-    line.until(Status::FaultNow, 1000);
-    assert_eq!(line.flags().present(), Flags::OVER_VOLT);
 }
 
 #[test]

@@ -1,74 +1,10 @@
-//! Every register of the table, in both profiles, on a motor with its feature and on one without.
+//! What registers show. That each can be read and written as the table says is shown by
+//! crates/conformance/tests/st/suite.rs.
 
-use motorlink_proto::st::register::{Features, Type, Writing};
-use motorlink_proto::st::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
-use motorlink_sim::st::{BuildConfig, MotorConfig};
+use motorlink_proto::st::{Command, Profile, RegisterId, Request, register::*};
+use motorlink_sim::st::MotorConfig;
 
 use crate::st_bench::NodeFixture;
-
-const BARE: BuildConfig = BuildConfig {
-    observer_pll: false,
-    observer_cordic: false,
-    position_sensor: false,
-    flux_weakening: false,
-    feed_forward: false,
-    pfc: false,
-    dac: false,
-    position_control: false,
-};
-
-fn lines() -> impl Iterator<Item = (Profile, Features, NodeFixture)> {
-    let bare = MotorConfig { build: BARE, ..MotorConfig::default() };
-    let motors = [MotorConfig::default(), MotorConfig::servo(), bare];
-    [Profile::Spec, Profile::Mcsdk54].into_iter().flat_map(move |profile| {
-        motors.map(|config| (profile, config.build.features(), NodeFixture::new(profile, [config])))
-    })
-}
-
-#[test]
-fn every_register_reads_in_its_size_or_is_refused() {
-    for (profile, features, mut line) in lines() {
-        for id in RegisterId::all() {
-            let size = id.shape().unwrap().read_size(profile, features);
-            let reply = line.ask(1, Request::GetRegister(id)).map(|payload| payload.len());
-            let expected = size.map(usize::from).ok_or(ErrorCode::GetWriteOnly.into());
-            assert_eq!(reply, expected, "{id} in {}", profile.name());
-        }
-        let unknown = line.get_id(1, RegisterId(0xFE));
-        assert_eq!(unknown, Err(ErrorCode::GetWriteOnly.into()));
-    }
-}
-
-#[test]
-fn every_register_that_can_be_written_keeps_its_value() {
-    for (profile, features, mut line) in lines() {
-        for id in RegisterId::all() {
-            let shape = id.shape().unwrap();
-            let size = match shape.writing(profile, features) {
-                Writing::Takes(size) => size,
-                refused => {
-                    let code = match refused {
-                        Writing::ReadOnly => ErrorCode::SetReadOnly,
-                        _ => ErrorCode::WrongSet,
-                    };
-                    assert_eq!(line.set_id(1, id, &[1, 0, 0, 0]), Err(code.into()), "{id}");
-                    continue;
-                }
-            };
-            let value: i32 = match id {
-                RegisterId::TARGET_MOTOR | RegisterId::CONTROL_MODE => 0,
-                RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => 0x27,
-                RegisterId::RAMP_FINAL_SPEED => -1200,
-                _ if shape.ty(profile) == Type::U16 => 90,
-                _ => -90,
-            };
-            line.set_id(1, id, &value.to_le_bytes()[..size.into()]).unwrap();
-            if shape.read_size(profile, features).is_some() {
-                assert_eq!(line.get_id(1, id), Ok(value), "{id} in {}", profile.name());
-            }
-        }
-    }
-}
 
 #[test]
 fn the_stages_of_the_revup_are_counted_in_every_state() {
@@ -82,16 +18,6 @@ fn the_stages_of_the_revup_are_counted_in_every_state() {
     for _ in 0..20 {
         line.wait(100);
         assert_eq!(line.get(RUC_STAGE_NBR), stages);
-    }
-}
-
-#[test]
-fn commands_for_a_pfc_need_one() {
-    for command in [Command::PfcEnable, Command::PfcDisable, Command::PfcFaultAck] {
-        let mut line = NodeFixture::demo(Profile::Spec);
-        assert_eq!(line.ask(1, Request::ExecuteCommand(command)), Ok(vec![]));
-        let refused = Err(ErrorCode::WrongCmd.into());
-        assert_eq!(line.ask(2, Request::ExecuteCommand(command)), refused);
     }
 }
 
@@ -155,6 +81,34 @@ fn the_signals_of_a_running_motor_belong_together() {
     let (expected, observed) = (line.get(EST_BEMF_LEVEL), line.get(OBS_BEMF_LEVEL));
     let ratio = f64::from(observed) / f64::from(expected);
     assert!((0.9..1.1).contains(&ratio), "observed {observed}, expected {expected}");
+}
+
+#[test]
+fn what_is_read_of_a_running_motor_has_no_offset() {
+    for config in MotorConfig::demo() {
+        let mut line = NodeFixture::new(Profile::Spec, [config]);
+        line.ramp(1500, 500);
+        line.run();
+        line.brake(0.02);
+        line.wait(2000);
+        let amps = f64::from(config.plant.sensing.full_scale) / 32767.0;
+        let (mut speed, mut current) = (0.0, 0.0);
+        for _ in 0..10 {
+            speed += line.mean_of(|line| {
+                f64::from(line.get(SPEED_MEAS)) - f64::from(line.truth().speed_rpm)
+            });
+            current += line.mean_of(|line| {
+                f64::from(line.get(TORQUE_MEAS)) * amps - f64::from(line.truth().plant.iq)
+            });
+        }
+        assert!(speed.abs() / 10.0 < 3.0, "{speed} rpm in ten means");
+        // A step of the converter is 16 digits.
+        assert!(current.abs() / 10.0 < 16.0 * amps, "{current} A in ten means");
+        let truth = line.truth();
+        let volts = f32::from(line.get(BUS_VOLTAGE)) - truth.plant.bus_voltage;
+        let celsius = line.get(HEATS_TEMP) as f32 - truth.temperature;
+        assert!(volts.abs() <= 0.5 && celsius.abs() <= 0.5, "{volts} V, {celsius} °C");
+    }
 }
 
 #[test]

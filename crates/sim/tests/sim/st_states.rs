@@ -123,30 +123,6 @@ fn a_stop_interrupts_a_start() {
 }
 
 #[test]
-fn start_stop_starts_an_idle_motor_and_stops_a_running_one() {
-    let mut line = NodeFixture::sensorless();
-    line.execute(Command::StartStop);
-    line.until(Run, 2000);
-    line.execute(Command::StartStop);
-    assert_eq!(line.status(), AnyStop);
-    line.execute(Command::StartStop);
-    line.until(Idle, 10_000);
-}
-
-#[test]
-fn starting_a_running_motor_and_stopping_an_idle_one_do_nothing() {
-    let mut line = NodeFixture::sensorless();
-    line.execute(Command::StopMotor);
-    assert_eq!(line.status(), Idle);
-    line.run();
-    line.wait(1500);
-    line.execute(Command::StartMotor);
-    line.wait(10);
-    assert_eq!(line.status(), Run);
-    assert_eq!(line.get(register::SPEED_REF), 1500);
-}
-
-#[test]
 fn an_inrush_limiter_delays_the_first_start() {
     let durations = DurationConfig { inrush_ms: 30, ..DurationConfig::default() };
     let config = MotorConfig { durations, ..MotorConfig::default() };

@@ -8,7 +8,6 @@ use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash;
 use motorlink_sim::rmd::RmdConfig;
-use motorlink_sim::st::{StDrive, StStation};
 
 use crate::{rmd_bench, st_bench};
 
@@ -27,7 +26,7 @@ fn st_run(piece: u64) -> (Vec<u8>, u64) {
     for motor in [1, 2] {
         line.ask(motor, Request::ExecuteCommand(Command::StartMotor)).unwrap();
     }
-    for round in 0..40 {
+    for round in 0..15 {
         let (mut now, station) = (line.now, &mut line.station);
         cut(&mut now, 77_777, piece, |now| station.advance_to(now));
         line.now = now;
@@ -45,7 +44,7 @@ fn st_run(piece: u64) -> (Vec<u8>, u64) {
 fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
     let short = RmdConfig { shutdown_ms: 90, ..RmdConfig::with_id(2) };
     let mut bench = rmd_bench::NodeFixture::new([RmdConfig::default(), short]);
-    for round in 0..40 {
+    for round in 0..15 {
         let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
         bench.raw(SetPosition { angle }.encode());
         let spin = SetSpeed { speed: CentiDps(round * 1000) };
@@ -75,16 +74,6 @@ fn an_rmd_bus_is_deterministic() {
     let once = rmd_run(u64::MAX / 2);
     assert_eq!(once, rmd_run(u64::MAX / 2));
     assert_eq!(once, rmd_run(101), "in pieces of 101 µs");
-}
-
-#[test]
-fn a_cut_off_command_gets_a_nack_after_25_ms() {
-    let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));
-    station.receive(Instant(1000), &[0x02, 0x01], |_| panic!("nothing to answer yet"));
-    assert_eq!(station.deadline(), Some(Instant(26_000)));
-    let mut reply = Vec::new();
-    station.poll(Instant(26_000), |bytes| reply.extend_from_slice(bytes));
-    assert_eq!(reply, [0xFF, 0x01, 0x09, 0x0A]);
 }
 
 #[cfg(feature = "serde")]

@@ -5,19 +5,23 @@ use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, SystemTime};
 
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
-use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Line, Protocol, Text};
+use motorlink_telemetry::share::frame::{Kind, append};
+use motorlink_telemetry::share::message::*;
 
 use crate::shared::LIMIT;
 
 /// What carries the bytes of a program.
 pub trait Connection {
     fn write(&mut self, bytes: &[u8]);
-    /// Waits for more.
+    /// Waits for more. There is nothing if the share has closed it.
     fn read(&mut self) -> Vec<u8>;
+    /// The time by its clock.
+    fn now(&self) -> Duration;
 }
 
 impl Connection for UnixStream {
@@ -28,8 +32,11 @@ impl Connection for UnixStream {
     fn read(&mut self) -> Vec<u8> {
         let mut bytes = [0; 4096];
         let size = Read::read(self, &mut bytes).unwrap();
-        assert!(size > 0, "the connection has ended");
         bytes[..size].to_vec()
+    }
+
+    fn now(&self) -> Duration {
+        SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap()
     }
 }
 
@@ -37,7 +44,12 @@ pub struct Asker {
     connection: Box<dyn Connection>,
     dialogue: Dialogue,
     pub events: VecDeque<Event>,
-    ended: VecDeque<Ended>,
+    pub ended: VecDeque<Ended>,
+    pub groups: Vec<Group>,
+    samples: VecDeque<Data>,
+    /// How many events the share has left out.
+    pub missed: u64,
+    closing: Option<String>,
 }
 
 impl Asker {
@@ -51,18 +63,50 @@ impl Asker {
     }
 
     pub fn by(connection: Box<dyn Connection>, name: &str) -> Self {
-        let dialogue = Dialogue::default();
-        let (events, ended) = (VecDeque::new(), VecDeque::new());
-        let mut asker = Asker { connection, dialogue, events, ended };
-        let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
-        asker.ask(hello).unwrap();
+        let mut asker = Self::silent(connection);
+        asker.ask(hello(VERSION, name)).unwrap();
         asker
     }
 
+    /// One that has not said hello.
+    pub fn silent(connection: Box<dyn Connection>) -> Self {
+        Asker {
+            connection,
+            dialogue: Dialogue::default(),
+            events: VecDeque::new(),
+            ended: VecDeque::new(),
+            groups: Vec::new(),
+            samples: VecDeque::new(),
+            missed: 0,
+            closing: None,
+        }
+    }
+
     pub fn send(&mut self, ask: Ask) -> u32 {
-        let (id, bytes) = self.dialogue.request(ask).unwrap();
-        self.connection.write(&bytes);
-        id
+        self.send_all([ask])[0]
+    }
+
+    /// Sends requests at once.
+    pub fn send_all(&mut self, asks: impl IntoIterator<Item = Ask>) -> Vec<u32> {
+        let (mut ids, mut stream) = (Vec::new(), Vec::new());
+        for ask in asks {
+            let (id, bytes) = self.dialogue.request(ask).unwrap();
+            ids.push(id);
+            stream.extend(bytes);
+        }
+        self.connection.write(&stream);
+        ids
+    }
+
+    /// Sends a text or what should be one.
+    pub fn send_text(&mut self, payload: &[u8]) {
+        let mut bytes = Vec::new();
+        append(Kind::Text, payload, &mut bytes).unwrap();
+        self.send_bytes(&bytes);
+    }
+
+    pub fn send_bytes(&mut self, bytes: &[u8]) {
+        self.connection.write(bytes);
     }
 
     pub fn ask(&mut self, ask: Ask) -> Result<Answer, Refusal> {
@@ -71,24 +115,32 @@ impl Asker {
     }
 
     pub fn end_of(&mut self, id: u32) -> Result<Answer, Refusal> {
-        // Events may come without an end.
-        let end = Instant::now() + LIMIT;
-        loop {
-            assert!(Instant::now() < end, "no answer to request {id}");
-            if let Some(at) = self.ended.iter().position(|ended| ended.id == id) {
-                return self.ended.remove(at).unwrap().result;
-            }
-            self.hear();
-        }
+        self.until(|it| {
+            let at = it.ended.iter().position(|ended| ended.id == id)?;
+            it.ended.remove(at).map(|ended| ended.result)
+        })
     }
 
     pub fn event(&mut self, happening: Happening) -> Event {
-        loop {
-            if let Some(at) = self.events.iter().position(|it| it.event == happening) {
-                return self.events.remove(at).unwrap();
-            }
-            self.hear();
-        }
+        self.until(|it| {
+            let at = it.events.iter().position(|it| it.event == happening)?;
+            it.events.remove(at)
+        })
+    }
+
+    /// The next samples, of a group that was described before.
+    pub fn data(&mut self) -> (Group, Data) {
+        self.until(|it| {
+            let data = it.samples.pop_front()?;
+            let group = it.groups.iter().find(|it| it.group == data.group);
+            Some((group.expect("described before").clone(), data))
+        })
+    }
+
+    /// Why the share closes the connection, once it has.
+    pub fn closing(&mut self) -> Option<String> {
+        while self.hear() {}
+        self.closing.take()
     }
 
     pub fn lines(&mut self) -> Vec<Line> {
@@ -102,16 +154,54 @@ impl Asker {
         self.lines().into_iter().map(|line| line.line).collect()
     }
 
-    fn hear(&mut self) {
-        loop {
-            match self.dialogue.hear().unwrap() {
-                Some(Heard::Ended(ended)) => return self.ended.push_back(ended),
-                Some(Heard::Text(Text::Event(event))) => return self.events.push_back(event),
-                Some(_) => return,
-                None => self.dialogue.push(&self.connection.read()),
-            }
+    /// The frames of a line between these times.
+    pub fn frames(&mut self, line: &str, from: Option<f64>, to: Option<f64>) -> Vec<WireFrame> {
+        let ask = Ask::Frames { line: line.to_owned(), from, to, after: None, most: 1000 };
+        match self.ask(ask).unwrap() {
+            Answer::Frames { frames, .. } => frames,
+            other => panic!("{other:?}"),
         }
     }
+
+    fn until<T>(&mut self, found: impl Fn(&mut Self) -> Option<T>) -> T {
+        // Others may come without an end.
+        let end = self.connection.now() + LIMIT;
+        loop {
+            if let Some(found) = found(self) {
+                return found;
+            }
+            assert!(self.connection.now() < end, "it does not come");
+            assert!(self.hear(), "the connection has ended: {:?}", self.closing);
+        }
+    }
+
+    /// Waits for the next message. Gives whether one came before the end.
+    pub fn hear(&mut self) -> bool {
+        loop {
+            match self.dialogue.hear().unwrap() {
+                Some(Heard::Ended(ended)) => self.ended.push_back(ended),
+                Some(Heard::Data(data)) => self.samples.push_back(data),
+                Some(Heard::Text(Text::Event(event))) => self.events.push_back(event),
+                Some(Heard::Text(Text::Group(group))) => self.groups.push(group),
+                Some(Heard::Text(Text::Missed { events })) => self.missed += events,
+                Some(Heard::Text(Text::Closing { message })) => self.closing = Some(message),
+                Some(_) => {}
+                None => {
+                    let bytes = self.connection.read();
+                    if bytes.is_empty() {
+                        return false;
+                    }
+                    self.dialogue.push(&bytes);
+                    continue;
+                }
+            }
+            return true;
+        }
+    }
+}
+
+pub fn hello(protocol: u32, name: &str) -> Ask {
+    Ask::Hello { protocol, name: name.to_owned() }
 }
 
 /// Opens a port whose drives have a long time for a reply.
@@ -133,4 +223,10 @@ pub fn command(line: &str, motor: u8, bytes: &[u8]) -> Ask {
         continues: false,
         own: false,
     }
+}
+
+/// Turns a motor of rmd0 with this speed.
+pub fn turn(motor: u8, dps: i32) -> Ask {
+    let [a, b, c, d] = (dps * 100).to_le_bytes();
+    command("rmd0", motor, &[0xA2, 0, 0, 0, a, b, c, d])
 }

@@ -1,4 +1,5 @@
 //! Simulated drives on ptys.
+#![allow(dead_code, reason = "each test uses a part")]
 
 use std::path::PathBuf;
 
@@ -12,8 +13,12 @@ pub fn path(name: &str, kind: &str) -> PathBuf {
 
 /// A bench, and its drives on ports: the paths of the ST line and of the RMD bus.
 pub fn served(name: &str) -> (Bench, Serving, String, String) {
+    served_by(name, &BenchConfig::default())
+}
+
+pub fn served_by(name: &str, config: &BenchConfig) -> (Bench, Serving, String, String) {
     let [st, rmd] = ["st", "rmd"].map(|kind| path(name, kind).display().to_string());
-    let bench = Bench::new(&BenchConfig::default()).unwrap();
+    let bench = Bench::new(config).unwrap();
     let port = |name: String| Some(name.parse().unwrap());
     let serving = bench.serve(port(format!("pty:{st}")), port(format!("slcan-pty:{rmd}"))).unwrap();
     (bench, serving, st, rmd)

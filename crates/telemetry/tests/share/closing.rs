@@ -30,6 +30,8 @@ fn a_port_that_is_opened_under_a_latch_has_its_motors_stopped() {
     program.ask(Ask::Latch).unwrap();
     cut.store(false, Ordering::SeqCst);
     stands_once_opened(&share, &mut program, &port);
+    let refused = program.ask(command("st1", 2, &START)).unwrap_err();
+    assert_eq!(refused.reason, Reason::Latched);
 }
 
 #[test]

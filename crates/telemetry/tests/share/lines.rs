@@ -1,25 +1,12 @@
-//! The lines of a share: what their exchanges came to, and lines that come and go.
+//! The lines of a share come and go.
 
 use crate::asking::{Asker, close, command, open};
-use crate::drives::served;
+use crate::drives::{path, served};
 use crate::shared::Share;
+use crate::stopping::eventually;
+use crate::virtual_share::VirtualShare;
 use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
-
-#[test]
-fn a_line_counts_its_exchanges_and_what_went_wrong() {
-    let share = Share::new("counts");
-    let mut program = Asker::join(&share.path, "counts");
-    let counts = |program: &mut Asker| program.lines()[0].counts.unwrap();
-    let before = counts(&mut program);
-    assert_eq!((before.refused, before.silent, before.failed, before.lost), (0, 0, 0, 0));
-    // GET_REG of SPEED_MEAS, then of a register that no drive has.
-    program.ask(command("st0", 1, &[2, 30])).unwrap();
-    program.ask(command("st0", 1, &[2, 250])).unwrap_err();
-    let after = counts(&mut program);
-    assert!(after.exchanges >= before.exchanges + 2, "{before:?} {after:?}");
-    assert_eq!((after.refused, after.silent, after.failed, after.lost), (1, 0, 0, 0));
-}
 
 fn opened(answer: Result<Answer, Refusal>) -> String {
     match answer {
@@ -36,7 +23,7 @@ fn refused(answer: Result<Answer, Refusal>) -> (Reason, String) {
 #[test]
 fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
     let share = Share::new("lines");
-    let (_bench, _serving, st, rmd) = served("lines-more");
+    let (bench, _serving, st, rmd) = served("lines-more");
     let mut program = Asker::join(&share.path, "opens");
     let mut other = Asker::join(&share.path, "sees");
     assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st1");
@@ -57,7 +44,15 @@ fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
         reason == Reason::Usage && why.ends_with("is open already: it is the line st1"),
         "{why}"
     );
-    assert!(matches!(program.ask(close("st1")), Ok(Answer::Close { motors }) if motors.is_empty()));
+    // Its motors stop before.
+    other.ask(command("st1", 1, &[7, 232, 3, 0, 0, 244, 1])).unwrap();
+    other.ask(command("st1", 1, &[3, 1])).unwrap();
+    let Ok(Answer::Close { motors }) = program.ask(close("st1")) else { panic!("no answer") };
+    let motor = MotorName { line: "st1".to_owned(), motor: 1 };
+    assert_eq!(motors, [StoppedMotor { motor, failure: None, absent: false }]);
+    assert_eq!(other.event(Happening::Stopped).motor, Some(1));
+    let speed = bench.signals().iter().position(|it| it.name == "st1.speed_rpm").unwrap();
+    eventually(|| bench.values()[speed].abs() < 10.0);
     assert_eq!(other.event(Happening::Closed).line.as_deref(), Some("st1"));
     assert_eq!(other.names(), ["st0", "rmd0", "rmd1"]);
     let (reason, why) = refused(other.ask(command("st1", 1, &[2, 30])));
@@ -68,59 +63,17 @@ fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
     assert!(matches!(other.ask(Ask::Rates { line: None }), Ok(Answer::Rates { .. })));
     // Programs may still mean the earlier line: its name is not used again.
     assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st2");
-}
 
-#[test]
-fn motors_of_a_line_stop_before_it_is_closed() {
-    let share = Share::new("close-stops");
-    let mut program = Asker::join(&share.path, "turns");
-    let mut other = Asker::join(&share.path, "closes");
-    program.ask(command("st0", 1, &[7, 232, 3, 0, 0, 244, 1])).unwrap();
-    program.ask(command("st0", 1, &[3, 1])).unwrap();
-    share.reaches("st1.speed_rpm", |rpm| rpm > 300.0);
-    let Ok(Answer::Close { motors }) = other.ask(close("st0")) else { panic!("no answer") };
-    let motor = MotorName { line: "st0".to_owned(), motor: 1 };
-    assert_eq!(motors, [StoppedMotor { motor, failure: None, absent: false }]);
-    assert_eq!(program.event(Happening::Stopped).motor, Some(1));
-    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 10.0);
-}
-
-#[test]
-fn requests_that_wait_when_a_line_is_closed_get_an_end() {
-    let share = Share::new("close-waits");
-    let mut program = Asker::join(&share.path, "waits");
-    let waiting: Vec<u32> =
-        (0..100).map(|_| program.send(command("rmd0", 1, &[0x9c, 0, 0, 0, 0, 0, 0, 0]))).collect();
-    let closing = program.send(close("rmd0"));
+    // Requests that wait when a line is closed get an end: they were carried out, or the line has gone.
+    let read = |_| command("rmd1", 1, &[0x9c, 0, 0, 0, 0, 0, 0, 0]);
+    let waiting = program.send_all((0..100).map(read));
+    let closing = program.send(close("rmd1"));
     let rates = program.send(Ask::Rates { line: None });
     for id in waiting {
-        // It was carried out, or it says that the line has gone.
         let _ = program.end_of(id);
     }
     assert!(matches!(program.end_of(closing), Ok(Answer::Close { .. })));
     assert!(matches!(program.end_of(rates), Ok(Answer::Rates { .. })));
-}
-
-#[test]
-fn a_latch_holds_for_a_line_that_is_opened_later() {
-    let share = Share::new("latch-later");
-    let (_bench, _serving, st, _) = served("latch-later-more");
-    let mut program = Asker::join(&share.path, "latches");
-    program.ask(Ask::Latch).unwrap();
-    assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st1");
-    assert_eq!(refused(program.ask(command("st1", 1, &[3, 1]))).0, Reason::Latched);
-}
-
-#[test]
-fn one_of_two_programs_that_open_the_same_port_gets_it() {
-    let share = Share::new("open-twice");
-    let (_bench, _serving, st, _) = served("open-twice-more");
-    let mut one = Asker::join(&share.path, "one");
-    let mut two = Asker::join(&share.path, "two");
-    let asked = (one.send(open(&st, Protocol::St)), two.send(open(&st, Protocol::St)));
-    let ends = [one.end_of(asked.0), two.end_of(asked.1)];
-    assert_eq!(ends.iter().filter(|end| end.is_ok()).count(), 1, "{ends:?}");
-    assert_eq!(one.names(), ["st0", "rmd0", "st1"]);
 }
 
 fn scan(port: &str, protocol: Protocol, rate: Option<u32>) -> Ask {
@@ -169,9 +122,9 @@ fn a_scan_says_what_answers_and_leaves_the_port_free() {
 }
 
 #[test]
-fn a_port_that_is_scanned_is_busy() {
+fn a_port_that_is_scanned_or_opened_is_busy() {
     let share = Share::new("scan-busy");
-    let (_bench, _serving, _, rmd) = served("scan-busy-more");
+    let (_bench, _serving, st, rmd) = served("scan-busy-more");
     let mut program = Asker::join(&share.path, "one");
     let mut other = Asker::join(&share.path, "two");
     // Addresses without a motor are silent for so long.
@@ -182,6 +135,12 @@ fn a_port_that_is_scanned_is_busy() {
     assert_eq!(reason, Reason::Busy);
     assert!(why.starts_with("one scans slcan:"), "{why}");
     assert_eq!(scanned(program.end_of(begun)).1, [1, 2, 3, 4]);
+
+    // Two programs open the same one.
+    let asked = [&mut program, &mut other].map(|it| it.send(open(&st, Protocol::St)));
+    let ends = [program.end_of(asked[0]), other.end_of(asked[1])];
+    assert_eq!(ends.iter().filter(|end| end.is_ok()).count(), 1, "{ends:?}");
+    assert_eq!(program.names(), ["st0", "rmd0", "st1"]);
 }
 
 #[test]
@@ -212,8 +171,8 @@ fn scans_that_hang_keep_no_line_from_being_closed() {
 fn only_devices_are_opened() {
     motorlink_testbench::register();
     motorlink_telemetry::share::port::register();
-    let share = Share::new("devices");
-    let mut program = Asker::join(&share.path, "tries");
+    let share = VirtualShare::new();
+    let mut program = share.join("tries");
     let file = std::env::temp_dir().join(format!("no-device-{}", std::process::id()));
     std::fs::write(&file, "as it was").unwrap();
     let terminal = rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR).unwrap();
@@ -223,7 +182,9 @@ fn only_devices_are_opened() {
     let link = file.with_extension("link");
     std::os::unix::fs::symlink(&name, &link).unwrap();
     let (file, link) = (file.display().to_string(), link.display().to_string());
-    let socket = share.path.display().to_string();
+    let socket = path("devices", "socket");
+    let _socket = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    let socket = socket.display().to_string();
     for port in [
         file.clone(),
         format!("serial:{file}"),
@@ -255,6 +216,7 @@ fn only_devices_are_opened() {
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "as it was");
     std::fs::remove_file(file).unwrap();
     std::fs::remove_file(link).unwrap();
+    std::fs::remove_file(socket).unwrap();
     let (_bench, _serving, st, _) = served("devices-more");
     assert!(refused(program.ask(open(&st, Protocol::Rmd))).1.contains("slcan:DEVICE"));
     let profile = Some("other".to_owned());

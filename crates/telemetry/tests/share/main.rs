@@ -2,7 +2,6 @@
 
 #[path = "../asking/mod.rs"]
 mod asking;
-mod asks;
 mod closing;
 #[path = "../drives/mod.rs"]
 mod drives;
@@ -15,6 +14,7 @@ mod lines;
 mod messages;
 mod owed;
 mod port;
+mod programs;
 mod scripted;
 mod server;
 #[path = "../shared/mod.rs"]

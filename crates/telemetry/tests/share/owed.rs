@@ -17,19 +17,6 @@ fn stands(share: &VirtualShare) {
 }
 
 #[test]
-fn a_motor_that_nobody_owns_or_reads_is_stopped_when_its_cable_is_back() {
-    let (share, cut) = share_of_a_turning_motor(false);
-    let mut program = share.join("stops");
-    program.ask(command("st0", 2, &READ_STATUS)).unwrap();
-    cut.store(true, Ordering::SeqCst);
-    let stopped = stop_all_of(&mut program, "st0", &[2]);
-    assert_eq!(stopped, motors("st0", &[(2, "may turn")]));
-    cut.store(false, Ordering::SeqCst);
-    stands(&share);
-    share.until(|| heard_and_unstopped(&mut program, "st0").1.is_empty());
-}
-
-#[test]
 fn a_motor_that_had_never_answered_is_stopped_when_it_does() {
     let (share, cut) = share_of_a_turning_motor(false);
     let mut program = share.join("stops");

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::asking::Asker;
 use crate::faulty::{deaf, repeating};
 use crate::scripted::{self, Scripted};
-use crate::shared::{LIMIT, Share};
+use crate::shared::{LIMIT, PATIENT, Share};
 use crate::stopping::eventually;
 use motorlink::port::{Ending, NotDone, PortError, PortName};
 use motorlink::st::{self, Profile, RegisterId, Status};
@@ -108,24 +108,6 @@ fn an_st_client_reads_writes_and_is_refused_as_on_a_port_of_its_own() {
 }
 
 #[test]
-fn a_motor_turns_as_long_as_its_client_is_there() {
-    let share = Share::new("turns");
-    let (mine, other) = (share.st(), share.st());
-    start(&mine);
-    share.reaches("st1.speed_rpm", |rpm| rpm > 1000.0);
-    other.confirm().unwrap();
-    drop(other);
-    let bus = share.rmd();
-    bus.ask(id(2), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap();
-    share.reaches("rmd2.speed_dps", |dps| dps > 100.0);
-    drop(bus);
-    share.reaches("rmd2.speed_dps", |dps| dps < 5.0);
-    share.reaches("st1.speed_rpm", |rpm| rpm > 1400.0);
-    drop(mine);
-    share.reaches("st1.speed_rpm", |rpm| rpm < 30.0);
-}
-
-#[test]
 fn a_client_that_ends_leaves_motors_that_another_one_has_moved_since() {
     let share = Share::new("moved-since");
     let [(alice, alices), (bob, bobs)] = [(); 2].map(|()| (share.st(), share.rmd()));
@@ -149,15 +131,6 @@ fn a_client_that_ends_leaves_motors_that_another_one_has_moved_since() {
     share.reaches("rmd1.speed_dps", |dps| dps.abs() < 1.0);
 }
 
-/// The frames of the bus so far.
-fn frames(program: &mut Asker) -> Vec<WireFrame> {
-    let (line, from, to, after) = ("rmd0".to_owned(), Some(0.0), None, None);
-    match program.ask(Ask::Frames { line, from, to, after, most: 1000 }).unwrap() {
-        Answer::Frames { frames, .. } => frames,
-        other => panic!("{other:?}"),
-    }
-}
-
 /// 0x80 of a program that has nothing to do with the load any more lets it fall.
 #[test]
 fn a_client_that_ends_does_not_switch_off_a_motor_that_another_one_has_stopped() {
@@ -169,9 +142,23 @@ fn a_client_that_ends_does_not_switch_off_a_motor_that_another_one_has_stopped()
     bob.motor(1).unwrap().stop().unwrap();
     assert!(alice.stop_on_drop().with(rmd::StopAction::Off).stop_now().is_empty());
     let mut witness = Asker::join(&share.path, "witness");
-    let frames = frames(&mut witness);
+    let frames = witness.frames("rmd0", Some(0.0), None);
     let of_code = |code| frames.iter().filter(|frame| frame.bytes.starts_with(code)).count();
     assert_eq!((of_code("80"), of_code("81")), (0, 2), "{frames:?}");
+}
+
+#[test]
+fn a_client_that_is_refused_has_no_motor_to_stop() {
+    let share = Share::leasing("refused", PATIENT, Some(PATIENT), |link| link);
+    let [alice, bob] = [(); 2].map(|()| share.rmd());
+    alice.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
+    bob.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap_err();
+    assert_eq!((alice.moving().len(), bob.moving().len()), (1, 0));
+    // What a command does that waits for the end of its move, and was refused.
+    assert!(bob.stop_on_drop().stop_now().is_empty());
+    drop(bob);
+    let mut witness = Asker::join(&share.path, "witness");
+    assert_eq!(stops(&mut witness), 0);
 }
 
 #[test]
@@ -191,7 +178,8 @@ fn a_share_ends_the_motion_of_a_client_as_the_client_has_declared() {
             _ => share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0),
         }
         // The engine keeps a frame after it has sent it.
-        eventually(|| frames(&mut witness).last().is_some_and(|it| it.bytes.starts_with(code)));
+        let is_last = |frame: &WireFrame| frame.bytes.starts_with(code);
+        eventually(|| witness.frames("rmd0", Some(0.0), None).last().is_some_and(is_last));
     }
     // It has no owner. The next program that moves it owns it.
     let next = share.rmd();
@@ -225,7 +213,7 @@ fn a_refusal_of_the_share_is_told_in_words_and_leaves_the_connection_open() {
 
 #[test]
 fn rmd_motors_answer_and_a_missing_one_is_silent() {
-    let share = Share::new("rmd");
+    let share = Share::with("rmd", Duration::from_secs(1), |link| link);
     let bus = share.rmd();
     bus.ask(id(1), &ReadStatus).unwrap();
     bus.confirm(id(1)).unwrap();
@@ -256,25 +244,6 @@ fn the_other_profile_is_refused_before_anything_is_sent() {
     );
     let Err(error) = st::EventClient::open(&share.port("st0"), options) else { panic!("open") };
     assert!(error.to_string().contains("profile spec"), "{error}");
-}
-
-#[test]
-fn each_client_has_its_own_data_segments() {
-    let share = Share::new("segments");
-    let (one, other) = (share.st(), share.st());
-    let configure = |client: &st::Client, registers: &[u8]| {
-        let segment = Request::ConfigureSegment { segment: 0, registers };
-        client.exchange(1, &segment, |_| Some(())).unwrap();
-    };
-    let read = |client: &st::Client| {
-        client.exchange(1, &Request::GetSegment(0), |payload| Some(payload.len()))
-    };
-    configure(&one, &[RegisterId::SPEED_MEAS.0]);
-    read(&other).unwrap_err();
-    configure(&other, &[RegisterId::STATUS.0]);
-    for _ in 0..3 {
-        assert_eq!((read(&one).unwrap(), read(&other).unwrap()), (4, 1));
-    }
 }
 
 /// An engine on a line of a share, which reads two registers, and what it gives.
@@ -319,18 +288,26 @@ fn an_engine_reads_through_a_share_and_is_told_of_refusals() {
 fn a_drive_that_never_answers_is_silent_and_nothing_else() {
     let share = deaf("silent");
     let (mut engine, subscription) = reading(&share.port("st0"));
-    // Long enough for requests to wait behind others at the share until they are too old.
-    let end = Instant::now() + Duration::from_secs(8);
     let mut told = Vec::new();
-    while Instant::now() < end {
-        let wait = engine.advance(&mut |_, _| {});
-        while let Some(record) = subscription.take() {
-            if let Record::Event(event) = record {
-                told.push(event.what.clone());
+    let mut advance_while = |goes_on: &dyn Fn(u64) -> bool| {
+        let end = Instant::now() + LIMIT;
+        while goes_on(engine.tally().counts().exchanges) {
+            assert!(Instant::now() < end, "{:?}", engine.tally().counts());
+            let wait = engine.advance(&mut |_, _| {});
+            while let Some(record) = subscription.take() {
+                if let Record::Event(event) = record {
+                    told.push(event.what.clone());
+                }
             }
+            std::thread::sleep(wait.unwrap_or_default().min(Duration::from_millis(5)));
         }
-        std::thread::sleep(wait.unwrap_or_default().min(Duration::from_millis(20)));
-    }
+    };
+    advance_while(&|exchanges| exchanges < 3);
+    // A request that the share reads late is not sent any more: that is no answer.
+    let (hold, frozen) = (share.freeze(), Instant::now());
+    advance_while(&|_| frozen.elapsed() < Duration::from_millis(1_300));
+    drop(hold);
+    advance_while(&|exchanges| exchanges < 8);
     assert!(matches!(told[..], [What::Unanswered(..), What::Silent(..)]), "{told:?}");
 }
 
@@ -355,7 +332,7 @@ fn no_wrong_value_is_confirmed_on_a_line_that_repeats_replies() {
     let (client, other) = (share.st(), share.st());
     let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI, RegisterId::TORQUE_KP];
     let mut confirmed = 0;
-    for round in 0..20u8 {
+    for round in 0..10u8 {
         let register = registers[usize::from(round) % 3];
         let value = [round, 0];
         let write = Request::SetRegister { register, value: &value };
@@ -394,27 +371,35 @@ fn a_command_of_an_engine_lives_no_longer_at_the_share() {
 }
 
 #[test]
-fn a_start_that_waited_in_a_frozen_share_is_refused() {
-    let share = Share::new("waited");
-    let line = StLine::open(&share.port("st0"), Default::default()).unwrap();
-    let mut engine = Acquisition::new(Box::new(line));
-    let hold = share.freeze();
-    let start = line::Request::st(1, Request::ExecuteCommand(Command::StartMotor));
-    engine.command(&"test".into(), start, Micros::from_millis(300)).unwrap();
-    engine.advance(&mut |_, _| {});
-    let sent = Instant::now();
-    while sent.elapsed() < Duration::from_millis(600) {
-        std::thread::yield_now();
-    }
-    drop(hold);
-    let mut refused = None;
-    while refused.is_none() {
-        assert!(sent.elapsed() < LIMIT, "no answer");
-        engine.advance(&mut |_, result| refused = Some(result.unwrap_err().to_string()));
-        std::thread::yield_now();
-    }
-    let refused = refused.unwrap();
-    assert!(refused.contains("the command is too old"), "{refused}");
+fn each_of_many_motors_is_confirmed_at_once() {
+    let path = crate::drives::path("share-asks", "socket");
+    let socket = UnixListener::bind(&path).unwrap();
+    // All motors answer each command.
+    let share = std::thread::spawn(move || {
+        let (mut share, mut confirmed) = (Scripted::accept(&socket), Vec::new());
+        while let Some(asked) = share.asked(|| scripted::line("rmd0", Protocol::Rmd)) {
+            let answer = match asked.ask {
+                Ask::Command { bytes, .. } => {
+                    Answer::Command { bytes: [&bytes[..1], &[7; 7]].concat() }
+                }
+                ask => {
+                    confirmed.extend(matches!(ask, Ask::Confirm { .. }).then_some(ask));
+                    Answer::Confirm
+                }
+            };
+            share.answer(asked.id, answer);
+        }
+        confirmed
+    });
+    port::register();
+    let port = format!("share:{}/rmd0", path.display()).parse().unwrap();
+    let client = rmd::Client::open(&port, Default::default()).unwrap();
+    let motors = [1, 2, 3].map(|number| (id(number), rmd::Asked::Confirmation));
+    client.ask_each(&motors, |id, reply, _| assert!(reply.is_ok(), "{id}")).unwrap();
+    drop(client);
+    let confirm = |motor| Ask::Confirm { line: "rmd0".to_owned(), motor };
+    assert_eq!(share.join().unwrap(), [1, 2, 3].map(confirm));
+    std::fs::remove_file(path).unwrap();
 }
 
 #[test]
@@ -461,27 +446,20 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
 }
 
 #[test]
-fn a_stop_of_all_ids_of_a_share_is_certain_of_the_ids_without_a_motor() {
+fn a_stop_of_all_ids_of_a_share_is_certain_and_fails_for_a_motor_that_was_turned_and_is_silent() {
     let share = deaf("all");
     let mut operator = Asker::join(&share.path, "operator");
     let client = share.rmd();
     let stopping = client.stop_all_until_confirmed(Default::default());
-    assert!(stopping.failed.is_empty(), "{stopping:?}");
-    assert!(stopping.is_silence_certain(), "{stopping:?}");
+    assert!(stopping.failed.is_empty() && stopping.is_silence_certain(), "{stopping:?}");
     assert_eq!(stopping.confirmed.len() + stopping.silent.len(), MotorSet::ALL.len());
     // The IDs without a motor are no alarm.
     assert!(stops(&mut operator) <= stopping.confirmed.len());
-}
-
-#[test]
-fn a_stop_of_all_ids_of_a_share_fails_for_a_motor_that_was_turned_and_is_silent() {
-    let share = deaf("all-turned");
-    let client = share.rmd();
     // Its replies are lost: only the share knows of it.
+    operator.ask(Ask::Release).unwrap();
     share.rmd().ask(id(9), &SetSpeed { speed: CentiDps::from_digits(36_000) }).unwrap_err();
     let stopping = client.stop_all_until_confirmed(Default::default());
     let failed: MotorSet = stopping.failed.iter().map(|(id, _)| *id).collect();
     assert_eq!(failed, id(9).into(), "{stopping:?}");
-    assert!(!stopping.silent.contains(id(9)), "{stopping:?}");
-    assert!(stopping.is_silence_certain(), "{stopping:?}");
+    assert!(!stopping.silent.contains(id(9)) && stopping.is_silence_certain(), "{stopping:?}");
 }

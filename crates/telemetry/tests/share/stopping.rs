@@ -14,8 +14,10 @@ use crate::asking::Asker;
 use crate::shared::{LIMIT, Share};
 use crate::virtual_share::VirtualShare;
 
-/// RMD motors have this time for a reply. Most of the stops here wait for it several times.
-pub const SHORT: Duration = Duration::from_millis(500);
+/// Drives on ports have this time for a reply. Most of the stops here wait for it several times.
+const SHORT: Duration = Duration::from_millis(500);
+/// The same on virtual time.
+pub const QUICK: Duration = Duration::from_millis(100);
 
 /// GET_REG of STATUS.
 pub const READ_STATUS: [u8; 2] = [2, 2];
@@ -120,7 +122,7 @@ pub fn share_of_a_turning_motor(begins_cut: bool) -> (VirtualShare, Arc<AtomicBo
 /// The same with ports.
 pub fn ports_of_a_turning_motor(name: &str, begins_cut: bool) -> (Share, Arc<AtomicBool>) {
     let (is_cut, around) = turning(begins_cut, |_| None);
-    let share = Share::with(name, SHORT, around);
+    let share = Share::with(name, if begins_cut { QUICK } else { SHORT }, around);
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     (share, is_cut)
 }
@@ -136,7 +138,7 @@ pub fn share_while(
     passes: impl Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync + 'static,
 ) -> (VirtualShare, Arc<AtomicBool>) {
     let (is_so, around) = turning(begins, passes);
-    let share = VirtualShare::with(SHORT, around);
+    let share = VirtualShare::with(QUICK, around);
     share.reaches("st2.speed_rpm", |rpm| rpm > 500.0);
     (share, is_so)
 }
@@ -215,9 +217,7 @@ pub fn stops(program: &mut Asker, motor: u8) -> usize {
 
 /// When the stops of a motor are on the wire of st0, in seconds.
 pub fn stop_times(program: &mut Asker, motor: u8) -> Vec<f64> {
-    let (from, to, after) = (Some(0.0), None, None);
-    let ask = Ask::Frames { line: "st0".to_owned(), from, to, after, most: 1000 };
-    let Ok(Answer::Frames { frames, .. }) = program.ask(ask) else { panic!() };
+    let frames = program.frames("st0", Some(0.0), None);
     let is_stop =
         |frame: &&WireFrame| frame.motor == Some(motor) && frame.words.contains("STOP_MOTOR");
     frames.iter().filter(is_stop).map(|frame| frame.t).collect()

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::asking::{Asker, command};
 use crate::stopping::{
-    Cable, READ_STATUS, SHORT, START, heard_and_unstopped, motors, share_of_a_turning_motor,
+    Cable, QUICK, READ_STATUS, START, heard_and_unstopped, motors, share_of_a_turning_motor,
     stop_all, stop_all_of, stops,
 };
 use crate::virtual_share::VirtualShare;
@@ -23,7 +23,7 @@ const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
 
 #[test]
 fn an_id_that_was_only_searched_is_absent_at_every_stop() {
-    let share = VirtualShare::with(SHORT, |link| link);
+    let share = VirtualShare::with(QUICK, |link| link);
     let mut program = share.join("searches");
     program.ask(command("rmd0", 1, &READ)).unwrap();
     program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
@@ -50,7 +50,7 @@ fn an_id_that_was_only_searched_is_absent_at_every_stop() {
 
 #[test]
 fn ids_that_never_answered_are_absent_where_others_confirm() {
-    let share = VirtualShare::with(SHORT, |link| link);
+    let share = VirtualShare::with(QUICK, |link| link);
     let mut program = share.join("searches");
     program.ask(command("rmd0", NOBODY, &READ)).unwrap_err();
     let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY, 30]);
@@ -79,7 +79,7 @@ fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
 fn a_motor_that_answered_and_is_silent_now_may_turn() {
     let is_cut = Arc::new(AtomicBool::new(false));
     let cut = Arc::clone(&is_cut);
-    let share = VirtualShare::with(SHORT, move |link| Cable::cut_while(link, &is_cut));
+    let share = VirtualShare::with(QUICK, move |link| Cable::cut_while(link, &is_cut));
     let mut program = share.join("reads");
     program.ask(command("st0", 1, &READ_STATUS)).unwrap();
     program.ask(command("st0", 5, &READ_STATUS)).unwrap_err();
@@ -162,7 +162,7 @@ fn where_nothing_has_answered_a_stop_is_not_confirmed_and_is_repeated() {
 fn a_release_ends_the_repeats_where_nothing_has_answered() {
     let is_cut = Arc::new(AtomicBool::new(true));
     let cut = Arc::clone(&is_cut);
-    let share = VirtualShare::with(SHORT, move |link| Cable::cut_while(link, &is_cut));
+    let share = VirtualShare::with(QUICK, move |link| Cable::cut_while(link, &is_cut));
     let mut program = share.join("releases");
     assert_eq!(stop_all_of(&mut program, "st0", &[ANY_MOTOR]), motors("st0", &[(0, "may turn")]));
     program.ask(Ask::Release).unwrap();

@@ -23,7 +23,7 @@ use crate::engine::Polled;
 use crate::shared::{LIMIT, PATIENT};
 
 /// How often the engines look at their lines.
-const STEP: Micros = Micros::from_millis(1);
+const STEP: Micros = Micros::from_millis(2);
 /// As the server.
 const BATCH: Micros = Micros::from_millis(25);
 
@@ -61,17 +61,21 @@ impl VirtualShare {
     }
 
     pub fn join(&self, name: &str) -> Asker {
-        let session = self.0.hub.borrow_mut().join();
-        let (world, reader) = (Rc::clone(&self.0), Reader::default());
-        Asker::by(Box::new(Joined { world, session, reader }), name)
+        Asker::by(self.connect(), name)
     }
 
-    /// Waits until this is so. It looks every 20 ms.
+    pub fn connect(&self) -> Box<dyn Connection> {
+        let session = self.0.hub.borrow_mut().join();
+        let (world, reader) = (Rc::clone(&self.0), Reader::default());
+        Box::new(Joined { world, session, reader })
+    }
+
+    /// Waits until this is so. It looks from time to time.
     pub fn until(&self, mut is: impl FnMut() -> bool) {
         let end = self.0.bench.now() + LIMIT.into();
         while !is() {
             assert!(self.0.bench.now() < end, "it never is");
-            (0..20).for_each(|_| self.0.step());
+            (0..10).for_each(|_| self.0.step());
         }
     }
 
@@ -130,24 +134,44 @@ struct Joined {
     reader: Reader,
 }
 
+impl Joined {
+    /// As the server, it takes no more than the hub wants.
+    fn take(&mut self) {
+        let mut hub = self.world.hub.borrow_mut();
+        while hub.is_accepting(self.session)
+            && let Some(frame) = self.reader.take().unwrap()
+        {
+            hub.received(self.session, &frame, Micros(0));
+        }
+    }
+}
+
 impl Connection for Joined {
     fn write(&mut self, bytes: &[u8]) {
         self.reader.push(bytes);
-        while let Some(frame) = self.reader.take().unwrap() {
-            self.world.hub.borrow_mut().received(self.session, &frame, Micros(0));
-        }
+        self.take();
     }
 
     fn read(&mut self) -> Vec<u8> {
         loop {
-            let next = self.world.hub.borrow_mut().next(self.session);
-            if let Some(frame) = next {
-                let mut bytes = Vec::new();
-                append(frame.kind, &frame.payload, &mut bytes).unwrap();
-                return bytes;
+            self.take();
+            let mut hub = self.world.hub.borrow_mut();
+            let (next, is_closing) = (hub.next(self.session), hub.is_closing(self.session));
+            drop(hub);
+            match next {
+                Some(frame) => {
+                    let mut bytes = Vec::new();
+                    append(frame.kind, &frame.payload, &mut bytes).unwrap();
+                    return bytes;
+                }
+                None if is_closing => return Vec::new(),
+                None => self.world.step(),
             }
-            self.world.step();
         }
+    }
+
+    fn now(&self) -> Duration {
+        self.world.bench.now().since(Instant(0)).into()
     }
 }
 

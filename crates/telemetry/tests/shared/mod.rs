@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{EventBytes, PortName};
+use motorlink::port::{EventBytes, EventCan, PortName};
 use motorlink::st::{EventClient, Options};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::acquisition::Acquisition;
@@ -18,9 +18,9 @@ use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_telemetry::share::words::Speaks;
-use motorlink_testbench::{Bench, Serving};
+use motorlink_testbench::{Bench, BenchConfig, Serving};
 
-use crate::drives::{path, served};
+use crate::drives::{path, served_by};
 
 pub const LIMIT: Duration = Duration::from_secs(30);
 /// A busy machine may be late with a reply.
@@ -57,27 +57,41 @@ impl Share {
         name: &str,
         timeout: Duration,
         lease: Option<Duration>,
-        mut around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+        around: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
     ) -> Self {
-        let (bench, serving, st, rmd) = served(&format!("share-{name}"));
+        let st_timeout = timeout.min(Duration::from_secs(1));
+        Self::of(name, Profile::Spec, (st_timeout, timeout), lease, (around, |bus| bus))
+    }
+
+    /// With something around the serial line and around the bus, whose drives have these times for a reply.
+    pub fn of(
+        name: &str,
+        profile: Profile,
+        (st_timeout, rmd_timeout): (Duration, Duration),
+        lease: Option<Duration>,
+        (mut around, mut around_bus): (
+            impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+            impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
+        ),
+    ) -> Self {
+        let config = BenchConfig { profile, ..BenchConfig::default() };
+        let (bench, serving, st, rmd) = served_by(&format!("share-{name}"), &config);
         let tap = Tap::default();
         let wrap = {
             let tap = tap.clone();
             move |link| tap.around_line(around(link))
         };
-        let options =
-            Options { timeout: timeout.min(Duration::from_secs(1)), ..Options::default() };
+        let options = Options { profile, timeout: st_timeout, ..Options::default() };
         let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, options);
-        let line = StLine::new(client.unwrap());
-        let engine = Acquisition::new(Box::new(line));
-        let (port, speaks) = (st.parse().unwrap(), Speaks::St(Profile::Spec));
+        let engine = Acquisition::new(Box::new(StLine::new(client.unwrap())));
+        let (port, speaks) = (st.parse().unwrap(), Speaks::St(profile));
         let st = Held::start("st0", Opened { port, speaks, engine, tap }).unwrap();
-        let options = motorlink::rmd::Options { timeout, ..Default::default() };
         let tap = Tap::default();
         let wrap = {
             let tap = tap.clone();
-            move |link| tap.around_bus(link)
+            move |link| tap.around_bus(around_bus(link))
         };
+        let options = motorlink::rmd::Options { timeout: rmd_timeout, ..Default::default() };
         let port: PortName = format!("slcan:{rmd}").parse().unwrap();
         let client = motorlink::rmd::EventClient::open_wrapped(&port, wrap, options);
         let engine = Acquisition::new(Box::new(RmdLine::new(client.unwrap())));
@@ -110,16 +124,25 @@ impl Share {
         continues
     }
 
-    pub fn end(&mut self) -> Vec<(String, Stopped)> {
+    /// Ends the share soon.
+    pub fn close(&self) {
         self.ends.store(true, Ordering::SeqCst);
+    }
+
+    pub fn end(&mut self) -> Vec<(String, Stopped)> {
+        self.close();
         self.thread.take().map_or_else(Vec::new, |thread| thread.join().unwrap())
     }
 
-    pub fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
+    pub fn value(&self, signal: &str) -> f64 {
         let at = self.bench.signals().iter().position(|it| it.name == signal).unwrap();
+        self.bench.values()[at]
+    }
+
+    pub fn reaches(&self, signal: &str, what: impl Fn(f64) -> bool) {
         let end = Instant::now() + LIMIT;
-        while !what(self.bench.values()[at]) {
-            assert!(Instant::now() < end, "{signal} is {}", self.bench.values()[at]);
+        while !what(self.value(signal)) {
+            assert!(Instant::now() < end, "{signal} is {}", self.value(signal));
             std::thread::sleep(Duration::from_millis(5));
         }
     }

@@ -3,7 +3,6 @@
 use motorlink_proto::st::ErrorCode;
 
 use super::{MCSDK, Mutant, ack, answers, caught, gives, mutant, nack, refuses, takes};
-use crate::peer::frame;
 
 const EXECUTE: u8 = 0x03;
 const BOARD_INFO: u8 = 0x06;
@@ -176,23 +175,4 @@ const MUTANTS: [Mutant; 36] = [
 #[test]
 fn messages() {
     caught(&MUTANTS);
-}
-
-#[test]
-fn a_correct_drive_passes_in_the_same_wrapper() {
-    use motorlink_sim::st::MotorConfig;
-
-    use crate::peer::{ALL, Peer, test, wire};
-    let same = || {
-        answers(|station, now, header, payload| {
-            let mut reply = Vec::new();
-            station.receive(now, &frame(header, payload), |bytes| reply = bytes.to_vec());
-            Some(reply)
-        })
-    };
-    for profile in [super::SPEC, MCSDK] {
-        let wire = wire(Peer::new(profile, &MotorConfig::demo(), same()));
-        let report = test(&wire, 1, &ALL);
-        assert!(report.is_clean(), "{:?}", report.failed().collect::<Vec<_>>());
-    }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use mcap::WriteOptions;
 use motorlink_recording::read::{Damage, Loss, Recording};
 
-use crate::files::{
+use super::files::{
     IN_A_CHUNK, check, chunk_starts, compressed, finished, messages, options, read, write,
 };
 
@@ -52,7 +52,9 @@ fn no_flipped_bit_is_a_wrong_message_or_a_hidden_loss() {
     let cut: Vec<Vec<u8>> = endings.iter().map(|file| file[..data_end(file)].to_vec()).collect();
     endings.extend(cut);
     for (n, file) in endings.iter().enumerate() {
-        for bit in 0..file.len() * 8 {
+        // The compressed files differ in the content of their chunks only, which has a checksum.
+        let is_compressed = n % 2 == 1;
+        for bit in (0..file.len() * 8).filter(|bit| !is_compressed || bit % 8 == bit / 8 % 8) {
             let mut file = file.clone();
             file[bit / 8] ^= 1 << (bit % 8);
             // Without an index both read from the beginning.
@@ -62,7 +64,7 @@ fn no_flipped_bit_is_a_wrong_message_or_a_hidden_loss() {
             };
             for reader in readers {
                 let (got, losses) = match reader(Cursor::new(&file)) {
-                    Ok(recording) => crate::files::all(recording),
+                    Ok(recording) => super::files::all(recording),
                     Err(_) => continue,
                 };
                 let place = format!("file {n}, byte {}, bit {}", bit / 8, bit % 8);

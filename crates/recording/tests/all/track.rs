@@ -1,8 +1,5 @@
 //! Simulated drives on virtual time, recorded without a thread.
 
-#[path = "../../telemetry/tests/engine/mod.rs"]
-mod engine;
-
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -25,7 +22,7 @@ use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use motorlink_testbench::Bench;
 
-use engine::{Engine, Polled, SECOND, bench, rmd, spec, st, st_options};
+use crate::engine::{Engine, Polled, SECOND, bench, rmd, spec, st, st_options};
 
 const CENTISECOND: Micros = Micros(10_000);
 const MILLISECOND: Micros = Micros(1_000);

@@ -4,8 +4,8 @@ use std::io::Cursor;
 
 use motorlink_recording::read::{ReadError, Recording};
 
-use crate::files::{
-    IN_A_CHUNK, all, check, chunk_starts, compressed, finished, messages, options, read,
+use super::files::{
+    IN_A_CHUNK, check, chunk_starts, compressed, finished, messages, options, read,
 };
 
 #[test]
@@ -55,14 +55,6 @@ fn facts_and_attachments_are_read_by_the_index_and_from_the_beginning() {
         let channel = recording.channels().next().unwrap().clone();
         assert_eq!(recording.schema(&channel).unwrap().name, "test/msg/Text");
     }
-}
-
-#[test]
-fn messages_are_read_again_as_often_as_wanted() {
-    let file = finished(compressed(), 2);
-    let mut recording = Recording::new(Cursor::new(&file)).unwrap();
-    assert_eq!(recording.messages().count(), 10);
-    assert_eq!(all(recording).0, messages(2));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use motorlink_recording::read::{Content, Recording};
 use motorlink_recording::schema::{Log, Message, Severity, SignalsRow, SignalsType, Time, name};
 use motorlink_telemetry::signal::{Motor, Signal};
 
-use crate::files::compressed;
+use super::files::compressed;
 
 const START: u64 = 1_700_000_000_000_000_000;
 

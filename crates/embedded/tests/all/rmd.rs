@@ -108,21 +108,17 @@ fn id(number: u8) -> MotorId {
 }
 
 impl Pair {
+    /// On a bus without former hosts.
     fn new() -> Self {
-        let mut bench = Pair::opened();
-        bench.host.host_mut().trust(MotorSet::ALL);
-        bench
-    }
-
-    /// On a bus where former hosts may have sent requests.
-    fn opened() -> Self {
         let (ours, theirs) = bus();
         let configs = [1, 2].map(RmdConfig::with_id);
         let drive =
             |config: RmdConfig| Drive::new(DriveConfig::new(id(config.id)), config.factory_rom());
+        let mut host = Host::new();
+        host.trust(MotorSet::ALL);
         let mut bench = Pair {
             now: Instant(0),
-            host: HostPort::new(ours, Host::new()),
+            host: HostPort::new(ours, host),
             drives: DrivePort::new(theirs, configs.map(drive)),
             motors: configs.map(|config| RmdMotor::new(config).expect("the presets are possible")),
         };
@@ -165,21 +161,6 @@ fn a_host_behind_one_controller_commands_drives_behind_another() {
     assert!(results.iter().all(|(_, result)| result.is_ok()), "{results:?}");
     let [one, two] = bench.drives.drives().each_ref().map(Drive::mode);
     assert_eq!((one, two), (Mode::Speed(CentiDps(36_000)), Mode::Off));
-}
-
-#[test]
-fn new_motors_are_trusted_after_a_silence() {
-    let mut bench = Pair::opened();
-    for number in [1, 2] {
-        bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
-    }
-    assert!(bench.run().into_iter().all(|(_, result)| result == Err(Failure::Quarantined)));
-    assert!(bench.drives.drives().iter().all(|drive| drive.mode() == Mode::Off));
-    bench.now += DEFAULT_QUARANTINE;
-    for number in [1, 2] {
-        bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
-    }
-    assert!(bench.run().into_iter().all(|(_, result)| result.is_ok()));
 }
 
 #[test]

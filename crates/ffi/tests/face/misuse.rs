@@ -1,33 +1,19 @@
 //! Calls with values that a program may pass by mistake.
-#![allow(clippy::undocumented_unsafe_blocks, reason = "every call here is one of C's")]
 
-use std::ffi::c_void;
-use std::mem::MaybeUninit;
 use std::ptr::null;
 use std::slice;
 
-use motorlink_ffi::motorlink_error as Error;
 use motorlink_ffi::rmd::{drive::*, host::*, message::*, *};
-use motorlink_ffi::st::{master::*, message::*, names::*, request::*, slave::*, *};
+use motorlink_ffi::st::{master::*, names::*, request::*, slave::*, *};
 use motorlink_ffi::*;
 use motorlink_proto::st::{Profile, Recovery, RegisterId};
 
-macro_rules! gives {
-    ($error:ident, $($call:expr),+ $(,)?) => { $( assert_eq!(unsafe { $call }, Error::$error); )+ };
-}
-
-fn zeroed<T>() -> T {
-    unsafe { MaybeUninit::zeroed().assume_init() }
-}
+use crate::{Error, execute_nothing, gives, set_no_mode, zeroed};
 
 fn text(text: motorlink_bytes) -> &'static str {
     let bytes = unsafe { slice::from_raw_parts(text.data, text.size) };
     std::str::from_utf8(bytes).unwrap()
 }
-
-extern "C" fn execute(_: *mut c_void, _: u8, _: u8) {}
-
-extern "C" fn set_mode(_: *mut c_void, _: *const motorlink_rmd_motion) {}
 
 #[test]
 fn a_config_of_zeros_has_the_defaults() {
@@ -105,25 +91,6 @@ fn the_unit_of_a_register_is_that_of_the_profile() {
 }
 
 #[test]
-fn a_value_that_is_possible_in_the_other_profile_only_is_an_error() {
-    let (spec, mcsdk) = (Profile::Spec as u8, Profile::Mcsdk54 as u8);
-    let check =
-        |profile, register: RegisterId, value| motorlink_st_check_value(profile, register.0, value);
-    for (register, value) in [
-        (RegisterId::HEATS_TEMP, 65_526),
-        (RegisterId::MOTOR_POWER, 65_534),
-        (RegisterId::FLUXWK_BUS, 985),
-    ] {
-        assert_eq!(check(spec, register, value), Error::Implausible, "{register}");
-    }
-    assert_eq!(check(spec, RegisterId::HEATS_TEMP, 25), Error::Ok);
-    assert_eq!(check(mcsdk, RegisterId::HEATS_TEMP, -10), Error::Ok);
-    assert_eq!(check(mcsdk, RegisterId::FLUXWK_BUS, 985), Error::Ok);
-    assert_eq!(check(spec, RegisterId(0xC0), i32::MIN), Error::Ok);
-    assert_eq!(check(2, RegisterId::HEATS_TEMP, 25), Error::BadArgument);
-}
-
-#[test]
 fn a_reply_is_decoded_only_by_the_function_for_its_code() {
     let motion = motorlink_rmd_data { bytes: [0x9C, 25, 1, 2, 3, 4, 5, 6] };
     let (mut status, mut decoded): (motorlink_rmd_status, motorlink_rmd_motion_status) =
@@ -153,8 +120,8 @@ fn a_drive_without_the_callback_that_stops_the_motor_is_refused() {
         motorlink_st_slave_init(&mut slave, size.0, 0, 1, &st),
         motorlink_rmd_drive_init(&mut drive, size.1, &config, null(), &rmd),
     );
-    st.execute = Some(execute);
-    rmd.set_mode = Some(set_mode);
+    st.execute = Some(execute_nothing);
+    rmd.set_mode = Some(set_no_mode);
     gives!(
         Ok,
         motorlink_st_slave_init(&mut slave, size.0, 0, 1, &st),
@@ -166,7 +133,7 @@ fn a_drive_without_the_callback_that_stops_the_motor_is_refused() {
 fn the_reply_of_a_drive_may_replace_the_frame() {
     let mut drive: motorlink_rmd_drive = zeroed();
     let mut motor: motorlink_rmd_motor_control = zeroed();
-    motor.set_mode = Some(set_mode);
+    motor.set_mode = Some(set_no_mode);
     let mut config: motorlink_rmd_drive_config = zeroed();
     config.id = 1;
     let size = size_of_val(&drive);

@@ -9,7 +9,7 @@ use motorlink_recording::read::{Damage, Recording, Tables};
 use motorlink_recording::schema::{SignalsRow, SignalsType, Time, name};
 use motorlink_telemetry::signal::{Motor, Signal};
 
-use crate::files::{chunk_starts, compressed};
+use super::files::{chunk_starts, compressed};
 
 /// A recording of one signal with one value, in as many chunks.
 fn recorded(signal: &str, value: f64, chunks: u64) -> Vec<u8> {

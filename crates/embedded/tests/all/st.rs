@@ -1,7 +1,6 @@
 //! Both ends of ST MCP behind embedded-io, on a simulated line and a virtual clock.
 
-mod uart;
-
+use crate::uart::{Uart, line};
 use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::st::{Event, MasterPort, SlavePort};
 use motorlink_proto::st::{
@@ -10,7 +9,6 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{StDrive, StMotor};
-use uart::{Uart, line};
 
 struct Pair {
     now: Instant,
@@ -88,15 +86,7 @@ fn a_master_behind_one_uart_commands_a_drive_behind_another() {
 }
 
 #[test]
-fn a_just_opened_line_needs_two_silences() {
-    let mut bench = Pair::opened();
-    assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
-    let quiet = MasterConfig::default().quiet;
-    assert_eq!(bench.now, Instant(0) + quiet + quiet);
-}
-
-#[test]
-fn a_stop_is_sent_at_once_on_a_lost_line() {
+fn a_stop_on_a_just_opened_line_is_sent_at_once_and_again_after_two_silences() {
     let mut bench = Pair::opened();
     let stop = Request::ExecuteCommand(Command::StopMotor);
     bench.master.master_mut().request(1, &stop).unwrap();
@@ -104,6 +94,8 @@ fn a_stop_is_sent_at_once_on_a_lost_line() {
     let frame = [0x23, 0x01, 0x02, 0x26].map(Ok);
     assert_eq!(*bench.slave.uart_mut().received.borrow(), frame);
     assert_eq!(bench.exchange(), Ok(vec![]), "acknowledged after the recovery");
+    let quiet = MasterConfig::default().quiet;
+    assert_eq!(bench.now, Instant(0) + quiet + quiet);
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! A drive behind a UART that speaks slcan.
 
-mod uart;
-
+use crate::uart::{Uart, line};
 use embedded_can::Frame as _;
 use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::rmd::{DrivePort, from_can, to_can};
@@ -10,7 +9,6 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Drive, DriveConfig, MotorId};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
-use uart::{Uart, line};
 
 struct Pair {
     host: Uart,

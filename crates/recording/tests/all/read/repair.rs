@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use motorlink_recording::read::Recording;
 
-use crate::files::{all, check, chunk_starts, compressed, finished, messages, options, read};
+use super::files::{all, check, chunk_starts, compressed, finished, messages, options, read};
 
 fn repaired(file: &[u8]) -> Vec<u8> {
     let mut new = Vec::new();
