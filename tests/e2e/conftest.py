@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from program import PATIENT, Outcome, Running, Sim, environment
+from program import PATIENT, Outcome, Running, environment, serving
 from terminal import Terminal
 from wireshark import dissector, packets, sets, tshark  # noqa: F401
 
@@ -94,25 +94,6 @@ def watch(motorlink):
     yield watch
     for terminal in started:
         terminal.end()
-
-
-def serving(motorlink, folder):
-    """Starts `motorlink sim`s on ports in `folder` and ends them."""
-    started = []
-
-    def sim(*arguments, st=("pty",), rmd=("slcan-pty",)):
-        """Serves a port of each kind: `pty` and `slcan-pty` are st0 and can0 in the folder."""
-        names = {"pty": f"pty:{folder}/st0", "slcan-pty": f"slcan-pty:{folder}/can0"}
-        names["tcp"] = "tcp-listen:127.0.0.1:0"
-        ports = [word for kind in st for word in ("--st", names.get(kind, kind))]
-        ports += [word for kind in rmd for word in ("--rmd", names.get(kind, kind))]
-        drives = Sim([motorlink, "sim", *map(str, arguments), *ports], len(ports) // 2)
-        started.append(drives)
-        return drives
-
-    yield sim
-    for drives in started:
-        drives.end()
 
 
 @pytest.fixture

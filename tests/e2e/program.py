@@ -252,3 +252,22 @@ class Sim(Running):
         fields = {"port": port} if port else {}
         (bench,) = self.do("state", **fields)["state"]
         return next(motor for motor in bench["motors"] if motor["motor"] == number)
+
+
+def serving(motorlink, folder):
+    """Starts `motorlink sim`s on ports in `folder` and ends them."""
+    started = []
+
+    def sim(*arguments, st=("pty",), rmd=("slcan-pty",)):
+        """Serves a port of each kind: `pty` and `slcan-pty` are st0 and can0 in the folder."""
+        names = {"pty": f"pty:{folder}/st0", "slcan-pty": f"slcan-pty:{folder}/can0"}
+        names["tcp"] = "tcp-listen:127.0.0.1:0"
+        ports = [word for kind in st for word in ("--st", names.get(kind, kind))]
+        ports += [word for kind in rmd for word in ("--rmd", names.get(kind, kind))]
+        drives = Sim([motorlink, "sim", *map(str, arguments), *ports], len(ports) // 2)
+        started.append(drives)
+        return drives
+
+    yield sim
+    for drives in started:
+        drives.end()

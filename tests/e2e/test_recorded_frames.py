@@ -4,8 +4,8 @@ import json
 
 import can
 import pytest
-from conftest import serving
-from program import PATIENT
+
+from program import PATIENT, serving
 
 
 @pytest.fixture(scope="module")
