@@ -273,7 +273,7 @@ python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
 	$(PYTHON_VENV)/bin/python bindings/python/tests/reference.py
 
 web-types: ## the types of messages in the page: web/src/wire.ts
-	MOTORLINK_UPDATE_WEB=1 $(CARGO) test -p motorlink-monitor --all-features --test types --locked
+	MOTORLINK_UPDATE_WEB=1 $(CARGO) test -p motorlink-monitor --all-features --locked --test all types::
 
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
