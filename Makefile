@@ -36,10 +36,8 @@ e2e ros2 python pages firmware-test: export PYTHONPATH = $(CURDIR)/tests
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # For all that the tests build, clippy is the compiler: so it needs no build of its own. It tells warnings again
-# each time; LINT fails if there is one.
+# each time; `lint` fails if there is one.
 lint unit e2e ros2 python pages browser ffi-test firmware-test test-socketcan: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
-LINT = @mkdir -p target; $(CARGO) test $(1) --locked --no-run >target/$@.log 2>&1; built=$$?; \
-	cat target/$@.log; [ $$built = 0 ] && ! grep -q '^warning' target/$@.log
 
 # The program with the features of the whole workspace: built once for all parts.
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --example rmd_frames --example wireshark_frames --locked
@@ -74,12 +72,12 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --locked -p motorlink-cli --no-default-features --features monitor -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 30 min: parts unit .. deny but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 30 min: parts lint .. test-socketcan but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(FORCE)$(LONG),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
 
 # Before a release, and each night in the public CI. A part that fails has no second chance.
-verify: toolchain $(if $(SUDO),packages) ## 4 h: all parts with all tests, beside a load, on one core, faults, soak, mutants
+verify: ## 4 h: all parts with all tests, beside a load, on one core, faults, soak, mutants
 	$(MAKE) --no-print-directory test PARTS="$(ALL_PARTS)" FORCE=1 ONCE=1 LONG=1
 	$(MAKE) --no-print-directory flakes RUNS=1
 	taskset --cpu-list 0 $(MAKE) --no-print-directory flakes RUNS=1 LOAD=0
@@ -89,9 +87,9 @@ verify: toolchain $(if $(SUDO),packages) ## 4 h: all parts with all tests, besid
 
 # Zenoh takes minutes to build.
 WITHOUT_NETWORK = --workspace --exclude motorlink-fleet --exclude motorlink-python \
-	--no-default-features --features motorlink-monitor/typescript \
-	--features motorlink-cli/conformance,motorlink-cli/monitor,motorlink-cli/record,motorlink-cli/watch
-CLI_ALONE = -p motorlink-cli --no-default-features --features conformance,monitor,record,watch
+	--no-default-features --features "motorlink-monitor/typescript $(addprefix motorlink-cli/,$(OF_CLI))"
+CLI_ALONE = -p motorlink-cli --no-default-features --features "$(OF_CLI)"
+OF_CLI := conformance monitor record watch
 # The crates with files that differ from this revision.
 SINCE ?= HEAD
 CHANGED = $(shell { git diff --name-only $(SINCE); git ls-files --others --exclude-standard; } | \
@@ -158,7 +156,8 @@ firmware-test: $(VENV)/ready ## 7 min: boards in QEMU against the conformance ki
 lint: ## 6 min: format, clippy: no warning; compiles all tests
 	$(CARGO) fmt --all --check
 	cd fuzz/fuzzers && $(CARGO) fmt --check
-	$(call LINT,--workspace --all-features)
+	@mkdir -p target; $(CARGO) test --workspace --all-features --locked --no-run >target/$@.log 2>&1; built=$$?; \
+		cat target/$@.log; [ $$built = 0 ] && ! grep -q '^warning' target/$@.log
 	$(CARGO) clippy -p motorlink-cli --no-default-features --locked -- -D warnings
 
 rustdoc: ## 2 min: rustdoc: no warning

@@ -24,7 +24,6 @@ export default defineConfig({
   expect: { timeout: 15_000 },
   reporter: [['list']],
   use: { launchOptions: chromium, trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false } },
-  grepInvert: process.env.LONG ? [] : /@long/,
   projects: [
     { name: 'desk, light', use: { ...desk, colorScheme: 'light' } },
     { name: 'phone, dark', use: { ...phone, colorScheme: 'dark' }, grep: look },

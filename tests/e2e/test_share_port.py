@@ -87,7 +87,7 @@ def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path):
     assert "the kit needs a port of its own; end the share" in told.err and told.out == ""
     guard = run("guard", "st", "-p", share.st, "--serve", f"pty:{tmp_path}/guarded").ended(2)
     assert "use it without a guard" in guard.err
-    # The socket of a share is no port of a drive.
+    # A share's socket does not speak a drive's protocol.
     failed = run("st", "-p", f"unix:{share.path}", "status").ended(3)
     assert "write -p share:PATH/st0, or /rmd0 for RMD motors" in failed.err, failed.err
 

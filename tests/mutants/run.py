@@ -102,11 +102,11 @@ class Tests:
         self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink {PYTEST}"
         self.turn = threading.Lock()
         of_tests = schemata.output("git", "rev-parse", "HEAD:crates", "HEAD:bindings", "HEAD:tests/e2e", cwd=TREE)
-        names, known = [*of_tests.split(), *(it["name"] for it in mutants)], {}
+        of, known = [*of_tests.split(), *(it["name"] for it in mutants)], {}
         if REACHED.with_suffix(".json").exists():
             known = json.loads(REACHED.with_suffix(".json").read_text())
-        if known.get("mutants") != names:
-            known = {"mutants": names, "seconds": {}, "reached": {}}
+        if known.get("of") != of:
+            known = {"of": of, "seconds": {}, "reached": {}}
         self.trace(known)
         self.seconds = known["seconds"]
         self.reached = {int(number): sorted(set(tests)) for number, tests in known["reached"].items()}

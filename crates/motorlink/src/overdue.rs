@@ -5,27 +5,36 @@ use motorlink_proto::time::Instant;
 /// How many reads may come before the end of a wait: others may send without an end.
 const READS: u8 = 64;
 
-/// The end of the wait of a line, if it is not over or what came until then was not read yet.
-#[derive(Default)]
+/// The end of the wait of a session, if it is not over or what came until then was not read yet.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Overdue {
     until: Option<Instant>,
     reads: u8,
+    is_reading: bool,
 }
 
 impl Overdue {
     pub(crate) fn waits(&mut self, until: Instant) {
-        *self = Overdue { until: Some(until), reads: READS };
+        *self = Overdue { until: Some(until), reads: READS, is_reading: false };
     }
 
-    /// Nothing has come, or nothing is waited for.
+    /// Nothing is waited for.
     pub(crate) fn clear(&mut self) {
         self.until = None;
     }
 
     /// Whether the line is to be read before the session is asked what to do.
     pub(crate) fn reads_first(&mut self, now: Instant) -> bool {
-        let reads = self.reads > 0 && self.until.is_some_and(|until| until <= now);
-        self.reads -= u8::from(reads);
-        reads
+        self.is_reading = self.reads > 0 && self.until.is_some_and(|until| until <= now);
+        self.reads -= u8::from(self.is_reading);
+        self.is_reading
+    }
+
+    /// Nothing was there to read. Whether that was read because the wait is over.
+    pub(crate) fn silent(&mut self) -> bool {
+        if self.is_reading {
+            self.clear();
+        }
+        self.is_reading
     }
 }

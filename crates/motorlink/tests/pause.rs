@@ -15,11 +15,12 @@ use motorlink::time::Micros;
 use motorlink_link::fault::Faults;
 use motorlink_testbench::{Bench, BenchConfig};
 
-/// A link whose program stands still for 10 s whenever it waits for a reply. What comes meanwhile is kept for it.
+/// A link whose program stands still for 10 s each time that it waits for a reply. What comes in that time is there
+/// afterwards.
 struct Standing<L, T> {
     link: L,
     clock: Clock,
-    /// From then on.
+    /// Whether the program stands still at all.
     stands: Arc<AtomicBool>,
     is_sent: bool,
     kept: VecDeque<T>,
@@ -32,7 +33,7 @@ impl<L: Link, T> Standing<L, T> {
         Standing { link, clock, stands, is_sent: false, kept: VecDeque::new() }
     }
 
-    /// Whether it stands still now, and has come to the end of that.
+    /// Stands still if a request was sent before. Whether it did.
     fn stands(&mut self, take: impl Fn(&mut L, Duration) -> Vec<T>) -> bool {
         let stands = std::mem::take(&mut self.is_sent) && self.stands.load(Ordering::Relaxed);
         let end = self.clock.now() + Micros(10_000_000);

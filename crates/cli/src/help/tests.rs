@@ -21,9 +21,17 @@ fn message(line: &str) -> String {
     }
 }
 
+/// Each command line is answered with these words.
+fn all_say(lines: &[(&str, &str)]) {
+    for (line, words) in lines {
+        let message = message(line);
+        assert!(message.contains(words), "{line}: {message}");
+    }
+}
+
 #[test]
 fn an_invalid_command_line_is_answered_with_what_to_write() {
-    for (line, tip) in [
+    all_say(&[
         ("-p sim: st status", "write options behind the protocol: motorlink st -p PORT status"),
         ("st ./st0 status", "write the port as -p ./st0"),
         ("guard st /dev/ttyACM0", "write the port as -p /dev/ttyACM0"),
@@ -44,15 +52,12 @@ fn an_invalid_command_line_is_answered_with_what_to_write() {
         ("st -p sim: --baud 9600 status", "-p '/dev/ttyUSB0?baud=9600'"),
         ("rmd -p sim: --bitrate=500000 scan", "-p 'slcan:/dev/ttyACM0?bitrate=500000'"),
         ("guard st -p sim: --profile mcsdk-5.4", "a guard needs no profile"),
-    ] {
-        let message = message(line);
-        assert!(message.contains(tip), "{line}: {message}");
-    }
+    ]);
 }
 
 #[test]
 fn values_of_options_are_refused_with_those_that_are_valid() {
-    for (line, said) in [
+    all_say(&[
         ("st get STATUS --every 100", NO_UNIT),
         ("st --timeout 100 get STATUS", NO_UNIT),
         ("st get STATUS --every 0", "it must be 1ms to 86400s"),
@@ -88,10 +93,7 @@ fn values_of_options_are_refused_with_those_that_are_valid() {
         ("rmd position 90 --full-turn", "--full-turn"),
         ("rmd position 90 --wait-timeout 1s", "--wait"),
         ("rmd position 90 --wait --wait-tolerance=-1", "0 or more"),
-    ] {
-        let message = message(line);
-        assert!(message.contains(said), "{line}: {message}");
-    }
+    ]);
 }
 
 #[test]
@@ -113,7 +115,7 @@ fn no_suggestion_turns_a_motor() {
 
 #[test]
 fn suggestions_that_turn_no_motor_are_kept() {
-    for (line, suggested) in [
+    all_say(&[
         ("st statu", "'status'"),
         ("st gett SPEED_MEAS", "'get'"),
         ("rmd scn", "'scan'"),
@@ -122,8 +124,5 @@ fn suggestions_that_turn_no_motor_are_kept() {
         ("st -p sim: get STATUS --evry 5ms", "'--every'"),
         ("portss", "'ports'"),
         ("st --jsn info", "'--json'"),
-    ] {
-        let message = message(line);
-        assert!(message.contains(suggested), "{line}: {message}");
-    }
+    ]);
 }

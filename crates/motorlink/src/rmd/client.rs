@@ -16,7 +16,6 @@ use motorlink_proto::time;
 
 use super::session::{Session, SessionOutput, ends_motion};
 use super::{Error, Options};
-use crate::overdue::Overdue;
 use crate::turn::{Turn, Turns};
 
 /// What a scan found under an ID.
@@ -64,7 +63,6 @@ pub struct Client {
 pub(super) struct Driven<L> {
     pub(super) port: Reopening<L>,
     pub(super) session: Session,
-    pub(super) overdue: Overdue,
     /// Exchanges and cycles so far: another number says that the one before it was given up.
     pub(super) exchanges: u64,
 }
@@ -452,7 +450,7 @@ impl<L: CanLink> Driven<L> {
             session.set_holder(holder);
             session.trust();
         }
-        Driven { port, session, overdue: Overdue::default(), exchanges: 0 }
+        Driven { port, session, exchanges: 0 }
     }
 
     /// Makes ready for these requests.
@@ -524,15 +522,11 @@ impl<L: CanLink> Driven<L> {
     ) -> Result<bool, Error> {
         loop {
             let now = self.port.now();
-            let reads_first = self.overdue.reads_first(now);
-            let output =
-                if reads_first { SessionOutput::Wait(Some(now)) } else { self.session.poll(now) };
-            let moved = match output {
+            let moved = match self.session.poll(now) {
                 SessionOutput::Transmit(frame) => {
                     self.port.link().and_then(|(link, _)| link.send(&frame))
                 }
                 SessionOutput::Done(id, result) => {
-                    self.overdue.clear();
                     let link = self.port.open_link();
                     let result = result.map_err(|error| match link {
                         Some(link) => error.behind(link),
@@ -543,9 +537,6 @@ impl<L: CanLink> Driven<L> {
                 }
                 SessionOutput::Wait(None) => return Ok(true),
                 SessionOutput::Wait(Some(until)) => {
-                    if !reads_first {
-                        self.overdue.waits(until);
-                    }
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
                     if left == Some(Duration::ZERO) {
@@ -555,8 +546,7 @@ impl<L: CanLink> Driven<L> {
                     let came = self.port.link().and_then(|(link, _)| link.receive(wait));
                     came.map(|frame| match frame {
                         Some(frame) => self.session.receive(self.port.now(), &frame),
-                        None if reads_first => self.overdue.clear(),
-                        None => {}
+                        None => _ = self.session.silent(),
                     })
                 }
             };

@@ -268,25 +268,22 @@ impl EventClient {
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
     pub fn into_client(self) -> Client {
-        let Driven { port, session, overdue, exchanges } = self.driven;
+        let Driven { port, session, exchanges } = self.driven;
         let port = port.map(|link| link as Box<dyn CanLink>);
-        Client::driving(Driven { port, session, overdue, exchanges })
+        Client::driving(Driven { port, session, exchanges })
     }
 
     fn moved(
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let Driven { port, session, overdue, .. } = &mut self.driven;
+        let Driven { port, session, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(None) };
         let mut listens = STEP;
         loop {
             let now = clock.now();
-            let reads_first = overdue.reads_first(now);
-            let output =
-                if reads_first { SessionOutput::Wait(Some(now)) } else { session.poll(now) };
-            match output {
+            match session.poll(now) {
                 SessionOutput::Transmit(frame) => {
                     if let Err(error) = link.send(&frame) {
                         let (id, why) = not_done(error)?;
@@ -294,12 +291,12 @@ impl EventClient {
                     }
                 }
                 SessionOutput::Done(id, result) => {
-                    overdue.clear();
                     each(id, result.map_err(|error| error.behind(link.as_ref())));
                 }
                 SessionOutput::Wait(until) => {
+                    let is_over = until.is_some_and(|until| until <= now);
                     let came = match listens {
-                        0 if !reads_first => Ok(None),
+                        0 if !is_over => Ok(None),
                         _ => link.receive(Some(Duration::ZERO)),
                     };
                     let came = match came {
@@ -311,11 +308,9 @@ impl EventClient {
                         }
                     };
                     let Some(frame) = came else {
-                        if reads_first {
-                            overdue.clear();
+                        if session.silent() {
                             continue;
                         }
-                        until.inspect(|until| overdue.waits(*until));
                         let wait = until.map(|until| until.since(now).into());
                         let full = link.flush()?.then_some(FULL);
                         // Frames that the link holds already do not make the descriptor readable.

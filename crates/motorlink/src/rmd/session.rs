@@ -12,6 +12,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time::{Instant, Micros};
 
 use super::{Error, Options};
+use crate::overdue::Overdue;
 
 /// The longest time for which a motor with doubtful replies may go on sending, in addition to the
 /// times of its exchanges.
@@ -48,6 +49,7 @@ pub(super) struct Session {
     unsent_for: Option<RequestError>,
     /// When the last frame to each motor was sent.
     sent: [Instant; MotorId::COUNT],
+    overdue: Overdue,
     /// How often the replies of each motor could not be confirmed any more.
     losses: [u32; MotorId::COUNT],
     /// Whether nothing is sent any more but what stops motors.
@@ -115,6 +117,7 @@ impl Session {
             unsent: MotorSet::EMPTY,
             unsent_for: None,
             sent: [Instant(0); MotorId::COUNT],
+            overdue: Overdue::default(),
             losses: [0; MotorId::COUNT],
             is_retired: false,
             is_held: false,
@@ -325,7 +328,26 @@ impl Session {
         self.host.receive(now, frame);
     }
 
+    /// Nothing was there to read. Whether [`poll`](Self::poll) asked for it because a wait is over: it
+    /// knows more now.
+    pub(super) fn silent(&mut self) -> bool {
+        self.overdue.silent()
+    }
+
     pub(super) fn poll(&mut self, now: Instant) -> SessionOutput {
+        if self.overdue.reads_first(now) {
+            return SessionOutput::Wait(Some(now));
+        }
+        let output = self.next(now);
+        match output {
+            SessionOutput::Wait(Some(until)) => self.overdue.waits(until),
+            SessionOutput::Done(..) => self.overdue.clear(),
+            SessionOutput::Transmit(_) | SessionOutput::Wait(None) => {}
+        }
+        output
+    }
+
+    fn next(&mut self, now: Instant) -> SessionOutput {
         loop {
             if let Some((id, why)) = self.not_done.pop() {
                 return SessionOutput::Done(id, Err(self.undone(id, why)));

@@ -16,7 +16,6 @@ use motorlink_proto::time::{self, Instant};
 
 use super::session::{Exchanged, Rules, Session};
 use super::{Error, Options};
-use crate::overdue::Overdue;
 use crate::turn::{Turn, Turns};
 use proto::{Effect, Started};
 
@@ -67,7 +66,6 @@ type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 pub(super) struct Driven<L> {
     pub(super) port: Reopening<L>,
     pub(super) session: Session,
-    pub(super) overdue: Overdue,
     pub(super) received: [u8; 256],
     /// When the last exchange ended.
     pub(super) ended: Instant,
@@ -435,8 +433,7 @@ impl<L: ByteLink> Driven<L> {
         if let Some(holder) = port.open_link().and_then(Link::holder) {
             session.set_holder(holder);
         }
-        let (ended, overdue) = (port.now(), Overdue::default());
-        Driven { port, session, overdue, received: [0; 256], ended, exchanges: 0 }
+        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
     /// Begins an exchange with motor number `motor`.
@@ -528,14 +525,9 @@ impl<L: ByteLink> Driven<L> {
     ) -> Result<Option<Outcome<T>>, PortError> {
         loop {
             let now = self.port.now();
-            let reads_first = self.overdue.reads_first(now);
-            let output = if reads_first { Output::Wait(Some(now)) } else { self.session.poll(now) };
-            match output {
+            match self.session.poll(now) {
                 Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
                 Output::Wait(until) => {
-                    if !reads_first {
-                        until.inspect(|until| self.overdue.waits(*until));
-                    }
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
                     if left == Some(Duration::ZERO) {
@@ -544,14 +536,13 @@ impl<L: ByteLink> Driven<L> {
                     let wait = until.map(|until| until.since(now).into());
                     let wait = wait.into_iter().chain(left).min();
                     let size = self.port.link()?.0.read(&mut self.received, wait)?;
+                    if size == 0 {
+                        self.session.silent();
+                    }
                     let now = self.port.now();
                     self.session.receive(now, &self.received[..size]);
-                    if reads_first && size == 0 {
-                        self.overdue.clear();
-                    }
                 }
                 Output::Done(result) => {
-                    self.overdue.clear();
                     return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
                 }
             }

@@ -221,40 +221,37 @@ impl EventClient {
     /// The client that waits, with what this one knows of the line: to stop what was started.
     pub fn into_client(mut self) -> Client {
         self.abandon();
-        let Driven { port, session, overdue, received, ended, exchanges } = self.driven;
+        let Driven { port, session, received, ended, exchanges } = self.driven;
         let port = port.map(|link| link as Box<dyn ByteLink>);
-        Client::driving(Driven { port, session, overdue, received, ended, exchanges })
+        Client::driving(Driven { port, session, received, ended, exchanges })
     }
 
     fn moved<T>(
         &mut self,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<Progress<T>, PortError> {
-        let Driven { port, session, overdue, received, .. } = &mut self.driven;
+        let Driven { port, session, received, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(Progress::Wait(None)) };
         // What is left in the port wakes the loop again; it has others to serve.
         let mut listens = true;
         loop {
             let now = clock.now();
-            let reads_first = overdue.reads_first(now);
-            let output = if reads_first { Output::Wait(Some(now)) } else { session.poll(now) };
-            match output {
+            match session.poll(now) {
                 Output::Transmit(bytes) => {
                     link.write(bytes)?;
                     listens = link.descriptor().is_none();
                 }
                 Output::Wait(until) => {
-                    let size = match listens || reads_first {
+                    let is_over = until.is_some_and(|until| until <= now);
+                    let size = match listens || is_over {
                         true => link.read(received, Some(Duration::ZERO))?,
                         false => 0,
                     };
                     if size == 0 {
-                        if reads_first {
-                            overdue.clear();
+                        if session.silent() {
                             continue;
                         }
-                        until.inspect(|until| overdue.waits(*until));
                         let wait = until.map(|until| until.since(now).into());
                         let full = link.flush()?.then_some(FULL);
                         return Ok(Progress::Wait(wait.into_iter().chain(full).min()));
@@ -263,7 +260,6 @@ impl EventClient {
                     listens = false;
                 }
                 Output::Done(result) => {
-                    overdue.clear();
                     let outcome = result.map(|payload| (reply(payload), payload.len()));
                     return Ok(Progress::Done(session.conclude(outcome)));
                 }

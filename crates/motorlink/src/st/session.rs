@@ -15,6 +15,7 @@ use motorlink_proto::time::Instant;
 
 use super::error::{Target, advice, hint};
 use super::{Error, LimitError, Limits, Options};
+use crate::overdue::Overdue;
 
 /// What a request is held to before it leaves.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +40,7 @@ pub(super) struct Session {
     before: Counters,
     /// When the last frame was sent.
     sent: Instant,
+    overdue: Overdue,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// Whether another program holds the port.
@@ -107,6 +109,7 @@ impl Session {
             rules,
             before: master.counters(),
             sent: Instant(0),
+            overdue: Overdue::default(),
             master,
             account: Account::new(options.limits),
             pending: asked,
@@ -231,10 +234,22 @@ impl Session {
         self.master.receive(now, bytes);
     }
 
+    /// Nothing was there to read. Whether [`poll`](Self::poll) asked for it because a wait is over: it
+    /// knows more now.
+    pub(super) fn silent(&mut self) -> bool {
+        self.overdue.silent()
+    }
+
     pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
+        if self.overdue.reads_first(now) {
+            return Output::Wait(Some(now));
+        }
         let output = self.master.poll(now);
-        if matches!(output, Output::Transmit(_)) {
-            self.sent = now;
+        match output {
+            Output::Transmit(_) => self.sent = now,
+            Output::Wait(Some(until)) => self.overdue.waits(until),
+            Output::Wait(None) => {}
+            Output::Done(_) => self.overdue.clear(),
         }
         output
     }

@@ -303,7 +303,7 @@ fn a_drive_that_never_answers_is_silent_and_nothing_else() {
         }
     };
     advance_while(&|exchanges| exchanges < 3);
-    // A request that the share reads late is not sent any more: that is no answer.
+    // The share does not send a request that it reads too late: the drive has not answered it.
     let (hold, frozen) = (share.freeze(), Instant::now());
     advance_while(&|_| frozen.elapsed() < Duration::from_millis(1_300));
     drop(hold);
