@@ -73,7 +73,7 @@ where
     /// until it works.
     pub fn run(mut self, every: Duration, repeat: &Repeat) -> Result<(), Failure> {
         let patience = repeat.count.map(|_| {
-            let waits = every.saturating_mul(2).saturating_add(self.line.timeout());
+            let waits = every.saturating_mul(2).saturating_add(self.line.rules().timeout);
             PATIENCE.saturating_add(waits)
         });
         let mut sink = Sink::new(repeat, self.output, &self.object, patience)?;

@@ -1,5 +1,7 @@
 //! A process that stood still is late itself: what came meanwhile is read before silence is concluded.
 
+use std::time::Duration;
+
 use motorlink_proto::time::Instant;
 
 /// How many reads may come before the end of a wait: others may send without an end.
@@ -16,6 +18,14 @@ pub(crate) struct Overdue {
 impl Overdue {
     pub(crate) fn waits(&mut self, until: Instant) {
         *self = Overdue { until: Some(until), reads: READS, is_reading: false };
+    }
+
+    /// Something was sent, and its reply takes at most this time. The program may stand still before it
+    /// waits.
+    pub(crate) fn sent(&mut self, now: Instant, timeout: Duration) {
+        let until = now + timeout.into();
+        let before = self.until.filter(|before| *before > now);
+        self.waits(before.map_or(until, |before| before.min(until)));
     }
 
     /// Nothing is waited for.

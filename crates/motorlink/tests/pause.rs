@@ -15,10 +15,19 @@ use motorlink::time::Micros;
 use motorlink_link::fault::Faults;
 use motorlink_testbench::{Bench, BenchConfig};
 
-/// A link whose program stands still for 10 s each time that it waits for a reply. What comes in that time is there
-/// afterwards.
+/// Where a program stands still.
+#[derive(Clone, Copy, PartialEq)]
+enum At {
+    /// When it has sent a request.
+    Sending,
+    /// When it waits for the reply.
+    Waiting,
+}
+
+/// A link whose program stands still for 10 s in each exchange. What comes in that time is there afterwards.
 struct Standing<L, T> {
     link: L,
+    at: At,
     clock: Clock,
     /// Whether the program stands still at all.
     stands: Arc<AtomicBool>,
@@ -27,15 +36,16 @@ struct Standing<L, T> {
 }
 
 impl<L: Link, T> Standing<L, T> {
-    fn new(link: L) -> Self {
+    fn new(link: L, at: At) -> Self {
         let clock = link.clock().expect("virtual time");
         let stands = Arc::new(AtomicBool::new(false));
-        Standing { link, clock, stands, is_sent: false, kept: VecDeque::new() }
+        Standing { link, at, clock, stands, is_sent: false, kept: VecDeque::new() }
     }
 
-    /// Stands still if a request was sent before. Whether it did.
-    fn stands(&mut self, take: impl Fn(&mut L, Duration) -> Vec<T>) -> bool {
-        let stands = std::mem::take(&mut self.is_sent) && self.stands.load(Ordering::Relaxed);
+    /// Stands still if this is the place and a request was sent before. Whether it did.
+    fn stands(&mut self, at: At, take: impl Fn(&mut L, Duration) -> Vec<T>) -> bool {
+        let is_here = at == self.at && self.stands.load(Ordering::Relaxed);
+        let stands = is_here && std::mem::take(&mut self.is_sent);
         let end = self.clock.now() + Micros(10_000_000);
         while stands && self.clock.now() < end {
             let left = end.since(self.clock.now()).into();
@@ -51,18 +61,26 @@ impl<L: Link, T: Send> Link for Standing<L, T> {
     }
 }
 
+fn read(link: &mut Box<dyn ByteLink>, left: Duration) -> Vec<u8> {
+    let mut bytes = [0; 64];
+    let size = link.read(&mut bytes, Some(left)).unwrap();
+    bytes[..size].to_vec()
+}
+
+fn receive(link: &mut Box<dyn CanLink>, left: Duration) -> Vec<CanFrame> {
+    link.receive(Some(left)).unwrap().into_iter().collect()
+}
+
 impl ByteLink for Standing<Box<dyn ByteLink>, u8> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.is_sent = true;
-        self.link.write(bytes)
+        self.link.write(bytes)?;
+        self.stands(At::Sending, read);
+        Ok(())
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        let stood = self.stands(|link, left| {
-            let mut bytes = [0; 64];
-            let size = link.read(&mut bytes, Some(left)).unwrap();
-            bytes[..size].to_vec()
-        });
+        let stood = self.stands(At::Waiting, read);
         if !stood && self.kept.is_empty() {
             return self.link.read(buffer, timeout);
         }
@@ -75,11 +93,13 @@ impl ByteLink for Standing<Box<dyn ByteLink>, u8> {
 impl CanLink for Standing<Box<dyn CanLink>, CanFrame> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.is_sent = true;
-        self.link.send(frame)
+        self.link.send(frame)?;
+        self.stands(At::Sending, receive);
+        Ok(())
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        if self.stands(|link, left| link.receive(Some(left)).unwrap().into_iter().collect()) {
+        if self.stands(At::Waiting, receive) {
             return Ok(None);
         }
         match self.kept.pop_front() {
@@ -117,15 +137,14 @@ fn asks_twice(stands: &AtomicBool, mut ask: impl FnMut() -> Vec<Result<(), rmd::
     }
 }
 
-#[test]
-fn clients_that_wait_take_them() {
+fn a_client_that_waits(at: At) {
     let bench = bench();
-    let line = Standing::new(bench.bytes(&Faults::NONE));
+    let line = Standing::new(bench.bytes(&Faults::NONE), at);
     line.stands.store(true, Ordering::Relaxed);
     let client = st::Client::over("bench", Box::new(line), st::Options::default());
     client.motor(1).unwrap().status().unwrap();
 
-    let bus = Standing::new(bench.can(&Faults::NONE));
+    let bus = Standing::new(bench.can(&Faults::NONE), at);
     let stands = Arc::clone(&bus.stands);
     let bus = rmd::Client::over("bench", Box::new(bus), rmd::Options::default());
     asks_twice(&stands, || {
@@ -136,10 +155,9 @@ fn clients_that_wait_take_them() {
     });
 }
 
-#[test]
-fn clients_for_event_loops_take_them() {
+fn a_client_of_an_event_loop(at: At) {
     let bench = bench();
-    let line = Standing::new(bench.bytes(&Faults::NONE));
+    let line = Standing::new(bench.bytes(&Faults::NONE), at);
     line.stands.store(true, Ordering::Relaxed);
     let mut line = Some(Box::new(line));
     let open = move || Ok(line.take().expect("opened once") as _);
@@ -154,7 +172,7 @@ fn clients_for_event_loops_take_them() {
     };
     assert_eq!(status.unwrap(), [0]);
 
-    let bus = Standing::new(bench.can(&Faults::NONE));
+    let bus = Standing::new(bench.can(&Faults::NONE), at);
     let stands = Arc::clone(&bus.stands);
     let mut bus = Some(Box::new(bus));
     let open = move || Ok(bus.take().expect("opened once") as _);
@@ -170,4 +188,36 @@ fn clients_for_event_loops_take_them() {
         }
         replies
     });
+}
+
+#[test]
+fn clients_that_wait_take_them() {
+    [At::Sending, At::Waiting].into_iter().for_each(a_client_that_waits);
+}
+
+#[test]
+fn clients_for_event_loops_take_them() {
+    [At::Sending, At::Waiting].into_iter().for_each(a_client_of_an_event_loop);
+}
+
+#[test]
+fn a_caller_that_takes_its_time_with_a_reply_loses_none_of_the_others() {
+    motorlink_testbench::register();
+    let timeout = Duration::from_millis(20);
+    let options = rmd::Options { timeout, ..rmd::Options::default() };
+    let bus = rmd::Client::open(&"sim:".parse().unwrap(), options).unwrap();
+    let requests = motors().map(|id| (id, rmd::ReadStatus));
+    let takes = |time| {
+        let mut replies = 0;
+        bus.cycle(&requests, |_, reply| {
+            reply.unwrap();
+            replies += 1;
+            std::thread::sleep(time);
+        })
+        .unwrap();
+        assert_eq!(replies, 4);
+    };
+    // The questions that come before the first one have a limit.
+    takes(Duration::ZERO);
+    takes(2 * timeout);
 }

@@ -172,7 +172,7 @@ impl Acquisition {
 
     /// How long a reply may take.
     pub fn timeout(&self) -> Duration {
-        self.line.timeout()
+        self.line.rules().timeout
     }
 
     /// What the exchanges came to, for other threads.

@@ -50,10 +50,6 @@ impl Line for Changed {
         self.line.clock()
     }
 
-    fn timeout(&self) -> Duration {
-        self.line.timeout()
-    }
-
     fn link_state(&self) -> LinkState {
         self.line.link_state()
     }

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::schedule::{
@@ -9,8 +10,9 @@ use motorlink_telemetry::schedule::{
 };
 use proptest::prelude::*;
 
-const SERIAL: LineRules = LineRules { window: 1, stop_preempts: false };
-const BUS: LineRules = LineRules { window: 32, stop_preempts: true };
+const TIMEOUT: Duration = Duration::from_millis(100);
+const SERIAL: LineRules = LineRules { window: 1, stop_preempts: false, timeout: TIMEOUT };
+const BUS: LineRules = LineRules { window: 32, stop_preempts: true, timeout: TIMEOUT };
 const MILLISECOND: u64 = 1_000;
 const SECOND: u64 = 1_000_000;
 
@@ -512,6 +514,24 @@ fn a_silent_motor_does_not_slow_the_others() {
 }
 
 #[test]
+fn a_pause_of_the_machine_is_not_the_time_of_an_exchange() {
+    for (rate, paused) in [(10, 1), (10, 50), (1, 1), (1, 50), (100, 7)] {
+        let mut asked = 0;
+        let mut line = Line::new(SERIAL, move |_, _, _: &Job<_>| {
+            asked += 1;
+            let span = if asked == paused { 300 * SECOND } else { 5 * MILLISECOND };
+            (Micros(span), Outcome::Answered)
+        });
+        line.polls(&[(1, 0, rate)]);
+        line.run(paused * SECOND / rate + 300 * SECOND);
+        line.events.clear();
+        line.run(10 * SECOND);
+        let asked = 10 * rate as usize;
+        assert!(line.count(1).abs_diff(asked) <= 1, "{rate} Hz: {}", line.count(1));
+    }
+}
+
+#[test]
 fn one_lost_reply_costs_one_instant() {
     let mut asked = 0;
     let mut line = Line::new(SERIAL, move |_, _, _: &Job<_>| {
@@ -601,7 +621,7 @@ proptest! {
         window in 1usize..5,
         preempts: bool,
     ) {
-        let rules = LineRules { window, stop_preempts: preempts };
+        let rules = LineRules { window, stop_preempts: preempts, timeout: TIMEOUT };
         let mut schedule = Schedule::new(rules);
         let mut now = Instant(0);
         let mut under_way: Vec<Lane> = Vec::new();

@@ -340,9 +340,10 @@ impl Session {
         }
         let output = self.next(now);
         match output {
+            SessionOutput::Transmit(_) => self.overdue.sent(now, self.timeout),
             SessionOutput::Wait(Some(until)) => self.overdue.waits(until),
-            SessionOutput::Done(..) => self.overdue.clear(),
-            SessionOutput::Transmit(_) | SessionOutput::Wait(None) => {}
+            // Others may be waited for.
+            SessionOutput::Done(..) | SessionOutput::Wait(None) => {}
         }
         output
     }

@@ -170,7 +170,7 @@ pub type Done<'a> = dyn FnMut(Over) + 'a;
 
 /// A client of one port, driven in steps.
 pub trait Line: Send {
-    /// How many exchanges there may be, and whether a stop cancels one.
+    /// How many exchanges there may be, whether a stop cancels one, and how long a reply may take.
     fn rules(&self) -> LineRules;
 
     /// The lane of a request.
@@ -178,9 +178,6 @@ pub trait Line: Send {
 
     /// The clock of the port.
     fn clock(&self) -> Clock;
-
-    /// How long a reply may take.
-    fn timeout(&self) -> Duration;
 
     /// Whether the port is open.
     fn link_state(&self) -> LinkState;

@@ -183,9 +183,9 @@ impl<R: Owned> Driver for Relayed<R> {
         self.clock.clone()
     }
 
-    /// The owner waits for the reply.
+    /// The owner waits for the reply, and carries out its own exchanges first.
     fn timeout(&self) -> Duration {
-        Duration::MAX
+        Duration::from_secs(10)
     }
 
     /// An exchange opens the port again, if it is closed. A client that its owner has closed stays

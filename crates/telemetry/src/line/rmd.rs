@@ -51,7 +51,7 @@ impl RmdLine {
 
 impl Line for RmdLine {
     fn rules(&self) -> LineRules {
-        LineRules { window: MotorId::COUNT, stop_preempts: true }
+        LineRules { window: MotorId::COUNT, stop_preempts: true, timeout: self.driver.timeout() }
     }
 
     fn lane(&self, request: &Request) -> Lane {
@@ -65,10 +65,6 @@ impl Line for RmdLine {
 
     fn clock(&self) -> Clock {
         self.driver.clock()
-    }
-
-    fn timeout(&self) -> Duration {
-        self.driver.timeout()
     }
 
     fn link_state(&self) -> LinkState {

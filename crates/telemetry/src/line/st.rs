@@ -202,7 +202,7 @@ fn shows_no_reply(error: &Error) -> bool {
 
 impl Line for StLine {
     fn rules(&self) -> LineRules {
-        LineRules { window: 1, stop_preempts: false }
+        LineRules { window: 1, stop_preempts: false, timeout: self.driver.timeout() }
     }
 
     fn lane(&self, _: &Request) -> Lane {
@@ -211,10 +211,6 @@ impl Line for StLine {
 
     fn clock(&self) -> Clock {
         self.driver.clock()
-    }
-
-    fn timeout(&self) -> Duration {
-        self.driver.timeout()
     }
 
     fn link_state(&self) -> LinkState {

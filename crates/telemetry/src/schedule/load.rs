@@ -67,6 +67,8 @@ struct Cost {
 #[derive(Debug)]
 pub struct Load {
     costs: Map<PollId, Cost>,
+    /// A duration that is longer is not that of an exchange.
+    longest: Micros,
     stretch: f64,
     demand: f64,
     is_decided: bool,
@@ -83,10 +85,12 @@ pub struct Load {
     delays: Recent,
 }
 
-impl Default for Load {
-    fn default() -> Self {
+impl Load {
+    /// Of exchanges that take at most this time.
+    pub(super) fn new(longest: Micros) -> Self {
         Load {
             costs: Map::new(),
+            longest,
             stretch: 1.0,
             demand: 0.0,
             is_decided: false,
@@ -102,9 +106,7 @@ impl Default for Load {
             delays: Recent::default(),
         }
     }
-}
 
-impl Load {
     /// The factor by which all periods are longer than asked; 1 if the line carries them.
     pub fn stretch(&self) -> f64 {
         self.stretch
@@ -166,7 +168,10 @@ impl Load {
     pub(super) fn ended(&mut self, now: Instant, exchange: &UnderWay, outcome: Outcome) {
         self.over(now, exchange.since);
         let span = now.since(exchange.since);
-        if !exchange.in_sync || !matches!(outcome, Outcome::Answered | Outcome::Refused) {
+        if span > self.longest
+            || !exchange.in_sync
+            || !matches!(outcome, Outcome::Answered | Outcome::Refused)
+        {
             return;
         }
         self.durations.push(span);

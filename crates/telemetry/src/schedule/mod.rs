@@ -34,6 +34,7 @@ mod pace;
 mod stops;
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
@@ -85,6 +86,9 @@ pub struct LineRules {
     pub window: usize,
     /// Whether a stop cancels an exchange of its lane. Else it waits for the end of the exchange.
     pub stop_preempts: bool,
+    /// How long a reply may take. An answer that took longer is not measured: its reply waited because
+    /// this process stood still.
+    pub timeout: Duration,
 }
 
 /// Why a command is not queued.
@@ -132,7 +136,7 @@ impl<C: Clone> Schedule<C> {
             lanes: Map::new(),
             groups: Vec::new(),
             openers: BTreeMap::new(),
-            load: Load::default(),
+            load: Load::new(rules.timeout.into()),
             anchor: None,
             is_started: false,
             under_way: 0,
