@@ -45,9 +45,9 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 # The Python package with the same features, so that it shares that build.
 AS_TESTED := --config-settings 'build-args=--profile=dev --features=typescript'
 
-# The parts of `make test`: two run at a time, in this order. The first ones compile, beside each other. Those
-# that wait for real time run beside one another; emulators delay other processes by up to 2.5 s.
-TEST_PARTS := lint probe web-test unit e2e browser python pages ffi-test firmware-test cost determinism test-socketcan
+# The parts of `make test`: two run at a time, in this order. The page is a part of the program, and `probe`
+# needs the lock of cargo for a moment only: they come before `lint`, which compiles for all others. Those that wait for real time run beside one another; emulators delay other processes by up to 2.5 s.
+TEST_PARTS := web-test probe lint unit e2e browser python pages ffi-test firmware-test cost determinism test-socketcan
 # Those of `make verify` only. With LONG=1 the other parts have all their tests.
 LONG_PARTS := rustdoc miri deny ros2
 ALL_PARTS := $(TEST_PARTS) $(LONG_PARTS)
@@ -72,7 +72,7 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --locked -p motorlink-cli --no-default-features --features monitor -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 30 min: parts lint .. test-socketcan but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 25 min: parts web-test .. test-socketcan but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(FORCE)$(LONG),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
 
@@ -110,7 +110,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 
 unit: ## 5 min: tests in Rust
 	$(CARGO) --config "target.'cfg(unix)'.runner = '$(CURDIR)/tests/measured'" test --workspace --all-features --locked \
-		$(or $(T),--lib --bins --tests --examples)
+		$(or $(T),--lib --bins --tests)
 	$(if $(T),,$(CARGO) test --workspace --all-features --locked --doc)
 
 python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
@@ -190,14 +190,14 @@ probe: board-target ## 1 min: the protocols on a Cortex-M4: no panic, flash, RAM
 	cd crates/ffi/bare-metal && $(CARGO) fmt --check && $(CARGO) clippy --release --locked $(BARE_METAL) -- -D warnings
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(BOARD) --locked
 
-FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-sim --example fingerprint
+FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-kernels
 PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.opt-level=0
 determinism: ## 1 min: simulated drives, optimised or not, to the last digit
 	mkdir -p target
-	$(FINGERPRINT) > target/fingerprint
-	$(FINGERPRINT) --release > target/fingerprint.release
-	$(FINGERPRINT) $(PLAIN) > target/fingerprint.plain
-	cmp target/fingerprint target/fingerprint.release
+	$(FINGERPRINT) -- fingerprint > target/fingerprint
+	$(FINGERPRINT) --profile dist -- fingerprint > target/fingerprint.dist
+	$(FINGERPRINT) $(PLAIN) -- fingerprint > target/fingerprint.plain
+	cmp target/fingerprint target/fingerprint.dist
 	cmp target/fingerprint target/fingerprint.plain
 
 # Other times and other programs do not change the counts.

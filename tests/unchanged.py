@@ -29,7 +29,7 @@ INSTALLED = ["docs/C.md", "docs/SIZES.md", "docs/SPEC-NOTES.md"]
 PARTS = {
     "browser": (["motorlink-monitor"], ["crates/cli/src/monitor", "crates/cli/src/share", "crates/cli/src/sim", "web"]),
     "cost": (["motorlink-kernels"], []),
-    "determinism": (["motorlink-sim"], []),
+    "determinism": (["motorlink-kernels"], []),
     "ffi-test": (["motorlink-conformance", "motorlink-ffi"], ["vectors", *INSTALLED]),
     "firmware-test": (
         ["motorlink-conformance", "motorlink-embedded", "motorlink-ffi"],

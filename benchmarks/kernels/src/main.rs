@@ -1,6 +1,8 @@
-//! Compares the instructions of the kernels with benchmarks/kernels/cost.txt. `make cost` runs it.
+//! Compares the instructions of the kernels with benchmarks/kernels/cost.txt for `make cost`, and prints
+//! what simulated drives do for `make determinism`.
 
 mod cost;
+mod fingerprint;
 
 use std::env::args;
 
@@ -12,6 +14,10 @@ fn main() -> Result<()> {
     match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => cost::check(false),
         ["--update"] => cost::check(true),
+        ["fingerprint"] => {
+            fingerprint::print();
+            Ok(())
+        }
         // Under the counter.
         ["kernel", name, count] => {
             named(name)
@@ -19,6 +25,6 @@ fn main() -> Result<()> {
                 .repeat(count.parse()?);
             Ok(())
         }
-        _ => Err("usage: motorlink-kernels [--update]".into()),
+        _ => Err("usage: motorlink-kernels [--update|fingerprint]".into()),
     }
 }

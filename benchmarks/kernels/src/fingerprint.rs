@@ -10,7 +10,7 @@ use motorlink_sim::hash::fingerprint;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{StDrive, StStation};
 
-fn main() {
+pub(crate) fn print() {
     st();
     rmd();
 }
