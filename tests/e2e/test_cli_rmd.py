@@ -216,19 +216,6 @@ def test_what_does_not_fit_is_not_sent(rmd, command, message):
     assert message in refused.err and "->" not in refused.err
 
 
-@pytest.mark.parametrize(
-    "limit, command",
-    [
-        ("--current-limit 1", "torque4 1 -1 0 0"),
-        ("--current-limit 62 --raw", "torque 62"),
-        ("--speed-limit 360.9", "position 0 --max-speed 360.9"),
-        ("--speed-limit 360 --current-limit 1", "--id 1 off"),
-    ],
-)
-def test_a_value_equal_to_its_limit_is_sent(rmd, limit, command):
-    rmd(*limit.split(), *command.split()).ended(0)
-
-
 # What goes wrong on the line.
 
 

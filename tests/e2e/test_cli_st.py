@@ -227,11 +227,6 @@ def test_what_does_not_fit_is_not_sent(sim_st, command, message):
     assert message in refused.err and "->" not in refused.err
 
 
-def test_a_value_equal_to_its_limit_is_sent(sim_st):
-    sim_st("--speed-limit", 1000, "ramp", -1000, 100).ended(0)
-    sim_st("--current-limit", 100, "current-reference", 100, -100).ended(0)
-
-
 def test_the_drive_refuses_a_motor_that_it_lacks_and_registers_that_it_does_not_write(sim_st):
     message = sim_st("set", "SPEED_MEAS", 3).ended(1).err
     assert "motor 1 refused writing SPEED_MEAS: SET_READ_ONLY" in message

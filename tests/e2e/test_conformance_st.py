@@ -33,24 +33,6 @@ def test_a_simulated_drive_passes_without_moving(sim, run, tmp_path):
     assert after["status"] == "IDLE"
 
 
-def test_a_drive_of_the_other_profile_passes_in_the_process(run, tmp_path):
-    config = tmp_path / "bench.toml"
-    config.write_text('profile = "mcsdk-5.4"\n')
-    words = ("--profile", "mcsdk-5.4", "--readings", "strict", "--json")
-    assert kit(run, f"sim:{config}", *words).ended(0).json["failed"] == 0
-
-
-def test_with_leave_the_motor_turns_and_is_stopped(sim, run):
-    drives = sim(rmd=())
-    before = drives.motor(1)
-    only = ("--spin", "--only", "ST-4.6-07", "--json")
-    report = kit(run, drives.st, *only).ended(0).json
-    assert report["passed"] == 1
-    after = drives.motor(1)
-    assert abs(after["angle_degrees"] - before["angle_degrees"]) > 360
-    assert after["status"] == "IDLE"
-
-
 def test_ctrl_c_stops_the_motor_and_puts_everything_back(sim, start, run):
     drives = sim(rmd=())
     before = run("st", "-p", drives.st, "get", "RAMP_FINAL_SPEED", "SPEED_KD").out

@@ -173,24 +173,6 @@ def test_stop_all_stops_all_motors_and_latches(site, watcher, way):
         turns(watcher)
 
 
-@pytest.mark.parametrize("way", ["share", "vanished"])
-def test_what_stops_a_motor_also_ends_its_run(site, watcher, run, way):
-    with site.page() as page, site.page() as other:
-        motor = {"line": "rmd0", "motor": 2}
-        answer = page.alive().ask("run", **motor, mode="speed", target=360, rate=60, hold=False)
-        assert answer["kind"] == "answer", answer
-        eventually(lambda: speeds(watcher)[1] > 30, "a motor that turns")
-        if way == "share":
-            run("share", "stop", "--at", f"unix:{site.path}").ended(0)
-        else:
-            page.vanish()
-        rests(watcher)
-        # Its next references would come each 20 ms.
-        began, beats = len(other.beats), 20
-        while len(other.beats) < began + beats:
-            assert are_still(watcher)
-
-
 def test_requests_of_a_page_about_drives_are_counted_and_delay_no_stop(site, watcher):
     turns_too(watcher)
     with site.page() as page:

@@ -12,7 +12,7 @@ import pytest
 from program import eventually
 
 READ_PID, PID_TO_RAM, PID_TO_ROM, READ_ACCEL, ACCEL_TO_RAM = 0x30, 0x31, 0x32, 0x33, 0x34
-READ_ENCODER, WRITE_OFFSET, MULTI_TURN, SINGLE_TURN = 0x90, 0x91, 0x92, 0x94
+MULTI_TURN, SINGLE_TURN = 0x92, 0x94
 STATUS_1, STATUS_2 = 0x9A, 0x9C
 OFF, STOP, RUN = 0x80, 0x81, 0x88
 TORQUE, SPEED, MOVE, MOVE_LIMITED, TURN_LIMITED = 0xA1, 0xA2, 0xA3, 0xA4, 0xA6
@@ -176,20 +176,6 @@ def test_run_resumes_what_stop_interrupted_and_nothing_after_off(host):
 
 def is_at(angle, degrees):
     return abs(angle - degrees) < 0.5
-
-
-def test_after_a_power_cycle_a_motor_has_what_is_in_its_rom(simulator, host):
-    host.ask(1, WRITE_OFFSET, null("5xH", 1000))
-    host.ask(1, PID_TO_ROM, bytes([0, 7, 8, 9, 10, 11, 12]))
-    host.ask(1, PID_TO_RAM, bytes([0, 1, 2, 3, 4, 5, 6]))
-    host.ask(1, ACCEL_TO_RAM, null("3xi", 500))
-    assert host.ask(1, READ_PID)[2:] == bytes([1, 2, 3, 4, 5, 6])
-    simulator.do("power-cycle", motor=1)
-    assert host.ask(1, READ_PID)[2:] == bytes([7, 8, 9, 10, 11, 12])
-    assert host.read(1, READ_ACCEL, "3xi") == (0,)
-    assert host.read(1, READ_ENCODER, "xHHH") == ((0 - 1000) % 16384, 0, 1000)
-    assert host.ask(2, READ_PID)[2:] == bytes([100] * 6)
-    assert simulator.motor(1)["rom_writes"] == 2
 
 
 def test_two_hosts_command_different_motors_at_once(sim):

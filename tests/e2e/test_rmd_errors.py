@@ -3,7 +3,6 @@
 import pytest
 
 from peers import device, slcan_adapter
-from program import eventually
 
 TEXT = "motor 2 answered and does not turn: it reports low voltage protection (supply 5.0 V, 25 °C)"
 LOW = "plant.supply.voltage = 5.0\n"
@@ -33,20 +32,6 @@ def test_of_several_motors_the_one_with_an_error_is_told(run, bus, words):
     assert [(line["motor"], line["ok"]) for line in lines] == [(1, True), (2, False)]
     assert lines[1]["error"]["kind"] == "refused"
     assert TEXT in run("rmd", "-p", bus, *words).ended(1).err
-
-
-def test_after_the_error_is_cleared_the_motor_turns(run, sim):
-    bench = sim(st=())
-    rmd = ("rmd", "-p", bench.port("slcan"), "--timeout", "500ms")
-    bench.do("supply", motor=1, volts=5.0)
-    eventually(lambda: bench.motor(1)["errors"] == ["LOW_VOLTAGE"], "low voltage")
-    run(*rmd, "speed", 90).ended(1)
-    bench.do("supply", motor=1, volts=24.0)
-    # The supply is right again, and the error is still active.
-    run(*rmd, "speed", 90).ended(1)
-    eventually(lambda: run(*rmd, "clear-errors").code == 0, "the error is cleared")
-    run(*rmd, "speed", 90).ended(0)
-    eventually(lambda: bench.motor(1)["speed_dps"] > 80, "motor 1 turns")
 
 
 def test_a_motor_that_does_not_tell_its_errors_may_be_turning(run, tmp_path):

@@ -265,20 +265,6 @@ def test_a_network_that_is_cut_stops_the_motor_and_brings_no_old_motion(node, di
     assert max(times) < LIVE + SLACK
 
 
-def test_a_command_that_is_wrong_moves_nothing_and_is_counted(node, robot, direct, diagnostics):
-    command = robot.commands()
-
-    def is_counted():
-        command(name=["wheel", "leg"], velocity=[50.0, 50.0])
-        time.sleep(PERIOD)
-        return int(diagnostics("commands").details.get("unknown_joint", 0)) > 10
-
-    eventually(is_counted, "counts", within=10)
-    assert abs(direct.rpm()) < 30
-    status = diagnostics("commands")
-    assert status.level == 1 and status.message.startswith("refused: "), status
-
-
 def test_a_latch_holds_until_commands_begin_again_and_a_program_that_takes_a_motor_keeps_it(
     node, direct, run, diagnostics
 ):

@@ -278,39 +278,6 @@ def test_the_log_says_who_did_what(start, sim, tmp_path):
     assert re.fullmatch(r"\d\d:\d\d:\d\d tuner joined", running.out[1]), running.out[1]
 
 
-def test_a_line_is_opened_turned_recorded_and_closed(start, drives, tmp_path):
-    path, port = tmp_path / "share", f"slcan:{drives.can}"
-    start("share", "-p", drives.st, "--at", f"unix:{path}", "--timeout", "2s").line(0)
-    client, other = Client(path, "opens"), Client(path, "sees")
-
-    def names():
-        return [line["line"] for line in client.ask("lines")["lines"]]
-
-    def are_read(*lines):
-        rates = client.ask("rates")["rates"]
-        return set(lines) <= {it["line"] for it in rates if it["achieved"] > 0}
-
-    assert client.ask("open", port=port, protocol="rmd", timeout=10)["line"] == "rmd0"
-    assert other.until(event("opened", line="rmd0", by="opens"))["message"] == f"rmd0: opens opened {port}"
-    assert names() == ["st0", "rmd0"]
-    lines = [word for line in ("st0", "rmd0") for word in ("-p", f"share:{path}/{line}")]
-    few = ["--motor", 1, "--id", 2, "--no-settings"]
-    recorder = start("record", *lines, *few, "-o", tmp_path / "run.mcap", "--json")
-    client.command("rmd0", 2, 0xA2, 0, 0, 0, *struct.pack("<i", 36000))
-    eventually(lambda: client.dps(2) > 100, "a motor that turns")
-    eventually(lambda: are_read("st0", "rmd0"), "signals of both lines that are read", within=30)
-    assert {"line": "rmd0", "motor": 2} in other.ask("close", line="rmd0")["motors"]
-    client.until(event("closed", line="rmd0", by="sees"))
-    assert names() == ["st0"]
-    eventually(lambda: are_read("st0"), "a line that is read on")
-    assert recorder.process.poll() is None
-    recorder.interrupt()
-    assert recorder.wait() == 0
-    # The port is free.
-    assert client.ask("open", port=port, protocol="rmd", timeout=10)["line"] == "rmd1"
-    eventually(lambda: client.dps(2, "rmd1") == 0, "a motor that stands")
-
-
 def test_a_drive_that_comes_under_a_latch_is_stopped(sim, start, run, tmp_path):
     drives, path, link = sim(rmd=()), tmp_path / "share", tmp_path / "drive"
     link.symlink_to(drives.st)

@@ -120,29 +120,6 @@ def test_what_cannot_be_served_is_told(run, tmp_path, monkeypatch):
 # Configuration.
 
 
-def test_the_configuration_says_what_the_drives_are(sim, tmp_path):
-    config = tmp_path / "bench.toml"
-    config.write_text("""
-        profile = "mcsdk-5.4"
-        [[st.motor]]
-        preset = "servo"
-        plant.supply.voltage = 28.0
-        registers.speed_kp = 1234
-        [[rmd.motor]]
-        id = 32
-        preset = "rmd-x8"
-        plant.supply.voltage = 36.0
-        plant.machine.pole_pairs = 7
-    """)
-    drives = sim(config)
-    st, rmd = drives.ports
-    assert (st["motors"], st["profile"], rmd["motors"]) == ([1], "mcsdk-5.4", [32])
-    assert drives.motor(1, st["port"])["bus_volts"] == close_to(28)
-    assert drives.motor(32, rmd["port"])["supply_volts"] == close_to(36)
-    with Line(drives.st) as line:
-        assert line.get(0x05) == 1234
-
-
 def test_the_profile_of_the_command_line_goes_before_the_configurations(sim, tmp_path):
     (tmp_path / "bench.toml").write_text('profile = "mcsdk-5.4"')
     drives = sim(tmp_path / "bench.toml", "--profile", "spec", rmd=())
@@ -221,20 +198,6 @@ def test_the_world_of_both_kinds_of_drives_is_changed(st, rmd):
         drives.do("lock-rotor", motor=2, locked=False)
         assert not drives.motor(2)["locked"]
         assert drives.motor(1)["load_newton_metres"] == 0
-
-
-def test_a_fault_happens_once_or_is_held(st, rmd):
-    st.do("fault", motor=1, fault="BREAK_IN")
-    eventually(lambda: st.motor(1)["status"] == "FAULT_OVER", "the fault is over")
-    st.do("fault", motor=2, fault="over_temp", hold=True)
-    eventually(lambda: st.motor(2)["status"] == "FAULT_NOW", "the fault stays")
-    assert "OVER_TEMP" in st.motor(2)["faults"]["present"]
-    st.do("fault", motor=2, fault="OVER_TEMP", hold=False)
-    eventually(lambda: st.motor(2)["status"] == "FAULT_OVER", "the cause is gone")
-    rmd.do("fault", motor=1, fault="LOW_VOLTAGE")
-    rmd.do("fault", motor=2, fault="over_temperature")
-    eventually(lambda: rmd.motor(1)["errors"] == ["LOW_VOLTAGE"], "the low voltage flag")
-    eventually(lambda: rmd.motor(2)["errors"] == ["OVER_TEMPERATURE"], "the temperature flag")
 
 
 def test_a_power_cycle_is_for_the_drive_or_for_a_motor_on_the_bus(st, rmd):

@@ -7,7 +7,6 @@ import time
 
 import pytest
 
-from program import eventually
 from st_wire import (
     ACK,
     BAD_CRC,
@@ -15,7 +14,6 @@ from st_wire import (
     EXECUTE,
     GET_REG,
     GET_WRITE_ONLY,
-    SET_RAMP,
     SET_READ_ONLY,
     SET_REG,
     TIMEOUT,
@@ -27,7 +25,7 @@ from st_wire import (
 )
 
 CONTROL_MODE, SPEED_KP, SPEED_MEAS, I_ALPHA = 0x03, 0x05, 0x1E, 0x25
-FF_1Q, START_MOTOR = 0x46, 0x01
+FF_1Q = 0x46
 ACKNOWLEDGED = frame(ACK)
 
 
@@ -35,58 +33,6 @@ ACKNOWLEDGED = frame(ACK)
 def spec(sim):
     with Line(sim(rmd=()).st) as line:
         yield line
-
-
-@pytest.fixture
-def mcsdk(sim):
-    with Line(sim("--profile", "mcsdk-5.4", rmd=()).st) as line:
-        yield line
-
-
-def hexadecimal(text):
-    return bytes.fromhex(text)
-
-
-# The bytes of the field notes, "Checks worth having".
-
-
-def test_the_field_notes_bytes_are_answered_as_printed(mcsdk):
-    for request, reply in (
-        ("21 05 5b 40 06 00 00 c7", "f0 00 f0"),
-        ("21 02 1d 25 65", "f0 00 f0"),
-        ("0a 04 e8 03 fb ff f5", "f0 00 f0"),
-        ("0b 03 00 01 02 11", "ff 01 0c 0d"),
-    ):
-        assert mcsdk.ask(hexadecimal(request)).hex(" ") == reply
-    # The monitor's first question gets the stage of the rev-up.
-    assert mcsdk.ask(hexadecimal("22 01 22 45"))[:2] == bytes([ACK, 1])
-
-
-def test_the_speed_reads_1998_rpm_once_the_motor_runs_that_fast(mcsdk):
-    assert mcsdk.ask(frame(SET_RAMP, (1998).to_bytes(4, "little") + b"\x64\x00")) == ACKNOWLEDGED
-    assert mcsdk.ask(frame(EXECUTE, [START_MOTOR])) == ACKNOWLEDGED
-    asked, printed = hexadecimal("02 01 1e 21"), hexadecimal("f0 04 ce 07 00 00 ca")
-    eventually(lambda: mcsdk.ask(asked) == printed, "SPEED_MEAS = 1998", within=20)
-
-
-def test_shipped_firmware_waits_for_ever_for_a_cut_off_frame_and_padding_frees_it(mcsdk):
-    whole = frame(GET_REG, [SPEED_MEAS])
-    mcsdk.send(frame(SET_REG, [0] * 100)[:50])
-    mcsdk.port.timeout = 0.1
-    mcsdk.send(whole)
-    assert mcsdk.port.read(64) == b""
-
-    mcsdk.send(b"\xff" * 130)
-    # A refusal that comes later would be taken for an answer.
-    mcsdk.port.timeout = 1
-    while mcsdk.port.read(64):
-        pass
-    mcsdk.port.timeout = 5
-    # The last byte of the padding may have been taken for a header: two tries, as in the field.
-    assert ACK in (mcsdk.ask(whole)[0], mcsdk.ask(whole)[0])
-
-
-# The document as written.
 
 
 def test_a_cut_off_frame_is_answered_with_timeout_after_25_ms(spec):

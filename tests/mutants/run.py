@@ -34,6 +34,11 @@ NO_TESTS_OF_BEHAVIOUR = {"structure", "fuzz", "bench", "kernels", "reliability"}
 #: A command that takes longer hangs, s.
 LIMIT = 1200
 PYTEST = f"{REPOSITORY}/.venv/bin/python -m pytest -q -p no:cacheprovider -n 4 --dist worksteal"
+#: Installs the Python package for its tests.
+PACKAGE = (
+    "make $PWD/.venv-python/ready && .venv-python/bin/python -m pip install --quiet "
+    "--config-settings 'build-args=--profile=dev --features=typescript' ."
+)
 PYTHON_TESTS = "cd bindings/python/tests && ../../../.venv-python/bin/python -m pytest -q -p no:cacheprovider -n 4"
 
 
@@ -97,8 +102,7 @@ class Tests:
         must("cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames "
              "--example wireshark_frames --locked")  # fmt: skip
         self.programs = programs()
-        must("make $PWD/.venv-python/ready && .venv-python/bin/python -m pip install --quiet "
-             "--config-settings 'build-args=--profile=dev --features=typescript' .")  # fmt: skip
+        must(PACKAGE)
         self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink {PYTEST}"
         self.turn = threading.Lock()
         of_tests = schemata.output("git", "rev-parse", "HEAD:crates", "HEAD:bindings", "HEAD:tests/e2e", cwd=TREE)
@@ -120,7 +124,7 @@ class Tests:
         ]:
             if name in known["seconds"]:
                 continue
-            folder = REACHED / name.replace(" ", "/")
+            folder = REACHED / name.replace(" ", "-")
             folder.mkdir(parents=True, exist_ok=True)
             begun = time.monotonic()
             passed, text = test(MUTANTS_REACHED=str(folder))
@@ -147,41 +151,45 @@ class Tests:
                 return program.name
         # Of a resource that many tests share, only the first one is known to reach the mutant.
         tests = [it.removeprefix("e2e ") for it in reached if it.startswith("e2e ")]
-        for chosen in (tests, sorted({it.partition("::")[0] for it in tests})):
-            if chosen and (test := self.pytest(self.end_to_end, chosen, number)):
-                return f"e2e {test}"
-        if "python" in reached and (test := self.pytest(PYTHON_TESTS, [], number)):
-            return f"python {test}"
-        return ""
-
-    def pytest(self, command, tests, number):
-        """The first of the tests that fails twice."""
-        arguments = REACHED / f"{number}.txt"
-        arguments.write_text("\n".join(tests))
         # Two of these at once would be late.
         with self.turn:
-            passed, text = run(f"{command} -x -rfE @{arguments}", MUTANT=str(number))
-            failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", text, re.M)[:4]
-            for test in failed:
-                arguments.write_text(test)
-                if not run(f"{command} @{arguments}", MUTANT=str(number))[0]:
-                    return test
-        if not passed and not failed:
-            return "no end" if text.startswith("no end") else f"pytest itself: {text[-300:]}"
-        return None
+            for chosen in (tests, sorted({it.partition("::")[0] for it in tests})):
+                if chosen and (test := noticed(self.end_to_end, chosen, MUTANT=str(number))):
+                    return f"e2e {test}"
+            if "python" in reached and (test := noticed(PYTHON_TESTS, [], MUTANT=str(number))):
+                return f"python {test}"
+        return ""
+
+
+def noticed(command, tests, **variables):
+    """The first of the tests of pytest that fails twice."""
+    arguments = TREE.parent / "tests.txt"
+    arguments.write_text("\n".join(tests))
+    passed, text = run(f"{command} -x -rfE @{arguments}", **variables)
+    failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", text, re.M)[:4]
+    for test in failed:
+        arguments.write_text(test)
+        if not run(f"{command} @{arguments}", **variables)[0]:
+            return test
+    if not passed and not failed:
+        return "no end" if text.startswith("no end") else f"pytest itself: {text[-300:]}"
+    return None
 
 
 def by_hand(mutant):
-    """The tests that notice a mutant of by_hand.toml."""
+    """What notices a mutant of by_hand.toml: in the page, or in the package where it is installed for its tests."""
     path = TREE / mutant["file"]
+    is_page = mutant["file"].startswith("web/")
+    if not is_page:
+        path = next(TREE.glob(f".venv-python/lib/*/site-packages/motorlink/{path.name}"))
     text = path.read_text()
     if text.count(mutant["find"]) != 1:
-        sys.exit(f"{mutant['name']}: {mutant['file']} does not have the text of `find` exactly once")
+        sys.exit(f"{mutant['name']}: {path} does not have the text of `find` exactly once")
     path.write_text(text.replace(mutant["find"], mutant["replace"]))
-    is_page = mutant["file"].startswith("web/")
-    commands = ["make web-test", "make browser T=-x"] if is_page else ["make python T=-x", "make e2e T=-x"]
     try:
-        for command in commands:
+        if not is_page:
+            return (test := noticed(PYTHON_TESTS, [])) and f"python {test}" or ""
+        for command in ("make web-test", "make browser T=-x"):
             if not run(command)[0] and not run(f"{command} AGAIN=1")[0]:
                 return command
         return ""
@@ -219,9 +227,11 @@ def main():
         with ThreadPoolExecutor(2) as workers:
             list(workers.map(lambda it: tell(drawn, it[1]["name"], tests.notice(it[0], it[1]["package"])), todo))
     schemata.restore(TREE)
+    made = [it for it in made if given.again or it["name"] not in of_people]
+    if made:
+        must(PACKAGE)
     for mutant in made:
-        if given.again or mutant["name"] not in of_people:
-            tell(of_people, mutant["name"], by_hand(mutant))
+        tell(of_people, mutant["name"], by_hand(mutant))
     results = {**drawn, **of_people}
     for name in (missed := [name for name, noticed in results.items() if not noticed]):
         print(f"NOT NOTICED: {name}")

@@ -21,7 +21,7 @@ use motorlink_fleet::network::Network;
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_proto::units::CentiDps;
-use motorlink_telemetry::share::message::{Ask, Event, Happening, Reason};
+use motorlink_telemetry::share::message::{Event, Happening, Reason};
 use world::{Cable, Jumping, World, eventually};
 use zenoh::Wait;
 
@@ -233,18 +233,6 @@ fn one_commander_holds_a_motor_and_another_one_takes_it() {
     // All may stop it.
     bob.motor(1).unwrap().stop().unwrap();
     stands(&world);
-}
-
-#[test]
-fn a_latch_refuses_motion_of_all_programs() {
-    let world = World::new("latch");
-    let client = st(&world, "");
-    turn(&client);
-    let mut witness = witness(&world);
-    witness.ask(Ask::Latch).unwrap();
-    witness.ask(Ask::Stop { motor: None }).unwrap();
-    stands(&world);
-    assert_eq!(not_done(&client.motor(1).unwrap().start().unwrap_err()), NotDone::Latched);
 }
 
 #[test]

@@ -127,22 +127,6 @@ fn the_motor_never_turns_faster_than_the_limit() {
     }
 }
 
-/// Shipped firmware drops header and length of the longest frame and reads its payload as frames.
-#[test]
-fn a_frame_of_any_length_hides_no_start() {
-    let start = [0x23, 0x01, 0x01, 0x25];
-    for size in [5, 127, 128] {
-        let bench = bench(Profile::Mcsdk54);
-        let options = Options { timeout: Duration::from_millis(50), ..options(Profile::Mcsdk54) };
-        let client = Client::over("bench", bench.bytes(&Faults::NONE), options);
-        let payload: Vec<u8> = start.into_iter().chain([0; 124]).take(size).collect();
-        // A question, to which the payload does not matter.
-        let asked = client.raw(1, 0x0C, &payload);
-        assert_eq!(is_limited(&asked), size == 128, "{size} bytes: {asked:?}");
-        assert_eq!(top_speed(&bench), 0.0, "{size} bytes");
-    }
-}
-
 #[test]
 fn a_start_that_any_profile_reads_in_a_raw_frame_counts_as_started() {
     let hidden = [&[0x83, 0x01, 0x01, 0x85][..], &[0; 124]].concat();
@@ -295,13 +279,4 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
             motor.execute(Command::StartMotor).unwrap();
         }
     }
-}
-
-#[test]
-fn a_ramp_that_the_drive_refused_does_not_count() {
-    let bench = bench(Profile::Mcsdk54);
-    let client = limited(&bench);
-    let missing = client.motor(7).unwrap();
-    assert!(missing.set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap_err().is_refusal());
-    assert!(is_limited(&missing.start()));
 }

@@ -1,15 +1,12 @@
 """Output that is not read, and a supervisor that does not listen."""
 
 import json
-import os
 import socket
-import subprocess
 
 import pytest
 
 from guarded import rests, turns
-from program import environment, eventually
-from unread import UNREAD
+from program import eventually
 
 
 @pytest.mark.parametrize(["protocol", "output"], [("st", "full"), ("rmd", "terminal"), ("st", "closed")])
@@ -45,26 +42,6 @@ def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client, tmp_p
     process.says("lines were dropped here")
     process.interrupt()
     assert process.wait() == 0
-
-
-def test_simulated_drives_go_on_while_nobody_reads_what_they_answer(motorlink, run, tmp_path):
-    ends = UNREAD["full"]()
-    process = subprocess.Popen(
-        [motorlink, "sim", "--st", f"pty:{tmp_path}/st0"],
-        stdin=subprocess.PIPE, stdout=ends[1], stderr=ends[1], env=environment(),
-    )
-    os.close(ends[1])
-    try:
-        eventually(lambda: os.path.lexists(tmp_path / "st0"), "the served port")
-        process.stdin.write(b'{"command":"state"}\n' * 500)
-        process.stdin.flush()
-        run("st", "-p", tmp_path / "st0", "info").ended(0)
-    finally:
-        process.terminate()
-        code = process.wait(15)
-        process.stdin.close()
-        os.close(ends[0])
-    assert code == 0
 
 
 def test_a_supervisor_that_does_not_listen_does_not_hold_up_a_guard(bench, start, client, tmp_path):

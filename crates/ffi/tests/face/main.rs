@@ -37,9 +37,3 @@ extern "C" fn set_no_mode(
     _: *const motorlink_ffi::rmd::drive::motorlink_rmd_motion,
 ) {
 }
-
-#[test]
-fn the_version_is_a_text_of_c() {
-    let version = unsafe { std::ffi::CStr::from_ptr(motorlink_version()) };
-    assert_eq!(version.to_str(), Ok(env!("CARGO_PKG_VERSION")));
-}

@@ -9,19 +9,6 @@ use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use crate::rmd_bench::NodeFixture;
 
 #[test]
-fn a_zero_position_takes_effect_with_the_next_power_on() {
-    let mut bench = NodeFixture::one();
-    bench.ask(SetPosition { angle: CentiDegrees::from_degrees(1000.0) });
-    bench.wait(3000);
-    let zero = bench.ask(WriteZeroRom).offset;
-    assert!((bench.angle() - 1000.0).abs() < 0.1, "reads keep the old zero");
-    bench.power_cycle();
-    assert!(bench.angle().abs() < 0.1, "{}°", bench.angle());
-    let encoder = bench.ask(ReadEncoder);
-    assert_eq!((encoder.offset, encoder.raw), (zero, zero));
-}
-
-#[test]
 fn turns_are_counted_until_power_off() {
     let mut bench = NodeFixture::one();
     bench.ask(SetPosition { angle: CentiDegrees::from_degrees(-2000.0) });
@@ -107,14 +94,6 @@ fn four_torques_are_answered_lowest_id_first() {
         let status = MotionStatus::decode(reply.data().try_into().unwrap());
         assert!((status.iq.amps() - torque.amps()).abs() < 0.05, "{} {torque}", status.iq);
     }
-}
-
-#[test]
-fn frames_for_other_motors_get_no_reply() {
-    let mut bench = NodeFixture::one();
-    assert!(bench.send(&CanFrame::new(0x142, ReadStatus.encode())).is_empty());
-    assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());
-    assert!(bench.send(&CanFrame::data_frame(0x141, false, &[0x9A])).is_empty());
 }
 
 #[test]
