@@ -95,12 +95,12 @@ def test_json_and_csv_have_the_same_values(run):
     objects = run("decode", "rmd", "--json", stdin=text).ended(0).lines
     rows = list(csv.DictReader(io.StringIO(run("decode", "rmd", "--csv", stdin=text).ended(0).out)))
     pairs = [
-        (str(line["entry"]), name, str(value["value"]), str(value["digits"]))
+        (str(line["entry"]), str(line.get("motor", "")), name, str(value["value"]), str(value["digits"]))
         for line in objects
         for name, value in line.get("values", {}).items()
     ]
     assert pairs == [
-        (row["entry"], row["field"], row["value"], row["digits"]) for row in rows if row["field"]
+        (row["entry"], row["motor"], row["field"], row["value"], row["digits"]) for row in rows if row["field"]
     ]
     assert rows[-1]["message"] == "other" and objects[-1]["other"] == rows[-1]["text"]
     assert all(float(row["time [s]"]) == line for row, line in zip(rows[:1], [objects[0]["wall"]]))

@@ -135,7 +135,7 @@ class Tests:
             for file in folder.iterdir():
                 for line in file.read_text().splitlines():
                     number, _, of_pytest = line.partition(" ")
-                    of_pytest = of_pytest.rpartition(" (")[0]
+                    of_pytest = of_pytest.rpartition(" (")[0].removeprefix("tests/e2e/")
                     label = f"e2e {of_pytest}" if name == "e2e" else name
                     if of_pytest or name != "e2e":
                         known["reached"].setdefault(number, []).append(label)
@@ -172,7 +172,7 @@ def noticed(command, tests, **variables):
         if not run(f"{command} @{arguments}", **variables)[0]:
             return test
     if not passed and not failed:
-        return "no end" if text.startswith("no end") else f"pytest itself: {text[-300:]}"
+        return "no end" if text.startswith("no end") else sys.exit(f"{command}\n{text[-1000:]}")
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import random
+import threading
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +15,7 @@ from drive import REGISTERS, START, STOP, Drive, value
 
 import motorlink
 from motorlink import aio
+from motorlink.aio._steps import Steps
 
 T = TypeVar("T")
 
@@ -290,5 +292,31 @@ def test_a_verified_write_is_repeated_and_reports_the_value(drive: Drive) -> Non
             with pytest.raises(motorlink.InvalidValueError, match="cannot be verified"):
                 await motor.set_verified("TORQUE_REF", 100)
         assert next(answers, None) is None
+
+    asyncio.run(within(60, main()))
+
+
+def test_a_cancelled_task_leaves_the_opening_of_a_port_to_the_others() -> None:
+    goes_on = threading.Event()
+
+    class Lost:
+        """A port that takes its time to be opened."""
+
+        is_open, port = False, "lost"
+
+        def reopen(self) -> None:
+            self.is_open = goes_on.wait(10)
+
+        def fileno(self) -> int | None:
+            return None
+
+    async def main() -> None:
+        steps = Steps(Lost(), lambda: None)
+        cancelled, other = [asyncio.ensure_future(steps.ready()) for _ in range(2)]
+        await asyncio.sleep(0)
+        cancelled.cancel()
+        await asyncio.wait([cancelled])
+        goes_on.set()
+        await other
 
     asyncio.run(within(60, main()))

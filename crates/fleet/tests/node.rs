@@ -104,7 +104,7 @@ fn a_network_that_is_cut_stops_the_motor_at_the_deadline() {
     let world = World::new("cut");
     let mut witness = witness(&world);
     let cable = Cable::to(&world.address);
-    let client = open(&world.port("st0", &cable.address, "&deadline=300ms")).unwrap();
+    let client = open(&world.port("st0", &cable.address, "&deadline=2s")).unwrap();
     turn(&client);
     turns(&world);
     let began = Instant::now();
@@ -118,6 +118,24 @@ fn a_network_that_is_cut_stops_the_motor_at_the_deadline() {
     assert!(failed.to_string().contains("does not answer"), "{failed}");
     cable.mend();
     std::thread::sleep(Duration::from_millis(500));
+    stands(&world);
+}
+
+#[test]
+fn a_network_that_is_slower_than_the_deadline_stops_the_motor() {
+    let world = World::new("slow");
+    let mut witness = witness(&world);
+    let cable = Cable::to(&world.address);
+    let client = open(&world.port("st0", &cable.address, "")).unwrap();
+    turn(&client);
+    turns(&world);
+    // Signs of life keep coming in time, and each is older than the one before.
+    for lag in (1..=16).map(|step| Duration::from_millis(100 * step)) {
+        cable.slow(lag);
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    let why = left(&mut witness);
+    assert!(why.starts_with("no sign of life for"), "{why}");
     stands(&world);
 }
 
@@ -277,9 +295,10 @@ fn two_nodes_with_one_name_are_told_apart() {
     let twin = world.namesake(&bridge);
     turn(&st(&world, ""));
     let _bridge = Cable::at(&bridge, &world.address);
-    let network = format!("tcp/{}", world.address).parse().unwrap();
-    eventually("the nodes do not meet", || directory::nodes(&network).unwrap().nodes.len() == 2);
     for world in [&world, &twin] {
+        let network = format!("tcp/{}", world.address).parse().unwrap();
+        let meet = || directory::nodes(&network).unwrap().nodes.len() == 2;
+        eventually("the nodes do not meet", meet);
         let error = open(&world.port("st0", &world.address, "")).err().unwrap().to_string();
         assert!(error.contains("2 nodes have the name twins"), "{error}");
     }

@@ -12,7 +12,7 @@ fn write(motor: MotorName, name: &str, value: f64, to_rom: bool) -> Ask {
     Ask::Write { motor, name: name.to_owned(), value, to_rom }
 }
 
-fn limit(motor: MotorName, mode: Mode, most: Option<f64>) -> Ask {
+pub fn limit(motor: MotorName, mode: Mode, most: Option<f64>) -> Ask {
     Ask::Limit { motor, mode, most }
 }
 
@@ -25,7 +25,7 @@ async fn written(page: &Page, ask: Ask) -> Vec<(String, Option<f64>)> {
     }
 }
 
-async fn limits(page: &Page) -> Vec<(String, u8, Mode, f64)> {
+pub async fn limits(page: &Page) -> Vec<(String, u8, Mode, f64)> {
     match page.ask(Ask::Limits).await {
         Ok(Answer::Limits { limits }) => {
             limits.into_iter().map(|it| (it.motor.line, it.motor.motor, it.mode, it.most)).collect()

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::world::{LIMIT, World};
+use crate::drive_writes::{limit, limits};
+use crate::world::{LIMIT, Page, World, st};
+use motorlink_monitor::message::Mode;
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, Text, decode};
@@ -151,4 +153,20 @@ async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() 
     joins(&link, false).await;
     let _world = World::new("link-latch", Profile::Spec);
     assert_eq!(latched_by(&connected(&link).await).await, None);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn limits_of_pages_hold_when_the_share_has_other_lines() {
+    let world = World::new("link-limits", Profile::Spec);
+    let link = Arc::new(Link::new(world.share()));
+    let kept = Arc::clone(&link);
+    tokio::spawn(async move { kept.keep().await });
+    joins(&link, true).await;
+    let before = link.drives().await.unwrap();
+    let page = Page { drives: before.clone(), ..world.page().await };
+    page.ask(limit(st(1), Mode::Speed, Some(1000.0))).await.unwrap();
+    page.view.ask(Ask::Close { line: "rmd0".to_owned() }).await.unwrap();
+    timeout(LIMIT, link.other_lines(&before)).await.unwrap();
+    let page = Page { drives: link.drives().await.unwrap(), ..page };
+    assert_eq!(limits(&page).await, [("st0".to_owned(), 1, Mode::Speed, 1000.0)]);
 }

@@ -28,21 +28,26 @@ def test_rmd_motors_are_ended_as_told(sim, guard, client):
         drives.end()
 
 
-def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(sim, start, tmp_path):
-    """The program stops, moves on and dies; replies are late, and the guard's first 0x81 is lost."""
+@pytest.mark.parametrize(["on_loss", "code", "mode"], [("stop", "81", "stopped"), ("off", "80", "off")])
+def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(
+    sim, start, tmp_path, on_loss, code, mode
+):
+    """The program stops, moves on and dies; replies are late, and the guard's first 0x81 or 0x80 is lost."""
+    end = f"t1418{code}".encode()
     drives = sim(st=())
     with Meddler(tmp_path / "bus", drives.can, delay=0.01) as bus:
         serve = f"slcan-pty:{tmp_path}/held"
-        process = start("guard", "rmd", "-p", f"slcan:{bus.path}", "--serve", serve, "--json")
+        words = ["--on-loss", on_loss, "--serve", serve, "--json"]
+        process = start("guard", "rmd", "-p", f"slcan:{bus.path}", *words)
         process.line(0)
         with RawLine(tmp_path / "held") as line:
             line.say(b"\rC\rS8\rO\r", b"\r")
-            os.write(line.end, b"t14188100000000000000\rt1418A2000000A08C0000\r")
+            os.write(line.end, end + b"00000000000000\rt1418A2000000A08C0000\r")
             eventually(lambda: bus.passed(b"t1418A2"), "the motor gets a motion command")
-            bus.lose(b"t141881")
-        eventually(lambda: bus.is_lost(b"t141881"), "the guard's first 0x81 is lost")
-        process.says("motor 1 acknowledged its stop (0x81)")
-        assert drives.motor(1)["mode"] == "stopped"
+            bus.lose(end)
+        eventually(lambda: bus.is_lost(end), "the guard's first request is lost")
+        process.says(f"motor 1 acknowledged its stop (0x{code})")
+        assert drives.motor(1)["mode"] == mode
         assert not any("another node" in text for text in process.err), process.err
 
 

@@ -164,7 +164,7 @@ impl<V: Value> Value for Vec<V> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::types::{Header, JointState, Time};
+    use super::super::types::{Header, JointState, Time, TriggerResponse};
     use super::*;
 
     fn state() -> JointState {
@@ -193,6 +193,18 @@ mod tests {
         ];
         assert_eq!(encode(&state()), expected);
         assert_eq!(decode(&expected), Some(state()));
+    }
+
+    #[test]
+    fn a_truth_value_is_0_or_1() {
+        for success in [false, true] {
+            let response = TriggerResponse { success, message: "x".to_owned() };
+            let mut bytes = encode(&response);
+            assert_eq!(bytes[4], u8::from(success));
+            assert_eq!(decode(&bytes), Some(response));
+            bytes[4] = 2;
+            assert_eq!(decode::<TriggerResponse>(&bytes), None);
+        }
     }
 
     #[test]

@@ -15,7 +15,8 @@ use crate::clock::Clock;
 
 /// How long a ramp of an ST drive to the next speed takes, in ms.
 const RAMP_MS: u16 = 50;
-/// A motion fails if its motor acknowledges no command for this time, in seconds.
+/// A motion fails if its motor acknowledges no command for this time after a refusal, in seconds. One refusal
+/// alone ends nothing: it may come after a pause of the machine.
 const PATIENCE: f64 = 0.5;
 
 /// Moves the motor of a joint.
@@ -34,8 +35,15 @@ struct Motion {
     may_move: bool,
     /// Whether the start of an ST motor had an effect.
     is_started: bool,
-    /// When the motion began, or the motor acknowledged a command last.
-    acknowledged: f64,
+    /// When the first refusal came since the motor acknowledged a command.
+    refused: Option<f64>,
+}
+
+impl Motion {
+    /// Whether it goes on after a refusal at this time.
+    fn has_patience(&mut self, now: f64) -> bool {
+        now - *self.refused.get_or_insert(now) < PATIENCE
+    }
 }
 
 /// A motion that failed.
@@ -67,14 +75,14 @@ impl Mover {
                     is_begun: false,
                     may_move: false,
                     is_started: false,
-                    acknowledged: self.clock.now(),
+                    refused: None,
                 });
             let result = self.carry_out(order, &mut motion, &goes_on).await;
             let now = self.clock.now();
             match result {
-                Ok(true) => motion.acknowledged = now,
+                Ok(true) => motion.refused = None,
                 Ok(false) => {}
-                Err(why) if is_transient(&why) && now - motion.acknowledged < PATIENCE => {}
+                Err(why) if is_transient(&why) && motion.has_patience(now) => {}
                 Err(Refusal { message: why, .. }) => {
                     failed(order, Failed { why, stops: motion.may_move });
                 }
@@ -177,4 +185,20 @@ fn is_transient(why: &Refusal) -> bool {
 fn may_be_sent(why: &Refusal) -> bool {
     use Reason::{Busy, Expired, Held, Latched, Overtaken, Usage};
     !matches!(why.reason, Busy | Expired | Held | Latched | Overtaken | Usage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_refusal_after_a_pause_ends_no_motion_and_refusals_without_an_end_do() {
+        let mut motion =
+            Motion { number: 1, is_begun: true, may_move: true, is_started: true, refused: None };
+        assert!(motion.has_patience(100.0));
+        assert!(motion.has_patience(100.0 + 0.9 * PATIENCE));
+        assert!(!motion.has_patience(100.0 + PATIENCE));
+        motion.refused = None;
+        assert!(motion.has_patience(200.0));
+    }
 }

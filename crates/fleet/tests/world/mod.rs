@@ -3,7 +3,8 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -126,9 +127,16 @@ impl Clock for Jumping {
 /// TCP connections to an address. While they are cut they stay open, and nothing passes.
 pub struct Cable {
     pub address: String,
-    is_cut: Arc<AtomicBool>,
-    ends: Arc<AtomicBool>,
+    state: Arc<State>,
     streams: Arc<Mutex<Vec<TcpStream>>>,
+}
+
+#[derive(Default)]
+struct State {
+    is_cut: AtomicBool,
+    ends: AtomicBool,
+    /// How long bytes are under way, ms.
+    lag: AtomicU64,
 }
 
 impl Cable {
@@ -141,13 +149,12 @@ impl Cable {
         let listener = TcpListener::bind(address).unwrap();
         listener.set_nonblocking(true).unwrap();
         let address = listener.local_addr().unwrap().to_string();
-        let (is_cut, ends) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-        let streams = Arc::new(Mutex::new(Vec::new()));
-        let cable = Cable { address, is_cut, ends, streams };
-        let (target, is_cut) = (target.to_owned(), Arc::clone(&cable.is_cut));
-        let (ends, streams) = (Arc::clone(&cable.ends), Arc::clone(&cable.streams));
+        let (state, streams) = (Arc::<State>::default(), Arc::new(Mutex::new(Vec::new())));
+        let cable = Cable { address, state, streams };
+        let (target, state) = (target.to_owned(), Arc::clone(&cable.state));
+        let streams = Arc::clone(&cable.streams);
         std::thread::spawn(move || {
-            while !ends.load(Ordering::SeqCst) {
+            while !state.ends.load(Ordering::SeqCst) {
                 let Ok((near, _)) = listener.accept() else {
                     std::thread::sleep(Duration::from_millis(2));
                     continue;
@@ -159,8 +166,8 @@ impl Cable {
                 ];
                 streams.lock().unwrap().extend([near, far]);
                 for (from, to) in pairs {
-                    let (is_cut, ends) = (Arc::clone(&is_cut), Arc::clone(&ends));
-                    std::thread::spawn(move || pass(from, to, &is_cut, &ends));
+                    let state = Arc::clone(&state);
+                    std::thread::spawn(move || pass(from, to, &state));
                 }
             }
         });
@@ -168,40 +175,59 @@ impl Cable {
     }
 
     pub fn cut(&self) {
-        self.is_cut.store(true, Ordering::SeqCst);
+        self.state.is_cut.store(true, Ordering::SeqCst);
+    }
+
+    /// Bytes are under way for this time from now on.
+    pub fn slow(&self, lag: Duration) {
+        self.state.lag.store(lag.as_millis() as u64, Ordering::SeqCst);
     }
 
     pub fn mend(&self) {
-        self.is_cut.store(false, Ordering::SeqCst);
+        self.state.is_cut.store(false, Ordering::SeqCst);
     }
 }
 
 impl Drop for Cable {
     fn drop(&mut self) {
-        self.ends.store(true, Ordering::SeqCst);
+        self.state.ends.store(true, Ordering::SeqCst);
         for stream in self.streams.lock().unwrap().iter() {
             let _ = stream.shutdown(Shutdown::Both);
         }
     }
 }
 
-fn pass(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool, ends: &AtomicBool) {
+fn pass(mut from: TcpStream, to: TcpStream, state: &Arc<State>) {
     from.set_nonblocking(false).unwrap();
     from.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+    let (sender, under_way) = channel();
+    let arrives = Arc::clone(state);
+    let arriving = std::thread::spawn(move || arrive(to, &under_way, &arrives));
     let mut bytes = [0; 1 << 16];
-    while !ends.load(Ordering::SeqCst) {
+    while !state.ends.load(Ordering::SeqCst) {
         match from.read(&mut bytes) {
             Ok(0) => break,
-            Ok(size) => {
-                while is_cut.load(Ordering::SeqCst) && !ends.load(Ordering::SeqCst) {
-                    std::thread::sleep(Duration::from_millis(1));
-                }
-                if to.write_all(&bytes[..size]).is_err() {
-                    break;
-                }
-            }
+            Ok(size) if sender.send((Instant::now(), bytes[..size].to_vec())).is_err() => break,
+            Ok(_) => {}
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             Err(_) => break,
+        }
+    }
+    drop(sender);
+    arriving.join().unwrap();
+}
+
+fn arrive(mut to: TcpStream, under_way: &Receiver<(Instant, Vec<u8>)>, state: &State) {
+    for (sent, bytes) in under_way {
+        let waits = || {
+            let lag = Duration::from_millis(state.lag.load(Ordering::SeqCst));
+            state.is_cut.load(Ordering::SeqCst) || sent.elapsed() < lag
+        };
+        while waits() && !state.ends.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if to.write_all(&bytes).is_err() {
+            break;
         }
     }
     let _ = to.shutdown(Shutdown::Both);

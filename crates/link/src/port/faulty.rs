@@ -164,10 +164,6 @@ impl<C: CanLink + Evented> Evented for FaultCan<C> {
         self.transmit()?;
         Ok(self.link.flush()? || self.lanes.has_delayed())
     }
-
-    fn discard(&mut self) -> Result<(), PortError> {
-        self.link.discard()
-    }
 }
 
 fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {

@@ -139,10 +139,6 @@ impl<C: Evented, F> Evented for TapCan<C, F> {
     fn flush(&mut self) -> Result<bool, PortError> {
         self.link.flush()
     }
-
-    fn discard(&mut self) -> Result<(), PortError> {
-        self.link.discard()
-    }
 }
 
 /// Time since a tap was made.

@@ -321,3 +321,21 @@ fn rmd_digits(field: &RmdField, name: &str, wanted: f64) -> Result<i64, Refusal>
 fn exactly(scale: &Scale, name: &str, wanted: f64) -> Result<i64, Refusal> {
     scale.wanted(wanted).map_err(|why| Refusal::usage(format!("{name}: {why}; nothing was sent")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_st_are_read_as_they_are_written() {
+        for (code, at, wanted) in [
+            (FrameCode::SetRamp, 0, -1000.0),
+            (FrameCode::SetRamp, 1, 65_535.0),
+            (FrameCode::SetPositionCmd, 0, -0.5),
+        ] {
+            let field = &st_fields(code, Profile::Mcsdk54)[at];
+            let bytes = st_bytes(field, wanted).unwrap();
+            assert_eq!(st_value(field.value, &bytes).unwrap().value, Some(wanted));
+        }
+    }
+}

@@ -3,8 +3,9 @@
 use motorlink::rmd::MotorId;
 use motorlink::settings::{
     Answer, Ask, Cause, Comparison, Dump, Next, Permissions, Procedure, RestoreError, RmdBlock,
-    RmdTuning, SettingsFile, Step, StepError, Undone,
+    RmdTuning, SettingsFile, StTuning, Step, StepError, Undone,
 };
+use motorlink::st::{MotorNumber, Profile};
 
 const FILE: &str = "[rmd]\n[rmd.settings]\nspeed_kp = 5\nacceleration = 6\n";
 
@@ -106,6 +107,19 @@ fn a_step_is_the_same_until_it_is_answered() {
     }
     procedure.answered(Err(Failure::Line));
     assert!(matches!(procedure.next(), Next::Done(Err(Failure::Line))));
+}
+
+#[test]
+fn a_drive_may_refuse_to_say_what_it_is_and_may_not_be_silent() {
+    for (error, is_read_on) in [(Failure::Refusal, true), (Failure::Line, false)] {
+        let motor = MotorNumber::new(1).unwrap();
+        let mut procedure =
+            Dump::reading::<_, Failure>(StTuning { motor, profile: Profile::Mcsdk54 });
+        let Next::Step(Step::Ask(ask)) = procedure.next() else { panic!("it has to ask first") };
+        assert!(matches!(ask, Ask::Identity(0)));
+        procedure.answered(Err(error));
+        assert_eq!(matches!(procedure.next(), Next::Step(_)), is_read_on, "{error:?}");
+    }
 }
 
 #[test]

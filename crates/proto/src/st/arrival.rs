@@ -181,3 +181,29 @@ impl fmt::Display for AbortReason {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_with_faults_is_asked_for_them() {
+        let mut sampler = ArrivalSampler {
+            target: PositionMove { angle_rad: 1.0, duration_s: 1.0 },
+            tolerance_rad: ARRIVAL_TOLERANCE_RAD,
+            timeout: ARRIVAL_SPARE_TIME,
+            until: None,
+            is_running: false,
+            register: RegisterId::STATUS,
+            status: Status::Idle,
+            flags: Flags::default(),
+            position: f32::NAN,
+        };
+        sampler.begin(Instant(0));
+        assert_eq!(sampler.request(), RegisterId::STATUS);
+        assert!(!sampler.replied(Instant(0), &i32::from(u8::from(Status::FaultNow))));
+        assert_eq!(sampler.request(), RegisterId::FLAGS);
+        assert!(sampler.replied(Instant(0), &0x40));
+        assert_eq!(sampler.prepare(), Err(AbortReason::Faults(Flags(0x40))));
+    }
+}

@@ -10,7 +10,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use motorlink_recording::WriteError;
 use motorlink_recording::schema::recording::{NAME, PART};
 use motorlink_recording::schema::{Log, Message, Severity, Time};
-use motorlink_recording::write::{Entry, Output, Rotate, Series, Topic, Writer};
+use motorlink_recording::write::{Attached, Entry, Output, Rotate, Series, Topic, Writer};
 
 /// A folder for one test.
 struct Folder(PathBuf);
@@ -120,9 +120,22 @@ fn every_file_of_a_rotated_recording_is_whole() {
     let folder = Folder::new("rotated");
     let rotate = Some(Rotate::Time(Duration::from_nanos(40)));
     let mut series = begin(Output { rotate, ..folder.output("run.mcap") });
+    let settings = Attached {
+        name: "st0.settings".to_owned(),
+        media_type: "text/plain".to_owned(),
+        time: 0,
+        data: b"SPEED_KP = 1".to_vec(),
+    };
+    series.take(Entry::Attached(settings)).unwrap();
     (0..100).for_each(|number| series.take(message(number)).unwrap());
     let written = series.finish().unwrap();
     assert_eq!(written.messages, 100);
+    for file in &written.files {
+        let bytes = fs::read(file).unwrap();
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let attached = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+        assert_eq!(&*attached.data, b"SPEED_KP = 1", "{file:?}");
+    }
     let names: Vec<_> = written.files.iter().map(|it| it.file_name().unwrap()).collect();
     assert_eq!(names, ["run_000.mcap", "run_001.mcap", "run_002.mcap"]);
     assert_eq!(whole(&written.files[0]), (0..40).collect::<Vec<u64>>());

@@ -156,3 +156,22 @@ fn draw(frame: &mut Frame<'_>, shown: &Shown, place: &mut Place, theme: &Theme) 
     lines.push(Line::styled(fit(KEYS, columns), theme.dim()));
     frame.render_widget(Paragraph::new(lines), area);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_typed_and_its_letters_are_no_keys() {
+        let mut place = Place::new(Sort::Name, Only::All, false, "old".to_owned());
+        let mut press = |code| place.press(KeyEvent::from(code));
+        assert!(press(KeyCode::Char('/')));
+        for letter in "arms/q1".chars() {
+            assert!(press(KeyCode::Char(letter)));
+        }
+        assert!(press(KeyCode::Backspace));
+        assert!(press(KeyCode::Enter));
+        assert!(!press(KeyCode::Char('q')));
+        assert_eq!((place.name.as_str(), place.types), ("arms/q", false));
+    }
+}

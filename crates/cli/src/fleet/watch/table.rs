@@ -456,4 +456,10 @@ mod tests {
         assert!(all[2].text(12).starts_with("arm2/rmd0/1  old"), "{}", all[2].text(12));
         assert!(all[3].text(12).starts_with("arm2/rmd0/3  old"), "{}", all[3].text(12));
     }
+
+    #[test]
+    fn drives_with_a_fault_or_old_values_stand_out() {
+        let all = rows(&drives(), 10.0, Sort::Name, Only::All, "");
+        assert_eq!(all.iter().map(Row::is_bad).collect::<Vec<_>>(), [false, true, true, true]);
+    }
 }
