@@ -11,7 +11,8 @@ endif
 NIGHTLY := nightly-2026-05-20
 # The boards of the tests have a Cortex-M4.
 BOARD := thumbv7em-none-eabihf
-DEBUG := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)/debug
+BUILT := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)
+DEBUG := $(BUILT)/debug
 
 VENV := $(CURDIR)/.venv
 PYTHON_VENV := $(CURDIR)/.venv-python
@@ -177,10 +178,10 @@ test-socketcan: ## 1 min: the port socketcan: in a CAN kernel in QEMU
 	$(PROGRAM)
 	CARGO="$(CARGO)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/socketcan/run.sh || [ $$? -eq 77 ]
 
-SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(BOARD)/release $(DEBUG)/../bare-metal/prefix
+SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(BOARD)/release $(BUILT)/bare-metal/prefix
 C_FOR_BOARDS := gcc-arm-none-eabi libnewlib-arm-none-eabi
-INSTALL_BARE_METAL = CARGO="$(CARGO)" crates/ffi/packaging/install $(DEBUG)/../bare-metal/prefix "" $(BOARD) >/dev/null
-BARE_METAL := --target $(BOARD) --target-dir $(DEBUG)/../bare-metal
+INSTALL_BARE_METAL = CARGO="$(CARGO)" crates/ffi/packaging/install $(BUILT)/bare-metal/prefix "" $(BOARD) >/dev/null
+BARE_METAL := --target $(BOARD) --target-dir $(BUILT)/bare-metal
 probe: board-target ## 1 min: the protocols on a Cortex-M4: no panic, flash, RAM
 	cd probe && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	cd probe && $(CARGO) build --release --locked
@@ -282,13 +283,13 @@ header: ## crates/ffi/include/motorlink.h
 deadman: web ## how long motors turn on after their page is gone
 	-@tests/install browser
 	$(CARGO) build --profile dist --locked -p motorlink-cli
-	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(DEBUG)/../dist/motorlink npm run --silent measure tests/deadman
+	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(BUILT)/dist/motorlink npm run --silent measure tests/deadman
 
 # MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md. MINUTES=0: without the soak.
 view: web ## how old and how smooth what the page draws is, and its memory
 	-@tests/install browser
 	$(CARGO) build --profile dist --locked -p motorlink-cli
-	cd web && MOTORLINK_BIN=$(DEBUG)/../dist/motorlink npm run --silent measure tests/view
+	cd web && MOTORLINK_BIN=$(BUILT)/dist/motorlink npm run --silent measure tests/view
 
 # SECONDS=60 of each size. MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md.
 fleet-scale: $(VENV)/ready ## 10 to 1000 simulated drives in nodes: losses, latency, CPU
