@@ -135,12 +135,14 @@ def patience(advance, pause):
 
 @pytest.fixture
 def on_board_time(monkeypatch):
-    """Makes the tests of a module of tests/e2e go by the time of a line that they have."""
+    """Makes the tests of a module of tests/e2e go by the time of a line that they have. Gives what waits by it."""
 
     def on_board_time(module, port):
-        monkeypatch.setattr(module, "eventually", patience(port.advance, 0.005))
-        if hasattr(module, "time"):
-            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=port.now))
+        eventually = patience(port.advance, 0.005)
+        for name, own in (("eventually", eventually), ("time", SimpleNamespace(monotonic=port.now))):
+            if hasattr(module, name):
+                monkeypatch.setattr(module, name, own)
+        return eventually
 
     return on_board_time
 

@@ -21,7 +21,7 @@ FLAGS, STATUS, FAULT_OVER, START_UP = 0x01, 0x02, 11, 0x10
 @pytest.fixture
 def spec(board, on_board_time):
     with Line(board.url(board.st)) as line:
-        on_board_time(test_st_bytes, line.port)
+        line.eventually = on_board_time(test_st_bytes, line.port)
         yield line
 
 
@@ -73,7 +73,7 @@ def test_a_rotor_that_does_not_follow_is_a_fault_until_it_is_acknowledged(st, sp
         data = [phase, *(1000).to_bytes(4, "little"), 0, 0, 20, 0]
         assert spec.ask(frame(header(SET_REVUP_DATA, 1), data)) == frame(ACK)
     assert spec.ask(frame(header(EXECUTE, 1), [START_MOTOR])) == frame(ACK)
-    test_st_bytes.eventually(lambda: spec.get(STATUS) == FAULT_OVER, "FAULT_OVER")
+    spec.eventually(lambda: spec.get(STATUS) == FAULT_OVER, "FAULT_OVER")
     assert spec.get(FLAGS) == START_UP
     spec.port.close()
     assert "START_UP" in st("start").ended(1).err
