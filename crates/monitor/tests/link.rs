@@ -27,12 +27,18 @@ async fn lost(name: &str) -> Arc<Link> {
 
 async fn lost_of(name: &str, with: fn(Link) -> Link) -> Arc<Link> {
     let world = World::new(name, Profile::Spec);
-    let link = Arc::new(with(Link::new(world.share())));
+    let link = joined(with(Link::new(world.share()))).await;
+    drop(world);
+    joins(&link, false).await;
+    link
+}
+
+/// A link that is kept and connected.
+async fn joined(link: Link) -> Arc<Link> {
+    let link = Arc::new(link);
     let kept = Arc::clone(&link);
     tokio::spawn(async move { kept.keep().await });
     joins(&link, true).await;
-    drop(world);
-    joins(&link, false).await;
     link
 }
 
@@ -129,10 +135,7 @@ async fn a_stop_that_is_too_old_is_not_sent() {
 #[tokio::test]
 async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() {
     let world = World::new("link-latch", Profile::Spec);
-    let link = Arc::new(Link::new(world.share()));
-    let kept = Arc::clone(&link);
-    tokio::spawn(async move { kept.keep().await });
-    joins(&link, true).await;
+    let link = joined(Link::new(world.share())).await;
     link.stop_all().await.unwrap();
     drop(world);
     joins(&link, false).await;
@@ -158,10 +161,7 @@ async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn limits_of_pages_hold_when_the_share_has_other_lines() {
     let world = World::new("link-limits", Profile::Spec);
-    let link = Arc::new(Link::new(world.share()));
-    let kept = Arc::clone(&link);
-    tokio::spawn(async move { kept.keep().await });
-    joins(&link, true).await;
+    let link = joined(Link::new(world.share())).await;
     let before = link.drives().await.unwrap();
     let page = Page { drives: before.clone(), ..world.page().await };
     page.ask(limit(st(1), Mode::Speed, Some(1000.0))).await.unwrap();

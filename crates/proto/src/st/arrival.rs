@@ -53,7 +53,13 @@ impl ArrivalWatch {
     /// [`ARRIVAL_SPARE_TIME`]. It begins with the command.
     pub fn new(target: PositionMove, tolerance_rad: f64, timeout: Option<Micros>) -> Self {
         let timeout = timeout.unwrap_or(seconds(target.duration_s) + ARRIVAL_SPARE_TIME);
-        Watch::over(ArrivalSampler {
+        Watch::over(ArrivalSampler::new(target, tolerance_rad, timeout))
+    }
+}
+
+impl ArrivalSampler {
+    fn new(target: PositionMove, tolerance_rad: f64, timeout: Micros) -> Self {
+        ArrivalSampler {
             target,
             tolerance_rad,
             timeout,
@@ -63,7 +69,7 @@ impl ArrivalWatch {
             status: Status::Idle,
             flags: Flags::default(),
             position: f32::NAN,
-        })
+        }
     }
 }
 
@@ -188,17 +194,8 @@ mod tests {
 
     #[test]
     fn a_drive_with_faults_is_asked_for_them() {
-        let mut sampler = ArrivalSampler {
-            target: PositionMove { angle_rad: 1.0, duration_s: 1.0 },
-            tolerance_rad: ARRIVAL_TOLERANCE_RAD,
-            timeout: ARRIVAL_SPARE_TIME,
-            until: None,
-            is_running: false,
-            register: RegisterId::STATUS,
-            status: Status::Idle,
-            flags: Flags::default(),
-            position: f32::NAN,
-        };
+        let target = PositionMove { angle_rad: 1.0, duration_s: 1.0 };
+        let mut sampler = ArrivalSampler::new(target, ARRIVAL_TOLERANCE_RAD, ARRIVAL_SPARE_TIME);
         sampler.begin(Instant(0));
         assert_eq!(sampler.request(), RegisterId::STATUS);
         assert!(!sampler.replied(Instant(0), &i32::from(u8::from(Status::FaultNow))));
