@@ -12,6 +12,9 @@ use super::wire::{Attachment, Gid};
 
 /// The most publishers that are remembered.
 const PUBLISHERS: usize = 16;
+/// A blocked joint takes commands again when none came for this time, in seconds, or for the time to
+/// live if that is longer. A publisher that is held up for less does not undo a stop.
+const QUIET: f64 = 1.0;
 /// How long the last refusal is shown, in seconds.
 const SHOWN: f64 = 5.0;
 
@@ -24,6 +27,12 @@ pub struct Rules {
     pub start_within: f64,
     /// Older values are none, in seconds.
     pub fresh: f64,
+}
+
+impl Rules {
+    fn quiet(&self) -> f64 {
+        self.time_to_live.max(QUIET)
+    }
 }
 
 /// The commands of all joints of a node.
@@ -55,11 +64,20 @@ enum Phase {
     Resting,
     /// The last command came at this time.
     Moving { motion: u64, heard: f64 },
-    /// It takes no command until none has come for the time to live.
+    /// It takes no command until none has come for [`Rules::quiet`].
     Blocked { why: String, heard: f64 },
 }
 
 impl Phase {
+    /// When it ends if no command comes.
+    fn end(&self, rules: &Rules) -> Option<f64> {
+        match self {
+            Phase::Resting => None,
+            Phase::Moving { heard, .. } => Some(heard + rules.time_to_live),
+            Phase::Blocked { heard, .. } => Some(heard + rules.quiet()),
+        }
+    }
+
     fn is_motion(&self, number: u64) -> bool {
         matches!(self, Phase::Moving { motion, .. } if *motion == number)
     }
@@ -140,13 +158,9 @@ impl Commands {
     pub fn tick(&mut self, now: f64) {
         for number in 0..self.joints.len() {
             let phase = &mut self.joints[number].phase;
-            let is_moving = match *phase {
-                Phase::Moving { heard, .. } if now - heard >= self.rules.time_to_live => true,
-                Phase::Blocked { heard, .. } if now - heard >= self.rules.time_to_live => false,
-                _ => continue,
-            };
-            *phase = Phase::Resting;
-            if is_moving {
+            if phase.end(&self.rules).is_some_and(|end| now >= end)
+                && let Phase::Moving { .. } = std::mem::replace(phase, Phase::Resting)
+            {
                 self.stop(number);
             }
         }
@@ -154,11 +168,7 @@ impl Commands {
 
     /// When something happens without an input.
     pub fn wake(&self) -> Option<f64> {
-        let heard = self.joints.iter().filter_map(|it| match it.phase {
-            Phase::Moving { heard, .. } | Phase::Blocked { heard, .. } => Some(heard),
-            Phase::Resting => None,
-        });
-        heard.reduce(f64::min).map(|heard| heard + self.rules.time_to_live)
+        self.joints.iter().filter_map(|it| it.phase.end(&self.rules)).reduce(f64::min)
     }
 
     /// What is to be done next.
@@ -190,13 +200,20 @@ impl Commands {
         self.outputs.push_back(Output::Stop(joint));
     }
 
-    /// All motions end: somebody stops their motors. `joint` is one, or all.
-    pub fn block(&mut self, now: f64, joint: Option<usize>, why: &str) {
-        let numbers = joint.map_or(0..self.joints.len(), |it| it..it + 1);
-        for number in numbers {
-            if let Some(Phase::Moving { motion, .. }) = self.joints.get(number).map(|it| &it.phase)
-            {
-                self.failed(now, number, *motion, why.to_owned(), true);
+    /// The motion of a joint ends: its motor has to stop.
+    pub fn end_motion(&mut self, now: f64, joint: usize, why: &str) {
+        if let Some(Phase::Moving { motion, .. }) = self.joints.get(joint).map(|it| &it.phase) {
+            self.failed(now, joint, *motion, why.to_owned(), true);
+        }
+    }
+
+    /// Somebody stops all motors. Also joints that rest take no command: their publisher may be late.
+    pub fn block_all(&mut self, now: f64, why: &str) {
+        for number in 0..self.joints.len() {
+            self.end_motion(now, number, why);
+            let phase = &mut self.joints[number].phase;
+            if *phase == Phase::Resting {
+                *phase = Phase::Blocked { why: why.to_owned(), heard: now };
             }
         }
     }
@@ -252,14 +269,15 @@ impl Commands {
             let why = "a sample without the attachment of rmw_zenoh 0.2.4 or later";
             ("not_rmw_zenoh", why.to_owned())
         })?;
-        self.in_time(now, &attachment)?;
-        let wanted = self.wanted(payload)?;
-        // While commands come, a blocked joint stays blocked.
-        for (number, ..) in &wanted {
+        let (is_in_time, wanted) = (self.in_time(now, &attachment), self.wanted(payload));
+        // While commands come, a blocked joint stays blocked, also if they come late.
+        for (number, ..) in wanted.iter().flatten() {
             if let Phase::Blocked { heard, .. } = &mut self.joints[*number].phase {
                 *heard = now;
             }
         }
+        is_in_time?;
+        let wanted = wanted?;
         self.hold(now, attachment.gid)?;
         for (number, mode, value) in &wanted {
             self.permit(now, *number, *mode, *value, readings)?;
@@ -380,8 +398,8 @@ impl Commands {
         match phase {
             Phase::Moving { .. } => return Ok(()),
             Phase::Blocked { why, .. } => {
-                let time_to_live = self.rules.time_to_live;
-                let why = format!("{name}: {why}; send nothing for {time_to_live} s, then start");
+                let quiet = self.rules.quiet();
+                let why = format!("{name}: {why}; send nothing for {quiet} s, then start");
                 return Err(("blocked", why));
             }
             Phase::Resting if *stops > 0 => {

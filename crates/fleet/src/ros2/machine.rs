@@ -271,7 +271,7 @@ impl Machine {
         let Some((number, joint)) = joint else { return };
         let fault = self.readings.of(joint).and_then(|it| it.faults(joint.motor));
         if let Some((words, _)) = fault {
-            self.commands.block(now, Some(number), &words);
+            self.commands.end_motion(now, number, &words);
         }
     }
 }

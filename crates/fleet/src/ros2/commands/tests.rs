@@ -248,16 +248,36 @@ fn a_motion_that_failed_is_not_tried_again_while_commands_come() {
     // An answer to a motion before this one changes nothing.
     commands.failed(READ, 1, 0, "old".to_owned(), true);
     commands.failed(READ, 1, 1, "operator has latched it".to_owned(), false);
-    for step in 1..100 {
-        publisher.send(&mut commands, READ + 0.02 * f64::from(step), &wheel(1.0));
+    // The publisher is held up for almost a second again and again.
+    let steps = (1..100).map(|step| 0.02 * f64::from(step));
+    let pauses = (1..10).map(|pause| 1.98 + (QUIET - 1e-3) * f64::from(pause));
+    for later in steps.chain(pauses) {
+        publisher.send(&mut commands, READ + later, &wheel(1.0));
         assert_eq!(outputs(&mut commands), []);
     }
     let shown = commands.phase("wheel").unwrap();
     assert_eq!((shown.words, shown.is_blocked), ("operator has latched it", true));
-    let later = READ + 0.02 * 99.0 + LIVE + 0.01;
-    assert!(commands.wake().unwrap() < later);
+    let later = commands.wake().unwrap();
+    assert!((later - (READ + 1.98 + 9.0 * (QUIET - 1e-3) + QUIET)).abs() < 1e-6);
     publisher.send(&mut commands, later, &wheel(1.0));
     assert!(sends(&outputs(&mut commands)[0]));
+}
+
+#[test]
+fn samples_that_come_late_keep_a_joint_blocked() {
+    let (mut commands, mut publisher) = ready();
+    publisher.send(&mut commands, READ, &wheel(1.0));
+    commands.failed(READ, 1, 1, "a fault".to_owned(), false);
+    outputs(&mut commands);
+    // The network holds all samples up for a second.
+    let payload = cdr::encode(&wheel(1.0));
+    for step in 0..200 {
+        let now = READ + 0.02 * f64::from(step);
+        let attachment = publisher.attachment(now - 1.0);
+        commands.receive(now, Some(&attachment), &payload, &measured());
+    }
+    publisher.send(&mut commands, READ + 4.0, &wheel(1.0));
+    assert_eq!((outputs(&mut commands), count(&commands, "blocked")), (vec![], 1));
 }
 
 #[test]
@@ -265,7 +285,7 @@ fn a_motion_goes_on_until_it_fails_or_ends() {
     let (mut commands, mut publisher) = ready();
     publisher.send(&mut commands, READ, &wheel(1.0));
     assert!(commands.goes_on(1, 1) && !commands.goes_on(1, 2) && !commands.goes_on(0, 1));
-    commands.block(READ, None, "stop_all");
+    commands.block_all(READ, "stop_all");
     assert!(!commands.goes_on(1, 1));
 }
 
@@ -274,10 +294,16 @@ fn all_motions_end_when_somebody_stops_all() {
     let (mut commands, mut publisher) = ready();
     publisher.send(&mut commands, READ, &wheel(1.0));
     outputs(&mut commands);
-    commands.block(READ, None, "stop_all");
+    commands.block_all(READ, "stop_all");
     assert_eq!(outputs(&mut commands), [Output::Stop(1)]);
     publisher.send(&mut commands, READ + 0.02, &wheel(1.0));
     assert_eq!(outputs(&mut commands), []);
+    // The arm rests. Its publisher was late, and sends on.
+    publisher.send(&mut commands, READ + 0.04, &arm(std::f64::consts::PI));
+    assert_eq!((outputs(&mut commands), count(&commands, "blocked")), (vec![], 2));
+    let silent = READ + 0.04 + QUIET;
+    publisher.send(&mut commands, silent, &arm(std::f64::consts::PI));
+    assert!(sends(&outputs(&mut commands)[0]));
 }
 
 #[test]
@@ -299,7 +325,7 @@ fn no_motion_begins_before_the_end_of_a_stop_is_known() {
     commands.failed(READ + 0.01, 1, 1, "a fault".to_owned(), true);
     outputs(&mut commands);
     // It is blocked no more, and its stop is still under way.
-    let later = READ + 0.01 + LIVE + 1e-3;
+    let later = READ + 0.01 + QUIET + 1e-3;
     publisher.send(&mut commands, later, &wheel(1.0));
     assert_eq!(outputs(&mut commands), []);
     assert_eq!(commands.phase("wheel").unwrap().words, "stopping");
