@@ -15,9 +15,7 @@ BUILT := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)
 DEBUG := $(BUILT)/debug
 
 VENV := $(CURDIR)/.venv
-PYTHON_VENV := $(CURDIR)/.venv-python
 BENCH_VENV := $(CURDIR)/.venv-bench
-PAGES_VENV := $(CURDIR)/.venv-pages
 
 # Which tests of a part to run: arguments of cargo test for unit and miri; of pytest, in
 # the folder of the tests, for e2e, python, pages and firmware-test.
@@ -34,17 +32,17 @@ export RUST_TEST_THREADS ?= 16
 PYTEST_FLAGS = -q -rfEs -n $(WORKERS) --dist worksteal -o cache_dir=$(CURDIR)/target/parts/$@.cache $(FAILED) \
 	-p measured $(if $(AGAIN),,--junitxml=$(CURDIR)/target/parts/$@.xml)
 e2e ros2 python pages firmware-test: export PYTHONPATH = $(CURDIR)/tests
-PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
+# The package and its plugin may be installed anew meanwhile.
+PYTEST = $(VENV)/bin/python -m pytest -p no:motorlink $(PYTEST_FLAGS)
 
 # For all that the tests build, clippy is the compiler: so it needs no build of its own. It tells warnings again
 # each time; `lint` fails if there is one.
-lint unit e2e ros2 python pages browser ffi-test firmware-test test-socketcan: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+lint unit e2e ros2 package python pages browser ffi-test firmware-test test-socketcan: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+# What maturin would write for the package, so that it does not build PyO3 again, nor `cargo test` after it.
+lint unit e2e ros2 package python pages browser ffi-test firmware-test test-socketcan: export PYO3_CONFIG_FILE = $(CURDIR)/bindings/python/pyo3.txt
 
 # The program with the features of the whole workspace: built once for all parts.
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --example rmd_frames --example wireshark_frames --locked
-
-# The Python package with the same features, so that it shares that build.
-AS_TESTED := --config-settings 'build-args=--profile=dev --features=typescript'
 
 # The parts of `make test`: two run at a time, in this order. The page is a part of the program, and `probe`
 # needs the lock of cargo for a moment only: they come before `lint`, which compiles for all others. Those that
@@ -60,7 +58,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test verify check flakes $(ALL_PARTS) wheel mutants fuzz soak bench bench-python reliability sizes table docs header python-table python-docs web-types web monitor deadman view
+.PHONY: help demo test verify check flakes $(ALL_PARTS) package wheel mutants fuzz soak bench bench-python reliability sizes table docs header python-table python-docs web-types web monitor deadman view
 .PHONY: ros2 fleet-scale fleet-faults install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -115,12 +113,11 @@ unit: ## 5 min: tests in Rust
 		$(or $(T),--lib --bins --tests)
 	$(if $(T),,$(CARGO) test --workspace --all-features --locked --doc)
 
-python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
-	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
-	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
-	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
-	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
-	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
+python: package ## 3 min: the Python package: its build, types, examples, tests
+	$(VENV)/bin/python -m mypy --strict -p motorlink
+	cd bindings/python/tests && $(VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
+	$(VENV)/bin/python -m mypy.stubtest motorlink._core
+	cd bindings/python/tests && $(VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 e2e: $(VENV)/ready ## 12 min: the program against independent clients
 	-@tests/install e2e
@@ -165,9 +162,8 @@ lint: ## 6 min: format, clippy: no warning; compiles all tests
 rustdoc: ## 2 min: rustdoc: no warning
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(WITHOUT_NETWORK) --no-deps --locked
 
-pages: $(PAGES_VENV)/ready ## 2 min: every code block of README and docs runs
-	$(PAGES_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
-	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
+pages: package ## 2 min: every code block of README and docs runs
+	cd tests/pages && $(PYTEST) $(T)
 
 # Whether the header is up to date is tested in unit.
 ffi-test: ## 1 min: the C face: sanitizers, valgrind, C against the program
@@ -269,9 +265,8 @@ docs: ## the tables of docs/CONFORMANCE.md
 python-table: ## the RMD commands of the Python package: _rmd_table.py
 	MOTORLINK_UPDATE_PYTHON=1 $(CARGO) test -p motorlink-python --test table --locked
 
-python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
-	$(PYTHON_VENV)/bin/python -m pip install --quiet $(AS_TESTED) .
-	$(PYTHON_VENV)/bin/python bindings/python/tests/reference.py
+python-docs: package ## the reference in docs/PYTHON.md
+	$(VENV)/bin/python bindings/python/tests/reference.py
 
 web-types: ## the types of messages in the page: web/src/wire.ts
 	MOTORLINK_UPDATE_WEB=1 $(CARGO) test -p motorlink-monitor --all-features --locked --test all types::
@@ -317,8 +312,17 @@ TARGET =
 install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGET=
 	CARGO="$(CARGO)" crates/ffi/packaging/install "$(PREFIX)" "$(DESTDIR)" $(TARGET)
 
-wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
-	$(PYTHON_VENV)/bin/python -m maturin build --quiet --profile dist --out target/wheels
+# The Python package as it is tested: with the features of the program, so that it shares that build. Where it
+# is up to date it stays: another part may be using it. The same content at the same date is the same wheel.
+package: $(VENV)/ready
+	@flock target/package.lock sh -ec 'export PATH=$(VENV)/bin:$$PATH SOURCE_DATE_EPOCH=1000000000; rm -rf target/package; \
+		python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir target/package \
+			--config-settings "build-args=--profile=dev --features=typescript" .; \
+		! cmp -s target/package/*.whl $(VENV)/motorlink.whl || exit 0; \
+		python -m pip install --quiet --force-reinstall --no-deps target/package/*.whl; \
+		cp target/package/*.whl $(VENV)/motorlink.whl'
+wheel: $(VENV)/ready ## the Python package as a wheel, in target/wheels
+	$(VENV)/bin/python -m maturin build --quiet --profile dist --out target/wheels
 # Checks the version in rust-version.
 oldest: ## compiles the workspace with the oldest Rust that is meant to work
 	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \
@@ -337,7 +341,7 @@ fmt: ## formats the Rust code
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
-	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) web/node_modules web/dist probe/target fuzz/fuzzers/target firmware/target
+	rm -rf $(VENV) $(BENCH_VENV) web/node_modules web/dist probe/target fuzz/fuzzers/target firmware/target
 
 # ---- What they need ----
 NPM_FLAGS := --no-audit --no-fund --loglevel=error
@@ -365,11 +369,8 @@ packages:
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(BOARD) || rustup target add $(BOARD)
 
-$(VENV)/ready: tests/e2e/requirements.txt
-$(PYTHON_VENV)/ready: bindings/python/tests/requirements.txt
-$(PAGES_VENV)/ready: tests/pages/requirements.txt
-# Two parts may want one at once.
-$(VENV)/ready $(PYTHON_VENV)/ready $(PAGES_VENV)/ready:
+# Two parts may want it at once.
+$(VENV)/ready: tests/requirements.txt
 	@mkdir -p target && flock target/$(notdir $(@D)).lock $(MAKE) --no-print-directory $(@D).venv FROM=$<
 %.venv:
 	@test $*/ready -nt $(FROM) || { \

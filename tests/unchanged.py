@@ -33,7 +33,7 @@ PARTS = {
     "ffi-test": (["motorlink-conformance", "motorlink-ffi"], ["vectors", *INSTALLED]),
     "firmware-test": (
         ["motorlink-conformance", "motorlink-embedded", "motorlink-ffi"],
-        ["firmware", ":(glob)tests/*.py", "tests/firmware", *OF_E2E, *INSTALLED],
+        ["firmware", ":(glob)tests/*.py", "tests/requirements.txt", "tests/firmware", *OF_E2E, *INSTALLED],
     ),
     "probe": (
         ["motorlink-embedded", "motorlink-ffi", "motorlink-proto", "motorlink-sim"],
@@ -41,7 +41,8 @@ PARTS = {
     ),
     "python": (
         ["motorlink-fleet", "motorlink-recording", "motorlink-testbench"],
-        ["bindings/python", "tests/measured.py", "tests/e2e/recordings.py", "docs/PYTHON.md", "scenarios", "vectors"],
+        ["bindings/python", "tests/measured.py", "tests/requirements.txt", "tests/e2e/recordings.py", "docs/PYTHON.md",
+         "scenarios", "vectors"],
     ),
     "test-socketcan": (["motorlink-telemetry"], ["tests/socketcan"]),
     "web-test": ([], ["web"]),

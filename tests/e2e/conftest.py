@@ -2,7 +2,7 @@
 
 $ cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames \
     --example wireshark_frames
-$ pip install -r tests/e2e/requirements.txt
+$ pip install -r tests/requirements.txt
 $ MOTORLINK_BIN=target/debug/motorlink pytest tests/e2e
 """
 

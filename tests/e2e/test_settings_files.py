@@ -4,6 +4,9 @@ What a file may have, and what a restore writes, is tested in crates/motorlink/t
 """
 
 import re
+import threading
+import time
+from contextlib import ExitStack
 
 import pytest
 
@@ -216,29 +219,52 @@ def test_a_cable_that_is_pulled_leaves_the_state_that_the_message_says(run, sim,
     run(*motor, "diff", file).ended(0)
 
 
+#: Requests of a restore of MANY: a read, the third write, and what puts the second setting back.
+READS_SPEED_KP, WRITES_TORQUE_KP, PUTS_SPEED_KI_BACK = "220105", "2103090300", "2103065900"
+
+
 @pytest.fixture
-def slow_restore(run, start, sim, tmp_path):
-    """A restore that has come to a request, a function that runs commands, the file, the settings before it."""
+def held_restore(run, start, sim, tmp_path):
+    """`held_restore(request..)`: a restore that waits for the reply to the first of these requests.
 
-    def slow_restore(until):
-        port = sim(rmd=()).st
-        file = tmp_path / "motor1.toml"
-        before = run("st", "-p", port, "dump").ended(0).out
-        file.write_text(OF_MANY)
-        slow = start("st", "-p", port, "--trace", "--fault", "delay=100ms", "restore", file)
-        slow.says(until)
-        return slow, lambda *words: run("st", "-p", port, *words), file, before
+    Gives it, a function that hands such a reply on, one that runs commands, the file, the settings before it.
+    """
+    port, file = sim(rmd=()).st, tmp_path / "motor1.toml"
 
-    return slow_restore
+    def command(*words):
+        return run("st", "-p", port, *words)
+
+    with ExitStack() as stack:
+
+        def held_restore(*requests):
+            waiting, came, handed_on = list(requests), threading.Event(), threading.Semaphore(0)
+            before = command("dump").ended(0).out
+            file.write_text(OF_MANY)
+            line = stack.enter_context(Line(port))
+
+            def passed_on(request):
+                reply = line.ask(request)
+                if waiting and request.hex().startswith(waiting[0]):
+                    del waiting[0]
+                    came.set()
+                    handed_on.acquire(timeout=60)
+                return reply
+
+            cable = stack.enter_context(device(tmp_path / "cable", passed_on))
+            stack.callback(handed_on.release, 9)
+            restore = start("st", "-p", cable, "--timeout", "5s", "--trace", "restore", file)
+            assert came.wait(60), restore.err
+            return restore, handed_on.release, command, file, before
+
+        yield held_restore
 
 
-def test_after_kill_the_difference_shows_what_was_not_written(slow_restore):
-    slow, command, file, _ = slow_restore("SET_REG TORQUE_KP")
-    slow.kill()
+def test_after_kill_the_difference_shows_what_was_not_written(held_restore):
+    restore, _, command, file, _ = held_restore(WRITES_TORQUE_KP)
+    restore.kill()
     shown = command("diff", file, "--json").ended(1).json
-    left = list(shown["values"])
-    # It was killed behind the first two; the third may not have arrived.
-    assert left in ([*MANY][2:], [*MANY][3:]), left
+    # The third has arrived.
+    assert list(shown["values"]) == [*MANY][3:]
     command("restore", file).ended(0)
     command("diff", file).ended(0)
 
@@ -246,24 +272,29 @@ def test_after_kill_the_difference_shows_what_was_not_written(slow_restore):
 PUTTING_BACK = "putting the old values back; another Ctrl-C leaves the settings mixed"
 
 
-def test_ctrl_c_puts_the_old_values_back(slow_restore):
-    slow, command, file, before = slow_restore("SET_REG TORQUE_KP")
-    slow.interrupt()
-    slow.says(PUTTING_BACK)
-    assert slow.wait(within=30) == 130
-    (said,) = [line for line in slow.err if line.startswith("interrupted")]
+def test_ctrl_c_puts_the_old_values_back(held_restore):
+    restore, hand_on, command, file, before = held_restore(WRITES_TORQUE_KP)
+    restore.interrupt()
+    restore.says(PUTTING_BACK)
+    hand_on()
+    assert restore.wait(within=30) == 130
+    (said,) = [line for line in restore.err if line.startswith("interrupted")]
     assert "rolled back to the old values: SPEED_KP, SPEED_KI, TORQUE_KP" in said
     assert command("dump").ended(0).out == before
 
 
-def test_a_second_ctrl_c_names_the_settings_that_are_mixed(slow_restore):
-    slow, command, file, before = slow_restore("SET_REG TORQUE_KP")
-    slow.interrupt()
-    slow.says("SET_REG SPEED_KI")
-    slow.until(lambda: sum("SET_REG SPEED_KI" in line for line in slow.err) == 2, "its roll-back")
-    slow.interrupt()
-    assert slow.wait() == 130
-    (said,) = [line for line in slow.err if line.startswith("interrupted")]
+def test_a_second_ctrl_c_names_the_settings_that_are_mixed(held_restore):
+    restore, hand_on, command, file, before = held_restore(WRITES_TORQUE_KP, PUTS_SPEED_KI_BACK)
+    restore.interrupt()
+    restore.says(PUTTING_BACK)
+    hand_on()
+    restore.until(lambda: sum("SET_REG SPEED_KI" in line for line in restore.err) == 2, "its roll-back")
+    restore.interrupt()
+    # A thread takes signals, and nothing shows when it has taken this one.
+    time.sleep(1)
+    hand_on()
+    assert restore.wait() == 130
+    (said,) = [line for line in restore.err if line.startswith("interrupted")]
     assert "unknown, old or new: SPEED_KI; as in the file: SPEED_KP; all others are as before" in said
     assert "rolled back to the old values: TORQUE_KP" in said
     assert f"diff {file}` shows what differs" in said
@@ -289,9 +320,12 @@ def test_a_third_ctrl_c_ends_a_restore_that_waits_for_a_reply(start, tmp_path):
     assert slow.err[-1] == f"interrupted; the roll-back did not end; `motorlink st -p {port} diff {file}` shows what differs"
 
 
-def test_ctrl_c_before_the_first_write_changes_nothing(slow_restore):
-    slow, *_ = slow_restore("GET_REG SPEED_KP")
-    slow.interrupt()
-    assert slow.wait() == 130
-    assert slow.err[-1] == "interrupted; nothing was changed"
-    assert not any("SET_REG" in line for line in slow.err)
+def test_ctrl_c_before_the_first_write_changes_nothing(held_restore):
+    restore, hand_on, *_ = held_restore(READS_SPEED_KP)
+    restore.interrupt()
+    time.sleep(1)
+    hand_on()
+    assert restore.wait() == 130
+    # The trace may come behind it.
+    assert "interrupted; nothing was changed" in restore.err
+    assert not any("SET_REG" in line for line in restore.err)

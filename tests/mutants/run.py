@@ -33,13 +33,8 @@ REACHED = REPOSITORY / "target/mutants/reached"
 NO_TESTS_OF_BEHAVIOUR = {"structure", "fuzz", "bench", "kernels", "reliability"}
 #: A command that takes longer hangs, s.
 LIMIT = 1200
-PYTEST = f"{REPOSITORY}/.venv/bin/python -m pytest -q -p no:cacheprovider -n 4 --dist worksteal"
-#: Installs the Python package for its tests.
-PACKAGE = (
-    "make $PWD/.venv-python/ready && .venv-python/bin/python -m pip install --quiet "
-    "--config-settings 'build-args=--profile=dev --features=typescript' ."
-)
-PYTHON_TESTS = "cd bindings/python/tests && ../../../.venv-python/bin/python -m pytest -q -p no:cacheprovider -n 4"
+PYTEST = "-m pytest -q -p no:cacheprovider -n 4 --dist worksteal"
+PYTHON_TESTS = f"cd bindings/python/tests && ../../../.venv/bin/python {PYTEST}"
 
 
 def run(command, limit=LIMIT, **variables):
@@ -102,8 +97,8 @@ class Tests:
         must("cargo build --workspace --all-features --bin motorlink --example machine --example rmd_frames "
              "--example wireshark_frames --locked")  # fmt: skip
         self.programs = programs()
-        must(PACKAGE)
-        self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink {PYTEST}"
+        must("make package")
+        self.end_to_end = f"cd tests/e2e && MOTORLINK_BIN={TREE}/target/debug/motorlink ../../.venv/bin/python {PYTEST} -p no:motorlink"
         self.turn = threading.Lock()
         of_tests = schemata.output("git", "rev-parse", "HEAD:crates", "HEAD:bindings", "HEAD:tests/e2e", cwd=TREE)
         of, known = [*of_tests.split(), *(it["name"] for it in mutants)], {}
@@ -181,7 +176,7 @@ def by_hand(mutant):
     path = TREE / mutant["file"]
     is_page = mutant["file"].startswith("web/")
     if not is_page:
-        path = next(TREE.glob(f".venv-python/lib/*/site-packages/motorlink/{path.name}"))
+        path = next(TREE.glob(f".venv/lib/*/site-packages/motorlink/{path.name}"))
     text = path.read_text()
     if text.count(mutant["find"]) != 1:
         sys.exit(f"{mutant['name']}: {path} does not have the text of `find` exactly once")
@@ -229,7 +224,7 @@ def main():
     schemata.restore(TREE)
     made = [it for it in made if given.again or it["name"] not in of_people]
     if made:
-        must(PACKAGE)
+        must("make package")
     for mutant in made:
         tell(of_people, mutant["name"], by_hand(mutant))
     results = {**drawn, **of_people}

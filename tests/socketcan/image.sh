@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes the folder $1 with what the virtual machine boots: `vmlinuz`, Debian's kernel, and
-# `initrd.gz`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our
+# `initrd`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our
 # programs and the checks. Debian's kernel and busybox are unpacked there, never installed.
 # Ends with 77 where the packages cannot be had. MOTORLINK_BIN
 # is the built program, SUDO is what makes a command root's.
@@ -66,7 +66,7 @@ for tool in candump cansend slcan_attach; do
 done
 ldd "$MOTORLINK_BIN" "$port" "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
     grep -o '/[^ ]*\.so[^ ]*' | sort -u | xargs -I {} cp -L --parents {} "$root"
-(cd "$root" && find . | cpio -o -H newc -R 0:0 --quiet | gzip -1) >"$made/initrd.gz"
+(cd "$root" && find . | cpio -o -H newc -R 0:0 --quiet) >"$made/initrd"
 cp "$unpacked/boot/vmlinuz-$version" "$made/vmlinuz"
 
 # What has to pass, one name a line.
