@@ -47,7 +47,7 @@ PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example ma
 # The parts of `make test`: two run at a time, in this order. The page is a part of the program, and `probe`
 # needs the lock of cargo for a moment only: they come before `lint`, which compiles for all others. Those that
 # wait for real time run beside one another; emulators delay other processes by up to 2.5 s.
-TEST_PARTS := web-test probe lint unit e2e browser python pages ffi-test firmware-test cost determinism test-socketcan
+TEST_PARTS := web-test probe lint unit e2e browser python pages ffi-test firmware-test test-socketcan cost determinism
 # Those of `make verify` only. With LONG=1 the other parts have all their tests.
 LONG_PARTS := rustdoc miri deny ros2
 ALL_PARTS := $(TEST_PARTS) $(LONG_PARTS)
