@@ -112,6 +112,25 @@ def drives(motorlink, tmp_path_factory):
 
 
 @pytest.fixture
+def shares(start, sim, tmp_path):
+    """`shares()`: a share of simulated drives, again and again at the same `path`. The drives stay when it ends.
+
+    `st` and `rmd` are its lines as ports.
+    """
+    drives, path = sim(), tmp_path / "share"
+
+    def shares(timeout="2s"):
+        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", timeout]
+        running = start("share", *words, "--json")
+        running.line(0)
+        running.path, running.drives = path, drives
+        running.st, running.rmd = f"share:{path}/st0", f"share:{path}/rmd0"
+        return running
+
+    return shares
+
+
+@pytest.fixture
 def nodes(start, sim, tmp_path):
     """`nodes("arm1", ...)`: a node of simulated drives, again and again; further ones connect to the first."""
     started, simulated = [], {}

@@ -94,7 +94,7 @@ class Member:
         assert taken["kind"] == "taken", taken
         return self.answer(sent)
 
-    def stop(self, motor=None, after=None):
+    def stop(self, motor=None):
         """Sends a stop; gives the answer of the share."""
         self.urgent += 1
         self.ids += 1
@@ -102,8 +102,7 @@ class Member:
         if motor:
             request["motor"] = motor
         post = {"number": self.urgent, "sent": 0.0, "time_to_live": 1.0}
-        after = self.last if after is None else after
-        ask = {"ask": "urgent", "after": after, **post, "request": request}
+        ask = {"ask": "urgent", "after": self.last, **post, "request": request}
         assert self.ask("stop", ask)["kind"] == "taken"
         return self.answer(self.ids)
 

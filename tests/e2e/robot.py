@@ -61,15 +61,11 @@ class Robot:
         self.sdk.ROS2Subscriber(topic, kind, heard.append, **self.at)
         return heard
 
-    def publisher(self, topic, kind=STATE):
-        """A function that publishes a message with these fields."""
-        return self.sdk.ROS2Publisher(topic, kind, **self.at).publish
-
-    def commands(self, topic="/arm1/joint_commands"):
+    def commands(self):
         """A function that publishes joint commands."""
         import numpy
 
-        publish = self.publisher(topic)
+        publish = self.sdk.ROS2Publisher("/arm1/joint_commands", STATE, **self.at).publish
         types = self.session.store.types
         header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), "")
 

@@ -57,11 +57,11 @@ class Line:
         self.send(data)
         return self.reply()
 
-    def get(self, register, motor=0, signed=True):
+    def get(self, register, motor=0):
         """Reads a register."""
         reply = self.ask(frame(header(GET_REG, motor), [register]))
         assert reply[0] == ACK, reply.hex(" ")
-        return int.from_bytes(reply[2:-1], "little", signed=signed)
+        return int.from_bytes(reply[2:-1], "little", signed=True)
 
     def set(self, register, value, size, motor=0):
         """Writes a register; gives the reply."""

@@ -19,7 +19,7 @@ from program import environment, eventually
 LAST = b"\0"
 KEYS = {
     "up": "\x1b[A", "down": "\x1b[B", "enter": "\r", "esc": "\x1b", "backspace": "\x7f", "F12": "\x1b[24~",
-    "space": " ", "ctrl-c": "\x03", "ctrl-x": "\x18", "ctrl-z": "\x1a", "end": "\x1b[F", "home": "\x1b[H",
+    "space": " ", "ctrl-c": "\x03", "ctrl-z": "\x1a", "end": "\x1b[F", "home": "\x1b[H",
     "page-up": "\x1b[5~", "page-down": "\x1b[6~",
 }
 

@@ -1,22 +1,28 @@
 """The program as a whole: the demo, ports, readers that have enough."""
 
-import fcntl
-import os
-import pty
 import re
-import select
 import signal
-import struct
-import subprocess
-import termios
-import time
 from xml.etree import ElementTree
 
 import pytest
 
-from program import environment
+from program import eventually
+from terminal import LAST, Terminal
 
 DEMO_ENDS_WITHIN = 30
+
+
+def demo_on_a_terminal(motorlink, columns=100, until=None, **variables):
+    """What the demo drew, and its exit code. With `until` it gets a Ctrl-C when it has drawn this."""
+    terminal = Terminal([motorlink, "demo"], columns, 40, **{"NO_COLOR": None, **variables})
+    try:
+        if until:
+            eventually(lambda: re.search(until, terminal.raw.decode(errors="replace")), until, DEMO_ENDS_WITHIN)
+            terminal.signal(signal.SIGINT)
+        code = terminal.wait(DEMO_ENDS_WITHIN)
+        return terminal.raw.removesuffix(LAST).decode(), code
+    finally:
+        terminal.end()
 
 
 def test_the_demo_tells_its_story_and_draws_its_screen_during_the_fault(run, tmp_path):
@@ -35,7 +41,7 @@ def test_the_demo_tells_its_story_and_draws_its_screen_during_the_fault(run, tmp
 
 
 def test_the_demo_draws_a_table_on_a_terminal_of_any_width_and_ends_by_itself(motorlink):
-    screen, code = on_a_terminal([motorlink, "demo"], columns=60)
+    screen, code = demo_on_a_terminal(motorlink, columns=60)
     assert code == 0
     drawn = screen.partition("What you saw:")[0]
     lines = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", drawn).splitlines()
@@ -50,40 +56,11 @@ def test_the_demo_draws_a_table_on_a_terminal_of_any_width_and_ends_by_itself(mo
 
 @pytest.mark.parametrize("variables", [{"TERM": "dumb"}, {"NO_COLOR": "1"}])
 def test_ctrl_c_during_the_demo_stops_the_motors_and_plain_lines_stay_plain(motorlink, tmp_path, variables):
-    variables = {**variables, "TMPDIR": str(tmp_path)}
-    screen, code = on_a_terminal([motorlink, "demo"], until=r"ST 1 +RUN", variables=variables)
+    screen, code = demo_on_a_terminal(motorlink, until=r"ST 1 +RUN", TMPDIR=str(tmp_path), **variables)
     assert code == 130 and "\x1b" not in screen
     assert "motor 1 acknowledged its stop" in screen
     assert "may still turn" not in screen
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
-
-
-def on_a_terminal(arguments, columns=100, until=None, variables=()):
-    """Runs a program on a terminal; gives what it drew and its exit code. With `until` it gets a Ctrl-C when
-    it has drawn this."""
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
-    inherited = {key: value for key, value in environment().items() if key != "NO_COLOR"}
-    variables = {**inherited, "TERM": "xterm-256color", **dict(variables)}
-    process = subprocess.Popen(
-        arguments, stdin=theirs, stdout=theirs, stderr=theirs, env=variables, start_new_session=True
-    )
-    os.close(theirs)
-    drawn, deadline = b"", time.monotonic() + DEMO_ENDS_WITHIN
-    try:
-        while select.select([ours], [], [], max(0, deadline - time.monotonic()))[0]:
-            try:
-                drawn += os.read(ours, 65536)
-            except OSError:  # Linux' way to say that the other side is closed.
-                break
-            if until and re.search(until, drawn.decode(errors="replace")):
-                process.send_signal(signal.SIGINT)
-                until = None
-        return drawn.decode(), process.wait(5)
-    finally:
-        process.kill()
-        process.wait()
-        os.close(ours)
 
 
 def test_ports_lists_what_is_connected(run):

@@ -200,8 +200,3 @@ def test_text_is_read_behind_a_damaged_first_line(run):
     for first, failed in (("\ufeff", 0), ("hello\n", 1)):
         lines = run("decode", "rmd", "--json", stdin=first + log(STATUS)).ended(failed).lines
         assert lines[-1]["message"] == "read_status" and len(lines) == 1 + failed
-    # A line of any length, between whose bytes it is divided.
-    line = f"{ASK} {REPLY} " * 10_000 + "\n"
-    done = run("decode", "st", stdin=line + ASK + "\n").ended(0)
-    assert "20001 frames: 10001 requests, 10000 replies" in done.err
-    assert done.out.count("ACK 1998 rpm") == 10_000

@@ -16,11 +16,10 @@ RMD = ("rmd", "-p", "sim:")
 
 
 def test_what_is_late_still_comes(run, drives):
-    for port in ("pty", "sim"):
-        began = time.monotonic()
-        late = run("st", "-p", drives.port(port), "--fault", "delay=60ms", "get", "STATUS").ended(0)
-        assert time.monotonic() - began >= 0.12, "both ways"
-        assert "STATUS" in late.out
+    began = time.monotonic()
+    late = run("st", "-p", drives.port("pty"), "--fault", "delay=60ms", "get", "STATUS").ended(0)
+    assert time.monotonic() - began >= 0.12, "both ways"
+    assert "STATUS" in late.out
     late = run("rmd", "-p", drives.port("slcan"), "--timeout", "2s", "--fault", "delay=10ms", "angle").ended(0)
     assert "angle" in late.out
 

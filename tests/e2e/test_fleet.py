@@ -74,26 +74,6 @@ def rest(watchers):
         eventually(lambda watcher=watcher: are_still(watcher), "motors that rest")
 
 
-def test_a_monitor_shows_all_nodes_and_stops_all_their_motors(show, watchers):
-    _, ready, site = show()
-    names = [line["line"] for line in ready["lines"]]
-    assert names == ["arm1/st0", "arm1/rmd0", "arm2/st0", "arm2/rmd0"]
-    with site.page() as page:
-        page.alive()
-        assert [line["line"] for line in page.ask("lines")["lines"]] == names
-        turn_both(page, watchers)
-        stopped = page.ask("stop-all")["motors"]
-        confirmed = {(it["line"], it["motor"]) for it in stopped if not it.get("failure")}
-        assert {("arm1/st0", 1), ("arm2/st0", 1), ("arm1/rmd0", 2), ("arm2/rmd0", 2)} <= confirmed
-        rest(watchers)
-        # While silent motors are still stopped it is `overtaken`.
-        eventually(lambda: page.act("arm2/st0", 1, "START_MOTOR")["reason"] == "latched", "the latch")
-        assert page.ask("release")["kind"] == "answer"
-        turn_both(page, watchers)
-        # The end of the page is that of its motors.
-    rest(watchers)
-
-
 @pytest.mark.parametrize("ends", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_monitor_that_fails_leaves_no_motor_of_any_node_turning(show, watchers, ends):
     for _ in range(ROUNDS):
@@ -293,7 +273,7 @@ def test_the_end_of_a_recording_waits_for_what_is_late(start, arms, tmp_path):
         cable.process.send_signal(signal.SIGCONT)
         assert recording.wait(20) == 0
     times = last_times(file)
-    assert len(times) == 12 and min(times.values()) > ends - 0.2, (ends, times)
+    assert len(times) == 12 and min(times.values()) > ends - 0.4, (ends, times)
 
 
 def test_one_recording_has_all_nodes_also_one_that_is_started_again(start, nodes, arms, run, tmp_path):

@@ -103,7 +103,7 @@ def test_a_motor_that_coasts_is_not_said_to_rest(sim, guard, client, tmp_path):
     rests(drives, 1)
 
 
-def test_a_program_that_dies_in_the_middle_of_a_request(sim, guard, run, tmp_path):
+def test_a_program_that_dies_in_the_middle_of_a_request(sim, guard, run):
     # Shipped firmware waits for the rest of a frame for ever.
     drives = sim("--profile", "mcsdk-5.4", rmd=())
     process = guard(drives.st)
@@ -147,7 +147,7 @@ def test_a_second_program_is_turned_away(sim, guard, run, start):
     eventually(lambda: run("st", "-p", f"tcp:{tcp}", "info").code == 0, "the next program")
 
 
-def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, guard, start):
+def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, guard):
     drives = sim(rmd=())
     process = guard(drives.st, "--silence", "1s")
     with Line(process.port) as line:

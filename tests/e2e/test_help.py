@@ -41,7 +41,7 @@ OF_THEIR_OWN = [(), *((name,) for name in ("ports", "completions", "man", "watch
 
 
 @pytest.mark.parametrize("command", ["st", "rmd", "guard", "share", "sim", "decode", "conformance", "spec", "node", "fleet", ""])
-def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
+def test_every_example_of_every_help_runs(run, motorlink, tmp_path, command):
     pages = helps(run, command) if command else [
         page for page in helps(run) if page[0][:1] in OF_THEIR_OWN
     ]

@@ -121,16 +121,6 @@ def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(s
         rests(watcher)
 
 
-def test_hold_to_run_ends_with_the_key(site, watcher):
-    with site.page() as page:
-        page.held = True
-        page.alive().turn(hold=True)
-        turns(watcher)
-        page.held = False
-        assert page.lapsed() == "the key or the finger of hold-to-run is up"
-        rests(watcher)
-
-
 def test_a_page_lets_its_motors_go(site, watcher):
     turns_on = turns_too(watcher)
     with site.page() as page, site.page() as other:
@@ -150,19 +140,12 @@ def test_a_page_lets_its_motors_go(site, watcher):
         turns_on()
 
 
-@pytest.mark.parametrize("way", ["socket", "viewer post"])
-def test_stop_all_stops_all_motors_and_latches(site, watcher, way):
+def test_stop_all_stops_all_motors_and_latches(site, watcher):
     turns_too(watcher)
     with site.page() as page:
         page.alive().turn()
         turns(watcher)
-        if way == "viewer post":
-            status, body = site.post("/api/stop-all", site.viewer)
-            assert status == 200
-            motors = json.loads(body)["motors"]
-        else:
-            motors = page.ask("stop-all")["motors"]
-        stopped = {(it["line"], it["motor"]): it.get("failure") for it in motors}
+        stopped = {(it["line"], it["motor"]): it.get("failure") for it in page.ask("stop-all")["motors"]}
         assert stopped.items() >= {("st0", 1): None, ("rmd0", 2): None, ("rmd0", 1): None}.items()
         rests(watcher)
         watcher.until(event("latched"))

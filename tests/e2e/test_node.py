@@ -7,7 +7,6 @@ import json
 import os
 import random
 import signal
-import struct
 import subprocess
 import sys
 import time
@@ -18,12 +17,11 @@ import pytest
 from fleeting import Member, network
 from program import eventually
 from sharing import Client, samples
+from siting import RAMP, START
 from test_json import check
 
 #: Programs that are killed.
 ROUNDS = int(os.environ.get("ROUNDS", "1"))
-RAMP = (7, *struct.pack("<iH", 1500, 100))
-START = (3, 1)
 
 #: A program that turns ST motor 1 of the node, and gives signs of life until it is killed.
 TURNS = """
@@ -69,7 +67,7 @@ def program(node):
     return process
 
 
-def test_the_command_line_uses_a_node_as_a_port(node, run, tmp_path):
+def test_the_command_line_uses_a_node_as_a_port(node, run):
     port = ["-p", "zenoh:arm1/st0"]
     speed = run("st", *port, "get", "SPEED_MEAS", "--json", **via(node)).ended(0)
     check(speed.out)
@@ -283,10 +281,7 @@ def test_limits_of_the_file_hold_for_all_programs(nodes, run, tmp_path):
     assert refused.code != 0 and "100" in refused.err, refused.err
 
 
-def test_two_nodes_with_one_name_and_a_network_that_is_not_there(nodes, run):
-    first = nodes("arm1")
-    words = ["node", "-p", "sim:", "--name", "arm1", "--connect", first.address]
-    assert "another node" in run(*words).ended(3).err
+def test_a_network_that_is_not_there_and_a_name_that_is_none(run):
     nobody = run("node", "-p", "sim:", "--connect", "tcp/127.0.0.1:1").ended(3)
     assert "nothing answers at tcp/127.0.0.1:1" in nobody.err
     assert run("node", "-p", "sim:", "--name", "a/b").code == 2

@@ -304,23 +304,8 @@ def test_what_is_recorded_is_chosen_and_what_does_not_come_is_named(run, drives,
     assert "is not a full scale" in run("record", "-p", drives.st, "-o", path, "--full-scale", "0").ended(2).err
 
 
-@pytest.fixture
-def share(start, sim, tmp_path):
-    """`share()`: a share of simulated drives. They stay when it ends."""
-    drives, place = sim(), tmp_path / "share"
-
-    def share():
-        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{place}", "--json"]
-        running = start("share", *words, *PATIENT)
-        running.line(0)
-        running.path, running.drives = place, drives
-        return running
-
-    return share
-
-
-def test_a_share_is_recorded_with_what_other_programs_do(run, share, record, tmp_path):
-    serving, path = share(), tmp_path / "run.mcap"
+def test_a_share_is_recorded_with_what_other_programs_do(run, shares, record, tmp_path):
+    serving, path = shares(), tmp_path / "run.mcap"
     place, drives = serving.path, serving.drives
     ports = ("-p", f"share:{place}/st0", "--motor", "1", "-p", f"share:{place}/rmd0", "--id", "2")
     running = record(path, *ports, until=1)
@@ -362,8 +347,8 @@ def test_a_share_is_recorded_with_what_other_programs_do(run, share, record, tmp
     assert "frames     those of rmd0 are not recorded: a share holds the port" in info
 
 
-def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, record, run, tmp_path):
-    running, path = share(), tmp_path / "run.mcap"
+def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(shares, record, run, tmp_path):
+    running, path = shares(), tmp_path / "run.mcap"
     recording = record(path, "-p", f"share:{running.path}/rmd0", "--id", "1", until=1)
 
     def values():
@@ -380,7 +365,7 @@ def test_a_share_that_ends_or_is_stopped_is_followed_when_it_is_back(share, reco
     assert running.wait() == 0
     recording.more_lines(2)
     ended = values()
-    share()
+    shares()
     continues(ended)
     told = recorded(recording)
     assert told["lost"] == 0

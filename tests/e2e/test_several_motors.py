@@ -55,19 +55,6 @@ def test_without_any_motor_all_is_a_failure(run):
     assert "may still be turning" in run(*lost, "off", "--all").ended(3).err
 
 
-@pytest.mark.parametrize("ids", [["--all"], ["--id", "1-4"], ["--id", "1"]])
-def test_motors_stop_on_a_line_that_loses_frames(bench, run, rmd, ids):
-    """With each of many seeds it is tested in crates/motorlink/tests/rmd_stopping.rs."""
-    rmd("--id", "1-4", "speed", 100).ended(0)
-    done = run("rmd", "-p", bench.port("slcan"), "--fault", "drop=0.4,seed=1", "off", *ids)
-    meant = modes(bench)[:1] if ids == ["--id", "1"] else modes(bench)
-    assert meant == ["off"] * len(meant), done.err
-    assert done.code in (0, 3)
-    # A motor without a confirmation is an error.
-    is_confirmed = len(done.out.splitlines()) == len(meant)
-    assert is_confirmed if done.code == 0 else "may still be turning" in done.err, done.err
-
-
 def test_what_is_for_one_motor_refuses_several(run):
     for words in (["zero"], ["encoder-offset", 3]):
         assert "one --id" in run("rmd", "-p", "sim:", "--id", "1,2", *words).ended(2).err

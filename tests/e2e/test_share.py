@@ -52,22 +52,8 @@ while client.receive():
 
 
 @pytest.fixture
-def drives(sim):
-    """Simulated drives on a port of each kind."""
-    return sim()
-
-
-@pytest.fixture
-def share(start, drives, tmp_path):
-    """A share of these drives; its socket is `path`."""
-    path = tmp_path / "share"
-    # A busy machine may be late with a reply.
-    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "60s"]
-    running = start("share", *words, "--json")
-    ready = json.loads(running.line(0))
-    assert [line["line"] for line in ready["lines"]] == ["st0", "rmd0"]
-    running.path = path
-    return running
+def share(shares):
+    return shares("60s")
 
 
 def program(code, share, said):
@@ -137,7 +123,7 @@ def test_the_stop_of_a_program_that_left_is_repeated_until_the_drive_confirms_it
         watcher.until(event("stopped"))
 
 
-def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, drives, run):
+def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, run):
     process = program(TURNS, share, "turning")
     watcher = Client(share.path, "watcher")
     share.interrupt()
@@ -147,19 +133,20 @@ def test_a_share_that_is_interrupted_stops_motors_and_says_so(share, drives, run
     stopped = [json.loads(line) for line in share.out if '"stopped"' in line]
     assert {(it["line"], it["motor"]) for it in stopped} == {("st0", 1), ("rmd0", 2)}
     eventually(
-        lambda: run("st", "-p", drives.st, "get", "SPEED_MEAS", "--json").values["SPEED_MEAS"] < 30,
+        lambda: run("st", "-p", share.drives.st, "get", "SPEED_MEAS", "--json").values["SPEED_MEAS"] < 30,
         "a motor that stops",
     )
     assert not share.path.exists()
 
 
-def test_a_new_share_takes_the_place_of_a_killed_one_and_stops_all_motors_that_it_turned(share, drives, start):
+def test_a_new_share_takes_the_place_of_a_killed_one_and_stops_all_motors_that_it_turned(share, start):
     process, client = program(TURNS, share, "turning"), Client(share.path, "x")
     share.process.send_signal(signal.SIGKILL)
     share.wait()
     # Programs see the end.
     assert list(iter(client.receive, None)) is not None
     process.communicate()
+    drives = share.drives
     words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--timeout", "1s"]
     new = start("share", *words, "--at", f"unix:{share.path}")
     assert new.line(0).startswith(f"share at unix:{share.path}: st0 (serial:")
@@ -244,7 +231,7 @@ def test_a_share_that_was_frozen_starts_no_motor_and_stops_one(share):
     eventually(lambda: are_still(program), "motors that stop")
 
 
-def test_a_share_takes_no_place_of_others(share, drives, run, tmp_path):
+def test_a_share_takes_no_place_of_others(share, run, tmp_path):
     taken = run("share", "-p", "sim:", "--at", f"unix:{share.path}").ended(3)
     assert "is served" in taken.err or "another" in taken.err, taken.err
     (tmp_path / "file").write_text("mine")

@@ -14,21 +14,8 @@ ROUNDS = int(os.environ.get("ROUNDS", "1"))
 
 
 @pytest.fixture
-def drives(sim):
-    """Simulated drives on a port of each kind."""
-    return sim()
-
-
-@pytest.fixture
-def share(start, drives, tmp_path):
-    """A share of these drives: `st` and `rmd` are its lines as ports, `path` is its socket."""
-    path = tmp_path / "share"
-    # A busy machine may be late with a reply.
-    words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "2s"]
-    running = start("share", *words, "--json")
-    running.line(0)
-    running.path, running.st, running.rmd = path, f"share:{path}/st0", f"share:{path}/rmd0"
-    return running
+def share(shares):
+    return shares()
 
 
 @pytest.fixture
@@ -61,16 +48,6 @@ def test_st_commands_work_as_on_a_port_of_their_own(share, run, tmp_path):
     refused = run(*st, "-m", "5", "stop").ended(1)
     assert "BAD_MOTOR_SELECTED" in refused.err and "no motor of this number" in refused.err
     assert "may still be turning" not in refused.err
-
-
-def test_rmd_commands_work_as_on_a_port_of_their_own(share, run, direct):
-    rmd = ["rmd", "-p", share.rmd]
-    assert len(run(*rmd, "scan", "--json").ended(0).lines) == 4
-    run(*rmd, "--id", "2", "dump").ended(0)
-    run(*rmd, "torque4", "0", "0", "0", "0.1").ended(0)
-    run(*rmd, "status", "--every", "20ms", "--count", "10").ended(0)
-    assert "does not answer" in run(*rmd, "--id", "9", "status").ended(3).err
-    eventually(lambda: all(abs(direct.dps(motor)) < 5 for motor in (1, 2, 3, 4)), "motors that stop")
 
 
 def test_what_cannot_be_opened_is_refused_with_words(share, run, tmp_path):
@@ -132,46 +109,44 @@ def test_a_command_latches_stops_and_releases(share, run, direct):
     assert "is --at that of a running `motorlink share`?" in missing
 
 
-def test_a_stop_that_a_drive_does_not_confirm_is_an_error(share, run, drives, direct):
+def test_a_stop_that_a_drive_does_not_confirm_is_an_error(share, run, direct):
     direct.command("rmd0", 9, 0xA2, *7 * [0])
     done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(3)
     assert "rmd0, motor 9: it may still be turning" in done.out
     assert "not all confirmed" in done.err
 
 
-def test_a_stop_of_all_says_where_no_motor_was_found_and_is_no_error_for_it(share, run, drives):
+def test_a_stop_of_all_says_where_no_motor_was_found_and_is_no_error_for_it(share, run):
     run("rmd", "-p", share.rmd, "--id", "1", "status").ended(0)
     for motor in (20, 21):
         run("rmd", "-p", share.rmd, "--id", motor, "status").ended(3)
     run("st", "-p", share.st, "-m", 5, "status").ended(1)
-    # What the first stop learned does not change the answer to the second one.
-    for _ in range(2):
-        done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(0)
-        assert "rmd0, motor 1: it confirmed the stop" in done.out
-        assert "rmd0: no motor was found at 20 to 21\n" in done.out
-        assert "st0: no motor was found at 5\n" in done.out
-        assert "may still be turning" not in done.out
+    done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(0)
+    assert "rmd0, motor 1: it confirmed the stop" in done.out
+    assert "rmd0: no motor was found at 20 to 21\n" in done.out
+    assert "st0: no motor was found at 5\n" in done.out
+    assert "may still be turning" not in done.out
     said = run("share", "stop", "--at", f"unix:{share.path}", "--json", within=60).ended(0)
     assert '"event":"no-motor","line":"rmd0"' in said.out.replace(" ", "")
 
 
-def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start, run, drives):
+def test_after_the_kill_of_a_share_commands_say_so_at_once(share, start):
     reads = start("st", "-p", share.st, "get", "STATUS", "--every", "10ms")
     reads.line(3)
     share.process.send_signal(signal.SIGKILL)
     share.wait()
     reads.until(lambda: any("the share is gone" in line for line in reads.err), "why it does not read")
-    new = start("share", "-p", drives.st, "--at", f"unix:{share.path}")
+    new = start("share", "-p", share.drives.st, "--at", f"unix:{share.path}")
     new.line(0)
     reads.more_lines()
     reads.interrupt()
     reads.wait()
 
 
-def test_a_program_that_ends_when_its_share_is_just_back_stops_its_motor(start, drives, tmp_path):
+def test_a_program_that_ends_when_its_share_is_just_back_stops_its_motor(start, sim, tmp_path):
     """The pause before a lost port is opened again does not hold for stops."""
     path = tmp_path / "share"
-    words = ["-p", f"slcan:{drives.can}", "--at", f"unix:{path}", "--timeout", "2s", "--json"]
+    words = ["-p", f"slcan:{sim().can}", "--at", f"unix:{path}", "--timeout", "2s", "--json"]
     share = start("share", *words)
     share.line(0)
     for _ in range(ROUNDS):
@@ -186,8 +161,8 @@ def test_a_program_that_ends_when_its_share_is_just_back_stops_its_motor(start, 
         eventually(lambda direct=direct: abs(direct.dps(2)) < 5, "a motor at rest")
 
 
-def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, drives, tmp_path):
-    words = ["-p", drives.st, "--at", f"unix:{tmp_path}/share", "--timeout", "100ms"]
+def test_a_frozen_share_is_not_taken_for_a_silent_drive(start, sim, tmp_path):
+    words = ["-p", sim().st, "--at", f"unix:{tmp_path}/share", "--timeout", "100ms"]
     share = start("share", *words)
     share.line(0)
     reads = start("st", "-p", f"share:{tmp_path}/share/st0", "get", "STATUS", "--every", "10ms")

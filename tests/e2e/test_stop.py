@@ -33,9 +33,8 @@ def write_cut_off(drive):
         line.port.flush()
 
 
-@pytest.mark.parametrize("profile", ["mcsdk-5.4", "spec"])
-def test_a_stop_reaches_a_drive_that_waits_for_the_rest_of_a_frame(run, drive, profile):
-    words = ("st", "-p", drive.st, "--profile", profile)
+def test_a_stop_reaches_a_drive_that_waits_for_the_rest_of_a_frame(run, drive):
+    words = ("st", "-p", drive.st)
     run(*words, "start").ended(0)
     write_cut_off(drive)
     assert run(*words, "stop").ended(0).out == "motor 1: STOP_MOTOR acknowledged\n"

@@ -11,16 +11,13 @@ SCENARIO = 'title = "rest"\nduration = 0.1\n[[st.motor]]\n'
 @pytest.mark.parametrize(
     "words, tip",
     [
-        ("st statuss", "'status'"),
         ("st --json info", "-p PORT"),
         ("st -p COM3 status", "`COM3` is a port of Windows, and this system is not Windows; `motorlink ports`"),
         ("rmd -p can0 scan", "did you mean `socketcan:can0`?"),
-        ("rmd -p ./can0 scan", "cannot be used as a CAN bus: use slcan:"),
         ("rmd -p ./can0 scan", "write -p slcan:./can0"),
         ("st -p slcan:./st0 status", "for an ST drive on this line write -p ./st0"),
         ("st -p socketcan:can0 status", "for RMD motors on a CAN bus use `motorlink rmd`"),
         ("st get SPEED_MES -p sim:", "did you mean `SPEED_MEAS`?"),
-        ("st set SPED_KP 1 -p sim:", "did you mean `SPEED_KP`?"),
         ("st get SPEED_* -p sim:", "`motorlink st registers 'SPEED_*'`"),
     ],
 )

@@ -53,23 +53,6 @@ def test_twelve_motors_have_a_row_each(sim, watch, tmp_path):
     eventually(lambda: terminal.is_as_before, "the terminal as before")
 
 
-def test_stop_all_while_a_value_is_typed_stops_the_motors(bench, watch):
-    bench.turn()
-    terminal = watch(*bench.ports)
-    terminal.shows("RUN", "turning")
-    terminal.press("r", "/", "SPEED_KP", "enter", "e", "12")
-    terminal.shows("new value of SPEED_KP: 12_")
-    terminal.press("F12")
-    bench.rests()
-    terminal.shows("LATCHED", "new value of SPEED_KP: 12_")
-    terminal.press("esc")
-    terminal.shows_no("new value")
-    terminal.press("esc")
-    terminal.shows_no("with `SPEED_KP`")
-    terminal.press("esc")
-    terminal.shows("stop confirmed by all 6")
-
-
 def test_stop_all_that_comes_together_with_more_is_taken(bench, watch):
     bench.turn()
     terminal = watch(*bench.ports)

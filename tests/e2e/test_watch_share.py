@@ -2,39 +2,20 @@
 
 import signal
 
-import pytest
-
-from program import PATIENT, eventually
+from program import eventually
 from sharing import Client
-
-
-@pytest.fixture
-def serve(start, sim, tmp_path):
-    """`serve()`: a share of simulated drives, `share.ports` is for watch. They stay when it is killed."""
-    drives = sim()
-
-    def serve():
-        path = tmp_path / "share"
-        words = ["-p", drives.st, "-p", f"slcan:{drives.can}", "--at", f"unix:{path}"]
-        running = start("share", *words, *PATIENT)
-        running.line(0)
-        running.path, running.drives = path, drives
-        running.ports = ("-p", f"share:{path}/st0", "-p", f"share:{path}/rmd0")
-        return running
-
-    return serve
 
 
 def speed(share):
     return abs(share.drives.motor(1, f"pty:{share.drives.st}")["speed_rpm"])
 
 
-def test_stop_all_stops_and_latches_the_programs_of_the_share(serve, watch):
-    share = serve()
+def test_stop_all_stops_and_latches_the_programs_of_the_share(shares, watch):
+    share = shares()
     tuner = Client(share.path, "tuner")
     tuner.command("st0", 1, 3, 1)
     eventually(lambda: speed(share) > 300, "a motor that turns")
-    terminal = watch(*share.ports)
+    terminal = watch("-p", share.st, "-p", share.rmd)
     terminal.shows("6 motors on 2 ports", "RUN")
     terminal.press("!")
     terminal.shows("stop confirmed by all 6 motors", "LATCHED (u releases it): every motion is refused")
@@ -48,11 +29,11 @@ def test_stop_all_stops_and_latches_the_programs_of_the_share(serve, watch):
     eventually(lambda: speed(share) > 300, "a motor that turns")
 
 
-def test_the_kill_of_the_share_is_said_and_stop_and_latch_are_repeated_at_the_next_one(serve, watch):
-    share = serve()
+def test_the_kill_of_the_share_is_said_and_stop_and_latch_are_repeated_at_the_next_one(shares, watch):
+    share = shares()
     tuner = Client(share.path, "tuner")
     tuner.command("st0", 1, 3, 1)
-    terminal = watch(*share.ports)
+    terminal = watch("-p", share.st, "-p", share.rmd)
     terminal.shows("RUN")
     share.process.send_signal(signal.SIGKILL)
     share.wait()
@@ -60,7 +41,7 @@ def test_the_kill_of_the_share_is_said_and_stop_and_latch_are_repeated_at_the_ne
     terminal.press("!")
     terminal.shows("stop NOT CONFIRMED, may still be turning:", "NOT LATCHED for other programs of the share")
     assert terminal.bold("NOT LATCHED") and speed(share) > 300
-    share = serve()
+    share = shares()
     eventually(lambda: speed(share) < 1, "a motor at rest", 30)
     terminal.shows("stop confirmed by all 6 motors", "LATCHED (u releases it)")
     terminal.shows_no("NOT LATCHED")

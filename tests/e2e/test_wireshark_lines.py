@@ -6,7 +6,8 @@ import shutil
 
 import pytest
 from pcapng import RTAC_SERIAL, Capture
-from wireshark import ALL_ST, GET_SPEED, NACK, SPEED_1500, frame_of
+from st_wire import frame
+from wireshark import ALL_ST, GET_SPEED, NACK, SPEED_1500
 
 pytestmark = pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
 
@@ -56,10 +57,10 @@ def test_damage_is_shown_where_it_is(packets, tshark):
 
 def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
     """The same cases as those of `motorlink decode`."""
-    speed, reference, status = (frame_of(b"\x22", bytes([register])) for register in (0x1E, 0x04, 0x02))
-    configure = [frame_of(b"\x2e", bytes([0, register])) for register in (0x1E, 0x04)]
-    reply, short, done = (frame_of(b"\xf0", data) for data in (bytes([7, 0, 0, 0]), b"\0", b""))
-    segment = frame_of(b"\x2d", b"\0")
+    speed, reference, status = (frame(0x22, bytes([register])) for register in (0x1E, 0x04, 0x02))
+    configure = [frame(0x2E, bytes([0, register])) for register in (0x1E, 0x04)]
+    reply, short, done = (frame(0xF0, data) for data in (bytes([7, 0, 0, 0]), b"\0", b""))
+    segment = frame(0x2D, b"\0")
     line = Capture(RTAC_SERIAL)
     texts = []
 
@@ -80,7 +81,7 @@ def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
     # No reply comes after a second.
     exchange(reference), exchange(speed, after_ms=1001), exchange(reply, "< ACK 7 rpm")
     exchange(configure[0]), exchange(done, "< ACK"), exchange(segment), exchange(reply, "< ACK SPEED_MEAS 7 rpm")
-    exchange(frame_of(b"\x23", b"\x07")), exchange(configure[1]), exchange(done, "< ACK")
+    exchange(frame(0x23, b"\x07")), exchange(configure[1]), exchange(done, "< ACK")
     exchange(segment, after_ms=1001), exchange(reply, "< ACK, 4 bytes")
     info = tshark(line, "-T", "fields", "-e", "_ws.col.Info").splitlines()
     assert [text if text is None else shown for text, shown in zip(texts, info)] == texts
@@ -93,7 +94,7 @@ def test_a_reply_that_may_answer_several_requests_has_no_value(packets, tshark):
 def test_a_length_over_128_begins_no_frame(packets):
     serial = Capture(RTAC_SERIAL)
     for length in (128, 129):
-        serial.serial(frame_of(b"\x01", b"\x08" + bytes(length - 1)), True)
+        serial.serial(frame(0x01, b"\x08" + bytes(length - 1)), True)
     # The length is wrong: the dissector does not wait for more bytes.
     serial.serial(bytes.fromhex("0181"), True, after_ms=1001)
     longest, longer, begun = packets(serial, preferences=ALL_ST)
@@ -113,7 +114,7 @@ def test_a_request_that_is_too_short_says_what_a_drive_answers(tshark):
         (9, bytes(8), "SET_REVUP_DATA", "WRONG_SET"),
         (10, bytes(3), "SET_CURRENT_REF", "WRONG_SET"),
     ):
-        serial.serial(frame_of(bytes([0x20 | code]), payload), True)
+        serial.serial(frame(0x20 | code, payload), True)
         expected.append(f"> {name}, too short, motor 1\tthe payload is too short: a drive answers {answer}")
     out = tshark(serial, "-T", "fields", "-e", "_ws.col.Info", "-e", "_ws.expert.message", preferences=ALL_ST)
     assert out.splitlines() == expected

@@ -106,9 +106,3 @@ def on_line(frames):
         # So late that no reply to an earlier request comes any more.
         capture.serial(frame["data"], frame["sent"], after_ms=1001 if frame["sent"] else 1)
     return capture
-
-
-def frame_of(header, payload):
-    """A frame of ST's protocol."""
-    total = header[0] + len(payload) + sum(payload)
-    return header + bytes([len(payload)]) + payload + bytes([((total >> 8) + total) & 0xFF])

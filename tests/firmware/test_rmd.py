@@ -35,20 +35,6 @@ def test_a_scan_finds_the_motors(rmd):
     assert {motor["dialect"] for motor in found} == {"V1.62"}
 
 
-def test_a_motor_moves_holds_a_torque_and_is_switched_off(rmd, eventually):
-    def angle():
-        return rmd("-i", 2, "--json", "angle").ended(0).values["multi_turn_angle"]
-
-    rmd("-i", 2, "position", 90, "--max-speed", 500).ended(0)
-    eventually(lambda: abs(angle() - 90) < 1, "90°")
-    rmd("-i", 2, "torque", 0.3).ended(0)
-    eventually(lambda: angle() > 180, "a motor that turns")
-    rmd("-i", 2, "off").ended(0)
-    eventually(lambda: rmd("-i", 2, "--json", "status").ended(0).values["speed"] == 0, "rest")
-    torques = rmd("--json", "torque4", 0.0, 0.0, 0.0, 0.0).ended(0)
-    assert len(torques.lines) == 4
-
-
 def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
     garbage = bytes((index * 89 + 7) & 0xFF for index in range(20_000))
     with connect(board.rmd) as line:

@@ -6,11 +6,9 @@ import test_st_bytes
 from clock import MOST_TICKS
 from st_wire import ACK, EXECUTE, GET_REG, TIMEOUT, Line, frame, header, nack
 from test_st_bytes import (  # noqa: F401  # tests that run here with this file's fixture
-    test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
     test_a_frame_in_single_bytes_is_understood,
     test_a_length_over_128_makes_the_drive_deaf_until_the_line_was_silent,
     test_a_payload_of_128_bytes_is_taken_and_one_of_128_bytes_comes_back,
-    test_noise_never_wedges_the_drive,
     test_motors_have_registers_of_their_own_and_refuse_what_these_are_not_for,
 )
 
@@ -32,14 +30,6 @@ def test_info_status_and_registers_are_read(st):
     assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
     assert len(st("--json", "revup-data").ended(0).lines) == 5
     assert list(st("--json", "segment", "SPEED_MEAS", "I_A").ended(0).values) == ["SPEED_MEAS", "I_A"]
-
-
-def test_what_is_written_is_read_back_and_what_is_wrong_is_refused(st):
-    st("set", "SPEED_KP", 1234).ended(0)
-    assert st("--json", "get", "SPEED_KP").ended(0).values["SPEED_KP"] == 1234
-    refused = st("get", "0xEE").ended(1)
-    assert "GET_WRITE_ONLY" in refused.err
-    assert "BAD_MOTOR_SELECTED" in st("-m", 3, "status").ended(1).err
 
 
 @pytest.mark.parametrize("motor", [1, 2])

@@ -7,6 +7,7 @@ use motorlink_kernels::kernel::{Counter, Kernel};
 use motorlink_kernels::result::Result;
 use rustix::time::{ClockId, clock_gettime};
 
+use crate::line::Spread;
 use crate::report::{Goal, Section};
 
 use peers::{Peer, Peers};
@@ -145,17 +146,5 @@ fn processor_seconds() -> f64 {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_median_is_the_middle_in_whatever_order() {
-        assert_eq!(median([3.0, -1.0, 2.0].into_iter()), 2.0);
-    }
+    Spread::of(values.collect()).median
 }

@@ -98,6 +98,10 @@ class Served:
         motors: list[dict[str, object]] = bench["motors"]
         return next(motor for motor in motors if motor["motor"] == number)
 
+    def rpm(self) -> float:
+        """The real speed of ST motor 1."""
+        return float(str(self.motor("st", 1)["speed_rpm"]))
+
     @contextmanager
     def silent(self) -> Iterator[None]:
         """Drives that do not answer."""

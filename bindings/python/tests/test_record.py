@@ -24,13 +24,8 @@ from motorlink.errors import InvalidValueError, PortError, RecordingError, Reply
 from motorlink.recording import Recorder, _record
 
 
-def speed(served: Served) -> float:
-    """The real speed of the ST motor, rpm."""
-    return float(str(served.motor("st", 1)["speed_rpm"]))
-
-
 def is_at_rest(served: Served) -> bool:
-    return abs(speed(served)) < 30
+    return abs(served.rpm()) < 30
 
 
 def turn(client: st.Client, rpm: float = 1500) -> None:
@@ -108,7 +103,7 @@ def test_a_program_drives_motors_and_records_them(served: Served, tmp_path: Path
                 assert client.motor(1).get("SPEED_KP") == digits
             client.confirm()
         # The end of the recording does not stop the motors. That of their clients does.
-        assert speed(served) > 1400 and (client.moving, bus.moving) == ([1], [2])
+        assert served.rpm() > 1400 and (client.moving, bus.moving) == ([1], [2])
         assert client.motor(1).get("SPEED_MEAS") > 1400
     eventually(lambda: is_at_rest(served), "a motor that stops")
     run = complete(recorder, path)
@@ -145,7 +140,7 @@ def test_the_close_of_the_client_stops_motors_at_once_and_ends_its_recording(
     client = st.open(served.st, timeout=PATIENT)
     with motorlink.record(client, path, rate=100, motors=[1]) as recorder:
         turn(client)
-        eventually(lambda: speed(served) > 1400, "a motor that turns")
+        eventually(lambda: served.rpm() > 1400, "a motor that turns")
         client.close()
         eventually(lambda: is_at_rest(served), "a motor that stops")
         with st.open(served.st, timeout=PATIENT) as other:
@@ -161,7 +156,7 @@ def test_a_recording_keeps_no_client_from_being_collected(served: Served, tmp_pa
     client = st.open(served.st, timeout=PATIENT)
     with motorlink.record(client, tmp_path / "run.mcap", rate=100, motors=[1]) as recorder:
         turn(client)
-        eventually(lambda: speed(served) > 1400, "a motor that turns")
+        eventually(lambda: served.rpm() > 1400, "a motor that turns")
         recorded(recorder, 1)
         del client
         gc.collect()
@@ -321,7 +316,7 @@ def test_a_disk_that_is_full_ends_the_recording_and_no_motor(served: Served, tmp
         stdin=subprocess.PIPE,
     )
     says(full, "RUN [1]")
-    eventually(lambda: speed(served) > 1400, "a motor that turns")
+    eventually(lambda: served.rpm() > 1400, "a motor that turns")
     full.communicate("\n", timeout=60)
     assert full.returncode == 0
     eventually(lambda: is_at_rest(served), "a motor that stops")
@@ -461,7 +456,7 @@ def test_a_signal_handler_uses_the_client_while_it_is_recorded(served: Served, t
         try:
             with motorlink.record(client, tmp_path / "run.mcap", rate=100, motors=[1]) as recorder:
                 turn(client)
-                eventually(lambda: speed(served) > 1400, "a motor that turns")
+                eventually(lambda: served.rpm() > 1400, "a motor that turns")
                 signal.raise_signal(signal.SIGALRM)
                 assert stops == ["stopped"] and client.moving == []
                 eventually(lambda: is_at_rest(served), "a motor that stops")

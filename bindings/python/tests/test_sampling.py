@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
 import importlib.util
-import threading
-import types
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,25 +20,6 @@ def test_registers_are_sampled_in_their_units(st_bus: st.Client) -> None:
     assert set(data["BUS_VOLTAGE"]) == {st_bus.motor(1).get("BUS_VOLTAGE")}
     assert 1 <= len(data) <= 50
     data["t"][0] = 0  # The array is the caller's.
-
-
-def test_segments_and_single_reads_have_the_same_values() -> None:
-    names = ["BUS_VOLTAGE", "SPEED_KP"]
-    # The client uses segments, which the first drive refuses.
-    for bench in (sim.Bench('profile = "mcsdk-5.4"'), sim.Bench()):
-        with st.open(bench) as bus:
-            bus.motor(1).set("SPEED_KP", 77)
-            data = bus.sample(names, rate=100, seconds=0.3)
-        assert set(data["SPEED_KP"]) == {77} and set(data["BUS_VOLTAGE"]) == {325}
-
-
-def test_more_registers_than_a_segment_has() -> None:
-    bus = sim.Bench().st
-    registers = bus.motor(1).registers
-    names = [name for name in registers.get_all()][:40]
-    data = bus.sample(names, rate=20, seconds=0.3)
-    assert data.dtype.names == ("t", *names)
-    assert data["SPEED_KP"][0] == registers.SPEED_KP
 
 
 def test_motors_have_columns_in_digits_or_units() -> None:
@@ -104,30 +81,6 @@ def test_invalid_arguments_are_refused(st_bus: st.Client, rmd_bus: rmd.Client) -
             nonsense()
     with pytest.raises(motorlink.RefusedError):
         st_bus.sample({7: ["STATUS"]}, rate=10, seconds=1)
-
-
-class Frame:
-    """The part of pandas that `to_pandas` uses."""
-
-    def __init__(self, columns: dict[str, Any]):
-        self.columns, self.index = columns, ""
-
-    def set_index(self, name: str) -> Frame:
-        """Remembers the index."""
-        self.index = name
-        return self
-
-
-def test_with_pandas_the_time_is_the_index(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = sim.Bench().st.sample(["STATUS", "SPEED_MEAS"], rate=100, seconds=0.3)
-    if importlib.util.find_spec("pandas"):
-        frame = motorlink.to_pandas(data)
-        assert list(frame.columns) == ["STATUS", "SPEED_MEAS"] and frame.index.name == "t"
-        return
-    pandas = types.SimpleNamespace(DataFrame=Frame)
-    monkeypatch.setattr(importlib, "import_module", lambda name: pandas)
-    frame = motorlink.to_pandas(data)
-    assert list(frame.columns) == ["t", "STATUS", "SPEED_MEAS"] and frame.index == "t"
 
 
 def test_samplings_do_not_use_the_segments_of_others() -> None:

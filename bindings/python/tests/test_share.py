@@ -40,11 +40,6 @@ def share(command: str, served: Served, tmp_path: Path) -> Iterator[Share]:
     share.end()
 
 
-def speed(drives: Served) -> float:
-    """The real speed of the ST motor, rpm."""
-    return float(str(drives.motor("st", 1)["speed_rpm"]))
-
-
 MOVES = """
 import signal, sys, motorlink
 bus = motorlink.rmd.open(sys.argv[1], on_close="off")
@@ -88,7 +83,7 @@ def test_tasks_use_a_share(share: Share, served: Served) -> None:
             assert {row[f"voltage_volts_{id}"] for id in quantities} == {24}
             await client.confirm()
             await motor.stop()
-        eventually(lambda: abs(speed(served)) < 30, "a motor that stops")
+        eventually(lambda: abs(served.rpm()) < 30, "a motor that stops")
 
     asyncio.run(asyncio.wait_for(main(), 60))
 

@@ -49,25 +49,6 @@ fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
 }
 
 #[test]
-fn an_overrun_drops_the_frame_and_sends_a_nack() {
-    let mut bench = spec();
-    bench.bytes(&GET_STATUS[..2]);
-    let reply = bench.slave.overrun().to_vec();
-    assert_eq!(answer(&reply), Err(ErrorCode::Overrun));
-    assert_eq!(answer(&bench.bytes(&GET_STATUS)), Ok(vec![0]));
-}
-
-#[test]
-fn a_value_keeps_its_sign() {
-    let mut bench = spec();
-    bench.ask(1, set(RegisterId::SPEED_KP, &[0xFF, 0xFF])).unwrap();
-    assert_eq!(bench.drive.value(1, RegisterId::SPEED_KP), -1);
-    bench.ask(1, set(RegisterId::FLUXWK_BUS, &[98, 0])).unwrap();
-    assert_eq!(bench.drive.value(1, RegisterId::FLUXWK_BUS), 980, "tenths inside the drive");
-    assert_eq!(bench.ask(1, Request::GetRegister(RegisterId::FLUXWK_BUS)), Ok(vec![98, 0]));
-}
-
-#[test]
 fn temperature_and_power_have_a_sign_in_shipped_firmware_only() {
     for register in [RegisterId::HEATS_TEMP, RegisterId::MOTOR_POWER] {
         for (profile, value, read) in [
@@ -103,21 +84,6 @@ fn shipped_firmware_differs_from_table_3_in_sizes_and_access() {
     assert_eq!(bench.ask(0, Request::GetRegister(c1)), Ok(vec![0x34, 0x12]));
     assert_eq!(bench.ask(0, set(RegisterId::OBSERVER_CR_C1, &[0; 4])), Err(ErrorCode::SetReadOnly));
     assert_eq!(bench.ask(0, set(RegisterId::SC_STARTUP_SPEED, &[0; 4])), Err(ErrorCode::WrongSet));
-}
-
-#[test]
-fn shipped_firmware_refuses_a_missing_feature_with_3_and_5() {
-    let mut bench = SlaveFixture::new(Profile::Mcsdk54, 1, Memory::with(Features::NONE));
-    let kp = RegisterId::FLUXWK_KP;
-    assert_eq!(bench.ask(0, Request::GetRegister(kp)), Err(ErrorCode::GetWriteOnly));
-    assert_eq!(bench.ask(0, set(kp, &[1, 0])), Err(ErrorCode::WrongSet));
-    let measured = RegisterId::FLUXWK_BUS_MEAS;
-    assert_eq!(bench.ask(0, set(measured, &[1, 0])), Err(ErrorCode::SetReadOnly));
-    assert_eq!(bench.ask(0, set(RegisterId::DAC_OUT1, &[0x27])), Ok(vec![]));
-    assert_eq!(
-        bench.ask(0, Request::GetRegister(RegisterId::DAC_OUT1)),
-        Err(ErrorCode::GetWriteOnly)
-    );
 }
 
 #[test]

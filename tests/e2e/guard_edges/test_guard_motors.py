@@ -92,19 +92,7 @@ def test_what_cannot_be_guarded_is_told(run):
         assert says in run("guard", *words).ended(2).err
 
 
-def test_two_requests_at_once_do_not_hide_which_motor_is_started(sim, guard):
-    """Motor number 0 is the motor of the request before, which is not answered yet."""
-    drives = sim(rmd=())
-    process = guard("st", drives)
-    with RawLine(process.port) as line:
-        line.say(bytes([0x42, 0x01, 0x02, 0x45]), b"\xf0\x01")
-        os.write(line.end, bytes([0x22, 0x01, 0x02, 0x25, 0x03, 0x01, 0x01, 0x05]))
-        turns(drives, "st")
-    process.says_halted("motor 1")
-    rests(drives, "st")
-
-
-def test_the_pfc_that_a_program_enabled_is_disabled(sim, guard, tmp_path):
+def test_the_pfc_that_a_program_enabled_is_disabled(sim, guard):
     drives = sim(rmd=())
     process = guard("st", drives)
     line = os.open(process.port, os.O_RDWR | os.O_NOCTTY)

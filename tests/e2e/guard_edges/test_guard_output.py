@@ -24,7 +24,7 @@ def test_a_guard_whose_output_nobody_reads_guards_on_and_ends(bench, mute, clien
     rests(drives, protocol)
 
 
-def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client, tmp_path):
+def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client):
     """Each event is a line on stderr, which is not read."""
     drives = bench("st")
     words = ["guard", "-p", drives.st, "--serve", "tcp-listen:127.0.0.1:0"]

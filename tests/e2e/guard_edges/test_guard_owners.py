@@ -12,7 +12,6 @@ import pytest
 from guarded import is_told_to_stop
 from lines import RawLine
 from program import eventually
-from sharing import Client
 from st_wire import EXECUTE, SET_RAMP, SET_REG, frame, header
 
 RUNS = int(os.environ.get("OWNER_RUNS", "1"))
@@ -71,36 +70,13 @@ def test_a_signal_to_a_guard_stops_a_motor_whose_motion_its_program_changed(driv
         drive.stops("SIGTERM of the guard")
 
 
-def test_a_share_stops_a_motor_whose_motion_its_program_changed(drive, start, tmp_path):
-    answered = 0
-    for name, (code, payload) in RUNS * list(ST.items()):
-        drive.turns()
-        share = start("share", "-p", drive.drives.st, "--at", f"unix:{tmp_path}/share", "--json")
-        share.line(0)
-        program = Client(tmp_path / "share", "program")
-        answer = program.command("st0", 1, code, *payload)
-        program.socket.close()
-        answered += answer["kind"] == "answer"
-        # What the drive refuses, or does not get on a busy machine, changes nothing.
-        if answer.get("reason") in ("refused", "expired"):
-            other = Client(tmp_path / "share", "other")
-            assert other.ask("stop")["kind"] == "answer"
-        drive.stops(name)
-        share.end()
-    assert answered
-
-
-@pytest.mark.parametrize("path", ["guard", "share"])
-def test_rmd_motors_whose_motion_a_program_changed_stop(sim, start, tmp_path, path):
+def test_rmd_motors_whose_motion_a_program_changed_stop(sim, start, tmp_path):
     drives = sim(st=(), rmd=("tcp",))
     host, _, port = drives.can_address.rpartition(":")
     other = socket.create_connection((host, int(port)), 10)
     other.sendall(b"\rC\rS8\rO\r")
     port = f"slcan:tcp:{drives.can_address}"
-    if path == "guard":
-        start("guard", "rmd", "-p", port, "--serve", f"slcan-pty:{tmp_path}/held").line(0)
-    else:
-        start("share", "-p", port, "--at", f"unix:{tmp_path}/share", "--json").line(0)
+    start("guard", "rmd", "-p", port, "--serve", f"slcan-pty:{tmp_path}/held").line(0)
     for name, (identifier, data) in RUNS * list(RMD.items()):
 
         def turns():
@@ -109,15 +85,7 @@ def test_rmd_motors_whose_motion_a_program_changed_stop(sim, start, tmp_path, pa
             return drives.motor(1)["mode"] == "speed"
 
         eventually(turns, "the motor turns")
-        if path == "guard":
-            with RawLine(tmp_path / "held") as line:
-                line.say(b"\rC\rS8\rO\r", b"\r")
-                line.say(f"t{identifier:03X}8{data.hex().upper()}\r".encode(), b"t1418")
-        elif identifier != 0x280:
-            program = Client(tmp_path / "share", "program")
-            sent = lambda: program.command("rmd0", 1, *data)  # noqa: E731
-            eventually(lambda: sent()["kind"] == "answer", f"the answer to {name}")
-            program.socket.close()
-        else:
-            continue
+        with RawLine(tmp_path / "held") as line:
+            line.say(b"\rC\rS8\rO\r", b"\r")
+            line.say(f"t{identifier:03X}8{data.hex().upper()}\r".encode(), b"t1418")
         eventually(lambda: is_told_to_stop(drives, "rmd"), f"the stop after {name}")

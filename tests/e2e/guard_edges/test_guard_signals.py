@@ -59,7 +59,7 @@ def test_a_guard_is_not_suspended(bench, guard, client):
     process.says_halted("motor 1")
 
 
-def test_what_a_guard_was_told_to_ignore_does_not_end_it(bench, guard, client, motorlink, tmp_path):
+def test_what_a_guard_was_told_to_ignore_does_not_end_it(bench, client, motorlink, tmp_path):
     drives = bench("st")
     words = [motorlink, "guard", "-p", drives.st, "--serve", f"pty:{tmp_path}/held"]
     process = subprocess.Popen(

@@ -105,11 +105,6 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_in_time_whatever_the_clock_of_the_publisher_says() {
-        settled();
-    }
-
-    #[test]
     fn a_sample_may_be_late_by_the_time_to_live() {
         let mut pace = settled();
         assert_eq!(pace.take(on_time(20) + 0.19, &sample(20), LIVE), Ok(()));

@@ -24,6 +24,9 @@ pub(super) struct Member {
     /// Its lines, as it told them last.
     pub(super) lines: Vec<Line>,
     pub(super) latched_by: Option<String>,
+    /// Its lines that the program latches and that have not told it yet: what they tell of a release happened
+    /// before. A line that is busy is late with what it tells.
+    pub(super) latching: BTreeSet<String>,
     /// The clocks of its lines, by the wall clock of this computer.
     clocks: BTreeMap<String, Clock>,
     /// The program's subscription of each of its subscriptions.
@@ -40,6 +43,7 @@ impl Member {
             state: State::Coming,
             lines: Vec::new(),
             latched_by: None,
+            latching: BTreeSet::new(),
             clocks: BTreeMap::new(),
             subscriptions: BTreeMap::new(),
             groups: BTreeMap::new(),

@@ -3,6 +3,7 @@
 //! It has no socket and reads no clock. Times come from the caller, in seconds.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::data;
@@ -12,6 +13,7 @@ use motorlink_telemetry::share::message::{
     Answer, Ask, Event, Happening, Line, Reason, Request, SignalName, Text, decode, encode,
 };
 
+use super::latches::Latches;
 use super::member::{Member, State};
 use super::names;
 use super::round::{Kind, Round};
@@ -80,8 +82,9 @@ pub(super) struct Merge {
     last_subscription: u32,
     subscriptions: BTreeMap<u32, Subscription>,
     last_group: u32,
-    /// Whether a node that comes is latched first.
-    latches: bool,
+    /// Whether a node that comes is latched first. The program is one of those that may latch.
+    latches: Latches,
+    program: Arc<()>,
     /// Until when a node that comes is stopped first.
     stops_until: f64,
     /// The nodes that have answered the last stop. What turns there since then was started on purpose.
@@ -93,7 +96,7 @@ pub(super) struct Merge {
 }
 
 impl Merge {
-    pub(super) fn new(who: String) -> Self {
+    pub(super) fn new(who: String, latches: Latches) -> Self {
         Merge {
             who,
             members: BTreeMap::new(),
@@ -105,7 +108,8 @@ impl Merge {
             last_subscription: 0,
             subscriptions: BTreeMap::new(),
             last_group: 0,
-            latches: false,
+            latches,
+            program: Arc::default(),
             stops_until: f64::NEG_INFINITY,
             stopped: BTreeSet::new(),
             now: 0.0,
@@ -147,7 +151,8 @@ impl Merge {
         member.state = State::Here;
         member.closing = None;
         // Before anything else can move its motors.
-        if self.latches {
+        member.latching.clear();
+        if self.latches.is_any() {
             self.ask(node, Ask::Latch, Of::Nothing);
         }
         if self.now < self.stops_until && !self.stopped.contains(node) {
@@ -250,11 +255,11 @@ impl Merge {
                 self.all(id, Kind::Stop);
             }
             Ask::Latch => {
-                self.latches = true;
+                self.latches.add(&self.program);
                 self.all(id, Kind::Latch);
             }
             Ask::Release => {
-                self.latches = false;
+                self.latches.clear();
                 self.all(id, Kind::Release);
             }
             Ask::Subscribe { .. } => self.subscribe(id, ask),
@@ -293,9 +298,7 @@ impl Merge {
                 self.answered(node, id, Err(Refusal { reason, message, code }));
             }
             Text::Event(event) => {
-                if event.event == Happening::Released {
-                    self.latches = false;
-                }
+                self.latch_is_told(node, &event);
                 let ahead = self.members.get(node).map_or(0.0, Member::ahead);
                 self.say(&Text::Event(names::event(node, event, ahead)));
             }
@@ -326,6 +329,18 @@ impl Merge {
                 }
             }
             Text::Later => {}
+        }
+    }
+
+    /// Somebody has latched or released the line of an event.
+    fn latch_is_told(&mut self, node: &Name, event: &Event) {
+        let (Some(member), Some(line)) = (self.members.get_mut(node), &event.line) else { return };
+        match event.event {
+            Happening::Latched => drop(member.latching.remove(line)),
+            Happening::Released if !member.latching.contains(line) => {
+                self.latches.remove(&self.program);
+            }
+            _ => {}
         }
     }
 
@@ -557,6 +572,9 @@ impl Merge {
     }
 
     fn ask(&mut self, node: &Name, ask: Ask, of: Of) {
+        if let (Ask::Latch, Some(member)) = (&ask, self.members.get_mut(node)) {
+            member.latching = member.lines.iter().map(|line| line.line.clone()).collect();
+        }
         self.last_id += 1;
         let asked = Asked { node: node.clone(), of, wall: self.wall };
         self.asked.insert(self.last_id, asked);

@@ -3,6 +3,7 @@
 //! Its lines are `NODE/LINE`. A node that goes away keeps its lines, and its subscriptions go on when it is
 //! back. `merge` decides, without sockets and clocks.
 
+mod latches;
 mod member;
 mod merge;
 mod names;
@@ -17,6 +18,8 @@ use motorlink_telemetry::share::address::{Address, Unreachable};
 use crate::key::Name;
 use crate::network::Network;
 use crate::remote::{self, Remote};
+use latches::Latches;
+use merge::Merge;
 use serve::{Known, Serving};
 
 /// The nodes of a network.
@@ -28,6 +31,7 @@ pub struct Whole {
     pub nodes: BTreeSet<Name>,
     /// Nodes that went away. They stay in the list, also for programs that come later.
     known: Known,
+    latches: Latches,
 }
 
 impl Whole {
@@ -35,7 +39,7 @@ impl Whole {
     pub fn new(network: Network, nodes: BTreeSet<Name>) -> Self {
         // No node has this name: each takes its place.
         let pattern = Remote::new(Name::near("node"), network);
-        Whole { pattern, nodes, known: Known::default() }
+        Whole { pattern, nodes, known: Known::default(), latches: Latches::default() }
     }
 }
 
@@ -49,12 +53,13 @@ impl Address for Whole {
     }
 
     fn connect(&self) -> Result<UnixStream, Unreachable> {
-        let Whole { pattern, nodes, known } = self.clone();
+        let Whole { pattern, nodes, known, latches } = self.clone();
         let is_meant = move |node: &Name| nodes.is_empty() || nodes.contains(node);
         let zenoh = remote::zenoh_of(&pattern.network)
             .map_err(|error| Unreachable::Missing(format!("no node can be reached: {error}")))?;
         let (own, other) = remote::pair()?;
-        let serving = Serving::open(pattern, is_meant, known, zenoh, own);
+        let merge = Merge::new(pattern.who.to_string(), latches);
+        let serving = Serving::open(merge, pattern, is_meant, known, zenoh, own);
         let opened = remote::runtime()?.block_on(serving);
         opened.map_err(|error| Unreachable::Failed(error.to_string()))?;
         Ok(other)

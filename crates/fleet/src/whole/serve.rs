@@ -103,6 +103,7 @@ pub(super) struct Absent {
 impl Serving {
     /// Looks for nodes, and serves the socket from then on. `known` has nodes that were there before.
     pub(super) async fn open(
+        merge: Merge,
         pattern: Remote,
         is_meant: impl Fn(&Name) -> bool + Send + Sync + 'static,
         known: Known,
@@ -119,7 +120,7 @@ impl Serving {
         let (reader, writer) = UnixStream::from_std(socket)?.into_split();
         let (told, news) = channel(QUEUE);
         let mut serving = Serving {
-            merge: Merge::new(pattern.who.to_string()),
+            merge,
             pattern,
             is_meant: Box::new(is_meant),
             here: BTreeSet::new(),

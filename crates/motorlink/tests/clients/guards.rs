@@ -2,16 +2,15 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, FdLink, Link, PortError};
+use motorlink::port::{ByteLink, FdLink, PortError};
 use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, StopAction};
 use motorlink::st::{self, Command, Request, Status};
 
 use crate::served::Served;
-use crate::wire::Fresh;
+use crate::wire::{Fresh, Wire};
 use crate::{open_st, patient, until};
 
 #[test]
@@ -63,34 +62,18 @@ fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     }
 }
 
-/// A bus whose motors hear and are not heard.
-struct Deaf(Arc<Mutex<Vec<CanFrame>>>);
-
-impl Link for Deaf {}
-
-impl CanLink for Deaf {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.0.lock().unwrap().push(*frame);
-        Ok(())
-    }
-
-    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        std::thread::sleep(timeout.unwrap_or_default());
-        Ok(None)
-    }
-}
-
 #[test]
 fn a_motor_that_does_not_answer_stays_one_that_moves() {
-    let sent = Arc::new(Mutex::new(Vec::new()));
+    // Motors that hear and are not heard.
+    let wire = Wire::<CanFrame>::new();
     let options = rmd::Options { timeout: Duration::from_millis(5), ..rmd::Options::default() };
-    let bus = rmd::Client::over("deaf", Box::new(Fresh(Deaf(Arc::clone(&sent)))), options);
+    let bus = rmd::Client::over("deaf", Box::new(Fresh(wire.clone())), options);
     let motor = bus.motor(5).unwrap();
     assert!(motor.set_speed(CentiDps(100)).is_err());
     assert!(motor.off().is_err());
     assert!(bus.moving().map(MotorId::number).eq([5]));
     drop(bus.stop_on_drop());
-    let stops = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x81).count();
+    let stops = wire.sent().iter().filter(|frame| frame.data()[0] == 0x81).count();
     assert!(stops >= 3, "{stops}");
 }
 

@@ -27,6 +27,8 @@ pub(super) struct McapFile {
     written: u64,
     /// Messages in the file.
     messages: u64,
+    /// Bytes and messages before the last flush.
+    before: (u64, u64),
     /// Messages since the last flush.
     unwritten: u64,
     /// A write has failed. The file has its end already.
@@ -51,7 +53,8 @@ impl McapFile {
         let mcap = Mcap::new(None).map_err(|error| WriteError::create(path, error))?;
         let path = path.to_owned();
         let (written, messages, unwritten, is_broken) = (0, 0, 0, false);
-        Ok(McapFile { path, file, is_new, mcap, written, messages, unwritten, is_broken })
+        let before = (0, 0);
+        Ok(McapFile { path, file, is_new, mcap, written, messages, before, unwritten, is_broken })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -83,7 +86,11 @@ impl McapFile {
     /// Writes all of it into the file.
     pub(super) fn flush(&mut self) -> Result<(), WriteError> {
         self.mcap.end_chunk().map_err(|error| self.failed(&error))?;
+        let before = (self.written, self.messages);
         self.commit()?;
+        if self.written > before.0 {
+            self.before = before;
+        }
         self.messages += std::mem::take(&mut self.unwritten);
         Ok(())
     }
@@ -104,8 +111,16 @@ impl McapFile {
         Ok(self.written)
     }
 
-    /// Ends a file that cannot be written any more without a summary: readers look for a footer.
+    /// Ends a file that cannot be written any more without a summary: readers look for a footer. Without room
+    /// for that, the last chunk makes room.
     fn end_short(&mut self) {
+        if self.file.write_all(&SHORT_END).is_ok() {
+            return;
+        }
+        if self.before.0 > 0 {
+            (self.written, self.messages) = self.before;
+        }
+        self.cut();
         if self.file.write_all(&SHORT_END).is_err() {
             self.cut();
         }
@@ -191,4 +206,63 @@ const fn short_end() -> [u8; 50] {
         at += 1;
     }
     end
+}
+
+#[cfg(test)]
+mod tests {
+    use std::env;
+    use std::process::Command;
+
+    use super::*;
+    use crate::write::entry::Topic;
+
+    /// Where a process with a limit for the size of files writes.
+    const PATH: &str = "MOTORLINK_TEST_OF_A_FULL_DISK";
+
+    /// Flushes messages until it fails. Gives the sizes before each chunk, and what failed.
+    fn filled(path: &Path) -> (Vec<u64>, Option<WriteError>) {
+        let mut file = McapFile::create(path, true).unwrap();
+        let (name, ty) = ("/a".to_owned(), "std_msgs/msg/UInt8".to_owned());
+        let topic = Topic { name, ty, definition: "uint8 data".to_owned(), metadata: [].into() };
+        file.put(&Entry::Topic(topic)).unwrap();
+        let mut sizes = Vec::new();
+        for time in 0..4 {
+            file.put(&Entry::Message { topic: 0, time, data: vec![0, 1, 0, 0, 7] }).unwrap();
+            sizes.push(file.written);
+            if let Err(error) = file.flush() {
+                return (sizes, Some(error));
+            }
+        }
+        (sizes, None)
+    }
+
+    #[test]
+    fn a_file_without_room_for_its_end_gives_up_its_last_chunk() {
+        if let Some(path) = env::var_os(PATH) {
+            let (_, failure) = filled(path.as_ref());
+            let Some(WriteError::Write { messages, bytes, .. }) = failure else { panic!() };
+            let file = std::fs::read(&path).unwrap();
+            assert_eq!(file.strip_suffix(&SHORT_END).map(<[u8]>::len), Some(bytes as usize));
+            println!("{messages} messages in {bytes} bytes");
+            return;
+        }
+        let path = env::temp_dir().join(format!("motorlink-full-{}", std::process::id()));
+        let (sizes, failure) = filled(&path);
+        assert!(failure.is_none(), "{failure:?}");
+        for (room, chunks) in [(50, 3), (49, 2), (0, 2)] {
+            // A limit holds for a whole process.
+            let exe = env::current_exe().unwrap();
+            let test =
+                "write::file::tests::a_file_without_room_for_its_end_gives_up_its_last_chunk";
+            let limited = "trap '' XFSZ; exec prlimit --fsize=\"$@\"";
+            let mut shell = Command::new("sh");
+            shell.args(["-c", limited, "sh", &(sizes[3] + room).to_string()]).arg(exe);
+            let done =
+                shell.args(["--exact", test, "--nocapture"]).env(PATH, &path).output().unwrap();
+            let said = String::from_utf8_lossy(&done.stdout);
+            let expected = format!("{chunks} messages in {} bytes", sizes[chunks]);
+            assert!(done.status.success() && said.contains(&expected), "{room}: {said}");
+        }
+        std::fs::remove_file(path).unwrap();
+    }
 }

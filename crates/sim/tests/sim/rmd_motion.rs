@@ -1,6 +1,5 @@
 //! Torque, speed and position, and their limits.
 
-use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::RmdConfig;
@@ -68,18 +67,6 @@ fn a_speed_is_reached_without_error_and_held_against_a_load() {
         let loaded = bench.mean_speed(500);
         assert!((loaded / 1234.5 - 1.0).abs() < 0.002, "{loaded} °/s");
     }
-}
-
-#[test]
-fn four_torques_are_not_limited_by_the_greatest_torque_current() {
-    let mut bench =
-        NodeFixture::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
-    bench.world().plant_mut().lock(true);
-    let torque = IqCommand::from_amps(10.0);
-    let torques = SetTorque4([torque, IqCommand(0), IqCommand(0), IqCommand(0)]);
-    bench.send(&CanFrame::new(TORQUE4_ID, torques.encode()));
-    let current = bench.watch(20).current;
-    assert!((9.8..10.5).contains(&current), "{current} A");
 }
 
 #[test]

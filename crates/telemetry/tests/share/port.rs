@@ -450,7 +450,9 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
 fn a_stop_of_all_ids_of_a_share_is_certain_and_fails_for_a_motor_that_was_turned_and_is_silent() {
     let share = deaf("all");
     let mut operator = Asker::join(&share.path, "operator");
-    let client = share.rmd();
+    // What a busy machine answers late counts as lost.
+    let patient = rmd::Options { timeout: PATIENT, ..Default::default() };
+    let client = rmd::Client::open(&share.port("rmd0"), patient).unwrap();
     let stopping = client.stop_all_until_confirmed(Default::default());
     assert!(stopping.failed.is_empty() && stopping.is_silence_certain(), "{stopping:?}");
     assert_eq!(stopping.confirmed.len() + stopping.silent.len(), MotorSet::ALL.len());

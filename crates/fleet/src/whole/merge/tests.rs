@@ -31,7 +31,12 @@ struct Fleet(Merge);
 
 impl Fleet {
     fn new() -> Self {
-        let mut merge = Merge::new("me".to_owned());
+        Fleet::beside(Latches::default())
+    }
+
+    /// Beside other programs of the process.
+    fn beside(latches: Latches) -> Self {
+        let mut merge = Merge::new("me".to_owned(), latches);
         merge.at(0.0, WALL);
         Fleet(merge)
     }
@@ -100,6 +105,13 @@ impl Fleet {
 
     fn refuses(&mut self, node: &str, id: u32, reason: Reason, message: &str) {
         self.says(node, &Text::Refusal { id, reason, message: message.to_owned(), code: None });
+    }
+
+    /// Whether a node that comes is latched before all else.
+    fn latches_first(&mut self, node: &str) -> bool {
+        self.0.coming(name(node));
+        self.0.came(&name(node));
+        self.requests(node)[0].ask == Ask::Latch
     }
 
     fn asked(&mut self, id: u32, ask: Ask) {
@@ -506,4 +518,40 @@ fn nothing_that_a_node_says_makes_it_fail() {
     fleet.says("arm1", &group(1, 99));
     fleet.0.heard(&node, Frame::data(rows(1)));
     assert_eq!(fleet.0.take(), []);
+}
+
+#[test]
+fn a_release_before_a_latch_that_is_told_late_does_not_end_it() {
+    let told = |event| {
+        let (t, line, by) = (Some(1.0), Some("rmd0".to_owned()), Some("operator".to_owned()));
+        let (since, motor, message) = (None, None, String::new());
+        Text::Event(Event { wall: WALL, line, t, since, motor, by, event, message })
+    };
+    let mut fleet = Fleet::of(&["arm1"]);
+    fleet.asked(1, Ask::Latch);
+    let id = fleet.one("arm1").id;
+    fleet.answers("arm1", id, Answer::Latch);
+    fleet.says("arm1", &told(Happening::Released));
+    assert!(fleet.latches_first("arm2"));
+    fleet.says("arm1", &told(Happening::Latched));
+    assert!(fleet.latches_first("arm3"));
+    fleet.says("arm1", &told(Happening::Released));
+    assert!(!fleet.latches_first("arm4"));
+}
+
+#[test]
+fn a_latch_of_another_program_of_the_process_holds_at_nodes_that_come() {
+    let latches = Latches::default();
+    let mut operators = [(); 2].map(|()| Fleet::beside(latches.clone()));
+    let mut moves = Fleet::beside(latches);
+    operators.iter_mut().for_each(|it| it.asked(1, Ask::Latch));
+    assert!(moves.latches_first("arm1"));
+    let [first, mut second] = operators;
+    drop(first);
+    assert!(moves.latches_first("arm2"));
+    second.asked(2, Ask::Release);
+    assert!(!moves.latches_first("arm3"));
+    second.asked(3, Ask::Latch);
+    drop(second);
+    assert!(!moves.latches_first("arm4"));
 }
