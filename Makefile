@@ -72,7 +72,7 @@ $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $
 monitor: toolchain web ## simulated drives in a browser
 	$(CARGO) run --locked -p motorlink-cli --no-default-features --features monitor -- monitor --open
 
-test: toolchain $(if $(SUDO),packages) ## 25 min: parts web-test .. test-socketcan but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 15 min: parts web-test .. test-socketcan but for unchanged ones; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(FORCE)$(LONG),--force) $(if $(STRICT),--strict) $(if $(ONCE)$(STRICT),,--again "$(TIMED)") $(PARTS)
 
@@ -108,7 +108,7 @@ flakes: toolchain $(if $(SUDO),packages) ## 60 min: parts that wait for time, RU
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## 5 min: tests in Rust
+unit: ## 3 min: tests in Rust
 	$(CARGO) --config "target.'cfg(unix)'.runner = '$(CURDIR)/tests/measured'" test --workspace --all-features --locked \
 		$(or $(T),--lib --bins --tests)
 	$(if $(T),,$(CARGO) test --workspace --all-features --locked --doc)
@@ -119,7 +119,7 @@ python: package ## 3 min: the Python package: its build, types, examples, tests
 	$(VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 12 min: the program against independent clients
+e2e: $(VENV)/ready ## 6 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -133,7 +133,7 @@ ros2: $(VENV)/ready ## 8 min: a node and a ROS 2 machine in Rust; not in `make t
 web-test: web ## 1 min: the monitor's page: types, tests of its parts, size
 	cd web && npm run --silent check && npm test && npm run --silent size
 
-browser: web ## 6 min: the monitor in Debian's Chromium, on simulated drives
+browser: web ## 3 min: the monitor in Debian's Chromium, on simulated drives
 	$(if $(AGAIN),,rm -f web/test-results/.last-run.json)
 	-@tests/install browser
 	$(PROGRAM)
@@ -148,7 +148,7 @@ miri: ## 2 min: the C face without undefined behaviour; not in `make test`
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-ffi --locked $(T)
 
-firmware-test: $(VENV)/ready ## 7 min: boards in QEMU against the conformance kit and hosts
+firmware-test: $(VENV)/ready ## 2 min: boards in QEMU against the conformance kit and hosts
 	$(PROGRAM)
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 

@@ -291,8 +291,8 @@ def test_pages_come_through_tls(start, certificate):
     "words, said",
     [
         (["--listen", "0.0.0.0:0"], "anybody can read the tokens"),
-        (["--deadline", "200ms", "--listen", "127.0.0.1:0", "--tls-cert", "CERT"], "--tls-key"),
-        (["--listen", "127.0.0.1:0", "--tls-cert", "CERT", "--tls-key", "CERT"], "CERT"),
+        (["--listen", "127.0.0.1:0", "--tls-cert", "CERT"], "--tls-key"),
+        (["--deadline", "200ms", "--listen", "127.0.0.1:0", "--tls-cert", "CERT", "--tls-key", "CERT"], "CERT"),
         (["--listen", "127.0.0.1:0", "--tls-cert", "/nowhere", "--tls-key", "KEY"], "/nowhere"),
         (["--deadline", "100ms"], "--deadline is 200ms"),
         (["--share", "unix:x", "-p", "sim:"], "leave -p out"),

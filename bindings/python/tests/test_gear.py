@@ -95,7 +95,13 @@ def test_limits_are_those_of_the_output_shaft(how: str) -> None:
 
 
 def test_a_ratio_by_id_is_that_of_its_motor() -> None:
-    with rmd.open(Bench(), gear_ratio=MappingProxyType({1: 6, 2: 9}), speed_limit_dps=10) as client:
+    bench = Bench()
+    with rmd.open(bench, gear_ratio=MappingProxyType({1: 6, 2: 9}), speed_limit_dps=10) as client:
+        client.motor(2).set_position(5, max_speed_dps=10)
+        bench.run(2)
+        data = client.sample({1: ["multi_turn_angle_degrees"], 2: ["multi_turn_angle_degrees"]}, rate=20, seconds=0.1)
+        assert data["multi_turn_angle_degrees_1"][0] == pytest.approx(0, abs=0.1)
+        assert data["multi_turn_angle_degrees_2"][0] == pytest.approx(5, abs=0.1)
         assert [client.motor(id).gear_ratio for id in (1, 2, 3)] == [6, 9, None]
         for id in (1, 2, 3):
             client.motor(id).set_speed(10)

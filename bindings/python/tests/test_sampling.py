@@ -33,6 +33,8 @@ def test_motors_have_columns_in_digits_or_units() -> None:
         data = bus.sample(asked, rate=50, seconds=0.3, raw=True)
         assert data.dtype["TORQUE_REF_2"] == np.int64
         assert set(data["TORQUE_REF_1"]) == {1500} and set(data["TORQUE_REF_2"]) == {-1000}
+        data = bus.sample(["TORQUE_REF"], motor=2, rate=50, seconds=0.3, raw=True)
+        assert set(data["TORQUE_REF"]) == {-1000}
 
 
 def test_values_of_motors_are_sampled_in_cycles() -> None:

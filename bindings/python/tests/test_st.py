@@ -112,6 +112,7 @@ def test_currents_are_amperes_where_full_scale_is_known(st_bus: st.Client) -> No
     assert digits.revup_data(1) == (800, 3000, 0.5)
     assert amps.revup_data(1).torque == pytest.approx(3.0)
     amps.set_current_reference(0.5, -0.25)
+    assert (digits.get("TORQUE_REF"), digits.get("FLUX_REF")) == (500, -250)
     with pytest.raises(motorlink.InvalidValueError, match="33 A does not fit"):
         amps.set("TORQUE_REF", 33)
     for nonsense in (0, -1, float("nan")):

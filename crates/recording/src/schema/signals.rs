@@ -228,10 +228,11 @@ mod tests {
 
     #[test]
     fn codes_have_their_names_as_constants() {
-        let text = st(&["STATUS", "FLAGS"]).definition();
+        let text = st(&["STATUS", "CONTROL_MODE", "FLAGS"]).definition();
         for constant in [
             "uint8 STATUS_IDLE=0",
             "uint8 STATUS_FAULT_NOW=10",
+            "uint8 CONTROL_MODE_SPEED=1",
             "uint32 FLAGS_OCCURRED_OVER_VOLT=2",
             "uint32 FLAGS_PRESENT_OVER_VOLT=131072",
         ] {
