@@ -315,10 +315,11 @@ install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGE
 # The Python package as it is tested: with the features of the program, so that it shares that build. Where it
 # is up to date it stays: another part may be using it. The same content at the same date is the same wheel.
 package: $(VENV)/ready
-	@flock target/package.lock sh -ec 'export PATH=$(VENV)/bin:$$PATH SOURCE_DATE_EPOCH=1000000000; rm -rf target/package; \
+	@mkdir -p target && flock target/package.lock sh -ec 'export PATH=$(VENV)/bin:$$PATH SOURCE_DATE_EPOCH=1000000000; rm -rf target/package; \
 		python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir target/package \
 			--config-settings "build-args=--profile=dev --features=typescript" .; \
 		! cmp -s target/package/*.whl $(VENV)/motorlink.whl || exit 0; \
+		rm -f $(VENV)/motorlink.whl; \
 		python -m pip install --quiet --force-reinstall --no-deps target/package/*.whl; \
 		cp target/package/*.whl $(VENV)/motorlink.whl'
 wheel: $(VENV)/ready ## the Python package as a wheel, in target/wheels

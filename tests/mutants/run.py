@@ -181,6 +181,8 @@ def by_hand(mutant):
     is_page = mutant["file"].startswith("web/")
     if not is_page:
         path = next(TREE.glob(f".venv/lib/*/site-packages/motorlink/{path.name}"))
+        # Or `make package` would keep it if this process is killed.
+        (TREE / ".venv/motorlink.whl").unlink(missing_ok=True)
     text = path.read_text()
     if text.count(mutant["find"]) != 1:
         sys.exit(f"{mutant['name']}: {path} does not have the text of `find` exactly once")

@@ -144,7 +144,6 @@ impl Commands {
         payload: &[u8],
         readings: &Readings,
     ) {
-        self.tick(now);
         match self.obey(now, attachment, payload, readings) {
             Ok(()) => self.accepted += 1,
             Err((kind, why)) => {
@@ -207,14 +206,19 @@ impl Commands {
         }
     }
 
-    /// Somebody stops all motors. Also joints that rest take no command: their publisher may be late.
+    /// Somebody stops a motor. Also a joint that rests takes no command: its publisher may be late.
+    pub fn block(&mut self, now: f64, joint: usize, why: &str) {
+        match self.joints[joint].phase {
+            Phase::Moving { motion, .. } => self.failed(now, joint, motion, why.to_owned(), false),
+            _ => self.joints[joint].phase = Phase::Blocked { why: why.to_owned(), heard: now },
+        }
+    }
+
+    /// Somebody stops all motors.
     pub fn block_all(&mut self, now: f64, why: &str) {
         for number in 0..self.joints.len() {
             self.end_motion(now, number, why);
-            let phase = &mut self.joints[number].phase;
-            if *phase == Phase::Resting {
-                *phase = Phase::Blocked { why: why.to_owned(), heard: now };
-            }
+            self.block(now, number, why);
         }
     }
 
@@ -270,12 +274,15 @@ impl Commands {
             ("not_rmw_zenoh", why.to_owned())
         })?;
         let (is_in_time, wanted) = (self.in_time(now, &attachment), self.wanted(payload));
-        // While commands come, a blocked joint stays blocked, also if they come late.
-        for (number, ..) in wanted.iter().flatten() {
-            if let Phase::Blocked { heard, .. } = &mut self.joints[*number].phase {
+        // While commands come, a blocked joint stays blocked, also if they come late, or are wrong: nobody knows
+        // for which joint those are.
+        for (number, joint) in self.joints.iter_mut().enumerate() {
+            let is_meant = wanted.as_ref().map_or(true, |all| all.iter().any(|it| it.0 == number));
+            if let (true, Phase::Blocked { heard, .. }) = (is_meant, &mut joint.phase) {
                 *heard = now;
             }
         }
+        self.tick(now);
         is_in_time?;
         let wanted = wanted?;
         self.hold(now, attachment.gid)?;

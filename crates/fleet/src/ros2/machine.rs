@@ -8,7 +8,7 @@ use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, DropRule, Event, Line, SignalName, Text, decode,
+    Answer, Ask, DropRule, Event, Happening, Line, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::runtime::Handle;
@@ -163,10 +163,23 @@ impl Shared {
                         self.with(|machine, _| machine.readings.describe(group));
                     }
                     Ok(Text::Event(Event {
-                        line: Some(line), motor: Some(motor), since, ..
+                        line: Some(line),
+                        motor: Some(motor),
+                        since,
+                        event,
+                        by,
+                        ..
                     })) => {
-                        let Some(since) = since else { continue };
-                        self.with(|machine, _| machine.readings.doubt(&line, motor, since));
+                        self.with(|machine, now| {
+                            if let Some(since) = since {
+                                machine.readings.doubt(&line, motor, since);
+                            }
+                            if let (Happening::Stopping, Some(by)) =
+                                (event, by.filter(|it| it != NAME))
+                            {
+                                machine.stopped_by(now, &line, motor, &by);
+                            }
+                        });
                     }
                     _ => {}
                 },
@@ -263,18 +276,33 @@ impl Machine {
         (self.lines, self.latched_by) = (lines, latched_by);
     }
 
+    /// The joint of a motor, if it can have commands.
+    fn commanded(&self, line: &str, motor: u8) -> Option<(usize, &Joint)> {
+        let is_of = |joint: &Joint| joint.line == line && joint.motor.number() == motor;
+        self.commands.joints().enumerate().find(|(_, joint)| is_of(joint))
+    }
+
+    /// Another program stops a motor.
+    fn stopped_by(&mut self, now: f64, line: &str, motor: u8, by: &str) {
+        if let Some((number, _)) = self.commanded(line, motor) {
+            self.commands.block(now, number, &format!("{by} has stopped it"));
+        }
+    }
+
     /// Takes samples. A fault ends the motion of its joint.
     fn take(&mut self, now: f64, data: &Data) {
         let Some((line, motor)) = self.readings.take(now, data) else { return };
-        let is_of = |joint: &Joint| joint.line == *line && joint.motor.number() == *motor;
-        let joint = self.commands.joints().enumerate().find(|(_, joint)| is_of(joint));
-        let Some((number, joint)) = joint else { return };
+        let (line, motor) = (line.clone(), *motor);
+        let Some((number, joint)) = self.commanded(&line, motor) else { return };
         let fault = self.readings.of(joint).and_then(|it| it.faults(joint.motor));
         if let Some((words, _)) = fault {
             self.commands.end_motion(now, number, &words);
         }
     }
 }
+
+/// The name of this program at its share.
+pub(super) const NAME: &str = "ros2";
 
 /// A topic that is published.
 struct Publisher<'a> {

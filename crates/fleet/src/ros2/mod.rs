@@ -27,7 +27,7 @@ use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
 use commands::{Commands, Rules};
-use machine::{Machine, Shared};
+use machine::{Machine, NAME, Shared};
 use readings::Readings;
 use service::Service;
 use types::{DiagnosticArray, JointState, TRIGGER};
@@ -82,7 +82,7 @@ impl Ros2 {
         clock: Arc<dyn Clock>,
         zenoh: &Zenoh,
     ) -> Result<Self, StartError> {
-        let (program, mut listener, _) = Program::connect(share, "ros2").await?;
+        let (program, mut listener, _) = Program::connect(share, NAME).await?;
         let (lines, _) = timeout(LINES, program.lines(&mut listener))
             .await
             .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;

@@ -1,37 +1,51 @@
-//! Which programs of this process have latched the fleet.
+//! Whether a program of this process has latched the fleet.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// While one of them is there, each program latches nodes that come, before it can move their motors. A page of
-/// the monitor latches with one program and turns motors with another.
+/// Until it is released, each program of the process latches nodes before it can move their motors, also if who
+/// has latched is gone. A page of the monitor latches with one program and turns motors with another.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Latches(Arc<Mutex<Vec<Weak<()>>>>);
+pub(super) struct Latches(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    /// The number of the last latch.
+    number: u64,
+    is_latched: bool,
+    /// The programs that have asked for it.
+    by: Vec<Weak<()>>,
+}
 
 impl Latches {
+    /// A program latches. Nodes that come, and those where another program moves motors, get this latch, too.
     pub(super) fn add(&self, program: &Arc<()>) {
-        self.others(program).push(Arc::downgrade(program));
-    }
-
-    pub(super) fn remove(&self, program: &Arc<()>) {
-        drop(self.others(program));
+        let mut state = self.state();
+        (state.number, state.is_latched) = (state.number + 1, true);
+        state.by.push(Arc::downgrade(program));
     }
 
     pub(super) fn clear(&self) {
-        self.programs().clear();
+        let mut state = self.state();
+        state.is_latched = false;
+        state.by.clear();
     }
 
-    pub(super) fn is_any(&self) -> bool {
-        self.programs().iter().any(|program| program.strong_count() > 0)
+    /// The number of the latch that holds.
+    pub(super) fn number(&self) -> Option<u64> {
+        let state = self.state();
+        state.is_latched.then_some(state.number)
     }
 
-    fn programs(&self) -> MutexGuard<'_, Vec<Weak<()>>> {
+    /// Whether this program finds out if the latch has been released: one of those that have latched, because
+    /// their question comes behind their latch; any other one if these are gone.
+    pub(super) fn are_watched_by(&self, program: &Arc<()>) -> bool {
+        let mut state = self.state();
+        state.by.retain(|it| it.strong_count() > 0);
+        let is_own = |it: &Weak<()>| std::ptr::eq(it.as_ptr(), Arc::as_ptr(program));
+        state.is_latched && (state.by.is_empty() || state.by.iter().any(is_own))
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Without this program and those that have ended.
-    fn others(&self, program: &Arc<()>) -> MutexGuard<'_, Vec<Weak<()>>> {
-        let mut programs = self.programs();
-        programs.retain(|it| it.upgrade().is_some_and(|it| !Arc::ptr_eq(&it, program)));
-        programs
     }
 }

@@ -24,9 +24,8 @@ pub(super) struct Member {
     /// Its lines, as it told them last.
     pub(super) lines: Vec<Line>,
     pub(super) latched_by: Option<String>,
-    /// Its lines that the program latches and that have not told it yet: what they tell of a release happened
-    /// before. A line that is busy is late with what it tells.
-    pub(super) latching: BTreeSet<String>,
+    /// The number of the last latch that this connection has asked for.
+    pub(super) latch: u64,
     /// The clocks of its lines, by the wall clock of this computer.
     clocks: BTreeMap<String, Clock>,
     /// The program's subscription of each of its subscriptions.
@@ -43,7 +42,7 @@ impl Member {
             state: State::Coming,
             lines: Vec::new(),
             latched_by: None,
-            latching: BTreeSet::new(),
+            latch: 0,
             clocks: BTreeMap::new(),
             subscriptions: BTreeMap::new(),
             groups: BTreeMap::new(),

@@ -46,6 +46,8 @@ enum Of {
     Round(u64),
     /// The lines of a node that came.
     Lines,
+    /// Whether it is latched, after somebody has released it.
+    Released,
     /// A subscription of the program, at a node that is back.
     Again(u32),
     /// The answer does not matter.
@@ -82,7 +84,7 @@ pub(super) struct Merge {
     last_subscription: u32,
     subscriptions: BTreeMap<u32, Subscription>,
     last_group: u32,
-    /// Whether a node that comes is latched first. The program is one of those that may latch.
+    /// Whether a node is latched before its motors can move. The program is one of those that may latch.
     latches: Latches,
     program: Arc<()>,
     /// Until when a node that comes is stopped first.
@@ -151,10 +153,8 @@ impl Merge {
         member.state = State::Here;
         member.closing = None;
         // Before anything else can move its motors.
-        member.latching.clear();
-        if self.latches.is_any() {
-            self.ask(node, Ask::Latch, Of::Nothing);
-        }
+        member.latch = 0;
+        self.latch_first(node);
         if self.now < self.stops_until && !self.stopped.contains(node) {
             self.ask(node, Ask::Stop { motor: None }, Of::Nothing);
         }
@@ -298,7 +298,11 @@ impl Merge {
                 self.answered(node, id, Err(Refusal { reason, message, code }));
             }
             Text::Event(event) => {
-                self.latch_is_told(node, &event);
+                // A busy line tells late of a release that came before a newer latch: the node knows.
+                if event.event == Happening::Released && self.latches.are_watched_by(&self.program)
+                {
+                    self.ask(node, Ask::Lines, Of::Released);
+                }
                 let ahead = self.members.get(node).map_or(0.0, Member::ahead);
                 self.say(&Text::Event(names::event(node, event, ahead)));
             }
@@ -332,15 +336,11 @@ impl Merge {
         }
     }
 
-    /// Somebody has latched or released the line of an event.
-    fn latch_is_told(&mut self, node: &Name, event: &Event) {
-        let (Some(member), Some(line)) = (self.members.get_mut(node), &event.line) else { return };
-        match event.event {
-            Happening::Latched => drop(member.latching.remove(line)),
-            Happening::Released if !member.latching.contains(line) => {
-                self.latches.remove(&self.program);
-            }
-            _ => {}
+    /// Latches a node, unless this connection has asked for the latch that holds.
+    fn latch_first(&mut self, node: &Name) {
+        let before = self.members.get(node).map_or(0, |member| member.latch);
+        if self.latches.number().is_some_and(|number| number > before) {
+            self.ask(node, Ask::Latch, Of::Nothing);
         }
     }
 
@@ -358,6 +358,9 @@ impl Merge {
         let Some(Asked { of, wall, .. }) = self.asked.remove(&id) else { return };
         if let Ok(Answer::Lines { lines, latched_by }) = &result {
             let before = self.learn(node, lines, latched_by.clone(), wall);
+            if matches!(of, Of::Released) && latched_by.is_none() {
+                self.latches.clear();
+            }
             if matches!(of, Of::Lines) {
                 self.tell_lines(node, &before, lines);
             }
@@ -403,7 +406,7 @@ impl Merge {
                 round.done.insert(node.clone(), result);
                 self.finish(number);
             }
-            Of::Lines | Of::Again(_) | Of::Nothing => {}
+            Of::Lines | Of::Released | Of::Again(_) | Of::Nothing => {}
         }
     }
 
@@ -553,6 +556,9 @@ impl Merge {
                 if let Some(line) = names::line_of(&mut ask) {
                     line.clone_from(&there);
                 }
+                if matches!(ask, Ask::Command { .. }) {
+                    self.latch_first(&node);
+                }
                 self.ask(&node, ask, Of::One(id, Some(there)));
             }
             // It does not take long until it is known whether the node is there.
@@ -573,7 +579,7 @@ impl Merge {
 
     fn ask(&mut self, node: &Name, ask: Ask, of: Of) {
         if let (Ask::Latch, Some(member)) = (&ask, self.members.get_mut(node)) {
-            member.latching = member.lines.iter().map(|line| line.line.clone()).collect();
+            member.latch = self.latches.number().unwrap_or(member.latch);
         }
         self.last_id += 1;
         let asked = Asked { node: node.clone(), of, wall: self.wall };

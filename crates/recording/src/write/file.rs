@@ -114,16 +114,18 @@ impl McapFile {
     /// Ends a file that cannot be written any more without a summary: readers look for a footer. Without room
     /// for that, the last chunk makes room.
     fn end_short(&mut self) {
-        if self.file.write_all(&SHORT_END).is_ok() {
-            return;
-        }
-        if self.before.0 > 0 {
+        let Err(error) = self.file.write_all(&SHORT_END) else { return };
+        let is_full = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded, ErrorKind::FileTooLarge];
+        if is_full.contains(&error.kind()) && self.before.0 > 0 {
             (self.written, self.messages) = self.before;
+            // Over the chunk: another program could take what is given back first.
+            let ended = self.file.seek(SeekFrom::Start(self.written));
+            if ended.and_then(|_| self.file.write_all(&SHORT_END)).is_ok() {
+                let _ = self.file.set_len(self.written + SHORT_END.len() as u64);
+                return;
+            }
         }
         self.cut();
-        if self.file.write_all(&SHORT_END).is_err() {
-            self.cut();
-        }
     }
 
     fn commit(&mut self) -> Result<(), WriteError> {

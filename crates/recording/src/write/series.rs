@@ -185,8 +185,9 @@ fn end(mut file: McapFile, before: &mut Written) -> Result<(), WriteError> {
         file.flush()?;
     }
     before.files.push(file.path().to_owned());
-    before.messages += file.messages();
+    let messages = file.messages();
     before.bytes += file.finish()?;
+    before.messages += messages;
     Ok(())
 }
 

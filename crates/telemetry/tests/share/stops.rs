@@ -34,7 +34,7 @@ fn an_id_that_was_only_searched_is_absent_at_every_stop() {
         panic!()
     };
     assert!(stopped[0].failure.is_some(), "{stopped:?}");
-    // Nobody has asked 30.
+    // No program has asked ID 30.
     for _ in 0..2 {
         let stopped = stop_all_of(&mut program, "rmd0", &[1, NOBODY, 30]);
         assert_eq!(stopped, motors("rmd0", &[(1, "confirmed"), (NOBODY, "absent")]));

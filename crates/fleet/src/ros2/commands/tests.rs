@@ -259,6 +259,7 @@ fn a_motion_that_failed_is_not_tried_again_while_commands_come() {
     assert_eq!((shown.words, shown.is_blocked), ("operator has latched it", true));
     let later = commands.wake().unwrap();
     assert!((later - (READ + 1.98 + 9.0 * (QUIET - 1e-3) + QUIET)).abs() < 1e-6);
+    commands.tick(later);
     publisher.send(&mut commands, later, &wheel(1.0));
     assert!(sends(&outputs(&mut commands)[0]));
 }
@@ -299,10 +300,22 @@ fn all_motions_end_when_somebody_stops_all() {
     publisher.send(&mut commands, READ + 0.02, &wheel(1.0));
     assert_eq!(outputs(&mut commands), []);
     // The arm rests. Its publisher was late, and sends on.
-    publisher.send(&mut commands, READ + 0.04, &arm(std::f64::consts::PI));
+    let half_a_turn = arm(std::f64::consts::PI);
+    publisher.send(&mut commands, READ + 0.04, &half_a_turn);
     assert_eq!((outputs(&mut commands), count(&commands, "blocked")), (vec![], 2));
-    let silent = READ + 0.04 + QUIET;
-    publisher.send(&mut commands, silent, &arm(std::f64::consts::PI));
+    // Another stop counts from its own time, and so does a sample that is wrong.
+    commands.block_all(READ + 0.9, "stop_all");
+    publisher.send(&mut commands, READ + 1.8, &wheel(f64::NAN));
+    publisher.send(&mut commands, READ + 2.7, &half_a_turn);
+    assert_eq!((outputs(&mut commands), count(&commands, "blocked")), (vec![], 3));
+    publisher.send(&mut commands, READ + 2.7 + QUIET, &half_a_turn);
+    assert_eq!(
+        count(&commands, "blocked"),
+        4,
+        "it has come when the time was over: no pause was seen"
+    );
+    commands.tick(READ + 2.7 + 2.0 * QUIET);
+    publisher.send(&mut commands, READ + 2.7 + 2.0 * QUIET, &half_a_turn);
     assert!(sends(&outputs(&mut commands)[0]));
 }
 
@@ -326,6 +339,7 @@ fn no_motion_begins_before_the_end_of_a_stop_is_known() {
     outputs(&mut commands);
     // It is blocked no more, and its stop is still under way.
     let later = READ + 0.01 + QUIET + 1e-3;
+    commands.tick(later);
     publisher.send(&mut commands, later, &wheel(1.0));
     assert_eq!(outputs(&mut commands), []);
     assert_eq!(commands.phase("wheel").unwrap().words, "stopping");

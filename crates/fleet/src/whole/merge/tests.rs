@@ -520,38 +520,62 @@ fn nothing_that_a_node_says_makes_it_fail() {
     assert_eq!(fleet.0.take(), []);
 }
 
-#[test]
-fn a_release_before_a_latch_that_is_told_late_does_not_end_it() {
-    let told = |event| {
-        let (t, line, by) = (Some(1.0), Some("rmd0".to_owned()), Some("operator".to_owned()));
-        let (since, motor, message) = (None, None, String::new());
-        Text::Event(Event { wall: WALL, line, t, since, motor, by, event, message })
-    };
-    let mut fleet = Fleet::of(&["arm1"]);
-    fleet.asked(1, Ask::Latch);
-    let id = fleet.one("arm1").id;
-    fleet.answers("arm1", id, Answer::Latch);
-    fleet.says("arm1", &told(Happening::Released));
-    assert!(fleet.latches_first("arm2"));
-    fleet.says("arm1", &told(Happening::Latched));
-    assert!(fleet.latches_first("arm3"));
-    fleet.says("arm1", &told(Happening::Released));
-    assert!(!fleet.latches_first("arm4"));
+/// What a line of a node tells.
+fn released() -> Text {
+    let (line, by) = (Some("rmd0".to_owned()), Some("operator".to_owned()));
+    let (t, since, motor, message) = (Some(1.0), None, None, String::new());
+    Text::Event(Event {
+        wall: WALL,
+        line,
+        t,
+        since,
+        motor,
+        by,
+        event: Happening::Released,
+        message,
+    })
 }
 
 #[test]
-fn a_latch_of_another_program_of_the_process_holds_at_nodes_that_come() {
+fn a_release_before_a_latch_that_is_told_late_does_not_end_it() {
+    let mut fleet = Fleet::of(&["arm1"]);
+    fleet.asked(1, Ask::Latch);
+    fleet.requests("arm1");
+    for (node, is_latched) in [("arm2", true), ("arm3", false)] {
+        fleet.says("arm1", &released());
+        let asked = fleet.one("arm1");
+        assert_eq!(asked.ask, Ask::Lines);
+        let latched_by = is_latched.then(|| "me".to_owned());
+        fleet.answers("arm1", asked.id, Answer::Lines { lines: vec![], latched_by });
+        assert_eq!(fleet.latches_first(node), is_latched);
+    }
+    fleet.says("arm1", &released());
+    assert_eq!(fleet.requests("arm1"), []);
+}
+
+#[test]
+fn a_latch_of_another_program_of_the_process_holds_for_all_of_them_until_it_is_released() {
     let latches = Latches::default();
     let mut operators = [(); 2].map(|()| Fleet::beside(latches.clone()));
     let mut moves = Fleet::beside(latches);
+    moves.0.coming(name("arm1"));
+    moves.0.came(&name("arm1"));
+    moves.lines("arm1");
     operators.iter_mut().for_each(|it| it.asked(1, Ask::Latch));
-    assert!(moves.latches_first("arm1"));
-    let [first, mut second] = operators;
-    drop(first);
+    // It was connected before, and the operators are not.
+    for latched in [1, 0] {
+        moves.asked(2, command("arm1/rmd0"));
+        let asks: Vec<_> = moves.requests("arm1").into_iter().map(|it| it.ask).collect();
+        assert_eq!(asks.iter().filter(|ask| **ask == Ask::Latch).count(), latched, "{asks:?}");
+        assert!(matches!(asks.last(), Some(Ask::Command { .. })), "{asks:?}");
+    }
+    // Who has latched looks whether that still holds, and if nobody is left, another one.
+    moves.says("arm1", &released());
+    assert_eq!(moves.requests("arm1"), []);
+    drop(operators);
     assert!(moves.latches_first("arm2"));
-    second.asked(2, Ask::Release);
+    moves.says("arm1", &released());
+    let asked = moves.one("arm1");
+    moves.answers("arm1", asked.id, Answer::Lines { lines: vec![], latched_by: None });
     assert!(!moves.latches_first("arm3"));
-    second.asked(3, Ask::Latch);
-    drop(second);
-    assert!(!moves.latches_first("arm4"));
 }
