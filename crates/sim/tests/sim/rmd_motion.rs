@@ -1,5 +1,6 @@
 //! Torque, speed and position, and their limits.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::RmdConfig;
@@ -37,16 +38,24 @@ fn torque_is_the_torque_constant_times_the_current() {
 
 #[test]
 fn torque_is_not_limited_by_the_greatest_torque_current() {
-    let mut bench =
-        NodeFixture::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
-    bench.world().plant_mut().lock(true);
-    bench.ask(SetTorque { iq: IqCommand::from_amps(10.0) });
-    let current = bench.watch(20).current;
-    assert!((9.8..10.5).contains(&current), "{current} A");
-    bench.ask(speed(-3000.0));
-    bench.wait(20);
-    let current = bench.watch(500).current;
-    assert!((1.9..2.1).contains(&current), "{current} A");
+    let (iq, none) = (IqCommand::from_amps(10.0), IqCommand(0));
+    for is_of_four in [false, true] {
+        let mut bench =
+            NodeFixture::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+        bench.world().plant_mut().lock(true);
+        if is_of_four {
+            let torques = SetTorque4([iq, none, none, none]);
+            bench.send(&CanFrame::new(TORQUE4_ID, torques.encode()));
+        } else {
+            bench.ask(SetTorque { iq });
+        }
+        let current = bench.watch(20).current;
+        assert!((9.8..10.5).contains(&current), "{current} A");
+        bench.ask(speed(-3000.0));
+        bench.wait(20);
+        let current = bench.watch(500).current;
+        assert!((1.9..2.1).contains(&current), "{current} A");
+    }
 }
 
 #[test]
