@@ -206,20 +206,16 @@ impl Commands {
         }
     }
 
-    /// Somebody stops a motor. Also a joint that rests takes no command: its publisher may be late.
+    /// Somebody stops a motor. Also a joint that rests takes no command: its publisher may be late. A motion
+    /// may have begun behind that stop, so it is ended, too.
     pub fn block(&mut self, now: f64, joint: usize, why: &str) {
-        match self.joints[joint].phase {
-            Phase::Moving { motion, .. } => self.failed(now, joint, motion, why.to_owned(), false),
-            _ => self.joints[joint].phase = Phase::Blocked { why: why.to_owned(), heard: now },
-        }
+        self.end_motion(now, joint, why);
+        self.joints[joint].phase = Phase::Blocked { why: why.to_owned(), heard: now };
     }
 
     /// Somebody stops all motors.
     pub fn block_all(&mut self, now: f64, why: &str) {
-        for number in 0..self.joints.len() {
-            self.end_motion(now, number, why);
-            self.block(now, number, why);
-        }
+        (0..self.joints.len()).for_each(|number| self.block(now, number, why));
     }
 
     /// How a stop went.
@@ -274,8 +270,8 @@ impl Commands {
             ("not_rmw_zenoh", why.to_owned())
         })?;
         let (is_in_time, wanted) = (self.in_time(now, &attachment), self.wanted(payload));
-        // While commands come, a blocked joint stays blocked, also if they come late, or are wrong: nobody knows
-        // for which joint those are.
+        // While commands come, a blocked joint stays blocked. Late ones count, too. A wrong one counts for all
+        // joints.
         for (number, joint) in self.joints.iter_mut().enumerate() {
             let is_meant = wanted.as_ref().map_or(true, |all| all.iter().any(|it| it.0 == number));
             if let (true, Phase::Blocked { heard, .. }) = (is_meant, &mut joint.phase) {

@@ -36,13 +36,14 @@ impl Latches {
         state.is_latched.then_some(state.number)
     }
 
-    /// Whether this program finds out if the latch has been released: one of those that have latched, because
-    /// their question comes behind their latch; any other one if these are gone.
-    pub(super) fn are_watched_by(&self, program: &Arc<()>) -> bool {
+    /// The number of the latch that holds, if this program finds out whether it has been released: one of those
+    /// that have latched, because their question comes behind their latch; any other one if these are gone.
+    pub(super) fn watched_by(&self, program: &Arc<()>) -> Option<u64> {
         let mut state = self.state();
         state.by.retain(|it| it.strong_count() > 0);
         let is_own = |it: &Weak<()>| std::ptr::eq(it.as_ptr(), Arc::as_ptr(program));
-        state.is_latched && (state.by.is_empty() || state.by.iter().any(is_own))
+        let watches = state.by.is_empty() || state.by.iter().any(is_own);
+        (state.is_latched && watches).then_some(state.number)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

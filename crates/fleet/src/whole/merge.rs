@@ -46,8 +46,8 @@ enum Of {
     Round(u64),
     /// The lines of a node that came.
     Lines,
-    /// Whether it is latched, after somebody has released it.
-    Released,
+    /// Whether the latch of this number holds, after somebody has released the node.
+    Released(u64),
     /// A subscription of the program, at a node that is back.
     Again(u32),
     /// The answer does not matter.
@@ -299,9 +299,10 @@ impl Merge {
             }
             Text::Event(event) => {
                 // A busy line tells late of a release that came before a newer latch: the node knows.
-                if event.event == Happening::Released && self.latches.are_watched_by(&self.program)
+                if event.event == Happening::Released
+                    && let Some(number) = self.latches.watched_by(&self.program)
                 {
-                    self.ask(node, Ask::Lines, Of::Released);
+                    self.ask(node, Ask::Lines, Of::Released(number));
                 }
                 let ahead = self.members.get(node).map_or(0.0, Member::ahead);
                 self.say(&Text::Event(names::event(node, event, ahead)));
@@ -358,7 +359,10 @@ impl Merge {
         let Some(Asked { of, wall, .. }) = self.asked.remove(&id) else { return };
         if let Ok(Answer::Lines { lines, latched_by }) = &result {
             let before = self.learn(node, lines, latched_by.clone(), wall);
-            if matches!(of, Of::Released) && latched_by.is_none() {
+            if let Of::Released(number) = of
+                && latched_by.is_none()
+                && self.latches.number() == Some(number)
+            {
                 self.latches.clear();
             }
             if matches!(of, Of::Lines) {
@@ -406,7 +410,7 @@ impl Merge {
                 round.done.insert(node.clone(), result);
                 self.finish(number);
             }
-            Of::Lines | Of::Released | Of::Again(_) | Of::Nothing => {}
+            Of::Lines | Of::Released(_) | Of::Again(_) | Of::Nothing => {}
         }
     }
 

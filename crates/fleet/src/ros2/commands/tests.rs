@@ -309,14 +309,21 @@ fn all_motions_end_when_somebody_stops_all() {
     publisher.send(&mut commands, READ + 2.7, &half_a_turn);
     assert_eq!((outputs(&mut commands), count(&commands, "blocked")), (vec![], 3));
     publisher.send(&mut commands, READ + 2.7 + QUIET, &half_a_turn);
-    assert_eq!(
-        count(&commands, "blocked"),
-        4,
-        "it has come when the time was over: no pause was seen"
-    );
+    assert_eq!(count(&commands, "blocked"), 4, "no tick has seen a pause before it");
     commands.tick(READ + 2.7 + 2.0 * QUIET);
     publisher.send(&mut commands, READ + 2.7 + 2.0 * QUIET, &half_a_turn);
     assert!(sends(&outputs(&mut commands)[0]));
+}
+
+#[test]
+fn a_motion_that_begins_behind_the_stop_of_another_program_is_stopped() {
+    let (mut commands, mut publisher) = ready();
+    publisher.send(&mut commands, READ, &wheel(1.0));
+    outputs(&mut commands);
+    // The event of the stop comes after the first sample.
+    commands.block(READ + 0.01, 1, "operator has stopped it");
+    assert_eq!(outputs(&mut commands), [Output::Stop(1)]);
+    assert_eq!(commands.phase("wheel").unwrap().words, "operator has stopped it");
 }
 
 #[test]

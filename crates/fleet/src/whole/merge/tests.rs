@@ -569,7 +569,7 @@ fn a_latch_of_another_program_of_the_process_holds_for_all_of_them_until_it_is_r
         assert_eq!(asks.iter().filter(|ask| **ask == Ask::Latch).count(), latched, "{asks:?}");
         assert!(matches!(asks.last(), Some(Ask::Command { .. })), "{asks:?}");
     }
-    // Who has latched looks whether that still holds, and if nobody is left, another one.
+    // A program that has latched asks the node whether the latch holds. Without such a program any other asks.
     moves.says("arm1", &released());
     assert_eq!(moves.requests("arm1"), []);
     drop(operators);
