@@ -20,7 +20,8 @@ export default defineConfig({
   fullyParallel: true,
   forbidOnly: !!process.env.CI,
   workers: Number(process.env.WORKERS ?? 2),
-  timeout: 60_000,
+  // A test that hangs ends. Each of its waits has the time below.
+  timeout: 180_000,
   expect: { timeout: 15_000 },
   reporter: [['list']],
   use: { launchOptions: chromium, trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false } },

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 use motorlink_fleet::clock::{Boot, Clock};
@@ -28,6 +28,7 @@ impl World {
     }
 
     pub fn with(name: &str, lease: Duration, clock: Arc<dyn Clock>) -> Self {
+        TURN.with(|_| {});
         let share = Share::leasing(&format!("fleet-{name}"), PATIENT, Some(lease), |link| link);
         let address = format!("127.0.0.1:{}", free_port());
         let listen = vec![format!("tcp/{address}")];
@@ -94,6 +95,32 @@ fn start(
         ros2: None,
         reader: None,
     })
+}
+
+thread_local! {
+    /// A test with nodes takes its turn with others until its thread ends: each node and client has to
+    /// answer within seconds, and to begin needs half a second of the processor.
+    static TURN: Turn = Turn::take();
+}
+
+struct Turn;
+
+static TURNS: (Mutex<usize>, Condvar) = (Mutex::new(0), Condvar::new());
+
+impl Turn {
+    fn take() -> Self {
+        let most = 2 * std::thread::available_parallelism().map_or(1, usize::from);
+        let (taken, freed) = &TURNS;
+        *freed.wait_while(taken.lock().unwrap(), |taken| *taken >= most).unwrap() += 1;
+        Turn
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        *TURNS.0.lock().unwrap() -= 1;
+        TURNS.1.notify_one();
+    }
 }
 
 pub fn free_port() -> u16 {
