@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from program import PATIENT, Outcome, Running, environment, serving
+from sharing import Client
 from terminal import Terminal
 from wireshark import dissector, packets, sets, tshark  # noqa: F401
 
@@ -148,6 +149,8 @@ def nodes(start, sim, tmp_path):
         assert ready["ports"] == [f"zenoh:{name}/st0", f"zenoh:{name}/rmd0"]
         running.path, running.address = path, ready["addresses"][0]
         running.drives = drives
+        # If the first answer of a drive is late, its line rests for twice the timeout (SPEC-NOTES S16).
+        Client(path, "waits").status()
         started.append(running)
         return running
 

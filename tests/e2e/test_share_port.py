@@ -3,6 +3,7 @@
 import os
 import signal
 import struct
+import time
 
 import pytest
 
@@ -92,6 +93,25 @@ def test_a_move_that_waits_leaves_a_motor_that_another_program_has_moved_since(s
         assert not any("was stopped" in line for line in waits.err), waits.err
         assert direct.ask("stop", motor={"line": "rmd0", "motor": 2})["kind"] == "answer"
         eventually(lambda: abs(direct.dps(2)) < 5, "a motor at rest")
+
+
+def test_the_motor_of_a_program_that_is_frozen_stops(share, start, direct):
+    times = []
+    for _ in range(ROUNDS):
+        waits = start("rmd", "-p", share.rmd, "--id", 2, "position", 720000, "--max-speed", 100, "--wait")
+        eventually(lambda: direct.dps(2) > 50, "a motor that turns")
+        began = time.monotonic()
+        waits.process.send_signal(signal.SIGSTOP)
+        left = direct.until(lambda it: event("left")(it) and "no sign of life" in it["message"])
+        times.append(time.monotonic() - began)
+        eventually(lambda: abs(direct.dps(2)) < 5, "a motor that stops")
+        waits.process.send_signal(signal.SIGCONT)
+        assert waits.wait() == 3
+        waits.says("no sign of life for 2")
+        assert left["by"].startswith("motorlink "), left
+    print(f"\nfrozen: {sorted(round(it, 2) for it in times)}")
+    # Signs of life come late by up to a quarter of the deadline.
+    assert min(times) > 1.4
 
 
 def test_a_command_latches_stops_and_releases(share, run, direct):

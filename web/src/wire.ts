@@ -926,7 +926,19 @@ motor?: MotorName | null, } | { "ask": "ending",
 /**
  * What is done.
  */
-motion: MotionEnding, } | { "ask": "take", 
+motion: MotionEnding, } | { "ask": "deadline", 
+/**
+ * Nothing came from the program for longer than this, in seconds.
+ */
+silence?: number | null, 
+/**
+ * A motor that it moves got no new command for longer than this, in seconds.
+ */
+motion?: number | null, } | { "ask": "alive" } | { "ask": "take", 
+/**
+ * The motor.
+ */
+motor: MotorName, } | { "ask": "claim", 
 /**
  * The motor.
  */
@@ -1036,7 +1048,7 @@ bytes: Array<number>, } | { "to": "confirm" } | { "to": "stop",
 /**
  * The motors and how they took it.
  */
-motors: Array<StoppedMotor>, } | { "to": "ending" } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
+motors: Array<StoppedMotor>, } | { "to": "claim" } | { "to": "deadline" } | { "to": "ending" } | { "to": "take" } | { "to": "latch" } | { "to": "release" } | { "to": "rates", 
 /**
  * Those of the signals that are read.
  */

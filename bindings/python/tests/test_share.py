@@ -110,6 +110,24 @@ def test_the_end_of_a_program_is_that_of_the_motors_that_it_has(share: Share, se
     eventually(lambda: mode(4) == "off", "the end of motor 4")
 
 
+def test_a_program_that_sleeps_lives_and_a_stream_that_ends_does_not(share: Share, served: Served) -> None:
+    def speed() -> float:
+        return float(str(served.motor("rmd", 1)["speed_dps"]))
+
+    with motorlink.rmd.open(share.rmd + "?deadline=400ms") as bus:
+        bus.motor(1).set_speed(100)
+        time.sleep(1)
+        assert speed() > 90
+    with motorlink.rmd.open(share.rmd + "?deadline=400ms&motion=300ms") as bus:
+        for _ in range(5):
+            bus.motor(1).set_speed(100)
+            time.sleep(0.1)
+        assert speed() > 90
+        eventually(lambda: abs(speed()) < 5, "a motor whose stream has ended")
+        with pytest.raises(errors.PortError, match="no new command for 3"):
+            bus.motor(1).set_speed(100)
+
+
 def test_the_end_of_a_share_is_told(share: Share) -> None:
     with motorlink.st.open(share.st, on_close="nothing") as client:
         client.motor(1).status()

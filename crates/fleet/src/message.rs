@@ -4,12 +4,9 @@
 use std::collections::BTreeMap;
 
 use motorlink_telemetry::share::message::{self as share, Line, Protocol, Reason};
+pub use motorlink_telemetry::share::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
 use serde::{Deserialize, Serialize};
 
-/// The longest sign-of-life deadline of a program, in seconds.
-pub const LONGEST_DEADLINE: f64 = 10.0;
-/// The shortest one.
-pub const SHORTEST_DEADLINE: f64 = 0.02;
 /// The longest reason of a program that leaves, in bytes.
 pub const LONGEST_WHY: usize = 200;
 /// The longest request, in bytes.

@@ -1,13 +1,11 @@
 //! The port `zenoh:`: a line of a node.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use motorlink_link::port::{self, Carries, Form, Given, NameError, PortName, Scheme};
-use motorlink_telemetry::share::port::line_port;
+use motorlink_telemetry::share::port::{Deadlines, deadline_of, line_port};
 
 use crate::key::BadName;
-use crate::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
 use crate::network::Network;
 use crate::remote::{self, DEADLINE, Remote};
 
@@ -60,18 +58,20 @@ impl Scheme for Zenoh {
             Some(text) => text.parse().map_err(|_| given.bad_option("as", text, what.clone()))?,
             None => remote::own_name(&network),
         };
-        let deadline = span(given, "deadline")?.unwrap_or(DEADLINE);
-        let motion = span(given, "motion")?;
+        let deadline = deadline_of(given, "deadline")?.unwrap_or(DEADLINE);
+        let motion = deadline_of(given, "motion")?;
         let takes = flag(given, "take")?;
         if flag(given, "raw")? {
             let what = "the port without it: there are no raw bytes of a node yet".to_owned();
             return Err(given.bad_option("raw", "set", what));
         }
         let remote = Remote { who, deadline, motion, takes, ..Remote::new(node, network) };
-        line_port(Arc::new(remote), line).ok_or_else(|| NameError::Incomplete {
-            name: given.name.to_owned(),
-            what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",
-            example: EXAMPLE,
+        line_port(Arc::new(remote), Deadlines::default(), line).ok_or_else(|| {
+            NameError::Incomplete {
+                name: given.name.to_owned(),
+                what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",
+                example: EXAMPLE,
+            }
         })
     }
 }
@@ -82,22 +82,5 @@ fn flag(given: &mut Given<'_>, option: &'static str) -> Result<bool, NameError> 
         None => Ok(false),
         Some("") => Ok(true),
         Some(text) => Err(given.bad_option(option, text, "it without a value".to_owned())),
-    }
-}
-
-/// A time of an option, such as `200ms`.
-fn span(given: &mut Given<'_>, option: &'static str) -> Result<Option<Duration>, NameError> {
-    let Some(text) = given.take(option) else { return Ok(None) };
-    let seconds = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
-        (Some(number), _) => number.parse::<f64>().ok().map(|it| it / 1e3),
-        (None, Some(number)) => number.parse().ok(),
-        (None, None) => None,
-    };
-    match seconds.filter(|it| (SHORTEST_DEADLINE..=LONGEST_DEADLINE).contains(it)) {
-        Some(seconds) => Ok(Some(Duration::from_secs_f64(seconds))),
-        None => {
-            let what = format!("{} ms to {LONGEST_DEADLINE} s", SHORTEST_DEADLINE * 1e3);
-            Err(given.bad_option(option, text, what))
-        }
     }
 }

@@ -27,7 +27,9 @@ impl Lines {
             },
             Ask::Stop { .. } | Ask::Latch => Kind::Stops,
             Ask::Ending { .. }
+            | Ask::Deadline { .. }
             | Ask::Take { .. }
+            | Ask::Claim { .. }
             | Ask::Release
             | Ask::Scan { .. }
             | Ask::Open { .. }
@@ -41,6 +43,7 @@ impl Lines {
             | Ask::Rates { .. }
             | Ask::Ports
             | Ask::Frames { .. }
+            | Ask::Alive
             | Ask::Leave { .. } => Kind::Reads,
         }
     }

@@ -198,7 +198,10 @@ impl Page {
             | Ask::Command { .. }
             | Ask::Confirm { .. }
             | Ask::Ending { .. }
+            | Ask::Deadline { .. }
+            | Ask::Alive
             | Ask::Take { .. }
+            | Ask::Claim { .. }
             | Ask::Leave { .. } => {
                 return Err(Refusal::new(Reason::Forbidden, "a page may not send this request"));
             }

@@ -158,7 +158,7 @@ async fn a_stop_ends_a_run_and_no_reference_follows() {
     let page = world.page().await;
     let other = world.other(&page).await;
     let (program, _listening) = connect(&world.share.path, "shell").await;
-    let is_stop = |frame: &Vec<u8>| Code::from(frame[0]).ends_motion();
+    let is_stop = |frame: &Vec<u8>| Code::from(frame[0]).motion().stops();
     for stopping in 0..6 {
         let begin = world.rmd_motion(1).len();
         from(&page, run(rmd(1), Mode::Speed, 3000.0, 100.0)).await;
@@ -189,7 +189,7 @@ async fn the_end_of_the_page_stops_its_run() {
     world.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0).await;
     let end = quiet(&world, 1).await;
     let frames = world.rmd_motion(1);
-    assert!(Code::from(frames[end - 1][0]).ends_motion(), "{frames:02x?}");
+    assert!(Code::from(frames[end - 1][0]).motion().stops(), "{frames:02x?}");
     assert_eq!(page.refused(run(rmd(1), Mode::Speed, 10.0, 10.0)).await.0, Reason::Lapsed);
 }
 

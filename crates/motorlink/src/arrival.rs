@@ -29,8 +29,8 @@ pub trait Positioned {
     ) -> Result<<Self::Sampler as Sampler>::Reply, Self::Error>;
     /// Checks that replies and requests match.
     fn confirm(&self) -> Result<(), Self::Error>;
-    /// Whether an error is that of the line.
-    fn is_line_failure(error: &Self::Error) -> bool;
+    /// Whether an error is that of the line, and the motor may go on with its move.
+    fn may_go_on(error: &Self::Error) -> bool;
     /// The error of a motor that did not arrive.
     fn not_arrived(&self, why: Why<Self>) -> Self::Error;
     /// Why the motor did not arrive, if it is the error.
@@ -124,7 +124,7 @@ impl<M: Positioned> Move<M> {
             }
         };
         if let Err(error) = exchanged {
-            if !self.watch.is_commanded() || !M::is_line_failure(&error) {
+            if !self.watch.is_commanded() || !M::may_go_on(&error) {
                 return Err(error);
             }
             self.watch.lost(clock.now());

@@ -12,10 +12,12 @@
 //! | find the baud rate of an ST drive | [`st::scan`] |
 //! | write settings to a file, compare and restore them | [`settings`] |
 //! | stop the motors of another program when it ends | [`relay::Relay`] |
+//! | say who owns a motor in motion, between several programs | [`ownership`] |
 #![forbid(unsafe_code)]
 
 pub mod arrival;
 mod overdue;
+pub mod ownership;
 pub mod relay;
 pub mod rmd;
 pub mod settings;

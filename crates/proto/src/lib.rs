@@ -33,9 +33,11 @@ mod table;
 pub mod arrival;
 pub mod can;
 mod hex;
+mod motion;
 pub mod rmd;
 pub mod st;
 pub mod time;
 pub mod units;
 
 pub use hex::Hex;
+pub use motion::Motion;

@@ -17,7 +17,7 @@ use motorlink::{Clock, LinkState};
 use motorlink_proto::time::{Instant, Micros};
 
 use crate::event::{CommandError, Event, What};
-use crate::line::{Line, LineError, Over, Reply, Request, Shows, Stopped, may_move};
+use crate::line::{Line, LineError, Over, Reply, Request, Shows, Stopped};
 use crate::plan::{Poll, Wants};
 use crate::schedule::{
     CommandId, Displaced, Job, Lane, Load, Next, Outcome, PollId, Quiet, Schedule, Verdict,
@@ -224,7 +224,7 @@ impl Acquisition {
         request: Request,
         time_to_live: Micros,
     ) -> Result<CommandId, CommandError> {
-        if let Some(latch) = self.latch.as_ref().filter(|_| may_move(&request)) {
+        if let Some(latch) = self.latch.as_ref().filter(|_| request.motion().may_move()) {
             return Err(CommandError::Latched(Arc::clone(latch)));
         }
         let lane = self.line.lane(&request);
@@ -243,8 +243,9 @@ impl Acquisition {
         let command = Command { by: by_whom, request: again, is_stop: true, deadline: None };
         let motor = request.motor();
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
-        let keep =
-            |queued: &Arc<Command>| !may_move(&queued.request) || is_other(queued.request.motor());
+        let keep = |queued: &Arc<Command>| {
+            !queued.request.motion().may_move() || is_other(queued.request.motor())
+        };
         let is_same = |queued: &Arc<Command>| queued.request == request;
         let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), is_same, keep);
         for (id, _) in overtaken {
@@ -279,7 +280,7 @@ impl Acquisition {
     /// is refused, too.
     pub fn latch(&mut self, by: &Arc<str>, ended: &mut Ended<'_>) {
         self.latch = Some(Arc::clone(by));
-        for (id, _) in self.schedule.withdraw(|queued| !may_move(&queued.request)) {
+        for (id, _) in self.schedule.withdraw(|queued| !queued.request.motion().may_move()) {
             ended(id, Err(CommandError::Latched(Arc::clone(by))));
         }
         self.tell(What::Latched(Arc::clone(by)));
@@ -410,7 +411,9 @@ impl Acquisition {
                 self.polls.get(&id).map(|poll| poll.request())
             }
             Job::Command(id, command) => {
-                if let Some(latch) = self.latch.clone().filter(|_| may_move(&command.request)) {
+                if let Some(latch) =
+                    self.latch.clone().filter(|_| command.request.motion().may_move())
+                {
                     self.schedule.ended(self.clock.now(), lane, Outcome::Refused);
                     return ended(id, Err(CommandError::Latched(latch)));
                 }

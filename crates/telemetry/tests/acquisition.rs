@@ -319,7 +319,7 @@ fn a_latch_refuses_commands_whose_effect_is_unknown() {
     for code in 0..=u8::MAX {
         let sent = engine.command(Request::Rmd(id, [code, 0, 0, 0, 0, 0, 0, 0]));
         let row = Code::from(code).info();
-        let is_harmless = row.is_some_and(|row| !row.moves);
+        let is_harmless = row.is_some_and(|row| !row.motion.may_move());
         assert_eq!(sent.is_ok(), is_harmless, "{code:#04x}");
     }
 }

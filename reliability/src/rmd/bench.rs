@@ -266,8 +266,8 @@ impl RmdRun {
                 true => Code::SetTorque,
                 false => Code::from(frame.data()[0]),
             };
-            let halts = matches!(code, Code::Off | Code::Stop);
-            let moves = code.info().is_some_and(|row| row.moves);
+            let halts = code.motion().stops();
+            let moves = code.motion().is_owned();
             let number = number + 1;
             let moved = if moves { number } else { moved };
             sent[id.index()] = SentFrame { number, at: self.now, halts, moved };

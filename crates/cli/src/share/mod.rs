@@ -37,7 +37,8 @@ Lines: st0, st1, .. are the ports with an ST drive; rmd0, rmd1, .. are those wit
 order of -p. A port that can have both, such as sim:, gives both.
 
 Safety: a stop goes before commands, and commands go before reads. When a program ends or is killed, \
-the motors that it turned last stop. The motors of a program that hangs but does not end keep turning. A \
+the motors that it turned last stop; when it is frozen or in a debugger, after 2 s (?deadline= of its \
+port). ?motion=300ms also stops a stream of references that ends. docs/SAFETY.md has the whole table. A \
 latch refuses motion of all programs until it is released. A share cannot stop a motor if the share \
 is killed with SIGKILL, if the cable to the drive is cut, or if the computer stops. If people can be \
 hurt, use an emergency stop in hardware.

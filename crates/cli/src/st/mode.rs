@@ -140,7 +140,7 @@ pub fn meaning(session: &Session, frame: &Frame<'_>) -> Option<String> {
     let mut out = [0; MAX_FRAME];
     let bytes = frame.encode(&mut out)?;
     let mut text = format!("sent {}", Transcript::new(profile).note(None, true, bytes).trim());
-    if Effect::of_frame(frame).moves() {
+    if Effect::of_frame(frame).motion().is_owned() {
         text += "; the motor may turn now";
     }
     Some(text)

@@ -302,14 +302,7 @@ impl Harness {
 
 /// Whether writing a register changes the effect of the next start.
 pub(super) fn is_setpoint(register: RegisterId) -> bool {
-    matches!(
-        register,
-        RegisterId::CONTROL_MODE
-            | RegisterId::TORQUE_REF
-            | RegisterId::FLUX_REF
-            | RegisterId::IQ_SPEEDMODE
-            | RegisterId::RAMP_FINAL_SPEED
-    )
+    register.effect().motion().is_owned() || register == RegisterId::IQ_SPEEDMODE
 }
 
 pub(super) fn faulty(status: Status) -> bool {

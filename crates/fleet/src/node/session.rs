@@ -191,7 +191,10 @@ impl Session {
                     self.refuse(request.id, Reason::Busy, why);
                     return None;
                 }
-                self.waiting.insert(request.id);
+                // It has no answer.
+                if request.ask != ShareAsk::Alive {
+                    self.waiting.insert(request.id);
+                }
                 match timeout(TAKEN, self.program.pass(&request)).await {
                     Ok(Ok(())) => None,
                     Ok(Err(error)) => Some(format!("the share is lost: {error}")),

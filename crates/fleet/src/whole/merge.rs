@@ -273,6 +273,7 @@ impl Merge {
                 self.end(id, answer);
             }
             Ask::Leave { .. } => return false,
+            Ask::Alive => {}
             Ask::Ports | Ask::Scan { .. } | Ask::Open { .. } => {
                 let why = "ports of a node are opened at the node: `motorlink node -p PORT`";
                 self.refuse(id, Refusal::usage(why));

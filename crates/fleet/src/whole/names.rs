@@ -25,7 +25,9 @@ pub(super) fn line_of(ask: &mut Ask) -> Option<&mut String> {
         | Ask::Close { line }
         | Ask::Frames { line, .. }
         | Ask::Rates { line: Some(line) } => Some(line),
-        Ask::Stop { motor: Some(motor) } | Ask::Take { motor } => Some(&mut motor.line),
+        Ask::Stop { motor: Some(motor) } | Ask::Take { motor } | Ask::Claim { motor } => {
+            Some(&mut motor.line)
+        }
         _ => None,
     }
 }

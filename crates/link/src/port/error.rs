@@ -332,6 +332,12 @@ impl PortError {
         !self.is_interruption() && !is_answered
     }
 
+    /// Whether the program that held the port has ended the session or is gone. The motors of this client do
+    /// not go on as they were commanded.
+    pub fn ends_session(&self) -> bool {
+        matches!(self, PortError::NoHolder { .. })
+    }
+
     /// Whether the drive did not get the request: the program that holds the port has not sent it.
     pub fn is_unsent(&self) -> bool {
         use NotDone::{Held, Latched, Unsent, Usage};

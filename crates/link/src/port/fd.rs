@@ -92,7 +92,10 @@ impl FdLink {
     }
 
     /// Writes the part of `bytes` that the kernel accepts at once. Returns its size.
-    pub(super) fn offer(&self, bytes: &[u8]) -> Result<usize, PortError> {
+    ///
+    /// # Errors
+    /// Those of the descriptor.
+    pub fn offer(&self, bytes: &[u8]) -> Result<usize, PortError> {
         loop {
             return match write(&self.fd, bytes) {
                 Ok(taken) => Ok(taken),

@@ -76,12 +76,20 @@ pub trait Link: Send {
         }
     }
 
-    /// From now on, whether requests are only for motors that no other program has moved, taken or stopped
-    /// since this one moved them. A program that holds the port refuses the others
+    /// From now on, whether requests are only for motors that this client owns: no other program has moved,
+    /// taken or stopped them since. A program that holds the port refuses the others
     /// ([`NotDone::Held`](super::NotDone::Held)).
     fn only_own(&self, is_set: bool) {
         if let Some(within) = self.within() {
             within.only_own(is_set);
+        }
+    }
+
+    /// This client has moved these motors before the port was opened again. A program that holds the port
+    /// takes them for motors of this client, unless another client has moved them there.
+    fn claim(&self, motors: &[u8]) {
+        if let Some(within) = self.within() {
+            within.claim(motors);
         }
     }
 
@@ -120,6 +128,10 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn only_own(&self, is_set: bool) {
         (**self).only_own(is_set);
+    }
+
+    fn claim(&self, motors: &[u8]) {
+        (**self).claim(motors);
     }
 
     fn end_with(&self, ending: Ending) {

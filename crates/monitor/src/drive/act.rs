@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use motorlink_proto::rmd::Code;
-use motorlink_proto::st::{Command as StCommand, Effect, Request as StRequest, Starting};
-use motorlink_telemetry::line::{Request, may_move};
+use motorlink_proto::st::{Command as StCommand, Request as StRequest, Starting};
+use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::{Program, Refusal};
 
@@ -37,11 +36,11 @@ impl Act {
                 "this command wears the ROM of the motor; nothing was sent",
             ));
         }
-        if may_move(&request) {
+        if request.motion().may_move() {
             return self.move_motor(control, drive, &request).await;
         }
         let exchanges = Exchanges::new(view, &self.target);
-        if ends_motion(&request) {
+        if request.motion().stops() {
             control.stopping(&self.target);
             let reply = exchanges.request(&request).await?;
             let values = self.values(&exchanges, &reply)?;
@@ -107,14 +106,6 @@ pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
                 Err(Refusal::new(Reason::Refused, message))
             }
         };
-    }
-}
-
-fn ends_motion(request: &Request) -> bool {
-    match request {
-        Request::St(_, request) => Effect::of(&request.request()) == Effect::Stops,
-        Request::Rmd(_, [code, ..]) => Code::from(*code).ends_motion(),
-        _ => false,
     }
 }
 

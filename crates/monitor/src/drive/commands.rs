@@ -10,7 +10,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::{Rounding, Scale};
 use motorlink_spec::st_messages::{self, Content, Value as StField};
-use motorlink_telemetry::line::{Request, may_move};
+use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
@@ -79,7 +79,7 @@ impl Command {
             name: self.name().to_owned(),
             doc: doc.to_owned(),
             fields,
-            moves: self.plain(motor).is_some_and(|request| may_move(&request)),
+            moves: self.plain(motor).is_some_and(|request| request.motion().may_move()),
             wears_rom: self.wears_rom(),
         }
     }

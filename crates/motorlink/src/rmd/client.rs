@@ -486,6 +486,8 @@ impl<L: CanLink> Driven<L> {
         let now = self.port.now();
         let (link, reopened) = self.port.link()?;
         if reopened {
+            let moved = self.session.moving().union(self.session.unexpected());
+            link.claim(&moved.map(MotorId::number).collect::<Vec<_>>());
             self.session.reopened(now);
             if link.is_fresh() {
                 self.session.trust();

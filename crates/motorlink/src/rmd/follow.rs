@@ -74,7 +74,7 @@ impl Follower {
                 );
             }
         } else if let Some(id) = MotorId::from_can_id(can_id.into()) {
-            let ends = Code::from(code).ends_motion();
+            let ends = Code::from(code).motion().stops();
             self.ask(id, SeenRequest { code, at: now, number, ends });
         }
     }

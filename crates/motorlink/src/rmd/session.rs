@@ -582,5 +582,5 @@ impl Session {
 
 /// Whether a frame, or the reply to it, is Off or Stop.
 pub(super) fn ends_motion([code, ..]: &[u8; 8]) -> bool {
-    Code::from(*code).ends_motion()
+    Code::from(*code).motion().stops()
 }

@@ -66,8 +66,8 @@ impl Positioned for Motor<'_> {
         self.client().confirm()
     }
 
-    fn is_line_failure(error: &Error) -> bool {
-        error.is_line_failure()
+    fn may_go_on(error: &Error) -> bool {
+        !matches!(error, Error::Port(error) if error.ends_session()) && error.is_line_failure()
     }
 
     fn not_arrived(&self, why: NotArrived) -> Error {

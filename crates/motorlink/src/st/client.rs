@@ -477,6 +477,8 @@ impl<L: ByteLink> Driven<L> {
         self.abandon();
         let (link, reopened) = self.port.link()?;
         if reopened {
+            let started = self.session.started().motors().map(MotorNumber::number);
+            link.claim(&started.collect::<Vec<_>>());
             self.session.reopened();
             if link.is_fresh() {
                 self.session.trust_line();

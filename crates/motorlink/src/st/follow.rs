@@ -147,7 +147,7 @@ impl Follower {
                 Parse::Frame(frame, size) if begin + size == self.recent.len() => (frame, size),
                 _ => continue,
             };
-            if Effect::of_frame(&frame).moves() {
+            if Effect::of_frame(&frame).motion().is_owned() {
                 // What is unanswered before it may change the current motor.
                 if self.out_of_sync || self.request.len() != size {
                     self.started.forget_current();

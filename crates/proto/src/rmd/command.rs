@@ -4,6 +4,7 @@ use super::message::SpinDirection;
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::{Field, Payload, payload, place, take};
 use super::reply::*;
+use crate::Motion;
 use crate::can::CanFrame;
 use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
@@ -88,8 +89,8 @@ pub struct CommandInfo {
     pub echo: bool,
     /// Whether the drive writes to its ROM, which wears (docs/SPEC-NOTES.md R8, R9).
     pub rom: bool,
-    /// Whether the motor may turn after this command.
-    pub moves: bool,
+    /// What the command does to the motion of the motor.
+    pub motion: Motion,
     /// Whether the values change without a command, so that programs read them periodically.
     pub sampled: bool,
     /// Values of the request.
@@ -109,7 +110,7 @@ impl CommandInfo {
             paragraph,
             echo: false,
             rom: false,
-            moves: false,
+            motion: Motion::Keeps,
             sampled: false,
             request: C::FIELDS,
             reply_name: "",
@@ -137,32 +138,18 @@ impl Code {
         self == reply || (self == Code::ClearErrors && reply == Code::ReadStatus)
     }
 
-    /// Whether the command ends the motion: Off or Stop.
-    pub const fn ends_motion(self) -> bool {
-        matches!(self, Code::Off | Code::Stop)
-    }
-
     /// Whether it only reads. Nothing is known of an unnamed code.
     pub fn is_read(self) -> bool {
         self.info().is_some_and(|row| row.stem.starts_with("read_"))
     }
-
-    /// Whether a motor may turn after this command. Unnamed codes from 0xA0 to 0xAF count as motion
-    /// commands: successors of this protocol have motion commands there.
-    pub fn may_move(self) -> bool {
-        match self.info() {
-            Some(row) => row.moves,
-            None => matches!(u8::from(self), 0xA0..=0xAF),
-        }
-    }
 }
 
 impl MotorSet {
-    /// The motors that may turn after a host's `frame`.
+    /// The motors whose motion the sender of a host's `frame` owns from then on.
     pub fn moved_by(frame: &CanFrame) -> Self {
         match frame.eight_bytes() {
             Some((TORQUE4_ID, _)) => MotorSet::TORQUE4,
-            Some((id, [code, ..])) if Code::from(*code).may_move() => {
+            Some((id, [code, ..])) if Code::from(*code).motion().is_owned() => {
                 MotorId::from_can_id(id.into()).map_or(MotorSet::EMPTY, MotorSet::from)
             }
             _ => MotorSet::EMPTY,
@@ -172,13 +159,13 @@ impl MotorSet {
 
 /// One row per command:
 ///
-/// `CODE stem Struct -> Reply [echo rom moves sampled] VERSIONS "name in chapter 2", "heading in
+/// `CODE stem Struct -> Reply [echo rom sampled] Motion VERSIONS "name in chapter 2", "heading in
 /// chapter 3", "description";`. The fields of the request follow `Struct`, as in [`payload!`].
 macro_rules! commands {
     ($d:tt $(
         $(#[$meta:meta])*
         $code:literal $stem:ident $name:ident $( ($inner:ty) )? $( { $($fields:tt)* } )?
-        -> $reply:ident [$($flag:ident)*] $($version:ident)+
+        -> $reply:ident [$($flag:ident)*] $motion:ident $($version:ident)+
         $text:literal, $paragraph:literal, $doc:literal;
     )+) => {
         named_numbers! {
@@ -197,6 +184,16 @@ macro_rules! commands {
                     Code::Unknown(_) => false,
                 }
             }
+
+            /// What the command does to the motion of the motor: [`CommandInfo::motion`]. Successors of
+            /// this protocol have motion commands from 0xA0 to 0xAF.
+            pub const fn motion(self) -> Motion {
+                match self {
+                    $( Code::$name => Motion::$motion, )+
+                    Code::Unknown(0xA0..=0xAF) => Motion::Starts,
+                    Code::Unknown(_) => Motion::Unknown,
+                }
+            }
         }
 
         $( payload! {
@@ -209,6 +206,7 @@ macro_rules! commands {
             const ROW: CommandInfo = CommandInfo {
                 versions: &[$( Version::$version, )+],
                 reply_name: stringify!($reply),
+                motion: Motion::$motion,
                 $( $flag: true, )*
                 ..CommandInfo::new::<$name>(Code::$name, stringify!($stem), $paragraph)
             };
@@ -234,79 +232,79 @@ macro_rules! commands {
 }
 
 commands! { $
-    0x30 read_pid ReadPid -> Pid [] V1_62
+    0x30 read_pid ReadPid -> Pid [] Keeps V1_62
         "Read PID data command", "Read PID parameter command",
         "reads the gains in RAM";
-    0x31 write_pid_ram WritePidRam(Pid) -> WritePidRam [echo] V1_62
+    0x31 write_pid_ram WritePidRam(Pid) -> WritePidRam [echo] Keeps V1_62
         "Write PID to RAM command", "Write PID to RAM parameter command",
         "sets the gains until power-off";
     /// Wears the ROM.
-    0x32 write_pid_rom WritePidRom(Pid) -> WritePidRom [echo rom] V1_62
+    0x32 write_pid_rom WritePidRom(Pid) -> WritePidRom [echo rom] Keeps V1_62
         "Write PID to ROM command", "Write PID to ROM parameter command",
         "sets the gains for good";
-    0x33 read_acceleration ReadAcceleration -> Acceleration [] V1_62
+    0x33 read_acceleration ReadAcceleration -> Acceleration [] Keeps V1_62
         "Read acceleration data command", "Read acceleration data command",
         "reads the acceleration limit";
-    0x34 write_acceleration_ram WriteAccelerationRam(Acceleration) -> WriteAccelerationRam [echo] V1_62
+    0x34 write_acceleration_ram WriteAccelerationRam(Acceleration) -> WriteAccelerationRam [echo] Keeps V1_62
         "Write acceleration data to RAM command", "Write acceleration data to RAM command",
         "sets the acceleration limit until power-off";
-    0x90 read_encoder ReadEncoder -> Encoder [] V1_62
+    0x90 read_encoder ReadEncoder -> Encoder [] Keeps V1_62
         "Read encoder data command", "Read encoder data command",
         "reads encoder position, original position and offset";
     /// docs/SPEC-NOTES.md R8. Wears the ROM.
-    0x91 write_encoder_offset_rom WriteEncoderOffsetRom(EncoderOffset) -> EncoderOffset [rom] V1_62
+    0x91 write_encoder_offset_rom WriteEncoderOffsetRom(EncoderOffset) -> EncoderOffset [rom] Keeps V1_62
         "Write encoder offset command", "Write encoder offset command",
         "sets the encoder offset, at once and for good";
     /// docs/SPEC-NOTES.md R9. Wears the ROM.
-    0x19 write_zero_rom WriteZeroRom -> EncoderOffset [rom] V1_62
+    0x19 write_zero_rom WriteZeroRom -> EncoderOffset [rom] Keeps V1_62
         "Write current position to ROM as motor zero command",
         "Write current position to ROM as motor zero position command",
         "makes the current position the zero effective after the next power cycle";
-    0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [sampled] V1_62
+    0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [sampled] Keeps V1_62
         "Read multi turns angle command", "Read multi turns angle command",
         "reads the angle over all turns";
-    0x94 read_single_turn_angle ReadSingleTurnAngle -> SingleTurnAngle [sampled] V1_62
+    0x94 read_single_turn_angle ReadSingleTurnAngle -> SingleTurnAngle [sampled] Keeps V1_62
         "Read single circle angle command", "Read single circle angle command",
         "reads the angle within the turn";
-    0x9A read_status ReadStatus -> Status [sampled] V1_62
+    0x9A read_status ReadStatus -> Status [sampled] Keeps V1_62
         "Read motor status 1 and error flag commands",
         "Read motor status 1 and error flag commands",
         "reads temperature, voltage and error flags";
     /// The reply may carry the code 0x9A (docs/SPEC-NOTES.md R1).
-    0x9B clear_errors ClearErrors -> Status [] V1_62
+    0x9B clear_errors ClearErrors -> Status [] Keeps V1_62
         "Clear motor error flag command", "Clear motor error flag command",
         "clears the error flags whose cause is gone";
-    0x9C read_motion_status ReadMotionStatus -> MotionStatus [sampled] V1_62
+    0x9C read_motion_status ReadMotionStatus -> MotionStatus [sampled] Keeps V1_62
         "Read motor status 2", "Read motor status 2",
         "reads temperature, torque current, speed and encoder position";
-    0x9D read_phase_currents ReadPhaseCurrents -> PhaseCurrents [sampled] V1_62
+    0x9D read_phase_currents ReadPhaseCurrents -> PhaseCurrents [sampled] Keeps V1_62
         "Read motor status 3", "Read motor status 3",
         "reads the three phase currents";
-    0x80 off Off -> Off [echo] V1_62
+    0x80 off Off -> Off [echo] Frees V1_62
         "Motor off command", "Motor off command",
         "switches the motor off and forgets what it was doing";
-    0x81 stop Stop -> Stop [echo] V1_62
+    0x81 stop Stop -> Stop [echo] Holds V1_62
         "Motor stop command", "Motor stop command",
         "stops the motor and remembers what it was doing";
-    0x88 run Run -> Run [echo moves] V1_62
+    0x88 run Run -> Run [echo] Starts V1_62
         "Motor running command", "Motor running command",
         "resumes what the motor was doing before the stop";
     0xA1 set_torque SetTorque {
         /// 0.016 A a digit, -2000 to 2000.
         4 iq: IqCommand,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Torque closed-loop command", "Torque current control command",
         "holds a torque current";
     0xA2 set_speed SetSpeed {
         /// 0.01 °/s a digit, positive is clockwise.
         4 speed: CentiDps,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Speed closed-loop command", "Speed control command",
         "holds a speed";
     0xA3 set_position SetPosition {
         /// 0.01° a digit, positive is clockwise from zero.
         4 angle: CentiDegrees,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Position closed-loop command 1", "Position control command 1",
         "turns to a multi-turn angle";
     /// The first column of the document holds for the bytes (docs/SPEC-NOTES.md R5).
@@ -315,7 +313,7 @@ commands! { $
         2 max_speed: SpeedLimit,
         /// 0.01° a digit, positive is clockwise from zero.
         4 angle: CentiDegrees,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Position closed-loop command 2", "Position control command 2",
         "turns to a multi-turn angle no faster than a limit";
     0xA5 set_single_turn_position SetSingleTurnPosition {
@@ -323,7 +321,7 @@ commands! { $
         1 direction: SpinDirection,
         /// 0.01° a digit, 0 to 35999.
         4 angle: TurnCentiDegrees,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Position closed-loop command 3", "Position control command 3",
         "turns to an angle within the turn, in a given direction";
     0xA6 set_single_turn_position_limited SetSingleTurnPositionLimited {
@@ -333,7 +331,7 @@ commands! { $
         2 max_speed: SpeedLimit,
         /// 0.01° a digit, 0 to 35999.
         4 angle: TurnCentiDegrees,
-    } -> MotionStatus [moves] V1_62
+    } -> MotionStatus [] Starts V1_62
         "Position closed-loop command 4", "Position control command 4",
         "turns to an angle within the turn, in a given direction, no faster than a limit";
 }
@@ -422,6 +420,9 @@ mod tests {
         assert!(with(|row| row.echo).eq([0x31, 0x32, 0x34, 0x80, 0x81, 0x88]));
         assert!(with(|row| row.code.is_repeated()).eq(with(|row| row.echo)));
         assert!(with(|row| row.rom).eq([0x32, 0x91, 0x19]));
-        assert!(with(|row| row.moves).eq([0x88, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6]));
+        let starts = with(|row| row.motion == Motion::Starts);
+        assert!(starts.eq([0x88, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6]));
+        assert!(with(|row| row.motion == Motion::Frees).eq([0x80]));
+        assert!(with(|row| row.motion == Motion::Holds).eq([0x81]));
     }
 }

@@ -128,7 +128,7 @@ impl Doubt {
             return Ok(Admitted::Request);
         }
         let own = match Code::from(code) {
-            code if code.ends_motion() && self.is_unknown() => {
+            code if code.motion().stops() && self.is_unknown() => {
                 let sent = if code == Code::Off { &mut self.off } else { &mut self.stop };
                 let again = core::mem::replace(sent, true);
                 return match silent {

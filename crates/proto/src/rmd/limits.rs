@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn every_motion_command_is_limited() {
-        for row in COMMANDS.iter().filter(|row| row.moves) {
+        for row in COMMANDS.iter().filter(|row| row.motion.may_move()) {
             let mut data = [0x7F; 8];
             data[0] = row.code.into();
             assert!(LIMITS.check(&data).is_err(), "{}", row.code);
@@ -331,7 +331,7 @@ mod tests {
 
     #[test]
     fn commands_that_do_not_move_the_motor_are_never_refused() {
-        for row in COMMANDS.iter().filter(|row| !row.moves) {
+        for row in COMMANDS.iter().filter(|row| !row.motion.may_move()) {
             let mut data = [0xFF; 8];
             data[0] = row.code.into();
             assert_eq!(LIMITS.check(&data), Ok(()), "{}", row.code);

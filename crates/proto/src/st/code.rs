@@ -1,5 +1,7 @@
 //! The named numbers of the protocol: frame codes, error codes, commands, states and flags.
 
+use super::effect::{Effect, Limited};
+
 /// The behaviour of a slave, and what a master expects. Profiles differ where the document and
 /// shipped drives differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -72,9 +74,14 @@ pub const HEADER_NACK: u8 = 0xFF;
 /// Header of the identification that SDK 4.x sends at start-up without a request (SPEC-NOTES S9).
 pub const HEADER_ATR: u8 = 0xE0;
 
-/// Declares the frame codes, each with the profiles that define it.
+/// Declares the frame codes, each with the profiles that define it, its effect, and which of its values
+/// are limited. The effect of SET_REG is in the table of registers, that of EXECUTE_CMD in the table of
+/// commands.
 macro_rules! frame_codes {
-    ($( $value:literal $variant:ident $text:literal [$($profile:ident)+] $doc:literal; )+) => {
+    ($(
+        $value:literal $variant:ident $text:literal [$($profile:ident)+] $effect:ident
+        $limited:ident $doc:literal;
+    )+) => {
         /// The request type of a command frame (table 1). The same number can have different
         /// meanings in different profiles, so a number becomes a code only with a [`Profile`].
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -108,25 +115,34 @@ macro_rules! frame_codes {
             pub const fn doc(self) -> &'static str {
                 match self { $( FrameCode::$variant => $doc, )+ }
             }
+
+            /// The effect of a frame, besides that of its command, register or segment.
+            pub const fn effect(self) -> Effect {
+                match self { $( FrameCode::$variant => Effect::$effect, )+ }
+            }
+
+            pub(super) const fn limited(self) -> Limited {
+                match self { $( FrameCode::$variant => Limited::$limited, )+ }
+            }
         }
     };
 }
 
 frame_codes! {
-    0x01 SetReg "SET_REG" [Spec Mcsdk54] "write a register (4.4)";
-    0x02 GetReg "GET_REG" [Spec Mcsdk54] "read a register (4.5)";
-    0x03 ExecuteCmd "EXECUTE_CMD" [Spec Mcsdk54] "execute a command (4.6)";
-    0x06 GetBoardInfo "GET_BOARD_INFO" [Spec Mcsdk54] "read the SDK's version and name (4.7)";
-    0x07 SetRamp "SET_RAMP" [Spec Mcsdk54] "program a speed ramp (4.8)";
-    0x08 GetRevupData "GET_REVUP_DATA" [Spec Mcsdk54] "read a rev-up phase (4.9)";
-    0x09 SetRevupData "SET_REVUP_DATA" [Spec Mcsdk54] "write a rev-up phase (4.10)";
-    0x0A SetCurrentRef "SET_CURRENT_REF" [Spec Mcsdk54] "set the Iq and Id references (4.11)";
-    0x0B GetMpInfo "GET_MP_INFO" [Mcsdk54] "list the registers of motor profiler steps";
-    0x0C GetFwVersion "GET_FW_VERSION" [Spec Mcsdk54] "read the firmware's version string (4.12)";
-    0x0D GetDataElement "GET_DATA_ELEMENT" [Spec] "read a data segment";
-    0x0D SetTorqueRamp "SET_TORQUE_RAMP" [Mcsdk54] "program a torque ramp";
-    0x0E ConfigDynStruct "CONFIG_DYN_STRUCT" [Spec] "choose the registers of a data segment";
-    0x12 SetPositionCmd "SET_POSITION_CMD" [Mcsdk54] "move to an angle in a given time";
+    0x01 SetReg "SET_REG" [Spec Mcsdk54] None Both "write a register (4.4)";
+    0x02 GetReg "GET_REG" [Spec Mcsdk54] None Nothing "read a register (4.5)";
+    0x03 ExecuteCmd "EXECUTE_CMD" [Spec Mcsdk54] None Speed "execute a command (4.6)";
+    0x06 GetBoardInfo "GET_BOARD_INFO" [Spec Mcsdk54] None Nothing "read the SDK's version and name (4.7)";
+    0x07 SetRamp "SET_RAMP" [Spec Mcsdk54] Ramps Speed "program a speed ramp (4.8)";
+    0x08 GetRevupData "GET_REVUP_DATA" [Spec Mcsdk54] None Nothing "read a rev-up phase (4.9)";
+    0x09 SetRevupData "SET_REVUP_DATA" [Spec Mcsdk54] None Both "write a rev-up phase (4.10)";
+    0x0A SetCurrentRef "SET_CURRENT_REF" [Spec Mcsdk54] Supersedes Current "set the Iq and Id references (4.11)";
+    0x0B GetMpInfo "GET_MP_INFO" [Mcsdk54] None Nothing "list the registers of motor profiler steps";
+    0x0C GetFwVersion "GET_FW_VERSION" [Spec Mcsdk54] None Nothing "read the firmware's version string (4.12)";
+    0x0D GetDataElement "GET_DATA_ELEMENT" [Spec] None Nothing "read a data segment";
+    0x0D SetTorqueRamp "SET_TORQUE_RAMP" [Mcsdk54] Supersedes Current "program a torque ramp";
+    0x0E ConfigDynStruct "CONFIG_DYN_STRUCT" [Spec] None Nothing "choose the registers of a data segment";
+    0x12 SetPositionCmd "SET_POSITION_CMD" [Mcsdk54] Supersedes Speed "move to an angle in a given time";
 }
 
 named_numbers! {
@@ -146,19 +162,6 @@ named_numbers! {
     }
 }
 
-impl Command {
-    /// Whether drives of `profile` know the command.
-    pub const fn is_in(self, profile: Profile) -> bool {
-        match self {
-            Command::Reset | Command::Ping | Command::ScStart | Command::ScStop => {
-                matches!(profile, Profile::Mcsdk54)
-            }
-            Command::Unknown(_) => false,
-            _ => true,
-        }
-    }
-}
-
 impl ErrorCode {
     /// Whether the drive did not understand the frame. This is a failure of the line.
     pub const fn is_damage(self) -> bool {
@@ -166,24 +169,51 @@ impl ErrorCode {
     }
 }
 
-named_numbers! {
-    /// The commands of EXECUTE_CMD (table 4, and those of shipped firmware).
-    pub enum Command: u8 {
-        0x01 StartMotor "START_MOTOR" "start the motor; nothing happens when it runs or is in fault";
-        0x02 StopMotor "STOP_MOTOR" "stop the motor";
-        0x03 StopRamp "STOP_RAMP" "stop the ramp that is executing";
-        0x04 Reset "RESET" "acknowledged without effect (mcsdk-5.4 only)";
-        0x05 Ping "PING" "acknowledged without effect (mcsdk-5.4 only)";
-        0x06 StartStop "START_STOP" "start an idle motor, stop a spinning one";
-        0x07 FaultAck "FAULT_ACK" "acknowledge past faults whose cause is gone";
-        0x08 EncoderAlign "ENCODER_ALIGN" "align the encoder";
-        0x09 IqdrefClear "IQDREF_CLEAR" "set the current references to their defaults";
-        0x0A PfcEnable "PFC_ENABLE" "start the power factor correction";
-        0x0B PfcDisable "PFC_DISABLE" "stop the power factor correction";
-        0x0C PfcFaultAck "PFC_FAULT_ACK" "acknowledge past faults of the power factor correction";
-        0x0D ScStart "SC_START" "start the motor profiler (mcsdk-5.4 only)";
-        0x0E ScStop "SC_STOP" "stop the motor profiler; acts as STOP_MOTOR (mcsdk-5.4 only)";
-    }
+/// Declares the commands, each with the profiles that define it and its effect.
+macro_rules! commands {
+    ($( $value:literal $variant:ident $text:literal [$($profile:ident)+] $effect:ident $doc:literal; )+) => {
+        named_numbers! {
+            /// The commands of EXECUTE_CMD (table 4, and those of shipped firmware).
+            pub enum Command: u8 {
+                $( $value $variant $text $doc; )+
+            }
+        }
+
+        impl Command {
+            /// Whether drives of `profile` know the command.
+            pub const fn is_in(self, profile: Profile) -> bool {
+                match self {
+                    $( Command::$variant => matches!(profile, $(Profile::$profile)|+), )+
+                    Command::Unknown(_) => false,
+                }
+            }
+
+            /// The effect of EXECUTE_CMD with this command.
+            pub const fn effect(self) -> Effect {
+                match self {
+                    $( Command::$variant => Effect::$effect, )+
+                    Command::Unknown(_) => Effect::None,
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    0x01 StartMotor "START_MOTOR" [Spec Mcsdk54] Starts "start the motor; nothing happens when it runs or is in fault";
+    0x02 StopMotor "STOP_MOTOR" [Spec Mcsdk54] Stops "stop the motor";
+    0x03 StopRamp "STOP_RAMP" [Spec Mcsdk54] EndsRamp "stop the ramp that is executing";
+    0x04 Reset "RESET" [Mcsdk54] Resets "acknowledged without effect (mcsdk-5.4 only)";
+    0x05 Ping "PING" [Mcsdk54] None "acknowledged without effect (mcsdk-5.4 only)";
+    0x06 StartStop "START_STOP" [Spec Mcsdk54] Starts "start an idle motor, stop a spinning one";
+    0x07 FaultAck "FAULT_ACK" [Spec Mcsdk54] None "acknowledge past faults whose cause is gone";
+    0x08 EncoderAlign "ENCODER_ALIGN" [Spec Mcsdk54] Aligns "align the encoder";
+    0x09 IqdrefClear "IQDREF_CLEAR" [Spec Mcsdk54] Supersedes "set the current references to their defaults";
+    0x0A PfcEnable "PFC_ENABLE" [Spec Mcsdk54] None "start the power factor correction";
+    0x0B PfcDisable "PFC_DISABLE" [Spec Mcsdk54] None "stop the power factor correction";
+    0x0C PfcFaultAck "PFC_FAULT_ACK" [Spec Mcsdk54] None "acknowledge past faults of the power factor correction";
+    0x0D ScStart "SC_START" [Mcsdk54] Starts "start the motor profiler (mcsdk-5.4 only)";
+    0x0E ScStop "SC_STOP" [Mcsdk54] Stops "stop the motor profiler; acts as STOP_MOTOR (mcsdk-5.4 only)";
 }
 
 named_numbers! {

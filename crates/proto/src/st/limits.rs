@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::effect::Limited;
 use super::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
 
 /// The limits of all requests, typed or raw. `None` means no limit.
@@ -116,16 +117,10 @@ impl Limits {
     }
 
     fn write(&self, register: RegisterId, value: &[u8]) -> Result<(), LimitError> {
-        match register {
-            RegisterId::RAMP_FINAL_SPEED if self.speed_rpm.is_some() => {
-                self.speed(whole(register, value)?)
-            }
-            RegisterId::TORQUE_REF | RegisterId::FLUX_REF | RegisterId::IQ_SPEEDMODE
-                if self.current_s16a.is_some() =>
-            {
-                self.current(whole(register, value)?)
-            }
-            _ => Ok(()),
+        match register.limited() {
+            limited if !self.bound(limited) => Ok(()),
+            Limited::Current => self.current(whole(register, value)?),
+            _ => self.speed(whole(register, value)?),
         }
     }
 
@@ -135,15 +130,17 @@ impl Limits {
     }
 
     fn short(&self, code: FrameCode) -> Result<(), LimitError> {
-        let is_limited = match code {
-            FrameCode::SetRamp | FrameCode::SetPositionCmd | FrameCode::ExecuteCmd => {
-                self.speed_rpm.is_some()
-            }
-            FrameCode::SetCurrentRef | FrameCode::SetTorqueRamp => self.current_s16a.is_some(),
-            FrameCode::SetReg | FrameCode::SetRevupData => *self != Limits::default(),
-            _ => false,
-        };
-        if is_limited { Err(LimitError::Short(code)) } else { Ok(()) }
+        if self.bound(code.limited()) { Err(LimitError::Short(code)) } else { Ok(()) }
+    }
+
+    /// Whether a limit is set for it.
+    fn bound(&self, limited: Limited) -> bool {
+        match limited {
+            Limited::Nothing => false,
+            Limited::Speed => self.speed_rpm.is_some(),
+            Limited::Current => self.current_s16a.is_some(),
+            Limited::Both => *self != Limits::default(),
+        }
     }
 
     fn speed(&self, rpm: i32) -> Result<(), LimitError> {

@@ -68,6 +68,7 @@ mod code;
 mod command;
 mod confirm;
 mod drive;
+mod effect;
 mod failure;
 mod frame;
 mod full_scale;
@@ -97,6 +98,7 @@ pub use code::{
 };
 pub use confirm::{Confirmation, LastExchange};
 pub use drive::{MotorControl, MotorNumber};
+pub use effect::Effect;
 pub use failure::{ExchangeError, Failure};
 pub use frame::{Bad, CODE_BITS, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
 pub use full_scale::{FullScale, InvalidFullScale};
@@ -114,7 +116,7 @@ pub use owned::OwnedRequest;
 pub use register::{Feature, Features, RegisterId, segment_values};
 pub use settings::{NotASetting, Setting};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
-pub use started::{Effect, Started};
+pub use started::Started;
 pub use starting::{NotStarted, Starting};
 #[cfg(feature = "std")]
 pub use value::{Implausible, Reading, UnknownRegister, ValueError, find_register, parse_value};

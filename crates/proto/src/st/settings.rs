@@ -3,8 +3,7 @@
 use super::message::REVUP_PHASES;
 use super::register::{Access, Feature, Features, Type, Writing};
 use super::slave::speed;
-use super::verified::acts;
-use super::{Profile, RegisterId, RevupPhase};
+use super::{Effect, Profile, RegisterId, RevupPhase};
 use crate::units::{Rounding, Scale};
 
 /// What one request reads, and one request writes.
@@ -52,7 +51,7 @@ impl RegisterId {
         if is_read && self.is_divisor() {
             return None;
         }
-        if is_written && (acts(self) || self == RegisterId::PFC_DCBUS_REF) {
+        if is_written && (self.effect() != Effect::None || self == RegisterId::PFC_DCBUS_REF) {
             return Some(NotASetting::Acts);
         }
         if !is_read || !is_written || shape.access != Access::ReadWrite {

@@ -1,97 +1,26 @@
 //! The motors that were set in motion and not stopped, according to requests and replies.
 
-use super::{Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request};
+use super::{Command, Effect, Frame, FrameCode, MotorNumber, Parse, Profile, Request};
 
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
 
-/// The effect of a request on started motors and on setpoints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Effect {
-    /// No effect.
-    #[default]
-    None,
-    /// It may make a motor turn until a stop. An alignment ends by itself and does not count.
-    Starts,
-    /// It stops a motor.
-    Stops,
-    /// Motor number 0 addresses another motor afterwards.
-    Retargets,
-    /// It sets the target speed of a start.
-    Ramps,
-    /// It may replace the speed ramp of a start by another setpoint.
-    Supersedes,
-    /// It ends a ramp at the speed that the motor has.
-    EndsRamp,
-    /// It may reset the drive.
-    Resets,
-    /// It configures this data segment.
-    Configures(u8),
-}
-
 impl Effect {
-    /// The effect of a request.
+    /// The effect of a request, according to the tables of frame codes, commands and registers.
     pub fn of(request: &Request<'_>) -> Self {
         match request {
-            Request::ExecuteCommand(command) => Effect::of_command(*command),
-            Request::SetRegister { register, .. } => Effect::of_write(*register),
+            Request::ExecuteCommand(command) => command.effect(),
+            Request::SetRegister { register, .. } => register.effect(),
             Request::ConfigureSegment { segment, .. } => Effect::Configures(*segment),
-            request => Effect::of_code(request.code()),
+            request => request.code().effect(),
         }
-    }
-
-    /// The effect of a frame that has neither command nor register.
-    pub const fn of_code(code: FrameCode) -> Self {
-        match code {
-            FrameCode::SetRamp => Effect::Ramps,
-            FrameCode::SetCurrentRef | FrameCode::SetTorqueRamp | FrameCode::SetPositionCmd => {
-                Effect::Supersedes
-            }
-            _ => Effect::None,
-        }
-    }
-
-    /// The effect of SET_REG.
-    pub const fn of_write(register: RegisterId) -> Self {
-        match register {
-            RegisterId::TARGET_MOTOR => Effect::Retargets,
-            RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
-            // A change of mode may activate the drive's own reference.
-            RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
-                Effect::Supersedes
-            }
-            _ => Effect::None,
-        }
-    }
-
-    /// The effect of EXECUTE_CMD.
-    pub const fn of_command(command: Command) -> Self {
-        match command {
-            Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
-            Command::StopMotor | Command::ScStop => Effect::Stops,
-            Command::StopRamp => Effect::EndsRamp,
-            // The defaults of the drive may be any.
-            Command::IqdrefClear => Effect::Supersedes,
-            Command::Reset => Effect::Resets,
-            _ => Effect::None,
-        }
-    }
-
-    /// Whether it may start a motion or change one. The sender then owns the motor and has to stop it.
-    pub const fn moves(self) -> bool {
-        matches!(self, Effect::Starts | Effect::Ramps | Effect::EndsRamp | Effect::Supersedes)
-    }
-
-    /// Whether a request stops a motor.
-    pub(super) fn stops(request: &Request<'_>) -> bool {
-        matches!(request, Request::ExecuteCommand(command) if Self::of_command(*command) == Effect::Stops)
     }
 
     /// Whether a raw frame stops a motor.
     pub(super) fn frame_stops(frame: &Frame<'_>) -> bool {
         match frame.payload {
             [command, ..] if frame.code() == FrameCode::ExecuteCmd.number() => {
-                Self::of_command(Command::from(*command)) == Effect::Stops
+                Command::from(*command).effect() == Effect::Stops
             }
             _ => false,
         }
@@ -111,7 +40,7 @@ impl Effect {
 }
 
 /// The started motors. A motor counts as started as soon as a request is sent that starts or changes
-/// its motion ([`Effect::moves`]): the reply may be lost, and another program may have started it before.
+/// its motion ([`Motion::is_owned`](crate::Motion::is_owned)): the reply may be lost, and another program may have started it before.
 /// It counts until a STOP is acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Started {
@@ -131,7 +60,7 @@ impl Started {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
         }
-        if effect.moves() {
+        if effect.motion().is_owned() {
             self.presume(motor);
         }
         let addressed = self.addressed(motor);
@@ -177,7 +106,7 @@ impl Started {
         let mut rest = bytes;
         while let [_, behind @ ..] = rest {
             if let Parse::Frame(frame, _) = Frame::parse(rest)
-                && Effect::of_frame(&frame).moves()
+                && Effect::of_frame(&frame).motion().is_owned()
             {
                 self.presume(frame.motor());
             }

@@ -2,7 +2,7 @@
 
 use super::register::{Type, Unit, Writing};
 use super::slave::speed;
-use super::{Features, Profile, RegisterId, Request};
+use super::{Effect, Features, Profile, RegisterId, Request};
 
 /// Default number of attempts of a verified write.
 pub const VERIFY_ATTEMPTS: u8 = 3;
@@ -55,7 +55,7 @@ impl VerifiedWrite {
         if shape.read_size(profile, built).is_none() {
             return Err(Unverified::NotReadable);
         }
-        if acts(register) {
+        if register.effect() != Effect::None {
             return Err(Unverified::Acts);
         }
         let kept = shape.ty(profile).fit(value);
@@ -144,17 +144,4 @@ impl Verifying {
         self.attempt = self.attempt.saturating_add(1);
         None
     }
-}
-
-/// Registers that command the drive: a write makes the motor act, the drive changes the register
-/// itself, or another motor is addressed afterwards.
-pub(super) fn acts(register: RegisterId) -> bool {
-    matches!(
-        register,
-        RegisterId::TARGET_MOTOR
-            | RegisterId::CONTROL_MODE
-            | RegisterId::TORQUE_REF
-            | RegisterId::FLUX_REF
-            | RegisterId::RAMP_FINAL_SPEED
-    )
 }

@@ -1,5 +1,6 @@
 //! The tables of the protocols name every request that changes the motion of a simulated drive.
 
+use motorlink_proto::Motion;
 use motorlink_proto::rmd::Code;
 use motorlink_proto::st::{
     Command, ControlMode, Effect, Frame, MAX_FRAME, Profile, RegisterId, Status, register,
@@ -63,11 +64,9 @@ fn every_request_that_changes_the_motion_of_an_st_drive_is_known() {
                 if after == before || matches!(after.0, Status::FaultNow | Status::FaultOver) {
                     continue;
                 }
-                changing += usize::from(effect.moves());
-                // An alignment ends by itself.
-                let aligns = payload[..] == [Command::EncoderAlign.number()] && code == 3;
+                changing += usize::from(effect.motion().is_owned());
                 assert!(
-                    effect.moves() || matches!(effect, Effect::Stops | Effect::Resets) || aligns,
+                    effect.motion() != Motion::Keeps || effect == Effect::Resets,
                     "{profile:?}: {code:#04x} {payload:02x?} ({effect:?}) {before:?} -> {after:?}"
                 );
             }
@@ -101,9 +100,9 @@ fn every_request_that_changes_the_motion_of_an_rmd_motor_is_known() {
                 let after = doing(bus);
                 let known = Code::from(code);
                 if after != before {
-                    changing += usize::from(known.may_move());
+                    changing += usize::from(known.motion().may_move());
                     assert!(
-                        known.may_move() || known.ends_motion(),
+                        known.motion() != Motion::Keeps,
                         "{code:#04x} {data:02x?} {before:?} -> {after:?}"
                     );
                 }

@@ -48,7 +48,7 @@ fn command(row: &CommandInfo) -> Value {
         "versions": row.versions.iter().map(|version| version.name()).collect::<Vec<_>>(),
         "echo": row.echo,
         "writes_rom": row.rom,
-        "moves": row.moves,
+        "moves": row.motion.may_move(),
         "sampled": row.sampled,
         "request": row.request.iter().map(field).collect::<Vec<_>>(),
         "reply_name": row.reply_name,

@@ -2,8 +2,8 @@
 
 use motorlink_proto::st::register::{Access, Origin, Unit, Writing};
 use motorlink_proto::st::{
-    CODE_BITS, Command, ControlMode, Effect, ErrorCode, Feature, Features, Flags, FrameCode,
-    HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_PAYLOAD, OVERHEAD, Profile, REVUP_PHASES, RegisterId,
+    CODE_BITS, Command, ControlMode, ErrorCode, Feature, Features, Flags, FrameCode, HEADER_ACK,
+    HEADER_ATR, HEADER_NACK, MAX_PAYLOAD, OVERHEAD, Profile, REVUP_PHASES, RegisterId,
     SEGMENT_REGISTERS, SEGMENTS, Status,
 };
 use serde_json::{Map, Value, json};
@@ -61,7 +61,7 @@ fn frame_code(code: &FrameCode) -> Value {
     let mut row = named(code.number(), Some(code.name()), code.doc());
     row["profiles"] = profiles(|it| FrameCode::from_number(code.number(), it) == Some(*code));
     let (request, reply) = contents(*code);
-    row["moves"] = Effect::of_code(*code).moves().into();
+    row["moves"] = code.effect().motion().may_move().into();
     row["request"] = payload(request);
     row["reply"] = payload(reply);
     row
@@ -70,7 +70,7 @@ fn frame_code(code: &FrameCode) -> Value {
 fn command(command: &Command) -> Value {
     let mut row = named(command.number(), command.name(), command.doc());
     row["profiles"] = profiles(|profile| command.is_in(profile));
-    row["moves"] = Effect::of_command(*command).moves().into();
+    row["moves"] = command.effect().motion().may_move().into();
     row
 }
 
@@ -114,7 +114,7 @@ fn register(id: RegisterId) -> Option<Value> {
             Origin::Table3 => "document",
             Origin::Firmware => "firmware",
         },
-        "moves": Effect::of_write(id).moves(),
+        "moves": id.effect().motion().may_move(),
         "segment_bytes": shape.segment_size(Features::NONE.with(shape.feature)),
         "profiles": profiles,
     });

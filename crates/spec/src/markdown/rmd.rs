@@ -25,7 +25,7 @@ pub fn tables(page: &mut Page) {
                 code(row.stem),
                 row.code.name().unwrap_or_default().to_owned(),
                 row.code.doc().to_owned(),
-                mark(row.moves, "yes"),
+                mark(row.motion.may_move(), "yes"),
                 mark(row.rom, "yes"),
                 if row.echo { "the request".to_owned() } else { code(row.reply_name) },
             ]

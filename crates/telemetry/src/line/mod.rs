@@ -11,9 +11,10 @@ use std::time::Duration;
 
 use motorlink::port::{NotDone, PortError};
 use motorlink::{Clock, LinkState};
+use motorlink_proto::Motion;
 use motorlink_proto::rmd::{Code, MotorId, Off, ReadStatus, Stop};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, Implausible, MotorNumber, OwnedRequest, RegisterId};
+use motorlink_proto::st::{Effect, Frame, Implausible, MotorNumber, OwnedRequest, RegisterId};
 use motorlink_proto::time::Instant;
 
 use crate::plan::{Poll, Read, Wants};
@@ -273,12 +274,24 @@ impl Request {
     /// Whether it is sent on a lane that is not in sync. A read that is late moves nothing, and what
     /// stops a motor goes ahead of the recovery.
     pub(crate) fn is_for_any_lane(&self) -> bool {
-        let stops = match self {
-            Request::St(_, request) => Effect::of(&request.request()) == Effect::Stops,
-            Request::Rmd(_, [code, ..]) => Code::from(*code).ends_motion(),
-            Request::Raw(..) | Request::Segment(..) | Request::Confirm(_) => false,
-        };
-        stops || self.is_read()
+        self.motion().stops() || self.is_read()
+    }
+
+    /// What it does to the motion of its motor.
+    pub fn motion(&self) -> Motion {
+        match self {
+            Request::St(_, request) => Effect::of(&request.request()).motion(),
+            Request::Raw(motor, code, payload) => {
+                let frame = Frame { header: Frame::header(*code, *motor), payload };
+                match Effect::of_frame(&frame).motion() {
+                    motion if motion.may_move() => motion,
+                    // What the drive makes of it is unknown, also of a stop.
+                    _ => Motion::Unknown,
+                }
+            }
+            Request::Rmd(_, [code, ..]) => Code::from(*code).motion(),
+            Request::Segment(..) | Request::Confirm(_) => Motion::Keeps,
+        }
     }
 
     /// Whether it only reads.
@@ -307,23 +320,5 @@ impl Poll {
             }
             (motor, _) => Request::Confirm(motor),
         }
-    }
-}
-
-/// Whether a motor may turn after this request. That of an unnamed code is unknown.
-pub fn may_move(request: &Request) -> bool {
-    match request {
-        Request::St(_, request) => {
-            let request = request.request();
-            let aligns = request == proto::Request::ExecuteCommand(proto::Command::EncoderAlign);
-            aligns || Effect::of(&request).moves()
-        }
-        Request::Rmd(_, [code, ..]) => {
-            let code = Code::from(*code);
-            // A later version of the protocol may let go of a brake with a code that this one lacks.
-            code.may_move() || code.info().is_none()
-        }
-        Request::Raw(..) => true,
-        Request::Segment(..) | Request::Confirm(_) => false,
     }
 }

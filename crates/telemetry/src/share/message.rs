@@ -36,6 +36,10 @@ pub const LONGEST_QUEUE: u32 = 100_000;
 pub const MOST_SIGNALS: usize = 1024;
 /// The most subscriptions of a program: a node has one for each motor of its buses.
 pub const MOST_SUBSCRIPTIONS: usize = 256;
+/// The longest deadline of a program, in seconds.
+pub const LONGEST_DEADLINE: f64 = 10.0;
+/// The shortest deadline of a program, in seconds.
+pub const SHORTEST_DEADLINE: f64 = 0.02;
 /// The longest time to live of a command and the longest period, in seconds.
 pub const LONGEST_TIME: f64 = 3600.0;
 
@@ -127,8 +131,25 @@ pub enum Ask {
         /// What is done.
         motion: Ending,
     },
+    /// Ends the motion of the motors that this program owns, and its connection, if it does not seem to live.
+    Deadline {
+        /// Nothing came from the program for longer than this, in seconds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        silence: Option<f64>,
+        /// A motor that it moves got no new command for longer than this, in seconds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motion: Option<f64>,
+    },
+    /// A sign of life, for `silence`, as every other request is one. It has no answer.
+    Alive,
     /// Takes a motor from the program that may change it. It keeps turning.
     Take {
+        /// The motor.
+        motor: MotorName,
+    },
+    /// Says that this program has moved a motor before the share began. It owns it, if no program has moved it
+    /// since.
+    Claim {
         /// The motor.
         motor: MotorName,
     },
@@ -302,6 +323,10 @@ pub enum Answer {
         /// The motors and how they took it.
         motors: Vec<StoppedMotor>,
     },
+    /// To claim.
+    Claim,
+    /// To deadline.
+    Deadline,
     /// To ending.
     Ending,
     /// To take.

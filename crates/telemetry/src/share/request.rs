@@ -1,28 +1,18 @@
 //! What the bytes of a command ask of a drive.
 
-use motorlink_proto::rmd::{Code, MotorId};
+use motorlink_proto::Motion;
+use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Effect, Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
+use motorlink_proto::st::{Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 
 use super::words::Speaks;
-use crate::line::{Request, may_move};
+use crate::line::Request;
 use crate::signal::Motor;
 
 /// A data segment that a command configures, for the program that sends it.
 pub(super) struct Configures {
     pub(super) segment: u8,
     pub(super) registers: Vec<RegisterId>,
-}
-
-/// What a command does to the motion of its motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Motion {
-    /// Whoever sends it is responsible for the stop.
-    Starts,
-    /// It changes a motion that continues. Its sender is responsible for the stop if no program is.
-    Changes,
-    Stops,
-    Keeps,
 }
 
 /// What a command does, as far as it matters who may send it.
@@ -41,11 +31,11 @@ pub enum Kind {
 impl Kind {
     /// What a request does.
     pub fn of(request: &Request) -> Self {
-        match Motion::of(request) {
-            Motion::Stops => Kind::Stops,
-            Motion::Keeps if request.is_read() => Kind::Reads,
-            Motion::Keeps => Kind::Changes,
-            Motion::Starts | Motion::Changes => Kind::Moves,
+        match request.motion() {
+            motion if motion.stops() => Kind::Stops,
+            motion if motion.is_owned() || motion == Motion::Unknown => Kind::Moves,
+            _ if request.is_read() => Kind::Reads,
+            _ => Kind::Changes,
         }
     }
 
@@ -53,34 +43,6 @@ impl Kind {
     pub fn of_bytes(speaks: Speaks, motor: u8, bytes: &[u8]) -> Self {
         let segments = |_| Some(Vec::new());
         of(speaks, motor, bytes, segments).map_or(Kind::Changes, |(request, _)| Kind::of(&request))
-    }
-}
-
-impl Motion {
-    pub(super) fn of(request: &Request) -> Self {
-        match request {
-            Request::St(_, request) => Motion::of_effect(Effect::of(&request.request())),
-            Request::Raw(motor, code, payload) => {
-                let frame = Frame { header: Frame::header(*code, *motor), payload };
-                match Motion::of_effect(Effect::of_frame(&frame)) {
-                    // What the drive makes of such a stop is unknown.
-                    Motion::Stops => Motion::Keeps,
-                    motion => motion,
-                }
-            }
-            Request::Rmd(_, [code, ..]) if Code::from(*code).ends_motion() => Motion::Stops,
-            _ if may_move(request) => Motion::Starts,
-            _ => Motion::Keeps,
-        }
-    }
-
-    fn of_effect(effect: Effect) -> Self {
-        match effect {
-            Effect::Starts => Motion::Starts,
-            effect if effect.moves() => Motion::Changes,
-            Effect::Stops => Motion::Stops,
-            _ => Motion::Keeps,
-        }
     }
 }
 

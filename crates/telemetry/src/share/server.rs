@@ -15,7 +15,7 @@ use rustix::io::Errno;
 
 use super::frame::{self, LONGEST_REQUEST, Reader};
 use super::hub::{Held, Hub, LineEnded, SessionId};
-use super::message::{Event, Line};
+use super::message::{self, Event, Line, Text};
 use super::opening::Limits;
 use crate::line::Stopped;
 
@@ -121,6 +121,7 @@ impl Server {
     pub fn turn(&mut self) -> Result<Vec<Event>, ServerError> {
         self.wait()?;
         self.accept();
+        self.hub.at(self.clock.now());
         for client in &mut self.clients {
             client.receive(&mut self.hub, self.clock.now());
             if client.since.elapsed() > HELLO && !self.hub.is_named(client.session) {
@@ -135,6 +136,10 @@ impl Server {
         if Instant::now() >= self.due {
             self.due = Instant::now() + BATCH;
             self.hub.collect()?;
+        }
+        for (session, why) in self.hub.take_lapsed() {
+            let gone = self.clients.iter_mut().filter(|client| client.session == session);
+            gone.for_each(|client| client.say_last(&why));
         }
         for client in &mut self.clients {
             client.send(&mut self.hub);
@@ -255,6 +260,13 @@ impl Client {
                 Err(_) => self.is_gone = true,
             }
         }
+    }
+
+    /// The session is over. The program is told why, if it reads.
+    fn say_last(&mut self, why: &str) {
+        let closing = message::encode(&Text::Closing { message: why.to_owned() });
+        // No message of a hub is too long.
+        let _ = frame::append(frame::Kind::Text, &closing, &mut self.out);
     }
 
     /// Sends what waits for the program.

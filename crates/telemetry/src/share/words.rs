@@ -7,7 +7,7 @@ use motorlink_capture::st::Transcript;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Direction, MotorId, describe};
 use motorlink_proto::st::{Frame, MAX_FRAME, MotorNumber, Profile};
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Instant, Micros};
 
 use super::message::{Happening, Line, Protocol};
 use crate::event::What;
@@ -83,15 +83,15 @@ pub struct Words {
 
 impl Words {
     /// The motors, among these, whose stop should be tried again after an event.
-    pub(super) fn retries<'m>(
+    pub(super) fn retries(
         &self,
         what: &What,
-        motors: impl Iterator<Item = &'m Motor>,
+        motors: impl Iterator<Item = Motor>,
         retry: &mut Vec<Motor>,
     ) {
         match what {
             What::Back => retry.extend(motors),
-            What::Heard(motor) => retry.extend(motors.filter(|it| *it == motor)),
+            What::Heard(motor) => retry.extend(motors.filter(|it| it == motor)),
             _ => {}
         }
     }
@@ -203,4 +203,14 @@ fn stops(by: &str) -> String {
         Some(name) => format!("the share stops it, because {name} has left"),
         None => format!("{by} stops it"),
     }
+}
+
+/// Why a program has lapsed that sends nothing.
+pub(super) fn silent(silent: Micros) -> String {
+    format!("no sign of life for {} ms", silent.0 / 1000)
+}
+
+/// Why a program has lapsed that commands a motor no more.
+pub(super) fn late(line: &str, motor: u8, age: Micros) -> String {
+    format!("{line}, motor {motor}: no new command for {} ms", age.0 / 1000)
 }

@@ -26,6 +26,7 @@ impl Scripted {
                     Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
                 }
                 Ask::Lines => Answer::Lines { lines: vec![line()], latched_by: None },
+                Ask::Deadline { .. } => Answer::Deadline,
                 ask => return Some(Request { id, ask }),
             };
             self.answer(id, answer);

@@ -18,6 +18,8 @@ const NOBODY: u8 = 20;
 const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 /// SET_RAMP to 800 rpm within 100 ms.
 const RAMP: [u8; 7] = [7, 32, 3, 0, 0, 100, 0];
+/// Stops it; it holds its position.
+const HOLD: [u8; 8] = [0x81, 0, 0, 0, 0, 0, 0, 0];
 /// Turns it with 10 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xE8, 3, 0, 0];
 
@@ -177,18 +179,56 @@ fn a_motor_without_owner_stops_with_the_program_that_changed_its_speed() {
 }
 
 #[test]
-fn a_motor_stays_with_its_owner_if_another_program_changes_its_speed() {
+fn a_motor_belongs_to_the_program_that_changed_its_speed_last() {
     let share = VirtualShare::new();
-    let mut owner = share.join("owns");
-    let mut program = share.join("ramps");
-    owner.ask(command("st0", 1, &RAMP)).unwrap();
-    owner.ask(command("st0", 1, &START)).unwrap();
-    program.ask(command("st0", 1, &RAMP)).unwrap();
-    drop(program);
-    owner.event(Happening::Left);
+    let mut first = share.join("starts");
+    let mut last = share.join("ramps");
+    first.ask(command("st0", 1, &RAMP)).unwrap();
+    first.ask(command("st0", 1, &START)).unwrap();
+    last.ask(command("st0", 1, &RAMP)).unwrap();
+    drop(first);
+    last.event(Happening::Left);
     share.reaches("st1.speed_rpm", |rpm| rpm > 700.0);
-    let stopped = owner.events.iter().find(|it| it.event == Happening::Stopping);
+    let stopped = last.events.iter().find(|it| it.event == Happening::Stopping);
     assert!(stopped.is_none(), "{stopped:?}");
-    drop(owner);
+    drop(last);
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+}
+
+#[test]
+fn a_motor_that_holds_after_a_stop_of_another_program_stays_with_its_owner() {
+    let share = VirtualShare::new();
+    for (ending, of_leaving) in [(Ending::Off, Some("80")), (Ending::Stop, None)] {
+        let (mut owner, mut other) = (share.join("owns"), share.join("stops"));
+        owner.ask(Ask::Ending { motion: ending }).unwrap();
+        owner.ask(command("rmd0", 1, &TURN)).unwrap();
+        other.ask(command("rmd0", 1, &HOLD)).unwrap();
+        drop(owner);
+        other.event(Happening::Left);
+        other.ask(command("rmd0", 1, &READ)).unwrap();
+        let frames = other.frames("rmd0", None, None);
+        let sent = frames.iter().filter(|frame| frame.direction == WireWay::ToDrive);
+        let codes: Vec<&str> = sent.map(|frame| &frame.bytes[..2]).collect();
+        let after = codes.rsplit(|code| *code == "81").next().unwrap();
+        assert_eq!(after.iter().copied().find(|code| *code != "9a"), of_leaving, "{codes:?}");
+    }
+}
+
+#[test]
+fn a_program_owns_again_what_it_moved_before_the_share_was_killed() {
+    let motor = MotorName { line: "st0".to_owned(), motor: 2 };
+    let claim = || Ask::Claim { motor: motor.clone() };
+    let (share, _) = share_of_a_turning_motor(false);
+    let mut program = share.join("turned it");
+    program.ask(claim()).unwrap();
+    drop(program);
+    share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
+    // A motor that a program has moved here belongs to that one, or to nobody after its stop.
+    let mut other = share.join("other");
+    other.ask(command("st0", 2, &RAMP)).unwrap();
+    let mut program = share.join("comes back");
+    for _ in 0..2 {
+        assert_eq!(program.ask(claim()).unwrap_err().reason, Reason::Held);
+        other.ask(Ask::Stop { motor: Some(motor.clone()) }).unwrap();
+    }
 }

@@ -70,6 +70,16 @@ impl VirtualShare {
         Box::new(Joined { world, session, reader })
     }
 
+    pub fn now(&self) -> Duration {
+        self.0.bench.now().since(Instant(0)).into()
+    }
+
+    /// The share does not run for a time.
+    pub fn pause(&self, time: Duration) {
+        let bench = &self.0.bench;
+        bench.clock().wait(bench.now() + time.into());
+    }
+
     /// Waits until this is so. It looks from time to time.
     pub fn until(&self, mut is: impl FnMut() -> bool) {
         let end = self.0.bench.now() + LIMIT.into();
@@ -118,6 +128,7 @@ impl World {
         let mut hub = self.hub.borrow_mut();
         hub.advance();
         let now = self.bench.now();
+        hub.at(now);
         if now >= self.due.get() {
             self.due.set(now + BATCH);
             hub.collect().unwrap();

@@ -161,7 +161,7 @@ impl Inner {
                 let (voltage, errors) = (DeciVolts(digits), Default::default());
                 Status { temperature, voltage, errors }.encode_as(Code::ReadStatus)
             }
-            _ if row.moves || code == Code::ReadMotionStatus => {
+            _ if row.motion.is_owned() || code == Code::ReadMotionStatus => {
                 let (iq, speed) = (IqFeedback(digits as i16), Dps(0));
                 MotionStatus { temperature, iq, speed, encoder: 0 }.encode_as(code)
             }

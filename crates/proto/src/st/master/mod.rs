@@ -125,7 +125,7 @@ impl Master {
         }
         let stored = self.exchange.store(motor, request, self.config.profile);
         stored.ok_or(RequestError::TooLong)?;
-        self.begin(Summary::new(motor, Some(request.code())), Effect::stops(request));
+        self.begin(Summary::new(motor, Some(request.code())), Effect::of(request) == Effect::Stops);
         Ok(())
     }
 

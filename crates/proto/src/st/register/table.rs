@@ -3,7 +3,8 @@
 //! The columns of a row: id, name, type, unit, access, feature that the drive must be built with,
 //! source. If firmware of `mcsdk-5.4` has another type, it follows after `|`. If its sizes differ
 //! from the access, `mcsdk(read, write)` has the bits of its GET_REG reply and of its SET_REG
-//! value; 0 means not handled.
+//! value; 0 means not handled. `set(effect, limited)` says what a write does that commands the drive or
+//! has a limit.
 
 use super::access::{Access, Origin};
 use super::feature::Feature;
@@ -14,13 +15,14 @@ use super::shape::Text;
 use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;
+use crate::st::effect::{Effect, Limited};
 
 /// Declares the registers: typed constants, ids for matching, shapes and texts. Ids ascend and may
 /// be sparse. A row out of order does not compile.
 macro_rules! registers {
     ($(
         $id:literal $name:ident: $ty:ident $(| $mcsdk:ident)?, $unit:ident, $access:ident, $feature:ident,
-        $origin:ident $(mcsdk($get:expr, $set:expr))?, $doc:literal;
+        $origin:ident $(mcsdk($get:expr, $set:expr))? $(set($effect:ident, $limited:ident))?, $doc:literal;
     )+) => {
         $( #[doc = concat!($doc, " (", stringify!($id), ")")]
            pub const $name: Register<rust_type!($ty $($mcsdk)?), $access> = Register::new($id); )+
@@ -28,6 +30,22 @@ macro_rules! registers {
         impl RegisterId {
             $( #[doc = concat!($doc, " (", stringify!($id), ")")]
                pub const $name: RegisterId = RegisterId($id); )+
+
+            /// The effect of SET_REG to this register.
+            pub const fn effect(self) -> Effect {
+                match self.0 {
+                    $( $( $id => Effect::$effect, )? )+
+                    _ => Effect::None,
+                }
+            }
+
+            /// What a write sets that has a limit.
+            pub(in crate::st) const fn limited(self) -> Limited {
+                match self.0 {
+                    $( $( $id => Limited::$limited, )? )+
+                    _ => Limited::Nothing,
+                }
+            }
         }
 
         /// The id of every row.
@@ -88,19 +106,19 @@ macro_rules! optional_pair {
 }
 
 registers! {
-    0x00 TARGET_MOTOR: u8, MotorIndex, ReadWrite, Core, Table3, "Motor that motor number 0 addresses; the value 0 is motor 1";
+    0x00 TARGET_MOTOR: u8, MotorIndex, ReadWrite, Core, Table3 set(Retargets, Nothing), "Motor that motor number 0 addresses; the value 0 is motor 1";
     0x01 FLAGS: u32, Flags, ReadOnly, Core, Table3, "Faults: low half occurred, high half present";
     0x02 STATUS: u8, Status, ReadOnly, Core, Table3, "State of the state machine";
-    0x03 CONTROL_MODE: u8, ControlMode, ReadWrite, Core, Table3, "Torque (0) or speed (1) control";
+    0x03 CONTROL_MODE: u8, ControlMode, ReadWrite, Core, Table3 set(Supersedes, Nothing), "Torque (0) or speed (1) control";
     0x04 SPEED_REF: i32, Rpm, ReadOnly, Core, Table3, "Speed reference";
     0x05 SPEED_KP: i16, S16APerUnit, ReadWrite, Core, Table3, "Speed regulator Kp, numerator";
     0x06 SPEED_KI: i16, S16APerUnit, ReadWrite, Core, Table3, "Speed regulator Ki, numerator";
     0x07 SPEED_KD: i16, S16APerUnit, ReadWrite, Core, Table3, "Speed regulator Kd, numerator";
-    0x08 TORQUE_REF: i16, S16A, ReadWrite, Core, Table3, "Iq reference";
+    0x08 TORQUE_REF: i16, S16A, ReadWrite, Core, Table3 set(Supersedes, Current), "Iq reference";
     0x09 TORQUE_KP: i16, S16VPerS16A, ReadWrite, Core, Table3, "Iq regulator Kp, numerator";
     0x0A TORQUE_KI: i16, S16VPerS16A, ReadWrite, Core, Table3, "Iq regulator Ki, numerator";
     0x0B TORQUE_KD: i16, S16VPerS16A, ReadWrite, Core, Table3, "Iq regulator Kd, numerator";
-    0x0C FLUX_REF: i16, S16A, ReadWrite, Core, Table3, "Id reference";
+    0x0C FLUX_REF: i16, S16A, ReadWrite, Core, Table3 set(Supersedes, Current), "Id reference";
     0x0D FLUX_KP: i16, S16VPerS16A, ReadWrite, Core, Table3, "Id regulator Kp, numerator";
     0x0E FLUX_KI: i16, S16VPerS16A, ReadWrite, Core, Table3, "Id regulator Ki, numerator";
     0x0F FLUX_KD: i16, S16VPerS16A, ReadWrite, Core, Table3, "Id regulator Kd, numerator";
@@ -153,7 +171,7 @@ registers! {
     0x3E DAC_USER2: i16, None, Dac, Dac, Table3, "User value of DAC channel 2";
     0x3F MAX_APP_SPEED: u32, Rpm, ReadOnly, Core, Table3 mcsdk(0, 0), "Highest speed of the application";
     0x40 MIN_APP_SPEED: u32, Rpm, ReadOnly, Core, Table3 mcsdk(0, 0), "Lowest speed of the application";
-    0x41 IQ_SPEEDMODE: i16, S16A, WriteOnly, Core, Table3 mcsdk(16, 16), "Id reference in speed mode; the document also says Iq (S22)";
+    0x41 IQ_SPEEDMODE: i16, S16A, WriteOnly, Core, Table3 mcsdk(16, 16) set(None, Current), "Id reference in speed mode; the document also says Iq (S22)";
     0x42 EST_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverPll, Table3 mcsdk(0, 0), "Expected back-EMF level (PLL)";
     0x43 OBS_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverPll, Table3 mcsdk(0, 0), "Observed back-EMF level (PLL)";
     0x44 EST_CR_BEMF_LEVEL: i16, S16VSquared, ReadOnly, ObserverCordic, Table3 mcsdk(0, 0), "Expected back-EMF level (CORDIC)";
@@ -179,7 +197,7 @@ registers! {
     0x58 PFC_V_KD: i16, S16APerVolt, ReadWrite, Pfc, Table3, "PFC voltage regulator Kd";
     0x59 PFC_STARTUP_DURATION: i16, Millisecond, ReadWrite, Pfc, Table3, "Length of the PFC start-up";
     0x5A PFC_ENABLED: i8, None, ReadOnly, Pfc, Table3, "Whether the PFC is enabled";
-    0x5B RAMP_FINAL_SPEED: i32, Rpm, ReadWrite, Core, Table3, "Final speed of the ramp";
+    0x5B RAMP_FINAL_SPEED: i32, Rpm, ReadWrite, Core, Table3 set(Ramps, Speed), "Final speed of the ramp";
     0x5C RAMP_DURATION: u16, Millisecond, Never, Core, Firmware, "Length of the ramp";
     0x5D HFI_EL_ANGLE: i16, S16Degree, ReadOnly, Hfi, Firmware, "Electrical angle from HFI";
     0x5E HFI_ROT_SPEED: i16, S16Speed, ReadOnly, Hfi, Firmware, "Mechanical speed from HFI";

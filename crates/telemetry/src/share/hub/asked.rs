@@ -17,16 +17,16 @@ use super::work::{Sent, Work};
 use super::{Hub, Why};
 use crate::acquisition::Acquisition;
 use crate::event::CommandError;
-use crate::line::{Request, may_move};
+use crate::line::Request;
 
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
 use crate::share::message::{
-    self, ANY_MOTOR, Answer, Ask, Column, DropRule, Happening, LONGEST_NAME, LONGEST_QUEUE,
-    LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason,
-    SignalName, StoppedMotor,
+    self, ANY_MOTOR, Answer, Ask, Column, DropRule, Happening, LONGEST_DEADLINE, LONGEST_NAME,
+    LONGEST_QUEUE, LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS,
+    MotorName, Reason, SHORTEST_DEADLINE, SignalName, StoppedMotor,
 };
-use crate::share::request::{Kind as CommandKind, Motion};
+use crate::share::request::Kind as CommandKind;
 use crate::share::wire::{MOST_FRAMES, Part};
 use crate::signal::{Motor, Signal, Source};
 use crate::subscription::Full;
@@ -67,6 +67,10 @@ impl Hub {
 
     fn asked(&mut self, session: SessionId, id: u32, ask: Ask, waited: Micros) {
         if let Some(session) = self.sessions.get_mut(&session) {
+            session.life.heard(self.now);
+            if ask == Ask::Alive {
+                return;
+            }
             session.pending += 1;
         }
         let answered = match (self.name(session), ask) {
@@ -135,7 +139,7 @@ impl Hub {
             self.check_place(session)?;
         }
         match ask {
-            Ask::Hello { .. } => Ok(None),
+            Ask::Hello { .. } | Ask::Alive => Ok(None),
             Ask::Lines => {
                 let latched_by = self.latch.as_deref().map(str::to_owned);
                 Ok(Some(Answer::Lines { lines: self.lines(), latched_by }))
@@ -177,11 +181,20 @@ impl Hub {
                 }
                 Ok(Some(Answer::Ending))
             }
+            Ask::Deadline { silence, motion } => {
+                let silence = silence.map(deadline).transpose()?;
+                let motion = motion.map(deadline).transpose()?;
+                if let Some(session) = self.sessions.get_mut(&session) {
+                    (session.life.silence, session.life.motion) = (silence, motion);
+                }
+                Ok(Some(Answer::Deadline))
+            }
             Ask::Take { motor } => self.take(session, name, &motor),
+            Ask::Claim { motor } => self.claim_moved(session, name, &motor),
             Ask::Latch => {
                 self.latch = Some(Arc::clone(name));
                 for (_, held) in self.lines.iter_mut() {
-                    held.sequences.clear();
+                    held.owners.interrupt_all();
                     held.remote().latch_then(name, || {}).map_err(ended)?;
                 }
                 Ok(Some(Answer::Latch))
@@ -325,10 +338,10 @@ impl Hub {
         let request = self.lines[&line].request(motor.motor, bytes, segments);
         let (request, configures) = request.map_err(usage)?;
         let motor = request.motor();
-        let (motion, moves) = (Motion::of(&request), may_move(&request));
+        let motion = request.motion();
         // A stop is never too old.
         let time_to_live = match motion {
-            Motion::Stops => Micros(0),
+            motion if motion.stops() => Micros(0),
             _ => {
                 self.check_busy(session)?;
                 time_to_live.ok_or_else(|| refused(&CommandError::Expired))?
@@ -342,26 +355,24 @@ impl Hub {
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
-            if own && held.is_lost_to_others(motor, session) {
+            if own && !held.owners.is_own(motor, session) {
                 let (line, motor) = (&held.name, motor.number());
                 let why =
                     format!("{line}: another program has moved or stopped motor {motor} since");
                 return Err((Reason::Held, why));
             }
-            held.follow((motor, session), motion, moves, continues)
+            held.follow((motor, session), motion, continues)
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
         held.known.extend(motor);
-        if let (Some(motor), Motion::Starts) = (motor, motion) {
-            held.starting.push((motor, session));
+        if let (Some(motor), Some(session)) = (motor, self.sessions.get_mut(&session)) {
+            session.life.commanded(self.now, (line, motor), motion);
         }
-        let sent = Sent { motor, motion, moves, configures };
+        let sent = Sent { motor, motion, configures };
         let ended_with = move |result| tell(Work::Command(sent, result));
-        let begun = match motion {
-            Motion::Stops => held.remote().stop_then(name, request, ended_with),
-            Motion::Starts | Motion::Changes | Motion::Keeps => {
-                held.remote().command_then(name, request, time_to_live, ended_with)
-            }
+        let begun = match motion.stops() {
+            true => held.remote().stop_then(name, request, ended_with),
+            false => held.remote().command_then(name, request, time_to_live, ended_with),
         };
         begun.map_err(ended)
     }
@@ -493,6 +504,13 @@ fn instant(seconds: f64) -> Result<Instant, Refused> {
     match seconds.is_finite() {
         true => Ok(Instant((seconds * 1e6).round() as u64)),
         false => Err(usage("a time is a number of seconds")),
+    }
+}
+
+fn deadline(seconds: f64) -> Result<Micros, Refused> {
+    match (SHORTEST_DEADLINE..=LONGEST_DEADLINE).contains(&seconds) {
+        true => Ok(Micros((seconds * 1e6).round() as u64)),
+        false => Err(usage(format!("a deadline is {SHORTEST_DEADLINE} to {LONGEST_DEADLINE} s"))),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use motorlink_proto::Motion;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::Hub;
@@ -43,6 +44,41 @@ impl Hub {
         Ok(())
     }
 
+    /// A program has moved a motor through a share before this one.
+    pub(super) fn claim_moved(
+        &mut self,
+        session: SessionId,
+        name: &Arc<str>,
+        motor: &MotorName,
+    ) -> Result<Option<Answer>, Refused> {
+        let (line, motor) = self.motor(motor)?;
+        let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };
+        if !held.owners.claim(motor, session) {
+            let (line, motor) = (&held.name, motor.number());
+            let why = format!("{line}: a program has moved motor {motor} since");
+            return Err((Reason::Held, why));
+        }
+        let now = held.now();
+        if let Some(length) =
+            self.lease.filter(|_| held.lease_of_another(motor, session, now).is_none())
+        {
+            let lease = Lease { session, name: Arc::clone(name), until: now + length };
+            held.leases.insert(motor, lease);
+        }
+        self.owns_now(session, (line, motor));
+        Ok(Some(Answer::Claim))
+    }
+
+    /// The motor is the program's without a command.
+    fn owns_now(&mut self, session: SessionId, place: (usize, Motor)) {
+        let owner = self.lines.get(&place.0).and_then(|held| held.owners.owner(place.1));
+        if owner == Some(session)
+            && let Some(session) = self.sessions.get_mut(&session)
+        {
+            session.life.commanded(self.now, place, Motion::Starts);
+        }
+    }
+
     /// A program takes a motor from the one that has it, and is responsible for its stop from now on.
     pub(super) fn take(
         &mut self,
@@ -59,42 +95,18 @@ impl Hub {
         let is_held = held.lease_of_another(motor, session, now).is_some();
         let lease = Lease { session, name: Arc::clone(name), until: now + length };
         let before = held.leases.insert(motor, lease);
-        if let Some(owner) = held.owners.get_mut(&motor) {
-            *owner = session;
-        }
-        held.sequences.retain(|(other, program)| *other != motor || *program == session);
+        held.owners.take(motor, session);
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
             let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
             self.say_of((Some(&of), Some(number)), Happening::Taken, name, message);
         }
+        self.owns_now(session, (line, motor));
         Ok(Some(Answer::Take))
     }
 }
 
 impl Held {
-    /// A program has moved a motor. Meanwhile another one may have taken it.
-    pub(super) fn own(&mut self, motor: Motor, session: SessionId) {
-        let owner = self.leases.get(&motor).map_or(session, |lease| lease.session);
-        self.owners.insert(motor, owner);
-        self.movers.insert((motor, session));
-    }
-
-    /// Whether another program has moved, taken or stopped a motor since this one moved it. A motor
-    /// without an owner may turn since before this share began: then the program may stop it.
-    pub(super) fn is_lost_to_others(&self, motor: Motor, session: SessionId) -> bool {
-        match self.owners.get(&motor) {
-            _ if self.starting.contains(&(motor, session)) => false,
-            Some(owner) => *owner != session,
-            None => self.is_starting(motor) || self.movers.contains(&(motor, session)),
-        }
-    }
-
-    /// Whether a program is responsible for the stop of a motor.
-    pub(super) fn has_owner(&self, motor: Motor) -> bool {
-        self.owners.contains_key(&motor) || self.is_starting(motor)
-    }
-
     /// A program has left.
     pub(super) fn give_leases_back(&mut self, gone: SessionId) {
         self.leases.retain(|_, lease| lease.session != gone);
@@ -104,7 +116,7 @@ impl Held {
     fn lease_of_another(&self, motor: Motor, own: SessionId, now: Instant) -> Option<String> {
         let lease = self.leases.get(&motor).filter(|lease| lease.session != own)?;
         let (line, number, name) = (&self.name, motor.number(), &lease.name);
-        if self.owners.get(&motor) == Some(&lease.session) {
+        if self.owners.owner(motor) == Some(lease.session) && !self.owners.is_held(motor) {
             return Some(format!(
                 "{line}: motor {number} turns for {name}, who holds it; stop it or take it"
             ));

@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use motorlink::ownership::Carried;
+use motorlink_proto::Motion;
+
 use super::line::Held;
 use super::place::SessionId;
 use super::reasons::{may_be_executed, reason};
@@ -14,7 +17,7 @@ use crate::event::CommandError;
 use crate::line::Reply;
 use crate::runner::CommandResult;
 use crate::share::message::{self, MotorName, Reason, SignalName, SignalRate};
-use crate::share::request::{Configures, Motion};
+use crate::share::request::Configures;
 use crate::signal::Motor;
 
 /// Why answers are not confirmed.
@@ -96,13 +99,27 @@ impl Hub {
         }
     }
 
+    /// A motor has confirmed a stop.
+    fn stopped(&mut self, line: usize, motor: Motor, motion: Motion) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        held.stopped(motor);
+        held.owners.stopped(motor, motion);
+        // A program that has left owns no motor that holds its position.
+        if held.owners.owner(motor).is_some_and(|owner| !self.sessions.contains_key(&owner)) {
+            held.owners.free(motor);
+        }
+    }
+
     /// A stop is over. If the motor did not confirm it, it is repeated.
     fn stop_ended(&mut self, line: usize, motor: Motor, by: &Arc<str>, result: &CommandResult) {
         let Some(held) = self.lines.get_mut(&line) else { return };
         match result {
-            Ok(_) => held.stopped(motor),
+            Ok(_) => {
+                let motion = held.stop_of(motor).motion();
+                self.stopped(line, motor, motion);
+            }
             Err(error) => {
-                held.ended(motor, false, result);
+                held.ended(motor, Motion::Holds, result);
                 held.not_stopped(motor, by, error);
             }
         }
@@ -116,10 +133,10 @@ impl Hub {
         sent: Sent,
         result: CommandResult,
     ) {
-        let Sent { motor, motion, moves, configures } = sent;
+        let Sent { motor, motion, configures } = sent;
         if let Some(motor) = motor {
             if let Some(held) = self.lines.get_mut(&line) {
-                held.ended(motor, moves, &result);
+                held.ended(motor, motion, &result);
             }
             self.command_ended(session, line, motor, motion, &result);
             let is_owed = |held: &Held| held.owed.contains_key(&motor);
@@ -182,38 +199,28 @@ impl Hub {
         result: &CommandResult,
     ) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        if let Some(at) = held.starting.iter().position(|it| *it == (motor, session)) {
-            held.starting.remove(at);
-        }
-        match (motion, result) {
-            (Motion::Stops, Ok(_)) => held.stopped(motor),
-            (Motion::Starts, result) => {
-                // The owner stays if the start was refused.
-                if result.as_ref().err().is_none_or(may_be_executed) {
-                    held.own(motor, session);
-                }
-                let mut all = None;
-                if result.is_ok() {
-                    held.started(motor);
-                    all = held.take_unanswered_stop();
-                }
-                if let Some(by) = all {
-                    self.stop_line(line, Some(motor), &by);
-                }
-                self.stop_if_orphaned(line, motor, Why::Asked);
-            }
-            (Motion::Stops, Err(error)) => {
+        let carried = match result {
+            Ok(_) => Carried::Out,
+            Err(why) if may_be_executed(why) => Carried::Perhaps,
+            Err(_) => Carried::Never,
+        };
+        held.owners.ended(motor, session, motion, carried);
+        match result {
+            Ok(_) if motion.stops() => self.stopped(line, motor, motion),
+            Err(error) if motion.stops() => {
                 let name = self.sessions.get(&session).and_then(|session| session.name.clone());
                 held.not_stopped(motor, &name.unwrap_or_else(|| "share".into()), error);
             }
-            // A motor may turn since before this share began.
-            (Motion::Changes, result) if !held.has_owner(motor) => {
-                if result.as_ref().err().is_none_or(may_be_executed) {
-                    held.own(motor, session);
-                    self.stop_if_orphaned(line, motor, Why::Asked);
+            Ok(_) if motion == Motion::Starts => {
+                held.started(motor);
+                if let Some(by) = held.take_unanswered_stop() {
+                    self.stop_line(line, Some(motor), &by);
                 }
             }
-            (Motion::Changes | Motion::Keeps, _) => {}
+            _ => {}
+        }
+        if motion.is_owned() {
+            self.stop_if_orphaned(line, motor, Why::Asked);
         }
     }
 }

@@ -3,12 +3,14 @@
 use std::collections::BTreeSet;
 use std::convert::Infallible;
 use std::io;
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use litemap::LiteMap as Map;
 use motorlink::Clock;
+use motorlink::ownership::Ownership;
 use motorlink::port::{Place, PortName};
+use motorlink_proto::Motion;
 use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
@@ -23,7 +25,7 @@ use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
 use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
 use crate::share::opening::Opened;
-use crate::share::request::{self, Configures, Motion};
+use crate::share::request::{self, Configures};
 use crate::share::wire::{self, Part, Tap};
 use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
@@ -50,16 +52,10 @@ pub struct Held {
     anchor: (Instant, f64),
     events: Subscription,
     pub(super) words: Words,
-    /// Who turned a motor last. They may have left; then its stop is not confirmed.
-    pub(super) owners: Map<Motor, SessionId>,
-    /// Programs and the motors that they have moved. Another program may own these by now.
-    pub(super) movers: BTreeSet<(Motor, SessionId)>,
+    /// Whose the motors are. An owner that has left waits for their stops.
+    pub(super) owners: Ownership<Motor, SessionId>,
     /// Who may change a motor, if one program at a time may.
     pub(super) leases: Map<Motor, Lease>,
-    /// Starts that the engine has not finished, and who sent them.
-    pub(super) starting: Vec<(Motor, SessionId)>,
-    /// Programs whose commands to a motor nothing has interrupted: no stop, and no motion of another program.
-    pub(super) sequences: BTreeSet<(Motor, SessionId)>,
     /// The motors that were read or commanded.
     pub(super) known: BTreeSet<Motor>,
     /// The motors that have answered.
@@ -115,11 +111,8 @@ impl Held {
             tally: acquisition.tally().clone(),
             events,
             words: Words::default(),
-            owners: Map::new(),
-            movers: BTreeSet::new(),
+            owners: Ownership::default(),
             leases: Map::new(),
-            starting: Vec::new(),
-            sequences: BTreeSet::new(),
             known: BTreeSet::new(),
             heard: BTreeSet::new(),
             moved: BTreeSet::new(),
@@ -138,33 +131,20 @@ impl Held {
     /// It continues commands that were interrupted.
     pub(super) fn follow(
         &mut self,
-        own: (Motor, SessionId),
+        (motor, session): (Motor, SessionId),
         motion: Motion,
-        moves: bool,
         continues: bool,
     ) -> Result<(), String> {
-        if continues && !self.sequences.contains(&own) {
-            let (name, motor) = (&self.name, own.0.number());
+        if continues && !self.owners.is_uninterrupted(motor, session) {
+            let (name, motor) = (&self.name, motor.number());
             return Err(format!("{name}: motor {motor} was stopped, or another program moved it"));
         }
-        if motion == Motion::Stops {
-            self.interrupt(own.0);
-            return Ok(());
-        }
-        if moves {
-            self.sequences.retain(|one| one.0 != own.0);
-        }
-        self.sequences.insert(own);
+        self.owners.sent(motor, session, motion);
         Ok(())
     }
 
-    /// A stop was asked for: no command continues an earlier one.
-    pub(super) fn interrupt(&mut self, motor: Motor) {
-        self.sequences.retain(|(other, _)| *other != motor);
-    }
-
-    /// The end of a command. `moves`: the motor may turn after it.
-    pub(super) fn ended(&mut self, motor: Motor, moves: bool, result: &CommandResult) {
+    /// The end of a command.
+    pub(super) fn ended(&mut self, motor: Motor, motion: Motion, result: &CommandResult) {
         match result {
             Ok(_) => {
                 self.heard.insert(motor);
@@ -176,19 +156,14 @@ impl Held {
         // One that was too old waited for a motor that did not answer: somebody knows that it is there.
         let is_for_a_motor =
             |error| may_be_executed(error) || matches!(error, CommandError::Expired);
-        if moves && result.as_ref().err().is_none_or(is_for_a_motor) {
+        if motion.may_move() && result.as_ref().err().is_none_or(is_for_a_motor) {
             self.moved.insert(motor);
         }
     }
 
     /// Whether a program turned a motor, or tried to.
     pub(super) fn may_turn(&self, motor: Motor) -> bool {
-        self.is_starting(motor) || self.moved.contains(&motor)
-    }
-
-    /// Whether a start of the motor is under way.
-    pub(super) fn is_starting(&self, motor: Motor) -> bool {
-        self.starting.iter().any(|(it, _)| *it == motor)
+        self.owners.is_under_way(motor) || self.moved.contains(&motor)
     }
 
     /// Whether the drive says that it has no such motor, no program turned it and it has never answered.
@@ -252,7 +227,7 @@ impl Held {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
-            let motors = self.owners.keys().chain(self.owed.keys());
+            let motors = self.owners.motors().chain(self.owed.keys().copied());
             self.words.retries(&event.what, motors, retry);
             match &event.what {
                 What::Lost(_) => {
@@ -339,7 +314,15 @@ impl Held {
     pub(super) fn end(self) -> Vec<Stopped> {
         let (ended, results) = mpsc::channel();
         // The engine stops those that programs moved.
-        for (motor, by) in self.owing().filter(|(motor, _)| !self.moved.contains(motor)) {
+        let by: Arc<str> = "share".into();
+        let is_claimed = |motor: &Motor| {
+            !(self.moved.contains(motor)
+                || self.owed.contains_key(motor)
+                || self.owners.is_held(*motor))
+        };
+        let claimed = self.owners.motors().filter(is_claimed).map(|motor| (motor, &by));
+        let owing = self.owing().filter(|(motor, _)| !self.moved.contains(motor));
+        for (motor, by) in owing.chain(claimed) {
             let ended = ended.clone();
             let tell = move |result| drop(ended.send((motor, result)));
             // An engine that has ended has stopped its motors.

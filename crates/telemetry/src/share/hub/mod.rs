@@ -8,7 +8,9 @@ mod coming;
 mod ended;
 mod feed;
 mod jobs;
+mod lapses;
 mod leases;
+mod life;
 mod line;
 mod owed;
 mod place;
@@ -22,7 +24,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
 
 use litemap::LiteMap as Map;
-use motorlink_proto::time::Micros;
+use motorlink_proto::time::{Instant, Micros};
 
 use super::frame::Frame;
 use super::message::{self, Ending, Event, Happening};
@@ -68,6 +70,10 @@ pub struct Hub {
     limits: Limits,
     log: VecDeque<Event>,
     owed: OwedPorts,
+    /// When it was looked at last.
+    now: Instant,
+    has_paused: bool,
+    lapsed: Vec<(SessionId, String)>,
     done: Sender<News>,
     ended: Receiver<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
@@ -102,6 +108,9 @@ impl Hub {
             limits: Limits::default(),
             log: VecDeque::new(),
             owed: OwedPorts::default(),
+            now: Instant(0),
+            has_paused: false,
+            lapsed: Vec::new(),
             done,
             ended,
             wake: Arc::new(wake),
@@ -145,8 +154,7 @@ impl Hub {
     fn leave_because(&mut self, id: SessionId, why: Option<&str>) {
         let Some(session) = self.sessions.remove(&id) else { return };
         for (_, held) in self.lines.iter_mut() {
-            held.sequences.retain(|(_, program)| *program != id);
-            held.movers.retain(|(_, program)| *program != id);
+            held.owners.forget(id);
             held.give_leases_back(id);
         }
         for (_, feed) in session.feeds {
@@ -156,36 +164,47 @@ impl Hub {
         let left = why.map_or_else(|| format!("{name} left"), |why| format!("{name} left: {why}"));
         self.say(Happening::Left, &name, left);
         let by = words::after(&name);
-        for line in self.numbers() {
-            for motor in self.orphans(line, id) {
-                let Some(held) = self.lines.get_mut(&line) else { continue };
-                match session.ending {
-                    Ending::Nothing => {
-                        held.owners.remove(&motor);
-                        continue;
-                    }
-                    Ending::Off => held.owe_off(motor, &by),
-                    Ending::Stop => {}
-                }
-                if let Some(why) = why {
-                    held.words.explain(motor, &by, why);
-                }
-                self.stop(Why::Asked, line, motor, id, None, &by);
+        let ending = session.ending;
+        for (line, motor) in self.take_own(id, ending) {
+            if let (Some(why), Some(held)) = (why, self.lines.get_mut(&line)) {
+                held.words.explain(motor, &by, why);
             }
+            self.end_motion((line, motor), ending, id, None, &by);
         }
     }
 
-    /// The motors of a program that has gone. If another program has sent a start, its end decides.
-    fn orphans(&self, line: usize, gone: SessionId) -> BTreeSet<Motor> {
-        let Some(Held { owners, starting, .. }) = self.lines.get(&line) else {
-            return BTreeSet::new();
-        };
-        let owned = owners.iter().filter(|(_, owner)| **owner == gone).map(|(motor, _)| *motor);
-        let started = starting.iter().filter(|(_, by)| *by == gone).map(|(motor, _)| *motor);
-        let is_taken = |motor: &Motor| {
-            starting.iter().any(|(it, by)| it == motor && self.sessions.contains_key(by))
-        };
-        owned.chain(started).filter(|motor| !is_taken(motor)).collect()
+    /// The motors whose motion a program has to end. It lets go of the others that it owns: those that
+    /// keep turning, and those that were stopped and hold their position.
+    fn take_own(&mut self, id: SessionId, ending: Ending) -> Vec<(usize, Motor)> {
+        let mut own = Vec::new();
+        for (line, held) in self.lines.iter_mut() {
+            if ending == Ending::Nothing {
+                held.owners.let_all_go(id);
+            }
+            for motor in held.owners.left_by(id, |program| self.sessions.contains_key(&program)) {
+                let is_held = held.owners.is_held(motor) && !held.owners.is_under_way(motor);
+                match ending {
+                    Ending::Stop if is_held => held.owners.let_go(motor, id),
+                    _ => own.push((*line, motor)),
+                }
+            }
+        }
+        own
+    }
+
+    /// Ends the motion of a motor as its program has declared.
+    fn end_motion(
+        &mut self,
+        (line, motor): (usize, Motor),
+        ending: Ending,
+        session: SessionId,
+        part: Option<Part>,
+        by: &Arc<str>,
+    ) {
+        if let (Ending::Off, Some(held)) = (ending, self.lines.get_mut(&line)) {
+            held.owe_off(motor, by);
+        }
+        self.stop(Why::Asked, line, motor, session, part, by);
     }
 
     fn numbers(&self) -> Vec<usize> {
@@ -235,6 +254,7 @@ impl Hub {
     /// An engine has ended.
     pub fn collect(&mut self) -> Result<(), LineEnded> {
         self.sessions.iter_mut().for_each(|(_, session)| session.collect());
+        self.end_lapsed();
         self.repeat_stops();
         self.collect_events()
     }
@@ -354,11 +374,10 @@ impl Hub {
     }
 
     fn stop_if_orphaned(&mut self, line: usize, motor: Motor, why: Why) {
-        let Some(owner) = self.lines.get(&line).and_then(|held| held.owners.get(&motor)) else {
+        let Some(owner) = self.lines.get(&line).and_then(|held| held.owners.owner(motor)) else {
             return;
         };
-        if !self.sessions.contains_key(owner) {
-            let owner = *owner;
+        if !self.sessions.contains_key(&owner) {
             self.stop(why, line, motor, owner, None, &"share".into());
         }
     }
@@ -374,7 +393,7 @@ impl Hub {
     ) {
         let tell = self.teller(session, None, line);
         let Some(held) = self.lines.get_mut(&line) else { return };
-        held.interrupt(motor);
+        held.owners.interrupt(motor);
         held.owe(motor, by);
         *held.stops.entry(motor).or_default() += 1;
         let quiet = match why {

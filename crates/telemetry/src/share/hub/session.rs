@@ -7,6 +7,7 @@ use litemap::LiteMap as Map;
 use motorlink_proto::st::RegisterId;
 
 use super::feed::Feed;
+use super::life::Life;
 use super::line::Lines;
 use crate::share::frame::Frame;
 use crate::share::message::{
@@ -32,6 +33,7 @@ pub(super) struct Session {
     pub(super) only_stops: Option<String>,
     /// What becomes of its motors when it leaves.
     pub(super) ending: Ending,
+    pub(super) life: Life,
     answers: VecDeque<Text>,
     events: VecDeque<Event>,
     missed: u64,
@@ -139,6 +141,7 @@ impl Session {
     pub(super) fn forget(&mut self, line: usize) {
         self.feeds.iter_mut().for_each(|(_, feed)| feed.forget(line));
         self.unconfirmed.retain(|(of, _), _| *of != line);
+        self.life.forget(line);
         self.segments.retain(|(of, _), _| *of != line);
     }
 

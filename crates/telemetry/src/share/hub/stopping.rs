@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use motorlink_proto::Motion;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::line::Held;
@@ -43,11 +44,10 @@ impl Held {
         }
     }
 
-    /// A motor has confirmed a stop: no program owns it any more.
+    /// A motor has confirmed a stop.
     pub(super) fn stopped(&mut self, motor: Motor) {
         self.heard.insert(motor);
         self.absent.remove(&motor);
-        self.owners.remove(&motor);
         self.owed.remove(&motor);
     }
 
@@ -91,7 +91,7 @@ impl Held {
             return None;
         }
         // A start that is under way ends the search if it is confirmed.
-        let is_free = |it: &Motor| !(self.stops.contains_key(it) || self.is_starting(*it));
+        let is_free = |it: &Motor| !(self.stops.contains_key(it) || self.owners.is_under_way(*it));
         let free = self.owed.iter().filter(|(motor, _)| is_free(motor));
         let due = free.filter_map(|(motor, owed)| Some((owed.search_due(now)?, *motor)));
         self.searched = due.min().map(|(_, motor)| motor);
@@ -101,7 +101,7 @@ impl Held {
     /// A search is over. Gives whether a motor is there, which has to be stopped then.
     pub(super) fn search_ended(&mut self, motor: Motor, result: &CommandResult) -> bool {
         self.searched = None;
-        self.ended(motor, false, result);
+        self.ended(motor, Motion::Holds, result);
         if let Err(why) = result {
             self.repeat(motor, why);
         }
@@ -130,7 +130,7 @@ impl Held {
     /// Whether nothing shows that the motor exists: no program has turned it and it has never answered.
     /// Where another one has answered, no program has read it, either.
     pub(super) fn is_unheard(&self, motor: Motor) -> bool {
-        let is_turned = self.owners.contains_key(&motor) || self.may_turn(motor);
+        let is_turned = self.owners.is_owned(motor) || self.may_turn(motor);
         let is_known = self.known.contains(&motor) && self.has_answered();
         !is_turned && !is_known && !self.heard.contains(&motor)
     }
@@ -199,7 +199,7 @@ impl Held {
 
     /// Whether a motor is there, as far as it is known.
     pub(super) fn is_there(&self, motor: Motor) -> bool {
-        self.owners.contains_key(&motor) || self.heard.contains(&motor) || self.may_turn(motor)
+        self.owners.is_owned(motor) || self.heard.contains(&motor) || self.may_turn(motor)
     }
 
     /// The motors that are there and have not confirmed a stop.

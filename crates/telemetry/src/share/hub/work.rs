@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::jobs::JobId;
 use super::place::SessionId;
 use super::session::Part;
+use motorlink_proto::Motion;
+
 use crate::acquisition::Rate;
 use crate::runner::CommandResult;
-use crate::share::request::{Configures, Motion};
+use crate::share::request::Configures;
 use crate::signal::Motor;
 
 /// Something that has ended in another thread.
@@ -52,7 +54,5 @@ pub(super) struct Sent {
     /// `None`: it is about the drive.
     pub(super) motor: Option<Motor>,
     pub(super) motion: Motion,
-    /// Whether the motor may turn after it.
-    pub(super) moves: bool,
     pub(super) configures: Option<Configures>,
 }

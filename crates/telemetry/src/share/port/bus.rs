@@ -97,6 +97,10 @@ impl Link for ShareBus {
         self.connection.only_own(is_set);
     }
 
+    fn claim(&self, motors: &[u8]) {
+        self.connection.claim(motors);
+    }
+
     fn end_with(&self, ending: Ending) {
         self.connection.end_with(ending);
     }

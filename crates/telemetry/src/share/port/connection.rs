@@ -2,13 +2,14 @@
 
 use std::cell::Cell;
 use std::collections::BTreeSet;
-use std::os::fd::{AsFd, BorrowedFd};
+use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{self, ByteLink, FdLink, Holder, PortError};
+use motorlink::port::{self, FdLink, Holder, PortError};
 use motorlink::st::Profile;
 
-use super::place::Place;
+use super::place::{Deadlines, Place};
+use super::pulse::Socket;
 use crate::share::VERSION;
 use crate::share::dialogue::{Dialogue, DialogueError, Ended, Heard};
 use crate::share::message::{Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Text};
@@ -24,18 +25,22 @@ const TIME_TO_LIVE: Duration = Duration::from_secs(1);
 /// The connection to a share.
 pub(super) struct Connection {
     port: Place,
-    socket: FdLink,
+    socket: Socket,
     dialogue: Dialogue,
     holder: Holder,
     /// The time to live of the next request, if it is shorter.
     expires: Cell<Duration>,
     /// Whether requests are for motors that no other program has moved since.
     is_own: Cell<bool>,
+    /// Motors that this program has moved through a connection before this one.
+    claims: Cell<Vec<u8>>,
     /// What the share does with the motors of this program when it leaves, and what it knows of that.
     ending: Cell<Ending>,
     declared: Ending,
     /// The motors that were taken from other programs.
     taken: BTreeSet<u8>,
+    /// Whether the share has the deadlines: once the program has changed something.
+    has_deadlines: bool,
     /// Why the share closes the connection.
     closing: Option<String>,
 }
@@ -45,12 +50,14 @@ impl Connection {
     pub(super) fn open(port: &Place) -> Result<Self, PortError> {
         let stream = port.at.connect().map_err(|error| port.unreachable(error))?;
         let mut opened = Connection {
-            socket: FdLink::new(stream, port.name())?,
+            socket: Socket::new(FdLink::new(stream, port.name())?),
+            has_deadlines: false,
             port: port.clone(),
             dialogue: Dialogue::default(),
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
             is_own: Cell::new(false),
+            claims: Cell::default(),
             ending: Cell::default(),
             declared: Ending::default(),
             taken: BTreeSet::new(),
@@ -98,7 +105,7 @@ impl Connection {
     }
 
     pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+        self.socket.descriptor()
     }
 
     /// The next command must not be sent later than this.
@@ -106,7 +113,12 @@ impl Connection {
         self.expires.set(time_to_live.min(TIME_TO_LIVE));
     }
 
-    /// Whether the share refuses commands to motors that another program has moved since.
+    /// The program has moved these motors through an earlier connection.
+    pub(super) fn claim(&self, motors: &[u8]) {
+        self.claims.set(motors.to_vec());
+    }
+
+    /// Whether the share refuses commands to motors that the program does not own.
     pub(super) fn only_own(&self, is_set: bool) {
         self.is_own.set(is_set);
     }
@@ -124,16 +136,40 @@ impl Connection {
     pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
         let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
         let line = self.port.line.clone();
+        let (claims, changes) = (self.claims.take(), self.changes(motor, &bytes));
+        if !self.has_deadlines && (changes || !claims.is_empty()) {
+            self.has_deadlines = true;
+            self.declare_deadlines()?;
+        }
+        for motor in claims {
+            let motor = MotorName { line: line.clone(), motor };
+            self.ask(Ask::Claim { motor })?;
+        }
         let motion = self.ending.get();
-        if motion != self.declared && self.changes(motor, &bytes) {
+        if motion != self.declared && changes {
             self.declared = motion;
             self.ask(Ask::Ending { motion })?;
         }
-        if self.port.at.takes() && self.changes(motor, &bytes) && self.taken.insert(motor) {
-            self.ask(Ask::Take { motor: MotorName { line: line.clone(), motor } })?;
+        if self.port.at.takes() && changes && self.taken.insert(motor) {
+            let motor = MotorName { line: line.clone(), motor };
+            self.ask(Ask::Take { motor })?;
         }
         let (continues, own) = (false, self.is_own.get());
         self.ask(Ask::Command { line, motor, bytes, time_to_live, continues, own })
+    }
+
+    /// From now on the share ends the motion of this program if it does not seem to live. One that only
+    /// reads needs no thread.
+    fn declare_deadlines(&mut self) -> Result<(), PortError> {
+        let Deadlines { silence, motion } = self.port.deadlines;
+        // Without a thread it would lapse while it does something else.
+        let silence = silence.filter(|silence| self.socket.live(*silence).is_ok());
+        if silence.is_none() && motion.is_none() {
+            return Ok(());
+        }
+        let seconds = |span: Duration| span.as_secs_f64();
+        let (silence, motion) = (silence.map(seconds), motion.map(seconds));
+        self.ask(Ask::Deadline { silence, motion }).map(drop)
     }
 
     fn changes(&self, motor: u8, bytes: &[u8]) -> bool {

@@ -3,10 +3,12 @@
 mod bus;
 mod connection;
 mod place;
+mod pulse;
 mod serial;
 
 use std::any::Any;
 use std::sync::Arc;
+use std::time::Duration;
 
 use motorlink::port::{
     self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
@@ -14,8 +16,9 @@ use motorlink::port::{
 };
 
 use super::address::{Address, Local};
-use super::message::Protocol;
+use super::message::{LONGEST_DEADLINE, Protocol, SHORTEST_DEADLINE};
 use bus::ShareBus;
+pub use place::Deadlines;
 use place::Place;
 use serial::ShareLine;
 
@@ -30,12 +33,24 @@ pub fn place_of(port: &PortName) -> Option<(Arc<dyn Address>, String)> {
     Some((Arc::clone(&place.at), place.line.clone()))
 }
 
+/// How long a program may be silent by default.
+const SILENCE: Duration = Duration::from_secs(2);
+
 /// The port of a line of the share at an address. `None`: no line can have this name.
-pub fn line_port(at: Arc<dyn Address>, line: &str) -> Option<PortName> {
+pub fn line_port(at: Arc<dyn Address>, deadlines: Deadlines, line: &str) -> Option<PortName> {
+    named_port(at, (deadlines, String::new()), line)
+}
+
+fn named_port(
+    at: Arc<dyn Address>,
+    (deadlines, options): (Deadlines, String),
+    line: &str,
+) -> Option<PortName> {
     let protocol = [Protocol::St, Protocol::Rmd]
         .into_iter()
         .find(|protocol| line.starts_with(protocol.word()))?;
-    Some(PortName::new(SharePort(Place { at, line: line.to_owned(), protocol })))
+    let line = line.to_owned();
+    Some(PortName::new(SharePort(Place { at, deadlines, line, protocol, options })))
 }
 
 /// `share:PATH/LINE`.
@@ -54,6 +69,10 @@ impl Scheme for Share {
         }]
     }
 
+    fn options(&self) -> &'static [&'static str] {
+        &["deadline", "motion"]
+    }
+
     fn parse(
         &self,
         rest: &str,
@@ -63,11 +82,53 @@ impl Scheme for Share {
         const EXAMPLE: &str = "share:./share/st0";
         let (path, line) = rest.rsplit_once('/').unwrap_or((rest, ""));
         given.present(path, "the path of the share's socket", EXAMPLE)?;
-        line_port(Arc::new(Local(path.into())), line).ok_or_else(|| NameError::Incomplete {
-            name: given.name.to_owned(),
-            what: "the line behind the path: st0, st1, .. or rmd0, rmd1, ..",
-            example: EXAMPLE,
+        let (silence, said) = match given.take("deadline") {
+            None => (Some(SILENCE), None),
+            Some("none") => (None, Some("deadline=none".to_owned())),
+            Some(text) => {
+                (Some(deadline(given, "deadline", text)?), Some(format!("deadline={text}")))
+            }
+        };
+        let (motion, text) = match given.take("motion") {
+            None => (None, None),
+            Some(text) => (Some(deadline(given, "motion", text)?), Some(format!("motion={text}"))),
+        };
+        let said: Vec<String> = said.into_iter().chain(text).collect();
+        let options = if said.is_empty() { String::new() } else { format!("?{}", said.join("&")) };
+        let at = Arc::new(Local(path.into()));
+        named_port(at, (Deadlines { silence, motion }, options), line).ok_or_else(|| {
+            NameError::Incomplete {
+                name: given.name.to_owned(),
+                what: "the line behind the path: st0, st1, .. or rmd0, rmd1, ..",
+                example: EXAMPLE,
+            }
         })
+    }
+}
+
+/// A deadline of an option, such as `200ms`.
+///
+/// # Errors
+/// It is none.
+pub fn deadline_of(
+    given: &mut Given<'_>,
+    option: &'static str,
+) -> Result<Option<Duration>, NameError> {
+    given.take(option).map(|text| deadline(given, option, text)).transpose()
+}
+
+fn deadline(given: &Given<'_>, option: &'static str, text: &str) -> Result<Duration, NameError> {
+    let seconds = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => number.parse::<f64>().ok().map(|it| it / 1e3),
+        (None, Some(number)) => number.parse().ok(),
+        (None, None) => None,
+    };
+    match seconds.filter(|it| (SHORTEST_DEADLINE..=LONGEST_DEADLINE).contains(it)) {
+        Some(seconds) => Ok(Duration::from_secs_f64(seconds)),
+        None => {
+            let what = format!("{} ms to {LONGEST_DEADLINE} s", SHORTEST_DEADLINE * 1e3);
+            Err(given.bad_option(option, text, what))
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The name of a line of a share, and errors about it.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use motorlink::port::{NotDone, PortError};
 
@@ -8,18 +9,31 @@ use crate::share::address::{Address, Unreachable};
 use crate::share::dialogue::Refusal;
 use crate::share::message::{Protocol, Reason};
 
+/// When a share ends the motion of a program that is connected and does not seem to live.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Deadlines {
+    /// Nothing comes from it for longer: it is stopped, hangs in a debugger, or starves. A thread of this
+    /// library gives a sign of life meanwhile, so this says nothing of the loop of the program.
+    pub silence: Option<Duration>,
+    /// A motor that it moves gets no new command for longer.
+    pub motion: Option<Duration>,
+}
+
 /// A line of a share.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
     pub(super) at: Arc<dyn Address>,
+    pub(super) deadlines: Deadlines,
     pub(super) line: String,
     pub(super) protocol: Protocol,
+    /// The options of its name that say the deadlines, with `?`.
+    pub(super) options: String,
 }
 
 impl Place {
     /// The name of the port.
     pub(super) fn name(&self) -> String {
-        self.at.port(&self.line)
+        self.at.port(&self.line) + &self.options
     }
 
     /// The error of a connection that failed.

@@ -1,0 +1,113 @@
+//! Programs that are connected and do not seem to live.
+
+use std::time::Duration;
+
+use crate::asking::{Asker, command};
+use crate::virtual_share::VirtualShare;
+use motorlink_telemetry::share::message::*;
+
+/// Turns an RMD motor with 360 °/s.
+const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
+/// Reads its state.
+const READ: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+const OFF: [u8; 8] = [0x80, 0, 0, 0, 0, 0, 0, 0];
+
+/// A share, somebody who watches it, and a program with these deadlines that turns a motor.
+fn turning(silence: Option<f64>, motion: Option<f64>) -> (VirtualShare, Asker, Asker) {
+    let share = VirtualShare::new();
+    let [watcher, mut program] = ["watches", "turns"].map(|who| share.join(who));
+    program.ask(Ask::Deadline { silence, motion }).unwrap();
+    program.ask(command("rmd0", 1, &TURN)).unwrap();
+    (share, watcher, program)
+}
+
+fn wait(share: &VirtualShare, seconds: f64) {
+    let end = share.now() + Duration::from_secs_f64(seconds);
+    share.until(|| share.now() >= end);
+}
+
+fn stands(share: &VirtualShare) {
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
+}
+
+fn turns(share: &VirtualShare) {
+    share.reaches("rmd1.speed_dps", |dps| dps > 300.0);
+}
+
+#[test]
+fn a_program_that_gives_no_sign_of_life_lapses_at_its_deadline() {
+    let (share, mut watcher, mut program) = turning(Some(0.5), None);
+    // Reads and signs are signs of life, also if no motor gets a new command.
+    for _ in 0..4 {
+        wait(&share, 0.4);
+        program.send(Ask::Alive);
+        wait(&share, 0.4);
+        program.ask(command("rmd0", 1, &READ)).unwrap();
+    }
+    turns(&share);
+    let heard = share.now();
+    let Event { message, .. } = watcher.event(Happening::Left);
+    let lapsed = share.now() - heard;
+    assert!((0.45..0.56).contains(&lapsed.as_secs_f64()), "{lapsed:?}");
+    let (_, why) = message.split_once("turns left: no sign of life for ").expect(&message);
+    let silent: u32 = why.strip_suffix(" ms").unwrap().parse().unwrap();
+    assert!((500..560).contains(&silent), "{why}");
+    stands(&share);
+}
+
+#[test]
+fn a_stream_that_ends_lapses_though_the_program_lives() {
+    let (share, mut watcher, mut program) = turning(Some(0.5), Some(0.3));
+    for _ in 0..5 {
+        wait(&share, 0.25);
+        program.ask(command("rmd0", 1, &TURN)).unwrap();
+    }
+    turns(&share);
+    let last = share.now();
+    while share.now() - last < Duration::from_millis(230) {
+        wait(&share, 0.05);
+        program.send(Ask::Alive);
+        program.ask(command("rmd0", 1, &READ)).unwrap();
+    }
+    let Event { message, .. } = watcher.event(Happening::Left);
+    assert!(message.starts_with("turns left: rmd0, motor 1: no new command for 3"), "{message}");
+    stands(&share);
+}
+
+#[test]
+fn nobody_lapses_who_owns_no_motor_or_lets_them_turn() {
+    let (share, mut watcher, mut program) = turning(Some(0.1), Some(0.1));
+    program.ask(command("rmd0", 1, &OFF)).unwrap();
+    wait(&share, 1.0);
+    program.ask(Ask::Ending { motion: Ending::Nothing }).unwrap();
+    program.ask(command("rmd0", 1, &TURN)).unwrap();
+    wait(&share, 1.0);
+    turns(&share);
+    watcher.ask(Ask::Lines).unwrap();
+    let left = watcher.events.iter().find(|event| event.event == Happening::Left);
+    assert!(left.is_none(), "{left:?}");
+}
+
+#[test]
+fn a_share_that_did_not_run_adds_that_time() {
+    let (share, _, mut program) = turning(Some(0.5), Some(0.5));
+    share.pause(Duration::from_secs(10));
+    wait(&share, 0.4);
+    program.ask(command("rmd0", 1, &TURN)).unwrap();
+    turns(&share);
+    wait(&share, 0.6);
+    stands(&share);
+}
+
+#[test]
+fn a_deadline_has_limits() {
+    let share = VirtualShare::new();
+    let mut program = share.join("program");
+    for seconds in [-1.0, 0.0, 0.019, 10.1] {
+        let silence = program.ask(Ask::Deadline { silence: Some(seconds), motion: None });
+        let motion = program.ask(Ask::Deadline { silence: None, motion: Some(seconds) });
+        for refused in [silence, motion] {
+            assert_eq!(refused.unwrap_err().reason, Reason::Usage, "{seconds}");
+        }
+    }
+}

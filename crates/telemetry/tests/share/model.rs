@@ -1,0 +1,532 @@
+//! Random histories of programs at a share, against an independent model of who owns which motor.
+//!
+//! The model is written from docs/SAFETY.md and docs/SHARE-PROTOCOL.md. After each step the drives have to
+//! do what it says, and each program has to own what it says. The drives do no physics: they note what
+//! they were told last.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use motorlink::Clock;
+use motorlink::port::{ByteLink, CanLink, EventBytes, Link, PortError};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::st::{
+    Command, CurrentReference, ErrorCode, Features, MotorControl, MotorNumber, Profile, Ramp,
+    RegisterId, RevupPhase, Slave, Version,
+};
+use motorlink_proto::time::{Instant, Micros};
+use motorlink_telemetry::acquisition::Acquisition;
+use motorlink_telemetry::line::{RmdLine, StLine};
+use motorlink_telemetry::runner::Remote;
+use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::frame::{Frame as Message, Kind};
+use motorlink_telemetry::share::hub::{Held, Hub, SessionId};
+use motorlink_telemetry::share::message::*;
+use motorlink_telemetry::share::opening::Opened;
+use motorlink_telemetry::share::wire::Tap;
+use motorlink_telemetry::share::words::Speaks;
+
+use crate::engine::Polled;
+
+/// Histories of `make test`. MODEL=2000 for more.
+const HISTORIES: u64 = 100;
+const STEPS: usize = 16;
+/// The deadline of programs that have one, s.
+const SILENCE: f64 = 0.5;
+/// The motors: of the ST drive, and of the bus.
+const MOTORS: [(&str, u8); 3] = [("st0", 1), ("rmd0", 1), ("rmd0", 2)];
+const PROGRAMS: usize = 3;
+
+/// What a motor does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Does {
+    Rests,
+    Turns,
+    Holds,
+}
+
+/// Drives, and whether their lines are cut.
+struct Drives {
+    motors: Mutex<[Does; 3]>,
+    is_cut: Mutex<[bool; 2]>,
+    clock: Clock,
+}
+
+/// The line of one of the drives.
+struct Wire {
+    drives: Arc<Drives>,
+    slave: Slave,
+    bytes: Vec<u8>,
+    frames: VecDeque<CanFrame>,
+}
+
+struct StMotor<'a>(&'a Drives);
+
+impl MotorControl for StMotor<'_> {
+    fn features(&self, _: MotorNumber) -> Features {
+        Features::NONE
+    }
+
+    fn version(&self) -> Version<'_> {
+        Version { name: "model", major: 1, minor: 0, patch: 0, pre_release: "" }
+    }
+
+    fn get_register(&mut self, _: MotorNumber, _: RegisterId) -> i32 {
+        0
+    }
+
+    fn set_register(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+        Ok(())
+    }
+
+    fn execute(&mut self, _: MotorNumber, command: Command) {
+        match command {
+            Command::StartMotor => self.0.does(0, Does::Turns),
+            Command::StopMotor => self.0.does(0, Does::Rests),
+            _ => {}
+        }
+    }
+
+    fn set_ramp(&mut self, _: MotorNumber, _: Ramp) {}
+
+    fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
+        RevupPhase::default()
+    }
+
+    fn set_revup_data(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+
+    fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
+}
+
+impl Drives {
+    fn does(&self, motor: usize, does: Does) {
+        self.motors.lock().unwrap()[motor] = does;
+    }
+}
+
+impl Wire {
+    fn to(drives: &Arc<Drives>) -> Self {
+        let slave = Slave::new(Profile::Spec, MotorNumber::FIRST);
+        Wire { drives: Arc::clone(drives), slave, bytes: Vec::new(), frames: VecDeque::new() }
+    }
+
+    fn wait(&self, timeout: Option<Duration>) {
+        let clock = &self.drives.clock;
+        if let Some(timeout) = timeout {
+            clock.wait(clock.now() + timeout.into());
+        }
+    }
+}
+
+impl Link for Wire {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.drives.clock.clone())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
+impl ByteLink for Wire {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        if self.drives.is_cut.lock().unwrap()[0] {
+            return Ok(());
+        }
+        let now = self.drives.clock.now();
+        for byte in bytes {
+            let reply = self.slave.receive(now, *byte, &mut StMotor(&self.drives));
+            self.bytes.extend(reply.unwrap_or_default());
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        if self.bytes.is_empty() {
+            self.wait(timeout);
+        }
+        let size = self.bytes.len().min(buffer.len());
+        buffer[..size].copy_from_slice(&self.bytes[..size]);
+        self.bytes.drain(..size);
+        Ok(size)
+    }
+}
+
+impl CanLink for Wire {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let Some((id @ 0x141..=0x142, data)) = frame.eight_bytes() else { return Ok(()) };
+        if self.drives.is_cut.lock().unwrap()[1] {
+            return Ok(());
+        }
+        let motor = usize::from(id - 0x140);
+        match data[0] {
+            0x80 => self.drives.does(motor, Does::Rests),
+            0x81 => self.drives.does(motor, Does::Holds),
+            0x88 | 0xA2 => self.drives.does(motor, Does::Turns),
+            _ => {}
+        }
+        let reply = match data[0] {
+            0x80..=0x88 => *data,
+            code => [code, 20, 0, 0, 0, 0, 0, 0],
+        };
+        self.frames.push_back(CanFrame::new(id, reply));
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        if self.frames.is_empty() {
+            self.wait(timeout);
+        }
+        Ok(self.frames.pop_front())
+    }
+}
+
+/// A hub with the two lines, and the programs that are connected.
+struct World {
+    drives: Arc<Drives>,
+    hub: RefCell<Hub>,
+    engines: [Remote; 2],
+    due: Cell<Instant>,
+    programs: [Option<Program>; PROGRAMS],
+}
+
+struct Program {
+    session: SessionId,
+    last: u32,
+    /// Whether it gives signs of life.
+    lives: bool,
+}
+
+impl World {
+    fn new(drives: &Arc<Drives>) -> Self {
+        let timeout = Duration::from_millis(50);
+        let tap = Tap::default();
+        let mut link = Some(tap.around_line(Box::new(Polled(Wire::to(drives)))));
+        let open = move || -> Result<Box<dyn EventBytes>, PortError> {
+            link.take().ok_or(PortError::NotFound { port: "st".to_owned() })
+        };
+        let options = motorlink::st::Options { timeout, ..Default::default() };
+        let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
+        let engine = Acquisition::new(Box::new(StLine::new(client)));
+        let (port, speaks) = ("/dev/st".parse().unwrap(), Speaks::St(Profile::Spec));
+        let (st, st_engine) = Held::here("st0", Opened { port, speaks, engine, tap });
+        let tap = Tap::default();
+        let link = tap.around_bus(Box::new(Polled(Wire::to(drives))));
+        let options = motorlink::rmd::Options { timeout, ..Default::default() };
+        let client = motorlink::rmd::EventClient::over("rmd", link, options);
+        let engine = Acquisition::new(Box::new(RmdLine::new(client)));
+        let (port, speaks) = ("slcan:/dev/rmd".parse().unwrap(), Speaks::Rmd);
+        let (rmd, rmd_engine) = Held::here("rmd0", Opened { port, speaks, engine, tap });
+        World {
+            drives: Arc::clone(drives),
+            hub: RefCell::new(Hub::new("model", vec![st, rmd], || {})),
+            engines: [st_engine, rmd_engine],
+            due: Cell::default(),
+            programs: [const { None }; PROGRAMS],
+        }
+    }
+
+    fn step(&self) {
+        for engine in &self.engines {
+            while engine.advance() == Some(Duration::ZERO) {}
+        }
+        let mut hub = self.hub.borrow_mut();
+        hub.advance();
+        let now = self.drives.clock.now();
+        hub.at(now);
+        if now >= self.due.get() {
+            self.due.set(now + Micros::from_millis(25));
+            for program in self.programs.iter().flatten().filter(|program| program.lives) {
+                send(&mut hub, program.session, 0, Ask::Alive);
+            }
+            hub.collect().unwrap();
+        }
+        while hub.take_event().is_some() {}
+        self.drives.clock.wait(now + Micros::from_millis(2));
+    }
+
+    fn run(&self, seconds: f64) {
+        let end = self.drives.clock.now() + Duration::from_secs_f64(seconds).into();
+        while self.drives.clock.now() < end {
+            self.step();
+        }
+    }
+
+    fn join(&mut self, program: usize) {
+        let session = self.hub.borrow_mut().join();
+        self.programs[program] = Some(Program { session, last: 0, lives: true });
+        let hello = Ask::Hello { protocol: VERSION, name: format!("p{program}") };
+        self.ask(program, hello).unwrap();
+    }
+
+    /// The connection of a program ends.
+    fn drop(&mut self, program: usize) {
+        if let Some(program) = self.programs[program].take() {
+            self.hub.borrow_mut().leave(program.session);
+        }
+    }
+
+    fn ask(&mut self, program: usize, ask: Ask) -> Result<Answer, Reason> {
+        let asker = self.programs[program].as_mut().unwrap();
+        asker.last += 1;
+        let (session, wanted) = (asker.session, asker.last);
+        send(&mut self.hub.borrow_mut(), session, wanted, ask);
+        for _ in 0..5_000 {
+            let mut hub = self.hub.borrow_mut();
+            while let Some(message) = hub.next(session) {
+                match decode(&message.payload) {
+                    Ok(Text::Answer { id, answer }) if id == wanted => return Ok(answer),
+                    Ok(Text::Refusal { id, reason, .. }) if id == wanted => return Err(reason),
+                    _ => {}
+                }
+            }
+            drop(hub);
+            self.step();
+        }
+        panic!("no answer");
+    }
+}
+
+fn send(hub: &mut Hub, session: SessionId, id: u32, ask: Ask) {
+    let payload = encode(&Request { id, ask });
+    hub.received(session, &Message { kind: Kind::Text, payload }, Micros(0));
+}
+
+fn command((line, motor): (&str, u8), bytes: &[u8], own: bool) -> Ask {
+    let (line, bytes) = (line.to_owned(), bytes.to_vec());
+    Ask::Command { line, motor, bytes, time_to_live: 1.0, continues: false, own }
+}
+
+fn read(motor: usize) -> Vec<u8> {
+    if motor == 0 { vec![2, 2] } else { vec![0x9A, 0, 0, 0, 0, 0, 0, 0] }
+}
+
+fn name(motor: usize) -> MotorName {
+    MotorName { line: MOTORS[motor].0.to_owned(), motor: MOTORS[motor].1 }
+}
+
+/// What docs/SAFETY.md says.
+#[derive(Debug, Clone)]
+struct Model {
+    does: [Does; 3],
+    owner: [Option<usize>; 3],
+    /// Whether a program has owned it since the share began.
+    owned: [bool; 3],
+    /// Whether it was stopped since its last motion, and stays with its owner.
+    held: [bool; 3],
+    ending: [Ending; PROGRAMS],
+    latched: bool,
+}
+
+impl Model {
+    /// A stop as the share sends it.
+    fn stop(&mut self, motor: usize) {
+        (self.does[motor], self.owner[motor]) = match motor {
+            0 => (Does::Rests, None),
+            _ => (Does::Holds, self.owner[motor]),
+        };
+        self.held[motor] = true;
+    }
+
+    /// A program is gone.
+    fn gone(&mut self, program: usize) {
+        for motor in 0..3 {
+            if self.owner[motor] != Some(program) {
+                continue;
+            }
+            match self.ending[program] {
+                Ending::Nothing => {}
+                Ending::Stop => self.stop(motor),
+                Ending::Off => self.does[motor] = Does::Rests,
+            }
+            self.owner[motor] = None;
+        }
+    }
+
+    /// A program owns a motor, which it or another one has moved.
+    fn own(&mut self, motor: usize, program: usize) {
+        (self.owner[motor], self.owned[motor], self.held[motor]) = (Some(program), true, false);
+    }
+}
+
+/// One of `0..most`.
+fn draw(random: &mut u64, most: usize) -> usize {
+    *random =
+        random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*random >> 33) as usize % most
+}
+
+/// Plays one history. An error has what was done until then.
+fn history(seed: u64) -> Result<(), String> {
+    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x5DEE_CE66;
+    let motors = Mutex::new([Does::Rests; 3]);
+    let clock = Clock::virtual_time();
+    let drives = Arc::new(Drives { motors, is_cut: Mutex::default(), clock });
+    let mut world = World::new(&drives);
+    let mut model = Model {
+        does: [Does::Rests; 3],
+        owner: [None; 3],
+        owned: [false; 3],
+        held: [false; 3],
+        ending: [Ending::Stop; PROGRAMS],
+        latched: false,
+    };
+    let mut done: Vec<String> = Vec::new();
+    for _ in 0..STEPS {
+        let (p, m) = (draw(&mut random, PROGRAMS), draw(&mut random, 3));
+        let what = draw(&mut random, 16);
+        if world.programs[p].is_none() {
+            world.join(p);
+            model.ending[p] = [Ending::Stop, Ending::Off, Ending::Nothing][draw(&mut random, 3)];
+            world.ask(p, Ask::Ending { motion: model.ending[p] }).unwrap();
+            let silence = Some(SILENCE);
+            world.ask(p, Ask::Deadline { silence, motion: None }).unwrap();
+            done.push(format!("p{p} joins, ending {:?}", model.ending[p]));
+        }
+        done.push(step(&mut world, &mut model, (p, m, what)));
+        world.run(0.1);
+        let does = *drives.motors.lock().unwrap();
+        if does != model.does {
+            return Err(format!("{done:#?}\nthe motors do {does:?}, not {:?}", model.does));
+        }
+        for (program, motor) in (0..PROGRAMS).flat_map(|it| [0, 1, 2].map(|motor| (it, motor))) {
+            if world.programs[program].is_some() {
+                let asked = world.ask(program, command(MOTORS[motor], &read(motor), true));
+                let owns = model.owner[motor] == Some(program) || !model.owned[motor];
+                // After a line was cut a read may fail.
+                if (asked == Err(Reason::Held)) == owns {
+                    let why = format!("p{program} owns {:?}: {owns}, not {asked:?}", name(motor));
+                    return Err(format!("{done:#?}\n{why}"));
+                }
+            }
+        }
+    }
+    std::mem::forget(world);
+    Ok(())
+}
+
+/// One step of the world and of the model. Gives what it was.
+fn step(world: &mut World, model: &mut Model, (p, m, what): (usize, usize, usize)) -> String {
+    let is_st = m == 0;
+    match what {
+        // A start, a ramp, a reference, a motion that goes on.
+        0..=5 => {
+            let (bytes, does): (&[u8], _) = match (is_st, what % 2) {
+                (true, 0) => (&[3, 1], Does::Turns),
+                (true, _) => (&[7, 220, 5, 0, 0, 100, 0], model.does[m]),
+                (false, 0) => (&[0xA2, 0, 0, 0, 0, 4, 0, 0], Does::Turns),
+                (false, _) => (&[0x88, 0, 0, 0, 0, 0, 0, 0], Does::Turns),
+            };
+            let asked = world.ask(p, command(MOTORS[m], bytes, false));
+            if model.latched {
+                assert_eq!(asked, Err(Reason::Latched));
+            } else {
+                assert!(asked.is_ok(), "{asked:?}");
+                model.does[m] = does;
+                model.own(m, p);
+            }
+            format!("p{p} moves {:?} with {bytes:x?}", MOTORS[m])
+        }
+        // A command whose reply is lost with the line: nobody knows whether the motor has it.
+        6 => {
+            *world.drives.is_cut.lock().unwrap() = [true; 2];
+            let bytes: &[u8] = if is_st { &[3, 1] } else { &[0xA2, 0, 0, 0, 0, 4, 0, 0] };
+            let asked = world.ask(p, command(MOTORS[m], bytes, false));
+            *world.drives.is_cut.lock().unwrap() = [false; 2];
+            world.run(0.5);
+            match asked {
+                Err(Reason::Latched) => assert!(model.latched),
+                Err(Reason::Silent) => model.own(m, p),
+                other => panic!("{other:?}"),
+            }
+            format!("p{p} moves {:?} on a line that is cut", MOTORS[m])
+        }
+        // Stops: of the protocol, and of the share.
+        7 | 8 => {
+            let bytes: &[u8] = match (is_st, what) {
+                (true, _) => &[3, 2],
+                (false, 7) => &[0x80, 0, 0, 0, 0, 0, 0, 0],
+                (false, _) => &[0x81, 0, 0, 0, 0, 0, 0, 0],
+            };
+            world.ask(p, command(MOTORS[m], bytes, false)).unwrap();
+            match bytes[0] {
+                0x80 => (model.does[m], model.owner[m]) = (Does::Rests, None),
+                _ => model.stop(m),
+            }
+            format!("p{p} sends {:?} {bytes:x?}", MOTORS[m])
+        }
+        9 => {
+            world.ask(p, Ask::Stop { motor: Some(name(m)) }).unwrap();
+            model.stop(m);
+            format!("p{p} stops {:?}", MOTORS[m])
+        }
+        10 => {
+            let ask = if model.latched { Ask::Release } else { Ask::Latch };
+            world.ask(p, ask.clone()).unwrap();
+            model.latched = !model.latched;
+            format!("p{p} asks for {ask:?}")
+        }
+        11 => {
+            let asked = world.ask(p, Ask::Claim { motor: name(m) });
+            if !model.owned[m] {
+                model.own(m, p);
+            }
+            match model.owner[m] == Some(p) {
+                true => assert_eq!(asked, Ok(Answer::Claim)),
+                false => assert_eq!(asked, Err(Reason::Held)),
+            }
+            format!("p{p} claims {:?}", MOTORS[m])
+        }
+        12 => {
+            world.drop(p);
+            model.gone(p);
+            format!("p{p} is killed")
+        }
+        // The line is cut when it is killed, and back later.
+        13 => {
+            *world.drives.is_cut.lock().unwrap() = [true; 2];
+            world.drop(p);
+            world.run(1.0);
+            *world.drives.is_cut.lock().unwrap() = [false; 2];
+            world.run(3.0);
+            model.gone(p);
+            format!("p{p} is killed while the lines are cut")
+        }
+        14 => {
+            let turns = |motor: usize| model.owner[motor] == Some(p) && !model.held[motor];
+            let owns = (0..3).any(turns) && model.ending[p] != Ending::Nothing;
+            world.programs[p].as_mut().unwrap().lives = false;
+            world.run(SILENCE + 0.2);
+            let lapsed = world.hub.borrow_mut().take_lapsed();
+            assert_eq!(lapsed.len(), usize::from(owns), "{lapsed:?}");
+            match owns {
+                true => {
+                    world.programs[p] = None;
+                    model.gone(p);
+                }
+                false => world.programs[p].as_mut().unwrap().lives = true,
+            }
+            format!("p{p} is frozen")
+        }
+        // The share is killed, and started again.
+        _ => {
+            let new = World::new(&Arc::clone(&world.drives));
+            // One that is dropped would stop the motors.
+            std::mem::forget(std::mem::replace(world, new));
+            (model.owner, model.owned, model.latched) = ([None; 3], [false; 3], false);
+            "the share is killed and started again".to_owned()
+        }
+    }
+}
+
+#[test]
+fn random_histories_end_as_the_model_says() {
+    let histories = std::env::var("MODEL").map_or(HISTORIES, |it| it.parse().unwrap());
+    for seed in 0..histories {
+        if let Err(why) = history(seed) {
+            panic!("history {seed}: {why}");
+        }
+    }
+}
