@@ -232,7 +232,7 @@ async fn motors_without_values_for_a_time_are_named() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn it_goes_on_without_the_page_and_ends_with_the_server() {
-    let desk = Desk::new("leaves").await;
+    let desk = Desk::new("page-leaves").await;
     let recordings = Arc::clone(&desk.recordings);
     let view = desk.view.clone();
     let page = tokio::spawn(async move {
