@@ -49,8 +49,8 @@ impl Hub {
                     }
                 }
             }
-            Work::Stop { part, motor, by, is_precaution, result } => {
-                self.stop_ended(line, motor, &by, &result);
+            Work::Stop { part, motor, by, motion, is_precaution, result } => {
+                self.stop_ended(line, motor, (&by, motion), &result);
                 // A line that was closed meanwhile is one that fails.
                 let address = self
                     .lines
@@ -102,7 +102,7 @@ impl Hub {
     /// A motor has confirmed a stop.
     fn stopped(&mut self, line: usize, motor: Motor, motion: Motion) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        held.stopped(motor);
+        held.stopped(motor, motion);
         held.owners.stopped(motor, motion);
         // A program that has left owns no motor that holds its position.
         if held.owners.owner(motor).is_some_and(|owner| !self.sessions.contains_key(&owner)) {
@@ -111,13 +111,16 @@ impl Hub {
     }
 
     /// A stop is over. If the motor did not confirm it, it is repeated.
-    fn stop_ended(&mut self, line: usize, motor: Motor, by: &Arc<str>, result: &CommandResult) {
+    fn stop_ended(
+        &mut self,
+        line: usize,
+        motor: Motor,
+        (by, motion): (&Arc<str>, Motion),
+        result: &CommandResult,
+    ) {
         let Some(held) = self.lines.get_mut(&line) else { return };
         match result {
-            Ok(_) => {
-                let motion = held.stop_of(motor).motion();
-                self.stopped(line, motor, motion);
-            }
+            Ok(_) => self.stopped(line, motor, motion),
             Err(error) => {
                 held.ended(motor, Motion::Holds, result);
                 held.not_stopped(motor, by, error);

@@ -403,9 +403,10 @@ impl Hub {
         };
         let is_precaution = quiet == Some(Quiet::Precaution);
         let request = held.stop_of(motor);
+        let motion = request.motion();
         let asker = Arc::clone(by);
         let ended = move |result| {
-            tell(Work::Stop { part, motor, by: asker, is_precaution, result });
+            tell(Work::Stop { part, motor, by: asker, motion, is_precaution, result });
         };
         let begun = match quiet {
             None => held.remote().stop_then(by, request, ended),
@@ -414,7 +415,7 @@ impl Hub {
         if begun.is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
             let name = held.name.as_str().into();
-            let what = Work::Stop { part, motor, by, is_precaution, result };
+            let what = Work::Stop { part, motor, by, motion, is_precaution, result };
             self.finish(Done { session, id: None, line, name, what });
         }
     }

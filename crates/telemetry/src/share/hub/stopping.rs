@@ -44,11 +44,13 @@ impl Held {
         }
     }
 
-    /// A motor has confirmed a stop.
-    pub(super) fn stopped(&mut self, motor: Motor) {
+    /// A motor has confirmed a stop. One that has to be switched off still has to be.
+    pub(super) fn stopped(&mut self, motor: Motor, motion: Motion) {
         self.heard.insert(motor);
         self.absent.remove(&motor);
-        self.owed.remove(&motor);
+        if motion != Motion::Holds || !self.owed.get(&motor).is_some_and(|owed| owed.is_off) {
+            self.owed.remove(&motor);
+        }
     }
 
     /// A motor has not confirmed a stop.

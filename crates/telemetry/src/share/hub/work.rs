@@ -39,6 +39,8 @@ pub(super) enum Work {
         part: Option<Part>,
         motor: Motor,
         by: Arc<str>,
+        /// What the stop does to the motion.
+        motion: Motion,
         is_precaution: bool,
         result: CommandResult,
     },
