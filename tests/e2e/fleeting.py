@@ -36,6 +36,10 @@ def runs(zenoh, node, within=10):
         time.sleep(0.05)
 
 
+class Over(Exception):
+    """The node has ended the session."""
+
+
 class Member:
     """A session at a node."""
 
@@ -129,7 +133,9 @@ class Member:
                 if isinstance(said, dict) and said.get("id") == sent:
                     self.heard.remove(said)
                     return said
-            self.pull()
+            said = self.pull()
+            if said and said["kind"] == "over":
+                raise Over(said["why"])
         raise AssertionError(f"no answer to {sent}")
 
     def lives(self):

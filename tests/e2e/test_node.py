@@ -27,10 +27,16 @@ ROUNDS = int(os.environ.get("ROUNDS", "1"))
 TURNS = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from fleeting import Member
-member = Member(sys.argv[1], "arm1", who="turns", deadline=0.3)
-member.lives()
-member.turn()
+from fleeting import Member, Over
+while True:
+    member = Member(sys.argv[1], "arm1", who="turns", deadline=0.3)
+    member.lives()
+    try:
+        member.turn()
+        break
+    except Over:
+        # The machine gave it no time for its signs of life.
+        member.dies()
 print("turning", flush=True)
 time.sleep(600)
 """

@@ -118,12 +118,12 @@ def test_a_program_that_sleeps_lives_and_a_stream_that_ends_does_not(share: Shar
     with motorlink.rmd.open(share.rmd + "?deadline=400ms") as bus:
         bus.motor(1).set_speed(100)
         time.sleep(1)
-        assert speed() > 90
+        assert speed() > 50
     with motorlink.rmd.open(share.rmd + "?deadline=400ms&motion=300ms") as bus:
         for _ in range(5):
             bus.motor(1).set_speed(100)
             time.sleep(0.1)
-        assert speed() > 90
+        assert speed() > 50
         eventually(lambda: abs(speed()) < 5, "a motor whose stream has ended")
         with pytest.raises(errors.PortError, match="no new command for 3"):
             bus.motor(1).set_speed(100)

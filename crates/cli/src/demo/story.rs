@@ -2,7 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{self, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
+use motorlink::arrival::ArrivalProgress;
+use motorlink::rmd::{
+    self, ArrivalOptions, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit,
+    Target,
+};
 use motorlink::st::{self, Flags, Ramp, Status, register};
 
 use super::bench::Drives;
@@ -164,12 +168,17 @@ impl<'a> Story<'a> {
         }
         motor.stop()?;
         let target = CentiDegrees::from_degrees(810.0);
-        motor.set_position(target, Some(SpeedLimit(500)))?;
-        let mut reached = 0.0;
-        self.until("RMD motor 1 reaches 810°", |_| {
-            reached = motor.multi_turn_angle()?.degrees();
-            Ok((reached - target.degrees()).abs() < 0.05 && motor.motion_status()?.speed.0 == 0)
-        })?;
+        // How far it is depends on how long the steps before took.
+        let (to, most) = (Target::MultiTurn(target), Some(SpeedLimit(500)));
+        let mut moved = motor.prepare_move(to, most, ArrivalOptions::default())?;
+        motor.set_position(target, most)?;
+        let reached = loop {
+            match moved.advance()? {
+                ArrivalProgress::Arrived(arrived) => break arrived.angle.angle.degrees(),
+                ArrivalProgress::Wait(_) => self.tick()?,
+            }
+        };
+        self.tick()?;
         self.done.push(format!("an RMD motor moved to {reached:.2}° and held its position"));
         Ok(())
     }
