@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motorlink_link::port::{self, Carries, Form, Given, NameError, PortName, Scheme};
-use motorlink_telemetry::share::port::{Deadlines, deadline_of, line_port};
+use motorlink_telemetry::share::port::{deadline_of, line_port};
 
 use crate::key::BadName;
 use crate::network::Network;
@@ -66,12 +66,10 @@ impl Scheme for Zenoh {
             return Err(given.bad_option("raw", "set", what));
         }
         let remote = Remote { who, deadline, motion, takes, ..Remote::new(node, network) };
-        line_port(Arc::new(remote), Deadlines::default(), line).ok_or_else(|| {
-            NameError::Incomplete {
-                name: given.name.to_owned(),
-                what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",
-                example: EXAMPLE,
-            }
+        line_port(Arc::new(remote), line).ok_or_else(|| NameError::Incomplete {
+            name: given.name.to_owned(),
+            what: "the line behind the node: st0, st1, .. or rmd0, rmd1, ..",
+            example: EXAMPLE,
         })
     }
 }

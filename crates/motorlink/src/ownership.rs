@@ -66,7 +66,7 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
         if !motion.stops() {
             state.uninterrupted.insert(by);
         }
-        if is_owned(motion) {
+        if motion.may_be_owned() {
             state.sent.push((by, by));
         }
     }
@@ -74,7 +74,7 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
     /// A request of a program is over.
     pub fn ended(&mut self, motor: M, by: P, motion: Motion, carried: Carried) {
         let state = self.0.entry(motor).or_default();
-        if is_owned(motion)
+        if motion.may_be_owned()
             && let Some(at) = state.sent.iter().position(|(sender, _)| *sender == by)
         {
             let (_, owner) = state.sent.remove(at);
@@ -139,7 +139,7 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
         }
     }
 
-    /// The motor has no owner any more. What is under way goes on.
+    /// The motor has no owner any more. A request that is under way may give it one.
     pub fn free(&mut self, motor: M) {
         if let Some(state) = self.0.get_mut(&motor) {
             state.owner = None;
@@ -148,13 +148,7 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
 
     /// A program lets go of all its motors, which turn on and have no owner.
     pub fn let_all_go(&mut self, by: P) {
-        let motors: Vec<M> = self.0.keys().copied().collect();
-        motors.into_iter().for_each(|motor| self.let_go(motor, by));
-    }
-
-    /// The owner lets go of the motor, which turns on and has no owner.
-    pub fn let_go(&mut self, motor: M, by: P) {
-        if let Some(state) = self.0.get_mut(&motor) {
+        for state in self.0.values_mut() {
             state.owner = state.owner.filter(|owner| *owner != by);
             state.sent.retain(|(_, owner)| *owner != by);
         }
@@ -183,9 +177,9 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
         self.0.get(&motor).is_some_and(|state| !state.sent.is_empty())
     }
 
-    /// Whether the motor holds its position after a stop.
+    /// Whether the motor holds its position after a stop, and nothing is under way that moves it.
     pub fn is_held(&self, motor: M) -> bool {
-        self.0.get(&motor).is_some_and(|state| state.is_held)
+        self.0.get(&motor).is_some_and(|state| state.is_held && state.sent.is_empty())
     }
 
     /// The motors that have an owner.
@@ -208,11 +202,6 @@ impl<P> State<P> {
     fn own(&mut self, owner: P) {
         (self.owner, self.was_owned, self.is_held) = (Some(owner), true, false);
     }
-}
-
-/// Whether its sender owns the motor after it. So it is for a request that no document knows.
-fn is_owned(motion: Motion) -> bool {
-    motion.is_owned() || motion == Motion::Unknown
 }
 
 #[cfg(test)]
@@ -285,9 +274,9 @@ mod tests {
         assert_eq!(motors.owner(1), Some('b'));
         motors.take(2, 'b');
         assert_eq!(motors.owner(2), None, "it does not turn");
-        motors.let_go(1, 'a');
+        motors.let_all_go('a');
         assert_eq!(motors.owner(1), Some('b'));
-        motors.let_go(1, 'b');
+        motors.let_all_go('b');
         assert_eq!(motors.owner(1), None);
     }
 

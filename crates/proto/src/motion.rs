@@ -34,6 +34,12 @@ impl Motion {
         matches!(self, Motion::Starts | Motion::Changes)
     }
 
+    /// Whether its sender is taken for the owner where several programs use a motor: also after a request
+    /// that no document knows.
+    pub const fn may_be_owned(self) -> bool {
+        self.is_owned() || matches!(self, Motion::Unknown)
+    }
+
     /// Whether it stops the motor.
     pub const fn stops(self) -> bool {
         matches!(self, Motion::Holds | Motion::Frees)

@@ -1,6 +1,5 @@
 //! What the bytes of a command ask of a drive.
 
-use motorlink_proto::Motion;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
@@ -33,7 +32,7 @@ impl Kind {
     pub fn of(request: &Request) -> Self {
         match request.motion() {
             motion if motion.stops() => Kind::Stops,
-            motion if motion.is_owned() || motion == Motion::Unknown => Kind::Moves,
+            motion if motion.may_be_owned() => Kind::Moves,
             _ if request.is_read() => Kind::Reads,
             _ => Kind::Changes,
         }

@@ -262,7 +262,7 @@ impl Client {
         }
     }
 
-    /// The session is over. The program is told why, if it reads.
+    /// Tells the program why its session has ended.
     fn say_last(&mut self, why: &str) {
         let closing = message::encode(&Text::Closing { message: why.to_owned() });
         // No message of a hub is too long.

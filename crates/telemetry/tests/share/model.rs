@@ -411,7 +411,7 @@ fn history(seed: u64) -> Result<(), String> {
 fn step(world: &mut World, model: &mut Model, (p, m, what): (usize, usize, usize)) -> String {
     let is_st = m == 0;
     match what {
-        // A start, a ramp, a reference, a motion that goes on.
+        // A start, a ramp, a reference, or 0x88.
         0..=5 => {
             let (bytes, does): (&[u8], _) = match (is_st, what % 2) {
                 (true, 0) => (&[3, 1], Does::Turns),
@@ -429,7 +429,7 @@ fn step(world: &mut World, model: &mut Model, (p, m, what): (usize, usize, usize
             }
             format!("p{p} moves {:?} with {bytes:x?}", MOTORS[m])
         }
-        // A command whose reply is lost with the line: nobody knows whether the motor has it.
+        // A command whose reply is lost with the line: it is unknown whether the motor has it.
         6 => {
             *world.drives.is_cut.lock().unwrap() = [true; 2];
             let bytes: &[u8] = if is_st { &[3, 1] } else { &[0xA2, 0, 0, 0, 0, 4, 0, 0] };

@@ -223,7 +223,7 @@ fn a_program_owns_again_what_it_moved_before_the_share_was_killed() {
     program.ask(claim()).unwrap();
     drop(program);
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
-    // A motor that a program has moved here belongs to that one, or to nobody after its stop.
+    // A motor that a program has moved here belongs to that program, and has no owner after its stop.
     let mut other = share.join("other");
     other.ask(command("st0", 2, &RAMP)).unwrap();
     let mut program = share.join("comes back");

@@ -39,8 +39,7 @@ impl Hub {
         if let Some(why) = held.lease_of_another(motor, session, now) {
             return Err((Reason::Held, why));
         }
-        let lease = Lease { session, name: Arc::clone(name), until: now + length };
-        held.leases.insert(motor, lease);
+        held.lease_to(motor, (session, name), now + length);
         Ok(())
     }
 
@@ -62,8 +61,7 @@ impl Hub {
         if let Some(length) =
             self.lease.filter(|_| held.lease_of_another(motor, session, now).is_none())
         {
-            let lease = Lease { session, name: Arc::clone(name), until: now + length };
-            held.leases.insert(motor, lease);
+            held.lease_to(motor, (session, name), now + length);
         }
         self.owns_now(session, (line, motor));
         Ok(Some(Answer::Claim))
@@ -93,8 +91,7 @@ impl Hub {
         let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };
         let now = held.now();
         let is_held = held.lease_of_another(motor, session, now).is_some();
-        let lease = Lease { session, name: Arc::clone(name), until: now + length };
-        let before = held.leases.insert(motor, lease);
+        let before = held.lease_to(motor, (session, name), now + length);
         held.owners.take(motor, session);
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
@@ -110,6 +107,16 @@ impl Held {
     /// A program has left.
     pub(super) fn give_leases_back(&mut self, gone: SessionId) {
         self.leases.retain(|_, lease| lease.session != gone);
+    }
+
+    /// A program has a motor until this time. Gives the lease before.
+    fn lease_to(
+        &mut self,
+        motor: Motor,
+        (session, name): (SessionId, &Arc<str>),
+        until: Instant,
+    ) -> Option<Lease> {
+        self.leases.insert(motor, Lease { session, name: Arc::clone(name), until })
     }
 
     /// Who has a motor, if it is another program than this one.

@@ -99,11 +99,10 @@ impl Hub {
         }
     }
 
-    /// A motor has confirmed a stop.
+    /// A motor has confirmed a stop, which its owners know.
     fn stopped(&mut self, line: usize, motor: Motor, motion: Motion) {
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.stopped(motor, motion);
-        held.owners.stopped(motor, motion);
         // A program that has left owns no motor that holds its position.
         if held.owners.owner(motor).is_some_and(|owner| !self.sessions.contains_key(&owner)) {
             held.owners.free(motor);
@@ -120,7 +119,10 @@ impl Hub {
     ) {
         let Some(held) = self.lines.get_mut(&line) else { return };
         match result {
-            Ok(_) => self.stopped(line, motor, motion),
+            Ok(_) => {
+                held.owners.stopped(motor, motion);
+                self.stopped(line, motor, motion);
+            }
             Err(error) => {
                 held.ended(motor, Motion::Holds, result);
                 held.not_stopped(motor, by, error);
@@ -222,7 +224,7 @@ impl Hub {
             }
             _ => {}
         }
-        if motion.is_owned() {
+        if motion.may_be_owned() {
             self.stop_if_orphaned(line, motor, Why::Asked);
         }
     }

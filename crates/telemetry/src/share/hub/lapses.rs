@@ -15,7 +15,7 @@ impl Held {
     /// The motors of a program that it has not stopped.
     fn turning_for(&self, id: SessionId) -> Vec<Motor> {
         let mut own = self.owners.left_by(id, |_| true);
-        own.retain(|motor| !self.owners.is_held(*motor) || self.owners.is_under_way(*motor));
+        own.retain(|motor| !self.owners.is_held(*motor));
         own
     }
 }

@@ -25,7 +25,7 @@ impl Life {
 
     /// The program commands a motor.
     pub(super) fn commanded(&mut self, now: Instant, place: (usize, Motor), motion: Motion) {
-        if motion.is_owned() {
+        if motion.may_be_owned() {
             self.commanded.insert(place, now);
         } else if motion.stops() {
             self.commanded.remove(&place);

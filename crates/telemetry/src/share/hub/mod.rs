@@ -166,10 +166,14 @@ impl Hub {
         let by = words::after(&name);
         let ending = session.ending;
         for (line, motor) in self.take_own(id, ending) {
-            if let (Some(why), Some(held)) = (why, self.lines.get_mut(&line)) {
+            let Some(held) = self.lines.get_mut(&line) else { continue };
+            if ending == Ending::Off {
+                held.owe_off(motor, &by);
+            }
+            if let Some(why) = why {
                 held.words.explain(motor, &by, why);
             }
-            self.end_motion((line, motor), ending, id, None, &by);
+            self.stop(Why::Asked, line, motor, id, None, &by);
         }
     }
 
@@ -182,29 +186,13 @@ impl Hub {
                 held.owners.let_all_go(id);
             }
             for motor in held.owners.left_by(id, |program| self.sessions.contains_key(&program)) {
-                let is_held = held.owners.is_held(motor) && !held.owners.is_under_way(motor);
                 match ending {
-                    Ending::Stop if is_held => held.owners.let_go(motor, id),
+                    Ending::Stop if held.owners.is_held(motor) => held.owners.free(motor),
                     _ => own.push((*line, motor)),
                 }
             }
         }
         own
-    }
-
-    /// Ends the motion of a motor as its program has declared.
-    fn end_motion(
-        &mut self,
-        (line, motor): (usize, Motor),
-        ending: Ending,
-        session: SessionId,
-        part: Option<Part>,
-        by: &Arc<str>,
-    ) {
-        if let (Ending::Off, Some(held)) = (ending, self.lines.get_mut(&line)) {
-            held.owe_off(motor, by);
-        }
-        self.stop(Why::Asked, line, motor, session, part, by);
     }
 
     fn numbers(&self) -> Vec<usize> {

@@ -18,8 +18,7 @@ use motorlink::port::{
 use super::address::{Address, Local};
 use super::message::{LONGEST_DEADLINE, Protocol, SHORTEST_DEADLINE};
 use bus::ShareBus;
-pub use place::Deadlines;
-use place::Place;
+use place::{Deadlines, Place};
 use serial::ShareLine;
 
 /// Registers the port `share:` in this process.
@@ -37,8 +36,8 @@ pub fn place_of(port: &PortName) -> Option<(Arc<dyn Address>, String)> {
 const SILENCE: Duration = Duration::from_secs(2);
 
 /// The port of a line of the share at an address. `None`: no line can have this name.
-pub fn line_port(at: Arc<dyn Address>, deadlines: Deadlines, line: &str) -> Option<PortName> {
-    named_port(at, (deadlines, String::new()), line)
+pub fn line_port(at: Arc<dyn Address>, line: &str) -> Option<PortName> {
+    named_port(at, (Deadlines::default(), String::new()), line)
 }
 
 fn named_port(
@@ -82,19 +81,19 @@ impl Scheme for Share {
         const EXAMPLE: &str = "share:./share/st0";
         let (path, line) = rest.rsplit_once('/').unwrap_or((rest, ""));
         given.present(path, "the path of the share's socket", EXAMPLE)?;
-        let (silence, said) = match given.take("deadline") {
-            None => (Some(SILENCE), None),
-            Some("none") => (None, Some("deadline=none".to_owned())),
-            Some(text) => {
-                (Some(deadline(given, "deadline", text)?), Some(format!("deadline={text}")))
-            }
+        let [of_silence, of_motion] = ["deadline", "motion"].map(|option| given.take(option));
+        let silence = match of_silence {
+            None => Some(SILENCE),
+            Some("none") => None,
+            Some(text) => Some(deadline(given, "deadline", text)?),
         };
-        let (motion, text) = match given.take("motion") {
-            None => (None, None),
-            Some(text) => (Some(deadline(given, "motion", text)?), Some(format!("motion={text}"))),
-        };
-        let said: Vec<String> = said.into_iter().chain(text).collect();
-        let options = if said.is_empty() { String::new() } else { format!("?{}", said.join("&")) };
+        let motion = of_motion.map(|text| deadline(given, "motion", text)).transpose()?;
+        let said = [("deadline", of_silence), ("motion", of_motion)];
+        let said =
+            said.into_iter().filter_map(|(option, text)| Some(format!("{option}={}", text?)));
+        let said: Vec<String> = said.collect();
+        let mark = if said.is_empty() { "" } else { "?" };
+        let options = format!("{mark}{}", said.join("&"));
         let at = Arc::new(Local(path.into()));
         named_port(at, (Deadlines { silence, motion }, options), line).ok_or_else(|| {
             NameError::Incomplete {

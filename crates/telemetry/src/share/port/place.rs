@@ -11,12 +11,12 @@ use crate::share::message::{Protocol, Reason};
 
 /// When a share ends the motion of a program that is connected and does not seem to live.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Deadlines {
+pub(super) struct Deadlines {
     /// Nothing comes from it for longer: it is stopped, hangs in a debugger, or starves. A thread of this
     /// library gives a sign of life meanwhile, so this says nothing of the loop of the program.
-    pub silence: Option<Duration>,
+    pub(super) silence: Option<Duration>,
     /// A motor that it moves gets no new command for longer.
-    pub motion: Option<Duration>,
+    pub(super) motion: Option<Duration>,
 }
 
 /// A line of a share.
