@@ -79,6 +79,9 @@ test: toolchain $(if $(SUDO),packages) ## 15 min: parts web-test .. test-socketc
 # Before a release, and each night in the public CI. A part that fails has no second chance.
 verify: ## 4 h: all parts with all tests, beside a load, on one core, faults, soak, mutants
 	$(MAKE) --no-print-directory test PARTS="$(ALL_PARTS)" FORCE=1 ONCE=1 LONG=1
+	ROUNDS=50 MODEL=300 $(MAKE) --no-print-directory e2e \
+		T="test_owners.py test_monitor.py test_node.py test_share.py test_share_port.py test_twins.py"
+	MODEL=2000 $(MAKE) --no-print-directory unit T="--test share model::"
 	$(MAKE) --no-print-directory flakes RUNS=1
 	taskset --cpu-list 0 $(MAKE) --no-print-directory flakes RUNS=1 LOAD=0
 	$(MAKE) --no-print-directory reliability MOST=1000000
@@ -119,7 +122,7 @@ python: package ## 3 min: the Python package: its build, types, examples, tests
 	$(VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## 6 min: the program against independent clients
+e2e: package ## 6 min: the program against independent clients
 	-@tests/install e2e
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
@@ -274,8 +277,8 @@ web-types: ## the types of messages in the page: web/src/wire.ts
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
 
-# RUNS=50 MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md.
-deadman: web ## how long motors turn on after their page is gone
+# RUNS=50 MOTORLINK_UPDATE_DOCS=1 writes the table of docs/BENCHMARKS.md. CASES=program measures these rows.
+deadman: web package ## how long motors turn on after their page or program is gone
 	-@tests/install browser
 	$(CARGO) build --profile dist --locked -p motorlink-cli
 	cd web && RUNS=$(RUNS) MOTORLINK_BIN=$(BUILT)/dist/motorlink npm run --silent measure tests/deadman

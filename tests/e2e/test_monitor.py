@@ -233,6 +233,27 @@ def test_a_killed_server_of_a_running_share_leaves_nothing_turning(serve, share,
     assert "st0 of the share has the profile spec, not mcsdk-5.4" in refused.err
 
 
+def test_a_frozen_server_of_a_running_share_leaves_nothing_turning(serve, share):
+    share()
+    watcher = Client(share.path, "watcher")
+    turns_on = turns_too(watcher)
+    for _ in range(ROUNDS):
+        server, site = serve("--share", f"unix:{share.path}")
+        with site.page() as page:
+            page.alive().turn()
+            turns(watcher)
+            server.process.send_signal(signal.SIGSTOP)
+            control = f"{page.welcome['name']} (control)"
+            left = watcher.until(event("left", by=control))["message"]
+            # Twice the deadline.
+            assert left.startswith(f"{control} left: no sign of life for 4"), left
+            rests(watcher)
+            server.process.send_signal(signal.SIGCONT)
+            assert page.lapsed()
+        turns_on()
+        server.kill()
+
+
 def test_pages_are_told_that_the_share_is_lost_and_back(serve, share):
     running = share()
     _, site = serve("--share", f"unix:{share.path}")

@@ -848,7 +848,11 @@ export type ShareRequest = {
 /**
  * A number of the program's choice.
  */
-id: number, } & ({ "ask": "hello", 
+id: number, 
+/**
+ * How long ago it was made at most, in seconds, if another program passes it on.
+ */
+age?: number | null, } & ({ "ask": "hello", 
 /**
  * The version of the messages.
  */
@@ -907,8 +911,8 @@ time_to_live: number,
  */
 continues?: boolean, 
 /**
- * Whether it is refused with `held` if another program has moved, taken or stopped the motor since
- * this one moved it. For automatic stops, such as those at the end of a program.
+ * Whether it is refused with `held` unless the program owns the motor. For automatic stops, such as
+ * those at the end of a program.
  */
 own?: boolean, } | { "ask": "confirm", 
 /**

@@ -194,7 +194,8 @@ impl DeadMan {
         self.motion.take().map(|_| lapse)
     }
 
-    fn is_alive(&self, now: Instant) -> bool {
+    /// Whether its last valid sign of life counts.
+    pub fn is_alive(&self, now: Instant) -> bool {
         self.until.is_some_and(|until| now < until)
     }
 

@@ -8,7 +8,7 @@ use motorlink::port::PortName;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{self as share, Event, Happening, MotorName, Reason};
-use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal};
+use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
@@ -29,6 +29,9 @@ pub struct Page {
     clock: Clock,
     link: Arc<Link>,
     control: Mutex<Control>,
+    /// The share stops the motors that the page turns if it gets no sign of life for this time, in seconds:
+    /// this server hangs or is stopped, or it would have stopped them itself.
+    silence: f64,
     /// The deadline of the dead-man may be another one.
     changed: Notify,
     /// One session is opened at a time.
@@ -73,6 +76,7 @@ impl Page {
     ) -> Self {
         let man = DeadMan::new(deadline, Arc::clone(link.stops()));
         Page {
+            silence: 2.0 * Duration::from(deadline).as_secs_f64(),
             name,
             may,
             clock: Clock::running(),
@@ -151,6 +155,10 @@ impl Page {
                 let mut control = self.control();
                 if let Some(lapse) = control.man.hear(&sign, now) {
                     self.lapse(&mut control, lapse);
+                }
+                // The share learns that the page lives only while this server runs.
+                if let Some(drive) = control.drive.as_ref().filter(|_| control.man.is_alive(now)) {
+                    drive.offer(&share::Request::new(UNAWAITED, share::Ask::Alive));
                 }
                 Ok(())
             }
@@ -379,6 +387,10 @@ impl Page {
         let name = format!("{} (control)", self.name);
         let connected = self.link.connect(&name).await;
         let (drive, listener, _) = connected.map_err(|error| lost(&error.to_string()))?;
+        let silence = Some(self.silence);
+        let deadline = share::Ask::Deadline { silence, motion: None };
+        let told = drive.pass(&share::Request::new(UNAWAITED, deadline)).await;
+        told.map_err(|error| lost(&error.to_string()))?;
         // The page may have lapsed meanwhile.
         self.permit(ticket, hold)?;
         {

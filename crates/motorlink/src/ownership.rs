@@ -159,12 +159,11 @@ impl<M: Ord + Copy, P: Ord + Copy> Ownership<M, P> {
         self.0.get(&motor)?.owner
     }
 
-    /// Whether a program may stop the motor as its own: it owns it, or will by a request under way, or none
-    /// has owned it yet.
+    /// Whether a program owns the motor, or will by a request under way.
     pub fn is_own(&self, motor: M, by: P) -> bool {
-        let Some(state) = self.0.get(&motor) else { return true };
-        let is_free = !state.was_owned && state.sent.is_empty();
-        state.owner == Some(by) || state.sent.iter().any(|(_, owner)| *owner == by) || is_free
+        self.0.get(&motor).is_some_and(|state| {
+            state.owner == Some(by) || state.sent.iter().any(|(_, owner)| *owner == by)
+        })
     }
 
     /// Whether the motor is owned by a program, or will be by a request under way.
@@ -281,9 +280,9 @@ mod tests {
     }
 
     #[test]
-    fn a_motor_that_nobody_has_owned_may_be_anybodys_since_before() {
+    fn a_motor_that_was_never_owned_may_be_claimed() {
         let mut motors = Motors::default();
-        assert!(motors.is_own(1, 'a') && motors.is_own(1, 'b'));
+        assert!(!motors.is_own(1, 'a'));
         assert!(motors.claim(1, 'a'));
         assert!(motors.is_own(1, 'a') && !motors.is_own(1, 'b'));
         assert!(motors.claim(1, 'a') && !motors.claim(1, 'b'));
@@ -292,7 +291,8 @@ mod tests {
         motors.sent(2, 'a', Starts);
         assert!(motors.is_own(2, 'a') && !motors.is_own(2, 'b') && !motors.claim(2, 'b'));
         motors.ended(2, 'a', Starts, Never);
-        assert!(motors.is_own(2, 'b'), "it was not moved");
+        assert!(!motors.is_own(2, 'a'), "it was not moved");
+        assert!(motors.claim(2, 'b'));
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
-use motorlink_telemetry::share::program::Program;
+use motorlink_telemetry::share::message::{Ask as ShareAsk, Request};
+use motorlink_telemetry::share::program::{Program, UNAWAITED};
 use tokio::runtime::{Handle, Runtime};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::mpsc::{Receiver, channel};
@@ -143,10 +144,14 @@ impl Common {
         let why = match Program::connect(&self.share, &name).await {
             Err(error) => format!("the share of the node: {error}"),
             Ok((program, listener, _)) => {
-                let now = self.clock.now();
+                let ask = ShareAsk::Deadline { silence: Some(deadline), motion };
+                // A share that is lost is noticed when it is read.
+                let _ = program.pass(&Request::new(UNAWAITED, ask)).await;
                 let served = Session {
                     common: Arc::clone(&self),
-                    gate: Gate::new(now, deadline, motion),
+                    gate: Gate::new(),
+                    heard: self.clock.now(),
+                    has_commanded: false,
                     deadline,
                     motion,
                     program,
@@ -155,6 +160,7 @@ impl Common {
                     waiting: BTreeSet::new(),
                     pull: None,
                     last_pull: 0,
+                    closing: None,
                 };
                 served.serve(asked).await
             }

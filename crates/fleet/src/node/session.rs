@@ -6,15 +6,15 @@ use std::time::Duration;
 
 use motorlink_link::is_printable;
 use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
-use motorlink_telemetry::share::message::{Ask as ShareAsk, Reason, Text, decode, encode};
-use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal};
+use motorlink_telemetry::share::message::{Ask as ShareAsk, Reason, Request, Text, decode, encode};
+use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
 use motorlink_telemetry::share::request::Kind;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
 use super::common::{Common, answer, answer_with};
-use super::gate::{Gate, Verdict};
+use super::gate::{Gate, Verdict, age};
 use super::outbox::Outbox;
 use super::sessions::{Asked, Asking};
 use crate::clock::span;
@@ -28,11 +28,17 @@ const REQUESTS: usize = 128;
 const WITH_STOPS: usize = 192;
 /// The longest time for a request into the socket of the share.
 const TAKEN: Duration = Duration::from_millis(500);
+/// How long a session may be silent, in seconds.
+const PATIENCE: f64 = 60.0;
 
 /// What a session task has.
 pub(super) struct Session {
     pub(super) common: Arc<Common>,
     pub(super) gate: Gate,
+    /// When the last message of any kind came.
+    pub(super) heard: f64,
+    /// Whether it has changed something.
+    pub(super) has_commanded: bool,
     pub(super) program: Program,
     pub(super) listener: Listener,
     pub(super) deadline: f64,
@@ -42,6 +48,8 @@ pub(super) struct Session {
     pub(super) waiting: BTreeSet<u32>,
     pub(super) pull: Option<Pull>,
     pub(super) last_pull: u32,
+    /// Why the share closes the connection.
+    pub(super) closing: Option<String>,
 }
 
 /// A query that waits for something to say.
@@ -62,24 +70,24 @@ impl Session {
     pub(super) async fn serve(mut self, mut asked: Receiver<Asked>) -> String {
         let why = loop {
             let now = self.now();
-            if let Some(why) = self.gate.lapse(now) {
-                break why;
-            }
             if self.outbox.is_over() {
                 break "it does not take what the share says".to_owned();
             }
-            if self.gate.is_forgotten(now) {
+            if now > self.heard + PATIENCE {
                 break "nothing was heard of it for a minute".to_owned();
             }
             self.answer_pull(now);
             match self.next(now, &mut asked).await {
                 Next::Due => {}
                 Next::Said(Ok(frame)) => self.said(&frame),
-                Next::Said(Err(_)) => break "the share has closed the connection".to_owned(),
+                Next::Said(Err(_)) => {
+                    let why = || "the share has closed the connection".to_owned();
+                    break self.closing.take().unwrap_or_else(why);
+                }
                 Next::Asked(None) => {
                     break "the node ends, or other programs need its place".to_owned();
                 }
-                Next::Asked(Some(Asked::Gone)) if self.gate.has_commanded() => {
+                Next::Asked(Some(Asked::Gone)) if self.has_commanded => {
                     break "its program or its network has gone".to_owned();
                 }
                 Next::Asked(Some(Asked::Gone)) => {}
@@ -104,7 +112,8 @@ impl Session {
 
     async fn next(&mut self, now: f64, asked: &mut Receiver<Asked>) -> Next {
         let until = self.pull.as_ref().map_or(f64::INFINITY, |pull| pull.until);
-        let wait = span((self.gate.due().min(until) - now).max(0.0)) + Duration::from_millis(1);
+        let wait =
+            span((until.min(self.heard + PATIENCE) - now).max(0.0)) + Duration::from_millis(1);
         tokio::select! {
             biased;
             asked = asked.recv() => Next::Asked(asked),
@@ -116,7 +125,7 @@ impl Session {
     /// Gives the end of the session, if this is it.
     async fn asked(&mut self, Asking { query, ask, scope }: Asking) -> Option<String> {
         let now = self.now();
-        self.gate.heard(now);
+        self.heard = now;
         match ask {
             Ask::Join { .. } => {
                 let (deadline, motion) = (self.deadline, self.motion);
@@ -124,7 +133,8 @@ impl Session {
                 answer(&query, &Answer::Joined { t: now, deadline, motion, lines });
             }
             Ask::Alive { sent, .. } => {
-                self.gate.sign(now, sent);
+                let age = Some(age(now, sent));
+                self.program.offer(&Request { id: UNAWAITED, age, ask: ShareAsk::Alive });
                 self.taken(&query, now);
             }
             Ask::Pull { number, after, wait, .. } => {
@@ -182,10 +192,9 @@ impl Session {
             }
             Verdict::Pass(request) => {
                 // The share takes requests only as long as few of its answers wait.
-                let most = match self.common.lines().kind(&request.ask) {
-                    Kind::Stops => WITH_STOPS,
-                    _ => REQUESTS,
-                };
+                let kind = self.common.lines().kind(&request.ask);
+                let most = if kind == Kind::Stops { WITH_STOPS } else { REQUESTS };
+                self.has_commanded |= matches!(kind, Kind::Changes | Kind::Moves);
                 if self.waiting.len() >= most {
                     let why = "too many requests wait for their answers".to_owned();
                     self.refuse(request.id, Reason::Busy, why);
@@ -211,10 +220,14 @@ impl Session {
 
     /// The share has said something.
     fn said(&mut self, frame: &Frame) {
-        if frame.kind == FrameKind::Text
-            && let Ok(Text::Answer { id, .. } | Text::Refusal { id, .. }) = decode(&frame.payload)
-        {
-            self.waiting.remove(&id);
+        if frame.kind == FrameKind::Text {
+            match decode(&frame.payload) {
+                Ok(Text::Answer { id, .. } | Text::Refusal { id, .. }) => {
+                    self.waiting.remove(&id);
+                }
+                Ok(Text::Closing { message }) => self.closing = Some(message),
+                _ => {}
+            }
         }
         self.outbox.push(frame);
     }
@@ -234,10 +247,15 @@ impl Session {
 /// Why a request may not be sent with this key.
 fn forbidden(post: &Post, kind: Kind, scope: Scope) -> Option<String> {
     let is_own = post.request.id >= OWN_IDS;
-    let is_of_session = matches!(post.request.ask, ShareAsk::Hello { .. } | ShareAsk::Leave { .. });
+    let is_of_session = matches!(
+        post.request.ask,
+        ShareAsk::Hello { .. } | ShareAsk::Deadline { .. } | ShareAsk::Leave { .. }
+    );
     match () {
         () if is_own => Some(format!("the id of a request is below {OWN_IDS}")),
-        () if is_of_session => Some("a session begins with join and ends with leave".to_owned()),
+        () if is_of_session => Some(
+            "a session begins with join, which says its deadlines, and ends with leave".to_owned(),
+        ),
         () if scope < weight::scope(kind) => {
             Some(format!("this request needs the key of `{}`", weight::scope(kind).word()))
         }

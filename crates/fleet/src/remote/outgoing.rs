@@ -131,7 +131,7 @@ mod tests {
     }
 
     fn request(id: u32, ask: ShareAsk) -> Request {
-        Request { id, ask }
+        Request::new(id, ask)
     }
 
     fn numbers(asks: &[Ask]) -> Vec<(char, u32)> {

@@ -235,7 +235,7 @@ impl Merge {
     }
 
     /// A request of the program. `false`: it leaves.
-    pub(super) fn asked(&mut self, Request { id, mut ask }: Request) -> bool {
+    pub(super) fn asked(&mut self, Request { id, mut ask, .. }: Request) -> bool {
         match &ask {
             Ask::Hello { protocol, .. } if *protocol != VERSION => {
                 let message = format!("the fleet speaks version {VERSION}");
@@ -589,7 +589,7 @@ impl Merge {
         self.last_id += 1;
         let asked = Asked { node: node.clone(), of, wall: self.wall };
         self.asked.insert(self.last_id, asked);
-        self.out.push(Out::Node(node.clone(), Request { id: self.last_id, ask }));
+        self.out.push(Out::Node(node.clone(), Request::new(self.last_id, ask)));
     }
 
     fn end(&mut self, id: u32, result: Result<Answer, Refusal>) {

@@ -120,8 +120,8 @@ impl Link {
             return Ok(());
         }
         let (program, mut listener, _) = self.open(NAME).await?;
-        program.pass(&Request { id: 1, ask: Ask::Latch }).await?;
-        program.pass(&Request { id: 2, ask: Ask::Stop { motor: None } }).await?;
+        program.pass(&Request::new(1, Ask::Latch)).await?;
+        program.pass(&Request::new(2, Ask::Stop { motor: None })).await?;
         // The share takes the requests of a program in their order: it has them when it answers.
         lines(&program, &mut listener).await?;
         let mut pending = self.pending();

@@ -78,7 +78,7 @@ impl Dialogue {
         self.last_id = self.last_id.wrapping_add(1);
         let id = self.last_id;
         let mut stream = Vec::new();
-        frame::append(Kind::Text, &message::encode(&Request { id, ask }), &mut stream)?;
+        frame::append(Kind::Text, &message::encode(&Request::new(id, ask)), &mut stream)?;
         Ok((id, stream))
     }
 

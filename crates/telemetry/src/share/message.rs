@@ -49,9 +49,19 @@ pub const LONGEST_TIME: f64 = 3600.0;
 pub struct Request {
     /// A number of the program's choice.
     pub id: u32,
+    /// How long ago it was made at most, in seconds, if another program passes it on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub age: Option<f64>,
     /// What it asks for.
     #[serde(flatten)]
     pub ask: Ask,
+}
+
+impl Request {
+    /// A request that is made now.
+    pub fn new(id: u32, ask: Ask) -> Self {
+        Request { id, age: None, ask }
+    }
 }
 
 /// What a program asks for.
@@ -106,8 +116,8 @@ pub enum Ask {
         /// since the program's last command to it without this.
         #[serde(default, skip_serializing_if = "is_false")]
         continues: bool,
-        /// Whether it is refused with `held` if another program has moved, taken or stopped the motor since
-        /// this one moved it. For automatic stops, such as those at the end of a program.
+        /// Whether it is refused with `held` unless the program owns the motor. For automatic stops, such as
+        /// those at the end of a program.
         #[serde(default, skip_serializing_if = "is_false")]
         own: bool,
     },

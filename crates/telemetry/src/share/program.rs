@@ -22,6 +22,9 @@ pub use super::dialogue::Refusal;
 /// Ids of requests of this side begin here. Those below belong to whoever passes requests on.
 pub const OWN_IDS: u32 = 1 << 31;
 
+/// The id of requests whose end does not matter.
+pub const UNAWAITED: u32 = OWN_IDS;
+
 /// Asks a share. Copies ask through the same connection. The motors that it turned stop when the
 /// [`Listener`] is dropped.
 #[derive(Clone)]
@@ -91,7 +94,7 @@ impl Program {
         let program = Program { shared: Arc::clone(&shared) };
         let mut listener = Listener { reader, frames: Reader::default(), shared };
         let hello = Ask::Hello { protocol: VERSION, name: name.to_owned() };
-        program.pass(&Request { id: OWN_IDS - 1, ask: hello }).await?;
+        program.pass(&Request::new(OWN_IDS - 1, hello)).await?;
         let first = listener.next().await?;
         match message::decode(&first.payload).map_err(io::Error::other)? {
             Text::Answer { answer: Answer::Hello { name, .. }, .. } => {
@@ -135,7 +138,7 @@ impl Program {
             pending.answers.insert(id, sender);
             id
         };
-        if self.pass(&Request { id, ask }).await.is_err() {
+        if self.pass(&Request::new(id, ask)).await.is_err() {
             return Err(self.shared.ended());
         }
         answer.await.unwrap_or_else(|_| Err(self.shared.ended()))
@@ -173,8 +176,19 @@ impl Program {
     /// As [`close`](Self::close), and the log of the share has the reason if it can be written at once.
     /// Requests without an answer get this one.
     pub fn close_because(&self, why: Refusal) {
-        self.shared.give_reason(&why.message);
+        self.offer(&Request::new(UNAWAITED, Ask::Leave { why: why.message.clone() }));
         self.shared.close(why);
+    }
+
+    /// Sends a short request if it can be sent at once, such as a sign of life.
+    pub fn offer(&self, request: &Request) {
+        // Within another request the share would not find it.
+        let Ok(writer) = self.shared.writer.try_lock() else { return };
+        let mut bytes = Vec::new();
+        if frame::append(Kind::Text, &message::encode(request), &mut bytes).is_ok() {
+            // The kernel takes so few bytes as a whole or not at all.
+            let _ = writer.try_write(&bytes);
+        }
     }
 
     /// Whether both ask through the same connection.
@@ -251,17 +265,6 @@ impl Drop for Listener {
 impl Shared {
     fn pending(&self) -> std::sync::MutexGuard<'_, Pending> {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Says why this program leaves. The end of the connection does not wait for it.
-    fn give_reason(&self, why: &str) {
-        // Within another request the share would not find it.
-        let Ok(writer) = self.writer.try_lock() else { return };
-        let leave = Request { id: OWN_IDS - 1, ask: Ask::Leave { why: why.to_owned() } };
-        let mut bytes = Vec::new();
-        if frame::append(Kind::Text, &message::encode(&leave), &mut bytes).is_ok() {
-            let _ = writer.try_write(&bytes);
-        }
     }
 
     fn close(&self, why: Refusal) {

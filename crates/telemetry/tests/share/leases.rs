@@ -135,7 +135,7 @@ fn a_program_from_which_a_motor_was_taken_does_not_stop_it_at_its_end() {
     let lost = |refusal: Result<Answer, Refusal>| {
         let Refusal { reason, message, .. } = refusal.unwrap_err();
         assert_eq!(reason, Reason::Held);
-        assert_eq!(message, "st0: another program has moved or stopped motor 1 since");
+        assert_eq!(message, "st0: motor 1 does not belong to this program");
     };
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     lost(alice.ask(own(&STOP)));

@@ -4,7 +4,11 @@ use std::time::Duration;
 
 use crate::asking::{Asker, command};
 use crate::virtual_share::VirtualShare;
+use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
+
+/// The id of requests with an age.
+const AGED: u32 = 1000;
 
 /// Turns an RMD motor with 360 °/s.
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];
@@ -24,6 +28,16 @@ fn turning(silence: Option<f64>, motion: Option<f64>) -> (VirtualShare, Asker, A
 fn wait(share: &VirtualShare, seconds: f64) {
     let end = share.now() + Duration::from_secs_f64(seconds);
     share.until(|| share.now() >= end);
+}
+
+/// Sends a request that was made some time ago, in seconds.
+fn send_aged(program: &mut Asker, age: f64, ask: Ask) {
+    program.send_text(&encode(&Request { id: AGED, age: Some(age), ask }));
+}
+
+fn ask_aged(program: &mut Asker, age: f64, ask: Ask) -> Result<Answer, Refusal> {
+    send_aged(program, age, ask);
+    program.end_of(AGED)
 }
 
 fn stands(share: &VirtualShare) {
@@ -71,6 +85,33 @@ fn a_stream_that_ends_lapses_though_the_program_lives() {
     }
     let Event { message, .. } = watcher.event(Happening::Left);
     assert!(message.starts_with("turns left: rmd0, motor 1: no new command for 3"), "{message}");
+    stands(&share);
+}
+
+#[test]
+fn what_another_program_passes_on_is_as_old_as_it_says() {
+    let (share, mut watcher, mut program) = turning(Some(0.5), Some(1.0));
+    wait(&share, 0.4);
+    send_aged(&mut program, 0.35, Ask::Alive);
+    let mut event = watcher.event(Happening::Left);
+    assert!(event.message.contains("no sign of life for 5"), "{event:?}");
+    let mut stream = share.join("streams");
+    stream.ask(Ask::Deadline { silence: None, motion: Some(0.5) }).unwrap();
+    ask_aged(&mut stream, 0.4, command("rmd0", 1, &TURN)).unwrap();
+    let sent = share.now();
+    event = watcher.event(Happening::Left);
+    assert!(event.message.contains("motor 1: no new command for 5"), "{event:?}");
+    assert!(share.now() - sent < Duration::from_millis(200));
+    let mut late = share.join("late");
+    let expired = ask_aged(&mut late, 100.0, command("rmd0", 1, &TURN)).unwrap_err();
+    assert_eq!(expired.reason, Reason::Expired);
+    for age in [-0.1, 3600.1] {
+        assert_eq!(
+            ask_aged(&mut late, age, Ask::Lines).unwrap_err().reason,
+            Reason::Usage,
+            "{age}"
+        );
+    }
     stands(&share);
 }
 

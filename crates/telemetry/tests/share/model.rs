@@ -290,7 +290,7 @@ impl World {
 }
 
 fn send(hub: &mut Hub, session: SessionId, id: u32, ask: Ask) {
-    let payload = encode(&Request { id, ask });
+    let payload = encode(&Request::new(id, ask));
     hub.received(session, &Message { kind: Kind::Text, payload }, Micros(0));
 }
 
@@ -394,7 +394,7 @@ fn history(seed: u64) -> Result<(), String> {
         for (program, motor) in (0..PROGRAMS).flat_map(|it| [0, 1, 2].map(|motor| (it, motor))) {
             if world.programs[program].is_some() {
                 let asked = world.ask(program, command(MOTORS[motor], &read(motor), true));
-                let owns = model.owner[motor] == Some(program) || !model.owned[motor];
+                let owns = model.owner[motor] == Some(program);
                 // After a line was cut a read may fail.
                 if (asked == Err(Reason::Held)) == owns {
                     let why = format!("p{program} owns {:?}: {owns}, not {asked:?}", name(motor));

@@ -20,14 +20,14 @@ impl Scripted {
     /// Answers hello and the question for lines, and gives the first other one; `None` if the program is gone.
     pub fn asked(&mut self, line: impl Fn() -> Line) -> Option<Request> {
         loop {
-            let Request { id, ask } = self.request()?;
+            let Request { id, ask, .. } = self.request()?;
             let answer = match ask {
                 Ask::Hello { name, .. } => {
                     Answer::Hello { protocol: VERSION, share: "test".to_owned(), name }
                 }
                 Ask::Lines => Answer::Lines { lines: vec![line()], latched_by: None },
                 Ask::Deadline { .. } => Answer::Deadline,
-                ask => return Some(Request { id, ask }),
+                ask => return Some(Request::new(id, ask)),
             };
             self.answer(id, answer);
         }

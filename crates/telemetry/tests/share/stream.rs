@@ -102,7 +102,7 @@ fn scripted(socket: &UnixListener) -> UnixStream {
     let mut share = Scripted::accept(socket);
     for subscription in [1, 2] {
         let line = || Line { t: 100.0, wall: now() as f64 / 1e9, ..line("rmd0", Protocol::Rmd) };
-        let Request { id, ask } = share.asked(line).expect("the stream was closed");
+        let Request { id, ask, .. } = share.asked(line).expect("the stream was closed");
         let is_right = matches!(ask, Ask::Subscribe { rows: true, drop: DropRule::Newest, .. });
         assert!(is_right, "{ask:?}");
         share.answer(id, Answer::Subscribe { subscription });

@@ -61,15 +61,11 @@ impl Fleet {
     }
 
     fn requests(&mut self, node: &str) -> Vec<Request> {
-        let is_to = |out| match out {
-            Out::Node(to, request) if to == name(node) => Ok(request),
-            other => Err(other),
-        };
         let (mut of_node, mut others) = (Vec::new(), Vec::new());
         for out in self.0.take() {
-            match is_to(out) {
-                Ok(request) => of_node.push(request),
-                Err(other) => others.push(other),
+            match out {
+                Out::Node(to, request) if to == name(node) => of_node.push(request),
+                other => others.push(other),
             }
         }
         self.0.out = others;
@@ -115,7 +111,7 @@ impl Fleet {
     }
 
     fn asked(&mut self, id: u32, ask: Ask) {
-        assert!(self.0.asked(Request { id, ask }));
+        assert!(self.0.asked(Request::new(id, ask)));
     }
 }
 

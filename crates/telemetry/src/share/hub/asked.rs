@@ -55,7 +55,7 @@ impl Hub {
             return self.close(session, "a program sends requests only");
         }
         match message::decode::<message::Request>(&frame.payload) {
-            Ok(request) => self.asked(session, request.id, request.ask, waited),
+            Ok(request) => self.asked(session, request, waited),
             Err(error) => match (self.sessions.get_mut(&session), id_of(&frame.payload)) {
                 (Some(session), Some(id)) => {
                     session.refuse(id, Reason::Usage, error.to_string());
@@ -65,9 +65,13 @@ impl Hub {
         }
     }
 
-    fn asked(&mut self, session: SessionId, id: u32, ask: Ask, waited: Micros) {
+    fn asked(&mut self, session: SessionId, request: message::Request, waited: Micros) {
+        let message::Request { id, age, ask } = request;
+        let age = age.map_or(Ok(Micros(0)), |age| span("the age of a request", age, 0.0));
         if let Some(session) = self.sessions.get_mut(&session) {
-            session.life.heard(self.now);
+            if let Ok(age) = age {
+                session.life.heard(made(self.now, age));
+            }
             if ask == Ask::Alive {
                 return;
             }
@@ -77,7 +81,9 @@ impl Hub {
             (None, Ask::Hello { protocol, name }) => self.hello(session, protocol, &name),
             (None, _) => Err(usage("the first request is `hello`")),
             (Some(_), Ask::Hello { .. }) => Err(usage("this program has said hello")),
-            (Some(name), ask) => self.carry_out(session, &name, id, ask, waited),
+            (Some(name), ask) => {
+                age.and_then(|age| self.carry_out(session, &name, id, ask, (age, waited + age)))
+            }
         };
         let Some(session) = self.sessions.get_mut(&session) else { return };
         match answered {
@@ -128,7 +134,7 @@ impl Hub {
         name: &Arc<str>,
         id: u32,
         ask: Ask,
-        waited: Micros,
+        (age, waited): (Micros, Micros),
     ) -> Result<Option<Answer>, Refused> {
         let may_stop =
             matches!(ask, Ask::Stop { .. } | Ask::Latch | Ask::Command { .. } | Ask::Leave { .. });
@@ -164,7 +170,7 @@ impl Hub {
                 let time_to_live = span("the time to live", time_to_live, 0.0)?;
                 let left = time_to_live.0.checked_sub(waited.0).map(Micros);
                 let motor = MotorName { line, motor };
-                self.command(session, name, id, &motor, (&bytes, continues, own), left)?;
+                self.command(session, name, id, &motor, (&bytes, continues, own), (age, left))?;
                 Ok(None)
             }
             Ask::Confirm { line, motor } => {
@@ -328,7 +334,7 @@ impl Hub {
         id: u32,
         motor: &MotorName,
         (bytes, continues, own): (&[u8], bool, bool),
-        time_to_live: Option<Micros>,
+        (age, time_to_live): (Micros, Option<Micros>),
     ) -> Result<(), Refused> {
         let line = self.line(&motor.line)?;
         let segments = |segment| {
@@ -357,8 +363,7 @@ impl Hub {
         if let Some(motor) = motor {
             if own && !held.owners.is_own(motor, session) {
                 let (line, motor) = (&held.name, motor.number());
-                let why =
-                    format!("{line}: another program has moved or stopped motor {motor} since");
+                let why = format!("{line}: motor {motor} does not belong to this program");
                 return Err((Reason::Held, why));
             }
             held.follow((motor, session), motion, continues)
@@ -366,7 +371,7 @@ impl Hub {
         }
         held.known.extend(motor);
         if let (Some(motor), Some(session)) = (motor, self.sessions.get_mut(&session)) {
-            session.life.commanded(self.now, (line, motor), motion);
+            session.life.commanded(made(self.now, age), (line, motor), motion);
         }
         let sent = Sent { motor, motion, configures };
         let ended_with = move |result| tell(Work::Command(sent, result));
@@ -505,6 +510,11 @@ fn instant(seconds: f64) -> Result<Instant, Refused> {
         true => Ok(Instant((seconds * 1e6).round() as u64)),
         false => Err(usage("a time is a number of seconds")),
     }
+}
+
+/// When a request of this age was made.
+fn made(now: Instant, age: Micros) -> Instant {
+    Instant(now.0.saturating_sub(age.0))
 }
 
 fn deadline(seconds: f64) -> Result<Micros, Refused> {

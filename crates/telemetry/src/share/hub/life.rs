@@ -18,15 +18,16 @@ pub(super) struct Life {
 }
 
 impl Life {
-    /// The program has sent something.
-    pub(super) fn heard(&mut self, now: Instant) {
-        self.heard = now;
+    /// The program has made a request at this time.
+    pub(super) fn heard(&mut self, made: Instant) {
+        self.heard = self.heard.max(made);
     }
 
-    /// The program commands a motor.
-    pub(super) fn commanded(&mut self, now: Instant, place: (usize, Motor), motion: Motion) {
+    /// The program has made a command to a motor at this time.
+    pub(super) fn commanded(&mut self, made: Instant, place: (usize, Motor), motion: Motion) {
         if motion.may_be_owned() {
-            self.commanded.insert(place, now);
+            let last = self.commanded.entry(place).or_insert(made);
+            *last = made.max(*last);
         } else if motion.stops() {
             self.commanded.remove(&place);
         }

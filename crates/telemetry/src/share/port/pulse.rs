@@ -61,7 +61,7 @@ impl Socket {
 fn give_signs(shared: &Weak<Shared>, period: Duration) {
     let mut sign = Vec::new();
     // It is not too long.
-    let _ = append(Kind::Text, &encode(&Request { id: 0, ask: Ask::Alive }), &mut sign);
+    let _ = append(Kind::Text, &encode(&Request::new(0, Ask::Alive)), &mut sign);
     loop {
         thread::sleep(period);
         let Some(shared) = shared.upgrade() else { return };
