@@ -98,7 +98,7 @@ class Member:
         assert taken["kind"] == "taken", taken
         return self.answer(sent)
 
-    def stop(self, motor=None):
+    def stop(self, motor=None, within=2.0):
         """Sends a stop; gives the answer of the share."""
         self.urgent += 1
         self.ids += 1
@@ -107,7 +107,7 @@ class Member:
             request["motor"] = motor
         post = {"number": self.urgent, "sent": 0.0, "time_to_live": 1.0}
         ask = {"ask": "urgent", "after": self.last, **post, "request": request}
-        assert self.ask("stop", ask)["kind"] == "taken"
+        assert self.ask("stop", ask, within)["kind"] == "taken"
         return self.answer(self.ids)
 
     def pull(self, wait=0.5):

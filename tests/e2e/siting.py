@@ -157,10 +157,11 @@ def leaves(site, it):
 
 @contextlib.contextmanager
 def strangers(address, count, is_silent):
-    """Connections without a certificate. Silent ones say nothing at all."""
+    """Connections without a certificate. Silent ones say nothing at all. Gives what counts those that the router
+    has closed."""
     host, port = address.removeprefix("tls/").split(":")
     context = ssl._create_unverified_context()
-    connected = []
+    connected, closed = [], []
 
     def attack():
         with socket.create_connection((host, int(port)), timeout=20) as stranger:
@@ -171,12 +172,13 @@ def strangers(address, count, is_silent):
                 stranger.recv(1)
             except OSError:
                 pass
+            closed.append(stranger)
 
     for _ in range(count):
         threading.Thread(target=attack, daemon=True).start()
     try:
         eventually(lambda: len(connected) == count, f"{count} connections")
-        yield
+        yield lambda: len(closed)
     finally:
         for stranger in connected:
             with contextlib.suppress(OSError):

@@ -215,6 +215,30 @@ fn a_motor_that_holds_after_a_stop_of_another_program_stays_with_its_owner() {
 }
 
 #[test]
+fn a_motor_whose_owner_leaves_behind_a_command_that_is_refused_ends_as_its_owner_declared() {
+    let share = VirtualShare::new();
+    for (ending, last) in [(Ending::Off, "80"), (Ending::Stop, "81")] {
+        let (mut owner, mut other) = (share.join("owns"), share.join("is refused"));
+        let mut latches = share.join("latches");
+        owner.ask(Ask::Ending { motion: ending }).unwrap();
+        owner.ask(command("rmd0", 1, &TURN)).unwrap();
+        share.reaches("rmd1.speed_dps", |dps| dps > 8.0);
+        // The share has all of it before the engine looks.
+        let refused = other.send(command("rmd0", 1, &TURN));
+        let latched = latches.send(Ask::Latch);
+        drop(owner);
+        assert_eq!(other.end_of(refused).unwrap_err().reason, Reason::Latched);
+        latches.end_of(latched).unwrap();
+        share.reaches("rmd1.speed_dps", |dps| dps.abs() < 1.0);
+        let frames = other.frames("rmd0", None, None);
+        let sent = frames.iter().filter(|frame| frame.direction == WireWay::ToDrive);
+        let codes: Vec<&str> = sent.map(|frame| &frame.bytes[..2]).collect();
+        assert_eq!(codes.iter().rfind(|code| code.starts_with('8')), Some(&last), "{codes:?}");
+        latches.ask(Ask::Release).unwrap();
+    }
+}
+
+#[test]
 fn a_program_owns_again_what_it_moved_before_the_share_was_killed() {
     let motor = MotorName { line: "st0".to_owned(), motor: 2 };
     let claim = || Ask::Claim { motor: motor.clone() };

@@ -74,6 +74,8 @@ pub struct Hub {
     now: Instant,
     has_paused: bool,
     lapsed: Vec<(SessionId, String)>,
+    /// Programs that have left and own motors, which are switched off.
+    switch_off: BTreeSet<SessionId>,
     done: Sender<News>,
     ended: Receiver<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
@@ -111,6 +113,7 @@ impl Hub {
             now: Instant(0),
             has_paused: false,
             lapsed: Vec::new(),
+            switch_off: BTreeSet::new(),
             done,
             ended,
             wake: Arc::new(wake),
@@ -165,6 +168,15 @@ impl Hub {
         self.say(Happening::Left, &name, left);
         let by = words::after(&name);
         let ending = session.ending;
+        if ending == Ending::Off {
+            // A command of another program may be under way: if it is refused, the motor is stopped then.
+            self.switch_off.insert(id);
+        }
+        let lines = &self.lines;
+        let owns = |id: &SessionId| {
+            lines.values().any(|held| !held.owners.left_by(*id, |_| false).is_empty())
+        };
+        self.switch_off.retain(owns);
         for (line, motor) in self.take_own(id, ending) {
             let Some(held) = self.lines.get_mut(&line) else { continue };
             if ending == Ending::Off {
@@ -366,7 +378,13 @@ impl Hub {
             return;
         };
         if !self.sessions.contains_key(&owner) {
-            self.stop(why, line, motor, owner, None, &"share".into());
+            let by = "share".into();
+            if self.switch_off.contains(&owner)
+                && let Some(held) = self.lines.get_mut(&line)
+            {
+                held.owe_off(motor, &by);
+            }
+            self.stop(why, line, motor, owner, None, &by);
         }
     }
 
