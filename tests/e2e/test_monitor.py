@@ -12,7 +12,7 @@ from monitoring import Site, is_kind, kind, trusting
 from program import eventually
 from sharing import Client, are_still, event, speeds
 
-#: Pages that are killed. ROUNDS=20 for more.
+#: Servers that are killed or frozen. ROUNDS=20 for more.
 ROUNDS = int(os.environ.get("ROUNDS", "1"))
 #: A deadline that a live page keeps on a busy machine.
 DEADLINE = ("--deadline", "2s")
@@ -82,20 +82,6 @@ def turns_too(watcher):
 
     eventually(turns_still, "a motor that turns")
     return check
-
-
-def test_the_motors_of_killed_pages_stop_and_those_of_others_turn_on(site, watcher):
-    turns_on = turns_too(watcher)
-    with site.page() as bystander:
-        for _ in range(ROUNDS):
-            with site.page() as page:
-                page.alive().turn()
-                turns(watcher)
-                page.vanish()
-                rests(watcher)
-            turns_on()
-        assert bystander.ask("lines")["kind"] == "answer"
-    turns_on()
 
 
 def test_the_motors_of_a_page_that_hangs_stop_at_the_deadline_and_it_can_go_on(site, watcher):

@@ -1,16 +1,8 @@
-"""`motorlink node`: drives at another computer. The programs of the tests speak the messages themselves.
-
-ROUNDS=30 pytest tests/e2e/test_node.py -s    kills and freezes each program 30 times, with times.
-"""
+"""`motorlink node`: drives at another computer. The programs of the tests speak the messages themselves."""
 
 import json
-import os
 import random
 import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -19,27 +11,6 @@ from program import eventually
 from sharing import Client, samples
 from siting import RAMP, START
 from test_json import check
-
-#: Programs that are killed.
-ROUNDS = int(os.environ.get("ROUNDS", "1"))
-
-#: A program that turns ST motor 1 of the node, and gives signs of life until it is killed.
-TURNS = """
-import sys, time
-sys.path.insert(0, sys.argv[2])
-from fleeting import Member, Over
-while True:
-    member = Member(sys.argv[1], "arm1", who="turns", deadline=0.3)
-    member.lives()
-    try:
-        member.turn()
-        break
-    except Over:
-        # The machine gave it no time for its signs of life.
-        member.dies()
-print("turning", flush=True)
-time.sleep(600)
-"""
 
 
 @pytest.fixture
@@ -64,13 +35,6 @@ def turns(direct):
 
 def via(node):
     return {"MOTORLINK_NETWORK": node.address}
-
-
-def program(node):
-    words = [sys.executable, "-c", TURNS, node.address, str(Path(__file__).parent)]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "turning\n"
-    return process
 
 
 def test_the_command_line_uses_a_node_as_a_port(node, run):
@@ -124,26 +88,6 @@ def test_a_fleet_is_listed_and_stopped_and_latched_until_it_is_released(nodes, r
     run("fleet", "release", **via(first)).ended(0)
     assert latched_by() == [None, None]
     assert members[1].command(*RAMP)["kind"] == "answer"
-
-
-@pytest.mark.parametrize("how", ["killed", "frozen"])
-def test_the_motor_of_a_program_that_is_lost_stops(node, direct, how):
-    times = []
-    for _ in range(ROUNDS):
-        process = program(node)
-        try:
-            turns(direct)
-            time.sleep(random.uniform(0, 0.2))
-            began = time.monotonic()
-            process.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-            eventually(lambda: direct.rpm() < 1300, "a motor that stops", within=20)
-            times.append(time.monotonic() - began)
-            stands(direct)
-        finally:
-            process.kill()
-            process.wait()
-            process.stdout.close()
-    print(f"\n{how}, deadline 0.3 s: {sorted(round(it, 3) for it in times)}")
 
 
 def test_the_motor_of_a_program_that_takes_no_answers_stops(node, direct):

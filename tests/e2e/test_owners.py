@@ -13,7 +13,7 @@ import sys
 
 import pytest
 
-from monitoring import Site
+from monitoring import Page, Site
 from program import eventually
 from sharing import Client
 
@@ -66,15 +66,12 @@ class Program:
 
     def __init__(self, ending, **ports):
         words = [sys.executable, "-c", PROGRAM, ending, *(f"{name}={port}" for name, port in ports.items())]
-        self.ending, self.ports = ending, ports
+        self.ending = ending
         #: Whether it takes each motor from other programs before it moves it for the first time.
         self.takes, self.taken = "take" in next(iter(ports.values())), set()
         self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert self.process.stdout.readline() == "ready\n"
         self.name = str(self.process.pid)
-
-    def can_move(self, motor):
-        return motor[0] in self.ports
 
     def does(self, what, motor=("", 0)):
         """The error of a request; empty if there is none."""
@@ -110,16 +107,11 @@ class Browser:
     @staticmethod
     def _opened(site):
         """A page, if the monitor has found the share."""
-        from monitoring import Page
-
         page = Page(site.open())
         if page.alive().ask("lines")["kind"] == "answer":
             return page
         page.leave()
         return None
-
-    def can_move(self, motor):
-        return motor != GUARDED
 
     def does(self, what, motor):
         line, number = motor
