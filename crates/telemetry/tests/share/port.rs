@@ -56,13 +56,17 @@ fn stops(witness: &mut Asker) -> usize {
 
 fn start(client: &st::Client) {
     let motor = client.motor(1).unwrap();
-    motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 100 }).unwrap();
-    let mut started = motor.start();
-    // A busy machine may be late: then nothing was sent.
-    while let Err(st::Error::Port(PortError::NotDone { kind: NotDone::Unsent, .. })) = started {
-        started = motor.start();
+    sent(|| motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 100 }));
+    sent(|| motor.start());
+}
+
+/// Sends a command. A busy machine may be late: then nothing was sent.
+fn sent<T>(command: impl Fn() -> Result<T, st::Error>) {
+    let mut done = command();
+    while let Err(st::Error::Port(PortError::NotDone { kind: NotDone::Unsent, .. })) = done {
+        done = command();
     }
-    started.unwrap();
+    done.unwrap();
 }
 
 fn not_done(error: st::Error) -> (NotDone, String) {
