@@ -6,7 +6,7 @@ use std::io::Write;
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
 use rustix::process::getpgrp;
@@ -16,7 +16,7 @@ use crate::terminal::safe;
 
 /// Lines that wait to be written.
 const WAITING: usize = 256;
-/// How long the last lines may take.
+/// How long a reader may leave one line at the end.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// A stream to print on.
@@ -29,6 +29,8 @@ pub struct Voice {
 struct State {
     waiting: AtomicUsize,
     dropped: AtomicU64,
+    /// How often a line was begun and ended: odd while one is written.
+    marks: AtomicUsize,
 }
 
 enum Word {
@@ -61,11 +63,20 @@ impl Voice {
         self.state.waiting.load(Ordering::SeqCst) < WAITING
     }
 
-    /// Waits until all is written, though not for long.
+    /// Waits until all is written, unless the reader takes nothing. A busy machine that gives the thread no
+    /// time loses nothing.
     pub fn finish(&self) {
         let (written, told) = sync_channel(1);
-        if self.words.try_send(Word::End(written)).is_ok() {
-            let _ = told.recv_timeout(PATIENCE);
+        if self.words.try_send(Word::End(written)).is_err() {
+            return;
+        }
+        let mut last = 0;
+        while told.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+            let marks = self.state.marks.load(Ordering::SeqCst);
+            if marks % 2 == 1 && marks == last {
+                return;
+            }
+            last = marks;
         }
     }
 }
@@ -86,8 +97,10 @@ fn speak(
         };
         let dropped = state.dropped.swap(0, Ordering::SeqCst);
         let missed = if dropped > 0 { missed(dropped) + "\n" } else { String::new() };
+        state.marks.fetch_add(1, Ordering::SeqCst);
         let is_written =
             may_write(&out) && writeln!(out, "{missed}{line}").and_then(|()| out.flush()).is_ok();
+        state.marks.fetch_add(1, Ordering::SeqCst);
         if !is_written {
             state.dropped.fetch_add(dropped + 1, Ordering::SeqCst);
         }
@@ -132,6 +145,22 @@ mod tests {
         assert_eq!(lines.last().map(String::as_str), Some("last"));
         let told = (lines.len() - missed.len() - 1) as u64;
         assert_eq!(told + missed.iter().sum::<u64>(), said);
+    }
+
+    #[test]
+    fn the_end_waits_for_what_is_written_and_not_for_a_reader_that_takes_nothing() {
+        let (near, far) = UnixStream::pair().unwrap();
+        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        // More than the socket takes.
+        voice.say("x".repeat(1 << 20));
+        voice.say("last");
+        voice.finish();
+        // It has not waited for it. A reader that reads gets all of it.
+        let reader =
+            std::thread::spawn(move || BufReader::new(far).lines().last().unwrap().unwrap());
+        voice.finish();
+        drop(voice);
+        assert_eq!(reader.join().unwrap(), "last");
     }
 
     #[test]
