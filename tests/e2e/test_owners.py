@@ -54,6 +54,8 @@ with contextlib.ExitStack() as stack:
                 case "start" | "change", _: motor.set_speed(360)
                 case ("stop", _) | ("off", "st0"): motor.stop()
                 case "off", _: motor.off()
+                case "read", "st0": motor.status()
+                case "read", _: motor.motion_status()
             said = ""
         except motorlink.MotorlinkError as error:
             said = f"{type(error).__name__}: {error}"
@@ -336,7 +338,8 @@ def step(world, draws):
 
         program.freezes(goes_on)
         if lapsing and isinstance(program, Program):
-            error = program.does("stop", ST if "st0" in lapsing else ONE)
+            # A stop would be sent again.
+            error = program.does("read", ST if "st0" in lapsing else ONE)
             assert error.startswith("PortError"), error
             program.ends("kill")
             world.programs[at] = None
