@@ -36,14 +36,14 @@ pub fn run(args: Args) -> Result<(), Failure> {
         return Err(Failure::usage("the motors to stop are not named; nothing was sent")
             .trying("name the motors: --id 1, or --all"));
     }
-    let port = connection.port()?;
-    motor.repeat_in_hints(connection.port_text());
     if is_stop {
         interrupt::complete_stop(match command.without_id() {
             Some(_) => "all motors".to_owned(),
             None => motor.names(),
         });
     }
+    let port = connection.port()?;
+    motor.repeat_in_hints(connection.port_text());
     let ids = motor.ids();
     let first = ids.map(MotorId::number).min().unwrap_or(1);
     let watched = match &command {

@@ -117,6 +117,9 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
             _ => failure.trying("is --at that of a running `motorlink share`?"),
         }
     };
+    if matches!(request, AskFor::Stop) {
+        interrupt::complete_stop("motors of the share");
+    }
     let name = format!("motorlink {}", std::process::id());
     let mut share = Connection::open(&Local(path.to_owned()), &name).map_err(failed)?;
     let done = |event: &str, message: &str| match args.json {

@@ -33,12 +33,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
     if let Command::Read(Read::Registers { filter }) = &command {
         return registers::list(connection.output(), filter);
     }
-    let port = connection.port()?;
-    drive.repeat_in_hints(connection.port_text());
-    let is_stop = matches!(command, Command::Act(Act::Stop));
-    if is_stop {
+    if matches!(command, Command::Act(Act::Stop)) {
         interrupt::complete_stop(format!("motor {}", drive.motor));
     }
+    let port = connection.port()?;
+    drive.repeat_in_hints(connection.port_text());
     let done = run_at(&connection, &drive, &port, command);
     done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
 }

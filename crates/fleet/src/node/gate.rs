@@ -54,8 +54,7 @@ impl Gate {
             std::cmp::Ordering::Greater => return Verdict::Early,
             std::cmp::Ordering::Equal => self.next = self.next.saturating_add(1),
         }
-        let changes = matches!(kind, Kind::Changes | Kind::Moves);
-        if changes && post.number <= self.overtaken {
+        if kind.changes() && post.number <= self.overtaken {
             return refuse(&post, Reason::Overtaken, "a stop came first");
         }
         take(now, post, kind)

@@ -194,7 +194,7 @@ impl Session {
                 // The share takes requests only as long as few of its answers wait.
                 let kind = self.common.lines().kind(&request.ask);
                 let most = if kind == Kind::Stops { WITH_STOPS } else { REQUESTS };
-                self.has_commanded |= matches!(kind, Kind::Changes | Kind::Moves);
+                self.has_commanded |= kind.changes();
                 if self.waiting.len() >= most {
                     let why = "too many requests wait for their answers".to_owned();
                     self.refuse(request.id, Reason::Busy, why);

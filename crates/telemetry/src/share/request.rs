@@ -28,6 +28,11 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether it changes something, and is no stop.
+    pub fn changes(self) -> bool {
+        matches!(self, Kind::Changes | Kind::Moves)
+    }
+
     /// What a request does.
     pub fn of(request: &Request) -> Self {
         match request.motion() {

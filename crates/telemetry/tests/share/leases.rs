@@ -84,6 +84,27 @@ fn a_lease_ends_by_itself_and_when_its_program_leaves() {
 }
 
 #[test]
+fn a_command_that_is_refused_gives_no_lease() {
+    let share = share(Duration::from_secs(3));
+    let [mut alice, mut bob] = ["alice", "bob"].map(|who| share.join(who));
+    let ask = |own, continues, time_to_live| {
+        let (line, bytes) = ("st0".to_owned(), GAIN.to_vec());
+        Ask::Command { line, motor: 1, bytes, time_to_live, continues, own }
+    };
+    alice.ask(Ask::Latch).unwrap();
+    assert_eq!(bob.ask(command("st0", 1, &START)).unwrap_err().reason, Reason::Latched);
+    alice.ask(Ask::Release).unwrap();
+    assert_eq!(bob.ask(ask(true, false, 1.0)).unwrap_err().reason, Reason::Held);
+    alice.ask(Ask::Stop { motor: Some(motor()) }).unwrap();
+    assert_eq!(bob.ask(ask(false, true, 1.0)).unwrap_err().reason, Reason::Overtaken);
+    // None of that gave Bob the motor.
+    alice.ask(command("st0", 1, &RAMP)).unwrap();
+    held(&mut bob, &RAMP);
+    alice.ask(ask(false, false, 1.0)).unwrap();
+    held(&mut bob, &GAIN);
+}
+
+#[test]
 fn a_motor_is_taken_explicitly_and_the_log_says_so() {
     let (share, mut alice, mut bob) = turning_for_alice(Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();

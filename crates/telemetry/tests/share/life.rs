@@ -116,6 +116,70 @@ fn what_another_program_passes_on_is_as_old_as_it_says() {
 }
 
 #[test]
+fn requests_of_others_that_are_refused_keep_no_owner_alive() {
+    let share = VirtualShare::new();
+    let [mut watcher, mut program, mut other] =
+        ["watches", "turns", "asks"].map(|who| share.join(who));
+    program.ask(Ask::Deadline { silence: Some(0.5), motion: None }).unwrap();
+    program.ask(command("st0", 1, &[7, 220, 5, 0, 0, 100, 0])).unwrap();
+    program.ask(command("st0", 1, &[3, 1])).unwrap();
+    let unknown = || command("st0", 1, &[0x1F]);
+    let mut sent = other.send_all((0..20).map(|_| unknown()));
+    let end = share.now() + Duration::from_secs(2);
+    while share.now() < end {
+        let why = other.end_of(sent.remove(0)).unwrap_err().reason;
+        assert!(matches!(why, Reason::Refused | Reason::Overtaken), "{why:?}");
+        sent.push(other.send(unknown()));
+    }
+    let Event { message, .. } = watcher.event(Happening::Left);
+    assert!(message.contains("no sign of life for 5"), "{message}");
+    // It rests already.
+    share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
+    assert!(share.now() < end + Duration::from_millis(200));
+}
+
+#[test]
+fn only_commands_that_are_carried_out_keep_a_stream_alive() {
+    let motor = || MotorName { line: "rmd0".to_owned(), motor: 1 };
+    let late = || match command("rmd0", 1, &TURN) {
+        Ask::Command { line, motor, bytes, continues, own, .. } => {
+            Ask::Command { line, motor, bytes, time_to_live: 0.0, continues, own }
+        }
+        _ => unreachable!(),
+    };
+    for what in 0..3 {
+        let share = VirtualShare::new();
+        share.lease(Duration::from_secs(5));
+        let [mut watcher, mut program] = ["watches", "streams"].map(|who| share.join(who));
+        program.ask(Ask::Deadline { silence: None, motion: Some(0.3) }).unwrap();
+        program.ask(command("rmd0", 1, &TURN)).unwrap();
+        for _ in 0..20 {
+            program.send(match what {
+                0 => Ask::Claim { motor: motor() },
+                1 => Ask::Take { motor: motor() },
+                _ => late(),
+            });
+            wait(&share, 0.05);
+        }
+        let Event { message, .. } = watcher.event(Happening::Left);
+        assert!(message.contains("motor 1: no new command for 3"), "{what}: {message}");
+    }
+}
+
+#[test]
+fn a_motor_that_is_taken_while_its_start_is_under_way_needs_commands() {
+    let share = VirtualShare::new();
+    share.lease(Duration::from_secs(5));
+    let [mut starts, mut takes] = ["starts", "takes"].map(|who| share.join(who));
+    takes.ask(Ask::Deadline { silence: None, motion: Some(0.3) }).unwrap();
+    starts.send(command("rmd0", 1, &TURN));
+    takes.ask(Ask::Take { motor: MotorName { line: "rmd0".to_owned(), motor: 1 } }).unwrap();
+    let Event { message, .. } = starts.event(Happening::Left);
+    assert!(message.contains("takes left: rmd0, motor 1: no new command for 3"), "{message}");
+    stands(&share);
+}
+
+#[test]
 fn nobody_lapses_who_owns_no_motor_or_lets_them_turn() {
     let (share, mut watcher, mut program) = turning(Some(0.1), Some(0.1));
     program.ask(command("rmd0", 1, &OFF)).unwrap();

@@ -484,15 +484,27 @@ fn step(world: &mut World, model: &mut Model, (p, m, what): (usize, usize, usize
             model.gone(p);
             format!("p{p} is killed")
         }
-        // The line is cut when it is killed, and back later.
+        // The line is cut when it is killed, and back later. Another program may stop the motor meanwhile.
         13 => {
+            let q = (p + 1) % PROGRAMS;
+            let is_off = model.owner[m] == Some(p) && model.ending[p] == Ending::Off && !is_st;
             *world.drives.is_cut.lock().unwrap() = [true; 2];
             world.drop(p);
+            world.run(0.1);
+            model.gone(p);
+            if world.programs[q].is_some() {
+                world.ask(q, Ask::Stop { motor: Some(name(m)) }).unwrap();
+                if !is_off {
+                    model.stop(m);
+                }
+            }
             world.run(1.0);
             *world.drives.is_cut.lock().unwrap() = [false; 2];
             world.run(3.0);
-            model.gone(p);
-            format!("p{p} is killed while the lines are cut")
+            format!(
+                "p{p} is killed while the lines are cut; p{q} stops {:?} if it is there",
+                MOTORS[m]
+            )
         }
         14 => {
             let turns = |motor: usize| model.owner[motor] == Some(p) && !model.held[motor];

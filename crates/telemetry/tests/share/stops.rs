@@ -239,6 +239,22 @@ fn a_motor_whose_owner_leaves_behind_a_command_that_is_refused_ends_as_its_owner
 }
 
 #[test]
+fn a_command_that_is_under_way_when_the_owner_leaves_goes_on() {
+    let share = VirtualShare::new();
+    let (mut gone, mut lives) = (share.join("leaves"), share.join("lives"));
+    gone.send(command("rmd0", 1, &TURN));
+    let sent = lives.send(command("rmd0", 1, &TURN));
+    drop(gone);
+    lives.end_of(sent).unwrap();
+    share.reaches("rmd1.speed_dps", |dps| dps > 8.0);
+    lives.lines();
+    let stop = lives.events.iter().find(|event| event.event == Happening::Stopping);
+    assert!(stop.is_none(), "{stop:?}");
+    drop(lives);
+    share.reaches("rmd1.speed_dps", |dps| dps.abs() < 1.0);
+}
+
+#[test]
 fn a_program_owns_again_what_it_moved_before_the_share_was_killed() {
     let motor = MotorName { line: "st0".to_owned(), motor: 2 };
     let claim = || Ask::Claim { motor: motor.clone() };

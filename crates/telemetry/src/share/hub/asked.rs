@@ -354,10 +354,10 @@ impl Hub {
             }
         };
         let kind = CommandKind::of(&request);
-        if matches!(kind, CommandKind::Changes | CommandKind::Moves) {
+        if kind.changes() {
             self.check_place(session)?;
         }
-        self.claim((session, name), line, motor, kind)?;
+        self.check_lease(session, line, motor, kind)?;
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
@@ -370,10 +370,9 @@ impl Hub {
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
         held.known.extend(motor);
-        if let (Some(motor), Some(session)) = (motor, self.sessions.get_mut(&session)) {
-            session.life.commanded(made(self.now, age), (line, motor), motion);
-        }
-        let sent = Sent { motor, motion, configures };
+        let leases = self.lease_by((session, name), line, motor, kind);
+        let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
+        let sent = Sent { motor, motion, configures, made: made(self.now, age), leases };
         let ended_with = move |result| tell(Work::Command(sent, result));
         let begun = match motion.stops() {
             true => held.remote().stop_then(name, request, ended_with),

@@ -22,25 +22,45 @@ impl Hub {
         self.lease = Some(length.into());
     }
 
-    /// A program changes a motor.
-    pub(super) fn claim(
-        &mut self,
-        (session, name): (SessionId, &Arc<str>),
+    /// Refuses a change of a motor that another program has.
+    pub(super) fn check_lease(
+        &self,
+        session: SessionId,
         line: usize,
         motor: Option<Motor>,
         kind: Kind,
     ) -> Result<(), Refused> {
-        let (Some(length), Some(motor), Kind::Changes | Kind::Moves) = (self.lease, motor, kind)
-        else {
-            return Ok(());
+        let motor = motor.filter(|_| kind.changes() && self.lease.is_some());
+        let held = motor.zip(self.lines.get(&line));
+        let why = held.and_then(|(motor, it)| it.lease_of_another(motor, session, it.now()));
+        why.map_or(Ok(()), |why| Err((Reason::Held, why)))
+    }
+
+    /// A program changes a motor, and has it for some time. Gives whether it did not have it before.
+    pub(super) fn lease_by(
+        &mut self,
+        program: (SessionId, &Arc<str>),
+        line: usize,
+        motor: Option<Motor>,
+        kind: Kind,
+    ) -> bool {
+        let Some((length, motor)) = self.lease.zip(motor).filter(|_| kind.changes()) else {
+            return false;
         };
-        let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
-        let now = held.now();
-        if let Some(why) = held.lease_of_another(motor, session, now) {
-            return Err((Reason::Held, why));
+        let Some(held) = self.lines.get_mut(&line) else { return false };
+        let until = held.now() + length;
+        let before = held.lease_to(motor, program, until);
+        before.is_none_or(|lease| lease.session != program.0)
+    }
+
+    /// The command with which a program got a motor was refused.
+    pub(super) fn give_lease_back(&mut self, session: SessionId, line: usize, motor: Motor) {
+        let Some(held) = self.lines.get_mut(&line) else { return };
+        if held.leases.get(&motor).is_some_and(|lease| lease.session == session)
+            && !held.owners.is_own(motor, session)
+        {
+            held.leases.remove(&motor);
         }
-        held.lease_to(motor, (session, name), now + length);
-        Ok(())
     }
 
     /// A program has moved a motor through a share before this one.
@@ -52,6 +72,7 @@ impl Hub {
     ) -> Result<Option<Answer>, Refused> {
         let (line, motor) = self.motor(motor)?;
         let Some(held) = self.lines.get_mut(&line) else { return Ok(None) };
+        let was_own = held.owners.is_own(motor, session);
         if !held.owners.claim(motor, session) {
             let (line, motor) = (&held.name, motor.number());
             let why = format!("{line}: a program has moved motor {motor} since");
@@ -63,17 +84,18 @@ impl Hub {
         {
             held.lease_to(motor, (session, name), now + length);
         }
-        self.owns_now(session, (line, motor));
+        self.owns_now(session, (line, motor), was_own);
         Ok(Some(Answer::Claim))
     }
 
-    /// The motor is the program's without a command.
-    fn owns_now(&mut self, session: SessionId, place: (usize, Motor)) {
-        let owner = self.lines.get(&place.0).and_then(|held| held.owners.owner(place.1));
-        if owner == Some(session)
+    /// The motor is the program's without a command. If it was before, that makes no command younger.
+    fn owns_now(&mut self, session: SessionId, (line, motor): (usize, Motor), was_own: bool) {
+        let is_own = |held: &Held| held.owners.is_own(motor, session);
+        if !was_own
+            && self.lines.get(&line).is_some_and(is_own)
             && let Some(session) = self.sessions.get_mut(&session)
         {
-            session.life.commanded(self.now, place, Motion::Starts);
+            session.life.commanded(self.now, (line, motor), Motion::Starts);
         }
     }
 
@@ -92,13 +114,14 @@ impl Hub {
         let now = held.now();
         let is_held = held.lease_of_another(motor, session, now).is_some();
         let before = held.lease_to(motor, (session, name), now + length);
+        let was_own = held.owners.is_own(motor, session);
         held.owners.take(motor, session);
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
             let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
             self.say_of((Some(&of), Some(number)), Happening::Taken, name, message);
         }
-        self.owns_now(session, (line, motor));
+        self.owns_now(session, (line, motor), was_own);
         Ok(Some(Answer::Take))
     }
 }

@@ -138,12 +138,25 @@ impl Hub {
         sent: Sent,
         result: CommandResult,
     ) {
-        let Sent { motor, motion, configures } = sent;
+        let Sent { motor, motion, configures, made, leases } = sent;
         if let Some(motor) = motor {
             if let Some(held) = self.lines.get_mut(&line) {
                 held.ended(motor, motion, &result);
             }
-            self.command_ended(session, line, motor, motion, &result);
+            let carried = match &result {
+                Ok(_) => Carried::Out,
+                Err(why) if may_be_executed(why) => Carried::Perhaps,
+                Err(_) => Carried::Never,
+            };
+            if let Some(session) =
+                self.sessions.get_mut(&session).filter(|_| carried != Carried::Never)
+            {
+                session.life.commanded(made, (line, motor), motion);
+            }
+            self.command_ended(session, line, motor, (motion, carried), &result);
+            if leases && carried == Carried::Never {
+                self.give_lease_back(session, line, motor);
+            }
             let is_owed = |held: &Held| held.owed.contains_key(&motor);
             if result.is_ok() && self.lines.get(&line).is_some_and(is_owed) {
                 self.stop_again(line, motor, Why::Asked);
@@ -200,15 +213,10 @@ impl Hub {
         session: SessionId,
         line: usize,
         motor: Motor,
-        motion: Motion,
+        (motion, carried): (Motion, Carried),
         result: &CommandResult,
     ) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        let carried = match result {
-            Ok(_) => Carried::Out,
-            Err(why) if may_be_executed(why) => Carried::Perhaps,
-            Err(_) => Carried::Never,
-        };
         held.owners.ended(motor, session, motion, carried);
         match result {
             Ok(_) if motion.stops() => self.stopped(line, motor, motion),
@@ -225,7 +233,8 @@ impl Hub {
             _ => {}
         }
         if motion.may_be_owned() {
-            self.stop_if_orphaned(line, motor, Why::Asked);
+            let was_refused = carried == Carried::Never && self.sessions.contains_key(&session);
+            self.stop_if_orphaned(line, motor, Why::Asked, was_refused);
         }
     }
 }

@@ -14,7 +14,8 @@ const PAUSE: Micros = Micros::from_millis(200);
 impl Held {
     /// The motors of a program that it has not stopped.
     fn turning_for(&self, id: SessionId) -> Vec<Motor> {
-        let mut own = self.owners.left_by(id, |_| true);
+        // The requests of others may all be refused.
+        let mut own = self.owners.left_by(id, |_| false);
         own.retain(|motor| !self.owners.is_held(*motor));
         own
     }

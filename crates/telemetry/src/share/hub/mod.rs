@@ -369,15 +369,19 @@ impl Hub {
         }
         match held.owed.get(&motor).map(|owed| Arc::clone(&owed.by)) {
             Some(by) => self.stop(why, line, motor, SessionId::default(), None, &by),
-            None => self.stop_if_orphaned(line, motor, why),
+            None => self.stop_if_orphaned(line, motor, why, false),
         }
     }
 
-    fn stop_if_orphaned(&mut self, line: usize, motor: Motor, why: Why) {
-        let Some(owner) = self.lines.get(&line).and_then(|held| held.owners.owner(motor)) else {
-            return;
-        };
-        if !self.sessions.contains_key(&owner) {
+    /// Stops a motor whose owner has left. A request of a program that is there may be under way: its end
+    /// decides, unless one `was_refused`.
+    fn stop_if_orphaned(&mut self, line: usize, motor: Motor, why: Why, was_refused: bool) {
+        let Some(held) = self.lines.get(&line) else { return };
+        let Some(owner) = held.owners.owner(motor) else { return };
+        let is_here = |program| !was_refused && self.sessions.contains_key(&program);
+        if !self.sessions.contains_key(&owner)
+            && held.owners.left_by(owner, is_here).contains(&motor)
+        {
             let by = "share".into();
             if self.switch_off.contains(&owner)
                 && let Some(held) = self.lines.get_mut(&line)

@@ -25,9 +25,9 @@ pub(super) enum Address {
 }
 
 impl Held {
-    /// A stop is asked for. One that switches the motor off for the same program stays so.
+    /// A stop is asked for. One that switches the motor off, because its owner has left, stays so.
     pub(super) fn owe(&mut self, motor: Motor, by: &Arc<str>) {
-        let is_off = self.owed.get(&motor).is_some_and(|owed| owed.is_off && owed.by == *by);
+        let is_off = self.owed.get(&motor).is_some_and(|owed| owed.is_off);
         self.owed.insert(motor, Owed::new(by).off(is_off));
     }
 

@@ -6,6 +6,7 @@ use super::jobs::JobId;
 use super::place::SessionId;
 use super::session::Part;
 use motorlink_proto::Motion;
+use motorlink_proto::time::Instant;
 
 use crate::acquisition::Rate;
 use crate::runner::CommandResult;
@@ -57,4 +58,8 @@ pub(super) struct Sent {
     pub(super) motor: Option<Motor>,
     pub(super) motion: Motion,
     pub(super) configures: Option<Configures>,
+    /// When the program made it.
+    pub(super) made: Instant,
+    /// Whether its program has the motor because of it, at a share with leases.
+    pub(super) leases: bool,
 }

@@ -141,14 +141,14 @@ impl Connection {
             self.has_deadlines = true;
             self.declare_deadlines()?;
         }
+        let motion = self.ending.get();
+        if motion != self.declared && (changes || !claims.is_empty()) {
+            self.declared = motion;
+            self.ask(Ask::Ending { motion })?;
+        }
         for motor in claims {
             let motor = MotorName { line: line.clone(), motor };
             self.ask(Ask::Claim { motor })?;
-        }
-        let motion = self.ending.get();
-        if motion != self.declared && changes {
-            self.declared = motion;
-            self.ask(Ask::Ending { motion })?;
         }
         if self.port.at.takes() && changes && self.taken.insert(motor) {
             let motor = MotorName { line: line.clone(), motor };
@@ -177,7 +177,7 @@ impl Connection {
             Protocol::St => Speaks::St(self.holder.profile.unwrap_or_default()),
             Protocol::Rmd => Speaks::Rmd,
         };
-        matches!(Kind::of_bytes(speaks, motor, bytes), Kind::Changes | Kind::Moves)
+        Kind::of_bytes(speaks, motor, bytes).changes()
     }
 
     /// Sends a request; gives its id.
