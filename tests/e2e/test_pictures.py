@@ -17,8 +17,8 @@ def words(svg):
     for text in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text"):
         lines.setdefault(int(text.get("y")), []).append((float(text.get("x")), text.text))
     joined = [" ".join(text for _, text in sorted(parts)) for _, parts in sorted(lines.items())]
-    # A rate is called `only` if it is low. A start is seen in one of its states.
-    bars, numbers = re.compile("[▁▂▃▄▅▆▇█]+|only (?=[0-9])|(?<=starts: )(IDLE_START|CHARGE_BOOT_CAP)"), re.compile(r"-?\d[\d.]*")
+    # A rate is called `only` if it is low, and one message has none. A start is seen in one of its states.
+    bars, numbers = re.compile("[▁▂▃▄▅▆▇█]+|, [0-9.]+ Hz$|only (?=[0-9])|(?<=starts: )(IDLE_START|CHARGE_BOOT_CAP)"), re.compile(r"-?\d[\d.]*")
     return [" ".join(numbers.sub("0", bars.sub("", line)).split()) for line in joined]
 
 

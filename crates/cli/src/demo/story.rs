@@ -20,7 +20,7 @@ use crate::output::print_line;
 /// How often the table is read.
 const TICK: Duration = Duration::from_millis(50);
 /// Timeout of a step.
-const PATIENCE: Duration = Duration::from_secs(6);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct Story<'a> {
     drives: &'a Drives,
@@ -168,9 +168,9 @@ impl<'a> Story<'a> {
         }
         motor.stop()?;
         let target = CentiDegrees::from_degrees(810.0);
-        // How far it is depends on how long the steps before took.
         let (to, most) = (Target::MultiTurn(target), Some(SpeedLimit(500)));
-        let mut moved = motor.prepare_move(to, most, ArrivalOptions::default())?;
+        let options = ArrivalOptions { timeout: Some(PATIENCE), ..Default::default() };
+        let mut moved = motor.prepare_move(to, most, options)?;
         motor.set_position(target, most)?;
         let reached = loop {
             match moved.advance()? {
