@@ -33,7 +33,8 @@ interface World {
   bench: Bench;
   wire: Wire;
   network: Network;
-  chromium: Chromium;
+  /** Not with a program. */
+  chromium: Chromium | undefined;
   guard: Program | undefined;
   /** What turns the motor instead of a page, and what it is connected to. */
   mover: ChildProcess | undefined;
@@ -54,11 +55,11 @@ interface Case {
 }
 
 const CASES: Case[] = [
-  { name: 'page killed (its process)', event: async ({ chromium }) => chromium.signals('SIGKILL') },
-  { name: 'browser killed', event: async ({ chromium }) => () => chromium.kill() },
-  { name: 'tab frozen (SIGSTOP)', event: async ({ chromium }) => chromium.signals('SIGSTOP') },
+  { name: 'page killed (its process)', event: async ({ chromium }) => chromium!.signals('SIGKILL') },
+  { name: 'browser killed', event: async ({ chromium }) => () => chromium!.kill() },
+  { name: 'tab frozen (SIGSTOP)', event: async ({ chromium }) => chromium!.signals('SIGSTOP') },
   { name: 'network cut', event: async ({ network }) => () => network.set({ cut: 'both' }) },
-  { name: 'tab hidden', event: async ({ chromium }) => () => chromium.tab() },
+  { name: 'tab hidden', event: async ({ chromium }) => () => chromium!.tab() },
   {
     name: 'server killed, guard beneath',
     guarded: true,
@@ -84,7 +85,7 @@ const CASES: Case[] = [
   {
     name: 'drive unplugged for 1 s, page killed meanwhile; from plugged in',
     event: async ({ wire, chromium }) => {
-      const kill = await chromium.signals('SIGKILL');
+      const kill = await chromium!.signals('SIGKILL');
       return async () => {
         wire.unplug();
         kill();
@@ -145,7 +146,7 @@ async function world(protocol: 'st' | 'rmd', guarded: boolean, program: Case['pr
     serial = `${kind}${at}`;
   }
   const network = await Network.open();
-  const chromium = await Chromium.open({ proxy: network.proxy });
+  const chromium = program ? undefined : await Chromium.open({ proxy: network.proxy });
   const none = { hub: undefined, mover: undefined };
   if (!program) await bench.serve(['-p', serial], '300ms');
   return { bench, wire, network, chromium, guard, ...(program ? await programAt(program, serial, bench) : none) };
@@ -160,7 +161,7 @@ async function run({ protocol = 'st', guarded = false, program, event, from }: C
   const all = await world(protocol, guarded, program);
   const { bench, wire, network, chromium, guard, mover, hub } = all;
   try {
-    if (!program) {
+    if (chromium) {
       const page = await chromium.tab();
       await page.goto(bench.url);
       // A page that gets no time for its signs of life turns nothing, or not for long.
@@ -184,7 +185,7 @@ async function run({ protocol = 'st', guarded = false, program, event, from }: C
   } finally {
     mover?.kill('SIGKILL');
     await hub?.end();
-    await chromium.close();
+    await chromium?.close();
     await bench.end();
     await guard?.end();
     await wire.close();

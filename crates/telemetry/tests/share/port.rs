@@ -20,7 +20,9 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{self, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
-use motorlink_telemetry::share::message::{Answer, Ask, Happening, Line, Protocol, WireFrame};
+use motorlink_telemetry::share::message::{
+    self, Answer, Ask, Happening, Line, MotorName, Protocol, WireFrame,
+};
 use motorlink_telemetry::share::port;
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -372,6 +374,50 @@ fn a_command_of_an_engine_lives_no_longer_at_the_share() {
     engine.advance(&mut |_, _| {});
     let Ask::Command { time_to_live, .. } = share.join().unwrap() else { panic!("no command") };
     assert!((0.0..=0.5).contains(&time_to_live), "{time_to_live}");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn what_a_program_has_declared_holds_at_the_next_share_too() {
+    let path = crate::drives::path("share-declares", "socket");
+    let socket = UnixListener::bind(&path).unwrap();
+    // It ends after the first command, and begins again.
+    let share = std::thread::spawn(move || {
+        let mut asks = Vec::new();
+        for _ in 0..2 {
+            asks.clear();
+            let mut share = Scripted::accept(&socket);
+            while let Some(asked) = share.asked(|| scripted::line("rmd0", Protocol::Rmd)) {
+                let answer = match &asked.ask {
+                    Ask::Command { bytes, .. } => {
+                        Answer::Command { bytes: [&bytes[..1], &[7; 7]].concat() }
+                    }
+                    Ask::Ending { .. } => Answer::Ending,
+                    _ => Answer::Claim,
+                };
+                share.answer(asked.id, answer);
+                asks.push(asked.ask);
+                if matches!(asks.last(), Some(Ask::Command { .. })) {
+                    break;
+                }
+            }
+        }
+        asks
+    });
+    port::register();
+    let port = format!("share:{}/rmd0", path.display()).parse().unwrap();
+    let client = rmd::Client::open(&port, Default::default()).unwrap();
+    client.end_with(Ending::Nothing);
+    let _ = client.ask(id(1), &SetSpeed { speed: CentiDps::from_digits(10_000) });
+    while !share.is_finished() {
+        let _ = client.ask(id(1), &ReadStatus);
+    }
+    let asks = share.join().unwrap();
+    let declared = [
+        Ask::Ending { motion: message::Ending::Nothing },
+        Ask::Claim { motor: MotorName { line: "rmd0".to_owned(), motor: 1 } },
+    ];
+    assert_eq!(&asks[..2], &declared, "{asks:?}");
     std::fs::remove_file(path).unwrap();
 }
 
