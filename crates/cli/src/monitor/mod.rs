@@ -50,7 +50,8 @@ computer can connect, unless --listen has another address. That needs --tls-cert
 Safety: a motor that a page turned stops when the page ends, or gives no sign of life for --deadline: \
 the browser hangs, the tab is hidden, the network fails. The monitor cannot stop a motor if it is \
 killed with SIGKILL or frozen, if the cable to the drive is cut, or if the computer stops. `motorlink \
-guard` between monitor and drive stops it after SIGKILL, and with --silence if the monitor is frozen. \
+guard` between monitor and drive stops it after SIGKILL, and with --silence if the monitor is frozen. So \
+does the share of another process, with --share. \
 If people can be hurt, use an emergency stop in hardware.
 
 Output: the addresses, then one line per event. SIGINT, SIGTERM and the other signals that end a program \
