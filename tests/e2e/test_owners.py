@@ -241,9 +241,10 @@ class World:
         for motor in (ST, ONE, TWO):
             model.owner[motor], model.is_held[motor] = None, False
             if model.is_latched:
-                # The monitor latches the next share, and stops its motors.
+                # The monitor latches the next share, and stops all motors that its lines can have.
                 model.stops(motor)
         if model.is_latched:
+            model.told.update((line, number) for line in ("st0", "rmd0") for number in range(1, 33))
             eventually(lambda: self.looks.ask("lines").get("latched_by"), "the latch of the monitor")
 
     def does(self, motor):
