@@ -157,7 +157,7 @@ class Model:
         self.owner = dict.fromkeys(MOTORS)
         self.is_held = dict.fromkeys(MOTORS, False)
         self.is_latched = False
-        #: The motors that were told to stop in this step.
+        #: Motors to which a stop was sent in this step.
         self.told = set()
 
     def moves(self, program, motor):

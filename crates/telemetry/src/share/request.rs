@@ -28,7 +28,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whether it changes something, and is no stop.
+    /// Whether it is a change other than a stop.
     pub fn changes(self) -> bool {
         matches!(self, Kind::Changes | Kind::Moves)
     }

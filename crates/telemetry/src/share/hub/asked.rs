@@ -357,7 +357,8 @@ impl Hub {
         if kind.changes() {
             self.check_place(session)?;
         }
-        self.check_lease(session, line, motor, kind)?;
+        let changed = motor.filter(|_| kind.changes());
+        self.check_lease(session, line, changed)?;
         let tell = self.teller(session, Some(id), line);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         if let Some(motor) = motor {
@@ -370,7 +371,7 @@ impl Hub {
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
         held.known.extend(motor);
-        let leases = self.lease_by((session, name), line, motor, kind);
+        let leases = self.lease_by((session, name), line, changed);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         let sent = Sent { motor, motion, configures, made: made(self.now, age), leases };
         let ended_with = move |result| tell(Work::Command(sent, result));

@@ -12,7 +12,6 @@ use super::leases::Lease;
 use super::line::Held;
 use super::place::SessionId;
 use crate::share::message::{Answer, Happening, MotorName, Reason};
-use crate::share::request::Kind;
 use crate::signal::Motor;
 
 impl Hub {
@@ -27,11 +26,9 @@ impl Hub {
         &self,
         session: SessionId,
         line: usize,
-        motor: Option<Motor>,
-        kind: Kind,
+        changed: Option<Motor>,
     ) -> Result<(), Refused> {
-        let motor = motor.filter(|_| kind.changes() && self.lease.is_some());
-        let held = motor.zip(self.lines.get(&line));
+        let held = changed.filter(|_| self.lease.is_some()).zip(self.lines.get(&line));
         let why = held.and_then(|(motor, it)| it.lease_of_another(motor, session, it.now()));
         why.map_or(Ok(()), |why| Err((Reason::Held, why)))
     }
@@ -41,12 +38,9 @@ impl Hub {
         &mut self,
         program: (SessionId, &Arc<str>),
         line: usize,
-        motor: Option<Motor>,
-        kind: Kind,
+        changed: Option<Motor>,
     ) -> bool {
-        let Some((length, motor)) = self.lease.zip(motor).filter(|_| kind.changes()) else {
-            return false;
-        };
+        let Some((length, motor)) = self.lease.zip(changed) else { return false };
         let Some(held) = self.lines.get_mut(&line) else { return false };
         let until = held.now() + length;
         let before = held.lease_to(motor, program, until);
