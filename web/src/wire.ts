@@ -182,11 +182,13 @@ by?: string | null,
 /**
  * What happened.
  */
-event: Happening, 
+event: EventKind, 
 /**
  * The same in words.
  */
 message: string, };
+
+export type EventKind = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "taken" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "late" | "clock" | "opened" | "closed" | "scanned" | "later";
 
 export type Fault = { 
 /**
@@ -293,8 +295,6 @@ motor: number,
  * The signals, in the order of the columns after `t` and `span`.
  */
 columns: Array<Column>, };
-
-export type Happening = "joined" | "left" | "commanded" | "stopping" | "stopped" | "stop-failed" | "taken" | "latched" | "released" | "lost" | "back" | "silent" | "answers" | "refused" | "doubtful" | "late" | "clock" | "opened" | "closed" | "scanned" | "later";
 
 export type Limit = { 
 /**

@@ -34,6 +34,7 @@ mod monitor;
 mod network;
 #[cfg(feature = "fleet")]
 mod node;
+mod nonblocking_writer;
 mod output;
 mod outputs;
 mod palette;
@@ -56,7 +57,6 @@ mod st;
 mod terminal;
 mod text;
 mod trace;
-mod voice;
 #[cfg(feature = "watch")]
 mod watch;
 

@@ -13,14 +13,14 @@ use serde_json::{Value, json};
 
 use crate::failure::Failure;
 use crate::json::{Cell, Line, Row};
+use crate::nonblocking_writer::NonblockingWriter;
 use crate::terminal::safe;
-use crate::voice::Voice;
 
 /// stdout, if the program must not wait for its reader.
-static RESULTS: OnceLock<Voice> = OnceLock::new();
+static RESULTS: OnceLock<NonblockingWriter> = OnceLock::new();
 
 /// stderr, if the program must not wait for its reader.
-static MESSAGES: OnceLock<Voice> = OnceLock::new();
+static MESSAGES: OnceLock<NonblockingWriter> = OnceLock::new();
 
 /// Whether an error of stdout is kept until the end.
 static KEEPS_ERROR: AtomicBool = AtomicBool::new(false);
@@ -115,9 +115,9 @@ pub fn has_json_messages() -> bool {
 
 /// From now on printing does not block, because motors or drives depend on this program. On stdout
 /// `missed` is the line in place of dropped lines. Returns stdout.
-pub fn never_wait(missed: fn(u64) -> String) -> &'static Voice {
+pub fn never_wait(missed: fn(u64) -> String) -> &'static NonblockingWriter {
     never_wait_for_messages();
-    RESULTS.get_or_init(|| Voice::new(stdout(), missed))
+    RESULTS.get_or_init(|| NonblockingWriter::new(stdout(), missed))
 }
 
 /// Whether a line can be printed without waiting for the reader of stdout, now or after this time.
@@ -133,7 +133,7 @@ pub fn is_read(within: Duration) -> bool {
 
 /// As [`never_wait`], for stderr only.
 pub fn never_wait_for_messages() {
-    MESSAGES.get_or_init(|| Voice::new(stderr(), missed_text));
+    MESSAGES.get_or_init(|| NonblockingWriter::new(stderr(), missed_text));
 }
 
 /// From now on an error of stdout does not end a command: it may have motors left to stop.
@@ -159,8 +159,8 @@ pub fn missed_text(lines: u64) -> String {
 
 /// Waits a moment until all output is written, after [`never_wait`].
 pub fn finish() {
-    for voice in [&MESSAGES, &RESULTS].into_iter().filter_map(OnceLock::get) {
-        voice.finish();
+    for writer in [&MESSAGES, &RESULTS].into_iter().filter_map(OnceLock::get) {
+        writer.finish();
     }
 }
 

@@ -11,22 +11,22 @@
 //! sent, and a motor of a program that gives no sign of life is stopped.
 #![forbid(unsafe_code)]
 
+mod authorization;
 mod certificate;
 pub mod clock;
 pub mod computer;
 mod config;
 pub mod directory;
 pub mod key;
+mod membership;
 pub mod message;
 pub mod network;
 pub mod node;
 pub mod port;
 pub mod remote;
-mod roll;
 pub mod ros2;
 pub mod site;
 pub mod view;
-mod weight;
 pub mod whole;
 
 /// The version of keys and messages.

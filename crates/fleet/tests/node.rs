@@ -21,7 +21,7 @@ use motorlink_fleet::network::Network;
 use motorlink_fleet::node::NodeError;
 use motorlink_proto::st::{Ramp, RegisterId};
 use motorlink_proto::units::CentiDps;
-use motorlink_telemetry::share::message::{Event, Happening, Reason};
+use motorlink_telemetry::share::message::{Event, EventKind, Reason};
 use world::{Cable, Jumping, World, eventually};
 use zenoh::Wait;
 
@@ -64,7 +64,7 @@ fn witness(world: &World) -> Asker {
 /// The reason with which a program left that used the node.
 fn left(witness: &mut Asker) -> String {
     loop {
-        let Event { message, .. } = witness.event(Happening::Left);
+        let Event { message, .. } = witness.event(EventKind::Left);
         if let Some((_, why)) = message.split_once("left: ") {
             return why.to_owned();
         }
@@ -245,7 +245,7 @@ fn one_commander_holds_a_motor_and_another_one_takes_it() {
     let mut witness = witness(&world);
     let taker = st(&world, "&as=bob&take");
     taker.motor(1).unwrap().set_ramp(ramp).unwrap();
-    let taken = witness.event(Happening::Taken).message;
+    let taken = witness.event(EventKind::Taken).message;
     assert!(taken.contains("bob") && taken.contains("takes it from alice"), "{taken}");
     assert_eq!(not_done(&alice.motor(1).unwrap().set_ramp(ramp).unwrap_err()), NotDone::Held);
     // All may stop it.

@@ -18,9 +18,9 @@ use motorlink_fleet::remote::Remote;
 use motorlink_fleet::whole::Whole;
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, StoppedMotor};
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::message::{Answer, Ask, EventKind, Reason, StoppedMotor};
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Signal};
 use world::{Cable, World, eventually};
 
@@ -117,13 +117,13 @@ fn a_node_that_ends_keeps_its_lines_and_those_of_others_go_on() {
     let mut program = join(&whole);
     turn(&mut program, "ends1");
     site.two.end_node();
-    let lost = program.event(Happening::Lost);
+    let lost = program.event(EventKind::Lost);
     assert!(lost.message.contains("node ends2 is away"), "{}", lost.message);
     assert_eq!(program.names().len(), 4);
     // Programs that come later know them, too.
     let mut later = join(&whole);
     assert_eq!(later.names(), program.names());
-    assert!(later.event(Happening::Lost).message.contains("node ends2 is away"));
+    assert!(later.event(EventKind::Lost).message.contains("node ends2 is away"));
     let refusal = program.ask(command("ends2/st0", 1, &START)).unwrap_err();
     assert_eq!(refusal.reason, Reason::Line);
     turns(&site.one);
@@ -144,9 +144,9 @@ fn a_cut_network_stops_the_motors_of_the_program_and_is_mended() {
     // Its deadline is 1 s.
     stands(&site.one);
     assert!(began.elapsed() > Duration::from_millis(500), "stopped too early");
-    program.event(Happening::Lost);
+    program.event(EventKind::Lost);
     site.cable.mend();
-    program.event(Happening::Back);
+    program.event(EventKind::Back);
     eventually("commands pass again", || program.ask(command("cut1/st0", 1, &RAMP)).is_ok());
 }
 
@@ -164,7 +164,7 @@ fn what_a_node_reads_while_the_network_is_cut_comes_late_and_nothing_is_lost() {
     let followed = Followed {
         share: Arc::new(remote),
         line: "rmd0".to_owned(),
-        speaks: Speaks::Rmd,
+        speaks: DriveProtocol::Rmd,
         name: "recorder".to_owned(),
         wanted: vec![Wanted { signals, period: 0.02 }],
     };

@@ -7,7 +7,7 @@ use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::frame::{Frame, Kind};
-use motorlink_telemetry::share::message::{self as share, Event, Happening, MotorName, Reason};
+use motorlink_telemetry::share::message::{self as share, Event, EventKind, MotorName, Reason};
 use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
@@ -287,7 +287,7 @@ impl Page {
     fn notice_stop(&self, frame: &Frame, counts: impl Fn(&Control, &Event) -> bool) {
         if frame.kind == Kind::Text
             && let Ok(share::Text::Event(event)) = share::decode(&frame.payload)
-            && event.event == Happening::Stopping
+            && event.event == EventKind::Stopping
             && event.by.as_ref() != Some(&self.name)
         {
             let mut control = self.control();

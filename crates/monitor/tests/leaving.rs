@@ -2,7 +2,7 @@
 
 use crate::world::{LIMIT, World, connect};
 use motorlink_proto::st::Profile;
-use motorlink_telemetry::share::message::{Answer, Ask, Event, Happening, Reason, Text, decode};
+use motorlink_telemetry::share::message::{Answer, Ask, Event, EventKind, Reason, Text, decode};
 use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::time::timeout;
 
@@ -25,7 +25,7 @@ async fn turning(world: &World) -> Program {
     drive
 }
 
-async fn event(watcher: &mut Listener, wanted: Happening) -> Event {
+async fn event(watcher: &mut Listener, wanted: EventKind) -> Event {
     let found = async {
         loop {
             let frame = watcher.next().await.unwrap();
@@ -48,9 +48,9 @@ async fn the_motors_of_a_page_stop_and_the_log_says_why_if_the_share_takes_the_r
     for (why, told) in [(why, format!(": {why}")), ("x".repeat(1000).as_str(), String::new())] {
         let drive = turning(&world).await;
         drive.close_because(Refusal::new(Reason::Lapsed, why));
-        let left = event(&mut watcher, Happening::Left).await;
+        let left = event(&mut watcher, EventKind::Left).await;
         assert_eq!(left.message, format!("page 4 (control) left{told}"));
-        let stopping = event(&mut watcher, Happening::Stopping).await.message;
+        let stopping = event(&mut watcher, EventKind::Stopping).await.message;
         assert!(stopping.ends_with(&format!("has left{told}")), "{stopping}");
         world.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0).await;
     }

@@ -8,7 +8,7 @@ use crate::world::{LIMIT, Page, World, st};
 use motorlink_monitor::message::Mode;
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
-use motorlink_telemetry::share::message::{Answer, Ask, Happening, Reason, Text, decode};
+use motorlink_telemetry::share::message::{Answer, Ask, EventKind, Reason, Text, decode};
 use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::time::timeout;
 
@@ -73,7 +73,7 @@ async fn listen(mut listener: Listener) {
 async fn released(events: &mut Listener) {
     loop {
         let text = decode(&events.next().await.unwrap().payload);
-        if matches!(text, Ok(Text::Event(event)) if event.event == Happening::Released) {
+        if matches!(text, Ok(Text::Event(event)) if event.event == EventKind::Released) {
             return;
         }
     }

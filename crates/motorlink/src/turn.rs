@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use motorlink_link::port::PortError;
 
-/// How often a client that waits makes the call of [`Client::looking`](crate::st::Client::looking)
-/// or [`rmd::Client::looking`](crate::rmd::Client::looking).
+/// How often a client that waits makes the call of [`Client::with_interrupt_hook`](crate::st::Client::with_interrupt_hook)
+/// or [`rmd::Client::with_interrupt_hook`](crate::rmd::Client::with_interrupt_hook).
 pub const LOOK: Duration = Duration::from_millis(50);
 
 /// Called while an exchange waits. An error ends the exchange.

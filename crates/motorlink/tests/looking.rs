@@ -29,8 +29,8 @@ fn silent_client(
     let (wire, place) = (Wire::new(), Arc::new(OnceLock::<st::Client>::new()));
     let options = st::Options { timeout, ..st::Options::default() };
     let (seen, looked) = (Arc::clone(&place), AtomicBool::new(false));
-    let client =
-        st::Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
+    let client = st::Client::over("wire", Box::new(Fresh(wire.clone())), options)
+        .with_interrupt_hook(move || {
             if !looked.swap(true, Ordering::SeqCst) {
                 once(seen.get().expect("it is there"));
             }
@@ -80,7 +80,7 @@ fn a_look_that_leaves_the_line_alone_does_not_disturb_the_exchange() {
     let looks = Arc::new(Mutex::new(0));
     let counted = Arc::clone(&looks);
     let client = st::Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
-    let client = client.looking(move || {
+    let client = client.with_interrupt_hook(move || {
         let mut looks = counted.lock().unwrap();
         *looks += 1;
         if *looks == 3 {
@@ -99,7 +99,7 @@ fn other_threads_wait_while_one_looks() {
     let (says, asked) = (wire.clone(), Arc::clone(&asks));
     let looks = AtomicU32::new(0);
     let client = st::Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
-    let client = client.looking(move || {
+    let client = client.with_interrupt_hook(move || {
         // The other thread has some looks to get in, if it could.
         let asks = asked.load(Ordering::SeqCst) > 0;
         if asks && looks.fetch_add(1, Ordering::SeqCst) == 3 {
@@ -132,8 +132,8 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
     let options = rmd::Options { timeout: LONG, ..rmd::Options::default() };
     let seen = Arc::clone(&place);
     let looked = AtomicBool::new(false);
-    let bus =
-        rmd::Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
+    let bus = rmd::Client::over("wire", Box::new(Fresh(wire.clone())), options)
+        .with_interrupt_hook(move || {
             if !looked.swap(true, Ordering::SeqCst) {
                 seen.get().unwrap().motor(1).unwrap().off().expect("it answers");
             }
@@ -160,7 +160,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
 fn an_error_of_the_look_interrupts_the_exchange_and_nothing_else() {
     let wire = Wire::new();
     let client = st::Client::over("wire", Box::new(Fresh(wire)), st::Options::default());
-    let client = client.looking(|| Err("enough".into()));
+    let client = client.with_interrupt_hook(|| Err("enough".into()));
     let error = client.motor(1).unwrap().start().expect_err("no time");
     assert!(matches!(&error, st::Error::Port(port) if port.is_interruption()), "{error}");
     assert!(error.to_string().contains("enough"), "{error}");

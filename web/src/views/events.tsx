@@ -4,16 +4,16 @@ import { useEffect } from 'preact/hooks';
 import { allMotors } from '../drives';
 import { nameOf, timeOfDay } from '../format';
 import { entries } from '../link';
-import type { Happening } from '../wire';
+import type { EventKind } from '../wire';
 import './events.css';
 
 const SHOWN = 200;
 /** Time between drawings, ms. */
 const DRAW = 200;
-const BAD: ReadonlySet<Happening> = new Set(['stop-failed', 'lost', 'silent', 'doubtful', 'refused']);
-const STOPS: ReadonlySet<Happening> = new Set(['stopping', 'latched']);
+const BAD: ReadonlySet<EventKind> = new Set(['stop-failed', 'lost', 'silent', 'doubtful', 'refused']);
+const STOPS: ReadonlySet<EventKind> = new Set(['stopping', 'latched']);
 
-const toneOf = (event: Happening) => (BAD.has(event) ? 'bad' : STOPS.has(event) ? 'warn' : 'muted');
+const toneOf = (event: EventKind) => (BAD.has(event) ? 'bad' : STOPS.has(event) ? 'warn' : 'muted');
 
 export default function Events() {
   const wanted = useSignal('');

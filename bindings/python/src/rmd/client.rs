@@ -57,7 +57,7 @@ impl RmdClient {
                 let wrap = move |link| seen.around_bus(link);
                 let bus = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                (bus.looking(deafness.look()), name.to_string())
+                (bus.with_interrupt_hook(deafness.look()), name.to_string())
             }
             AnyPort::Other(Port::Sim(port)) => {
                 let bus = Client::over(SimPort::NAME, port.can(py)?, options);
@@ -69,7 +69,7 @@ impl RmdClient {
                 let open = Box::new(move || Ok(seen.around_bus(Box::new(links()))));
                 let bus = Client::open_with(port.name(), open, options);
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                (bus.looking(deafness.look()), port.name().to_owned())
+                (bus.with_interrupt_hook(deafness.look()), port.name().to_owned())
             }
         };
         geared.iter().for_each(|(id, limits)| bus.set_limits(*id, *limits));

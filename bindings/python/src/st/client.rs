@@ -46,7 +46,7 @@ impl StClient {
                 let wrap = move |link| seen.around_line(link);
                 let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
-                let client = client.looking(deafness.look());
+                let client = client.with_interrupt_hook(deafness.look());
                 let clock = client.clock();
                 (client, name.to_string(), clock)
             }

@@ -20,7 +20,7 @@ use motorlink_capture::{
 };
 
 use motorlink_recording::read::{Line, MAGIC};
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 
 use crate::failure::Failure;
 use crate::output::note;
@@ -135,8 +135,8 @@ fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Re
     let mut recording = input.open()?;
     let lines = recording.lines();
     let is_wanted: fn(&Line) -> bool = match decoder {
-        Decoder::St(_) => |line| matches!(line.speaks, Speaks::St(_)),
-        Decoder::Rmd(_) => |line| line.speaks == Speaks::Rmd,
+        Decoder::St(_) => |line| matches!(line.speaks, DriveProtocol::St(_)),
+        Decoder::Rmd(_) => |line| line.speaks == DriveProtocol::Rmd,
     };
     if !lines.values().any(|line| is_wanted(line)) {
         let labels: Vec<&str> = lines.values().map(|line| &*line.label).collect();
@@ -149,8 +149,8 @@ fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Re
     let decoder = match decoder {
         Decoder::St(decoder) => {
             Decoder::St(lines.values().fold(decoder, |decoder, line| match line.speaks {
-                Speaks::St(profile) => decoder.with_line(&line.label, profile),
-                Speaks::Rmd => decoder,
+                DriveProtocol::St(profile) => decoder.with_line(&line.label, profile),
+                DriveProtocol::Rmd => decoder,
             }))
         }
         Decoder::Rmd(decoder) => Decoder::Rmd(decoder),

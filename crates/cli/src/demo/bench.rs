@@ -12,9 +12,9 @@ use motorlink_testbench::{BenchConfig, SimServer};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
+use crate::nonblocking_writer::NonblockingWriter;
 use crate::output::missed;
 use crate::sim;
-use crate::voice::Voice;
 
 pub struct Drives {
     /// Port of the ST drive.
@@ -75,7 +75,7 @@ impl Drives {
 
 fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = SimServer::new();
-    let out = Voice::new(stream.try_clone()?, missed);
+    let out = NonblockingWriter::new(stream.try_clone()?, missed);
     sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &out)?;
     // A signal must not end the drives before the demo has stopped its motors.
     sim::obey(&mut bench, stream, &out, |end| end)

@@ -9,8 +9,8 @@ use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, Protocol};
-use motorlink_telemetry::share::words::Speaks;
 use serde_json::json;
 
 use super::args::Motors;
@@ -130,7 +130,8 @@ fn read_line(node: &Name, network: Network, line: &Line, motors: &[(String, u8)]
     };
     match line.protocol {
         Protocol::St => {
-            let profile = Speaks::of(line).and_then(Speaks::profile).unwrap_or_default();
+            let profile =
+                DriveProtocol::of(line).and_then(DriveProtocol::profile).unwrap_or_default();
             let options = st::Options { profile, ..Default::default() };
             match st::Client::open(&port, options) {
                 Ok(client) => read(&|number| values(client.motor(number).map_err(text)?)),

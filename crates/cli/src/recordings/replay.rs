@@ -6,7 +6,7 @@ use std::time::Duration;
 use motorlink_link::serve::{ServeName, Server};
 use motorlink_recording::replay::{RmdLine, RmdReplay, Speed, StLine, StReplay, Tally};
 use motorlink_recording::schema::drive;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use serde_json::{Value, json};
 
 use super::input::Input;
@@ -96,8 +96,8 @@ fn read(input: &Input) -> Result<BTreeMap<String, Line>, Failure> {
     let mut lines: BTreeMap<String, Line> = BTreeMap::new();
     for line in recording.lines().into_values() {
         let empty = match line.speaks {
-            Speaks::St(profile) => Line::St(StLine::new(profile)),
-            Speaks::Rmd => Line::Rmd(RmdLine::default()),
+            DriveProtocol::St(profile) => Line::St(StLine::new(profile)),
+            DriveProtocol::Rmd => Line::Rmd(RmdLine::default()),
         };
         lines.insert(line.label.to_string(), empty);
     }

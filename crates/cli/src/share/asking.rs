@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
+use motorlink_telemetry::share::client_codec::{ClientCodec, Ended, Heard, Refusal};
 use motorlink_telemetry::share::message::{Answer, Ask, Line, StoppedMotor, Text};
 
 /// The longest time for the answer of a share that does not wait for a drive.
@@ -16,7 +16,7 @@ const ANSWER: Duration = Duration::from_secs(5);
 /// A connection to a share that asks one thing at a time.
 pub struct Connection {
     socket: UnixStream,
-    dialogue: Dialogue,
+    codec: ClientCodec,
     /// Answers that came before they were asked for with `answer`.
     ended: BTreeMap<u32, Result<Answer, Refusal>>,
     /// Why the share closes the connection.
@@ -31,7 +31,7 @@ impl Connection {
         socket.set_read_timeout(Some(ANSWER))?;
         socket.set_write_timeout(Some(ANSWER))?;
         let (ended, closing) = (BTreeMap::new(), None);
-        let mut opened = Connection { socket, dialogue: Dialogue::default(), ended, closing };
+        let mut opened = Connection { socket, codec: ClientCodec::default(), ended, closing };
         opened.ask(Ask::Hello { protocol: VERSION, name: by.to_owned() })?;
         Ok(opened)
     }
@@ -62,7 +62,7 @@ impl Connection {
     }
 
     fn send(&mut self, ask: Ask) -> io::Result<u32> {
-        let (id, stream) = self.dialogue.request(ask).map_err(io::Error::other)?;
+        let (id, stream) = self.codec.request(ask).map_err(io::Error::other)?;
         self.socket.write_all(&stream)?;
         Ok(id)
     }
@@ -74,7 +74,7 @@ impl Connection {
             if let Some(result) = self.ended.remove(&id) {
                 return result.map_err(|refusal| io::Error::other(refusal.message));
             }
-            while let Some(heard) = self.dialogue.hear().map_err(io::Error::other)? {
+            while let Some(heard) = self.codec.hear().map_err(io::Error::other)? {
                 match heard {
                     Heard::Ended(Ended { id, result }) => drop(self.ended.insert(id, result)),
                     Heard::Text(Text::Closing { message }) => self.closing = Some(message),
@@ -90,7 +90,7 @@ impl Connection {
                     let why = why.unwrap_or_else(|| "the share closed the connection".to_owned());
                     return Err(io::Error::other(why));
                 }
-                count => self.dialogue.push(&bytes[..count]),
+                count => self.codec.push(&bytes[..count]),
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use motorlink::st::Profile;
-use motorlink_telemetry::share::hub::Held;
+use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::message::{Line, Protocol};
 use motorlink_telemetry::share::opening::{Limits, OpenError, Wish};
 
@@ -46,7 +46,7 @@ impl Lines {
     }
 
     /// Opens each port, once for each protocol that it can have. `limits` hold for all programs.
-    pub fn open(&self, limits: Limits) -> Result<Vec<Held>, Failure> {
+    pub fn open(&self, limits: Limits) -> Result<Vec<SharedLine>, Failure> {
         let (mut held, mut st, mut rmd) = (Vec::new(), 0_usize, 0_usize);
         if self.is_empty() {
             return Err(missing_port());
@@ -60,7 +60,7 @@ impl Lines {
                     Protocol::Rmd => &mut rmd,
                 };
                 let name = format!("{}{number}", protocol.word());
-                held.push(Held::start(&name, wish.open(protocol)?)?);
+                held.push(SharedLine::start(&name, wish.open(protocol)?)?);
                 *number += 1;
             }
         }

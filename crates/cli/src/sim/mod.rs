@@ -24,8 +24,8 @@ use rustix::termios::{isatty, tcgetpgrp};
 use crate::failure::Failure;
 use crate::hint;
 use crate::interrupt::{self, interrupted};
+use crate::nonblocking_writer::NonblockingWriter;
 use crate::output;
-use crate::voice::Voice;
 
 /// Interval at which drives are advanced while no request comes.
 const IDLE: Duration = Duration::from_millis(20);
@@ -134,7 +134,7 @@ pub fn serve(
     config: &BenchConfig,
     st: &[String],
     rmd: &[String],
-    out: &Voice,
+    out: &NonblockingWriter,
 ) -> Result<(), Failure> {
     for port in st {
         out.say(bench.serve_st(&port.parse::<ServeName>()?, config)?);
@@ -151,7 +151,7 @@ pub fn serve(
 pub fn obey(
     bench: &mut SimServer,
     mut input: impl Read + AsFd,
-    out: &Voice,
+    out: &NonblockingWriter,
     ended: impl Fn(bool) -> bool,
 ) -> Result<(), Failure> {
     let mut lines = Lines::default();

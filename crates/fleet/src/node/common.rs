@@ -13,11 +13,11 @@ use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
 use super::sessions::Sessions;
+use crate::authorization::Lines;
 use crate::clock::Clock;
 use crate::key::Name;
+use crate::membership::Membership;
 use crate::message::{Answer, NoAnswer};
-use crate::roll::Roll;
-use crate::weight::Lines;
 
 /// What all tasks of a node have.
 pub(super) struct Common {
@@ -32,7 +32,7 @@ pub(super) struct Common {
     pub(super) state: RwLock<State>,
     pub(super) sessions: Mutex<Sessions>,
     /// The other nodes.
-    pub(super) roll: Mutex<Roll>,
+    pub(super) members: Mutex<Membership>,
 }
 
 /// What the node knows of its share.

@@ -1,12 +1,12 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
+mod admission;
 mod common;
-mod door;
-mod gate;
 mod others;
 mod outbox;
 mod publish;
 mod queries;
+mod query_router;
 mod reader;
 mod session;
 mod sessions;
@@ -103,7 +103,7 @@ impl Node {
             return Err(NodeError::NameTaken(name));
         }
         let boot = Name::run(computer::mark())?;
-        let (state, sessions, roll) = (RwLock::default(), Mutex::default(), Mutex::default());
+        let (state, sessions, members) = (RwLock::default(), Mutex::default(), Mutex::default());
         let own = OnceLock::new();
         let common = Arc::new(Common {
             name,
@@ -115,12 +115,12 @@ impl Node {
             zenoh,
             state,
             sessions,
-            roll,
+            members,
         });
         others::follow(&common).map_err(failed)?;
         runtime.block_on(publish::start(&common, period))?;
         runtime.block_on(queries::open(&common, reader))?;
-        let alive = door::open(&common, &runtime).map_err(failed)?;
+        let alive = query_router::open(&common, &runtime).map_err(failed)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {
             return Err(NodeError::Unknown(common.name.clone()));

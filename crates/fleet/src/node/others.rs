@@ -10,7 +10,7 @@ use zenoh::sample::{Sample, SampleKind};
 
 use super::common::Common;
 use crate::key::{self, Name};
-use crate::roll::Roll;
+use crate::membership::Membership;
 
 /// How long the network may take to take the last words.
 const LAST: Duration = Duration::from_secs(1);
@@ -20,7 +20,7 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
     let (zenoh, follower) = (&common.zenoh, Arc::clone(common));
     let ended = move |sample: Sample| {
         if let Some(run) = key::run_of(sample.key_expr().as_str()) {
-            follower.roll().ended(run);
+            follower.members().ended(run);
         }
     };
     let any = key::ended(&Name::any(), &Name::any());
@@ -30,8 +30,8 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
         let run = key::run_of(sample.key_expr().as_str());
         let Some(run) = run.filter(|(_, boot)| *boot != follower.boot) else { return };
         match sample.kind() {
-            SampleKind::Put => follower.roll().came(run),
-            SampleKind::Delete => follower.roll().went(run, follower.clock.now()),
+            SampleKind::Put => follower.members().came(run),
+            SampleKind::Delete => follower.members().went(run, follower.clock.now()),
         }
     };
     let alive = zenoh.liveliness().declare_subscriber(key::all_alive());
@@ -54,7 +54,7 @@ pub(super) fn say_end(common: &Common) {
 }
 
 impl Common {
-    pub(super) fn roll(&self) -> MutexGuard<'_, Roll> {
-        self.roll.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn members(&self) -> MutexGuard<'_, Membership> {
+        self.members.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -9,12 +9,12 @@ use motorlink_proto::rmd::{Command, ReadStatus};
 use motorlink_proto::st::{FrameCode, RegisterId};
 use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, DropRule, Event, Group, Happening, Line, SignalName, Text, decode,
+    Answer, Ask, DropRule, Event, EventKind, Group, Line, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
 use tokio::runtime::Handle;
@@ -26,9 +26,9 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
 use super::common::{Common, State, covers, reply};
+use crate::authorization::Lines;
 use crate::key;
 use crate::message::Info;
-use crate::weight::Lines;
 
 /// How often the state is published.
 const STATE: Duration = Duration::from_secs(1);
@@ -153,7 +153,7 @@ impl Common {
     /// Reads something of each motor that a line can have. The share remembers those that answer. A line
     /// that was silent at the first question is searched again: its drives may be switched on in between.
     fn search(self: Arc<Self>, program: &Program, line: &Line) {
-        let Some(speaks) = Speaks::of(line) else { return };
+        let Some(speaks) = DriveProtocol::of(line) else { return };
         let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
         let (program, name) = (program.clone(), line.line.clone());
         self.state_mut().searching.insert(name.clone());
@@ -210,7 +210,7 @@ impl Common {
             lines: state.known.clone(),
             searching: state.searching.iter().cloned().collect(),
             latched_by: state.latched_by.clone(),
-            away: self.roll().away(),
+            away: self.members().away(),
         }
     }
 
@@ -234,8 +234,8 @@ impl Common {
     fn follow_port(&self, event: &Event) {
         let Event { line: Some(line), event, message, .. } = event else { return };
         match event {
-            Happening::Lost => self.state_mut().lost.insert(line.clone(), message.clone()),
-            Happening::Back | Happening::Closed => self.state_mut().lost.remove(line),
+            EventKind::Lost => self.state_mut().lost.insert(line.clone(), message.clone()),
+            EventKind::Back | EventKind::Closed => self.state_mut().lost.remove(line),
             _ => None,
         };
     }
@@ -287,7 +287,9 @@ fn question(motor: Motor) -> Vec<u8> {
 
 /// Subscribes to the main values of a motor. Gives whether the share has taken it.
 async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) -> bool {
-    let Some(motor) = Speaks::of(line).and_then(|speaks| speaks.motor(motor)) else { return false };
+    let Some(motor) = DriveProtocol::of(line).and_then(|speaks| speaks.motor(motor)) else {
+        return false;
+    };
     let main = Overview::of(motor);
     let sources = main.fast().chain(main.slow()).chain(main.angle);
     let signals = sources

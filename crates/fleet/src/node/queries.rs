@@ -4,9 +4,9 @@ use std::io;
 use std::sync::Arc;
 
 use motorlink_proto::st::ErrorCode;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::words::Speaks;
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
@@ -194,7 +194,7 @@ fn say(query: &Query, answers: Vec<Reply>) {
 fn motor(line: &Line, number: &str) -> Option<u8> {
     // Replies have the number as it is written elsewhere: not `01`.
     let number = number.parse().ok().filter(|it: &u8| it.to_string() == number)?;
-    Speaks::of(line)?.motor(number).map(|_| number)
+    DriveProtocol::of(line)?.motor(number).map(|_| number)
 }
 
 fn json(value: &impl Serialize) -> Content {

@@ -13,14 +13,14 @@ use tokio::sync::mpsc::Receiver;
 use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
+use super::admission::{Admission, Verdict, age};
 use super::common::{Common, answer, answer_with};
-use super::gate::{Gate, Verdict, age};
 use super::outbox::Outbox;
 use super::sessions::{Asked, Asking};
+use crate::authorization;
 use crate::clock::span;
 use crate::key::Scope;
 use crate::message::{Answer, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
-use crate::weight;
 
 /// Requests without an answer. A share that has 256 answers for a program takes no more of its requests.
 const REQUESTS: usize = 128;
@@ -34,7 +34,7 @@ const PATIENCE: f64 = 60.0;
 /// What a session task has.
 pub(super) struct Session {
     pub(super) common: Arc<Common>,
-    pub(super) gate: Gate,
+    pub(super) admission: Admission,
     /// When the last message of any kind came.
     pub(super) heard: f64,
     /// Whether it has changed something.
@@ -156,7 +156,7 @@ impl Session {
                 if let Some(why) = forbidden(&post, kind, scope) {
                     answer(&query, &Answer::Refused { t: now, why });
                 } else {
-                    let verdict = self.gate.post(now, post, kind);
+                    let verdict = self.admission.post(now, post, kind);
                     self.taken(&query, now);
                     return self.carry_out(verdict).await;
                 }
@@ -169,7 +169,7 @@ impl Session {
                             .to_owned();
                     answer(&query, &Answer::Refused { t: now, why });
                 } else {
-                    let verdict = self.gate.urgent(now, after, post);
+                    let verdict = self.admission.urgent(now, after, post);
                     self.taken(&query, now);
                     return self.carry_out(verdict).await;
                 }
@@ -179,7 +179,7 @@ impl Session {
     }
 
     fn taken(&self, query: &Query, now: f64) {
-        answer(query, &Answer::Taken { t: now, next: self.gate.next() });
+        answer(query, &Answer::Taken { t: now, next: self.admission.next() });
     }
 
     /// Gives the end of the session, if this is it.
@@ -256,8 +256,8 @@ fn forbidden(post: &Post, kind: Kind, scope: Scope) -> Option<String> {
         () if is_of_session => Some(
             "a session begins with join, which says its deadlines, and ends with leave".to_owned(),
         ),
-        () if scope < weight::scope(kind) => {
-            Some(format!("this request needs the key of `{}`", weight::scope(kind).word()))
+        () if scope < authorization::scope(kind) => {
+            Some(format!("this request needs the key of `{}`", authorization::scope(kind).word()))
         }
         () => None,
     }

@@ -25,11 +25,11 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session as Zenoh, Wait};
 
 use crate::VERSION;
+use crate::authorization::{self, Lines};
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
 use crate::message::{Answer, Ask};
 use crate::remote::outgoing::Outgoing;
-use crate::weight::{self, Lines};
 
 /// How long a node keeps a pull, in seconds.
 const WAIT: f64 = 0.25;
@@ -313,7 +313,7 @@ impl Tunnel {
                     (Of::Urgent(post.number), Scope::Stop, Priority::RealTime)
                 }
                 Ask::Post(post) => {
-                    let scope = weight::scope(self.lines.kind(&post.request.ask));
+                    let scope = authorization::scope(self.lines.kind(&post.request.ask));
                     let priority = match scope {
                         Scope::Act => Priority::InteractiveHigh,
                         Scope::See | Scope::Stop => Priority::DataHigh,

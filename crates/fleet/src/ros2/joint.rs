@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use motorlink_proto::rmd::{Command as _, SetPositionLimited, SetSpeed, SetTorque};
 use motorlink_proto::st::Ramp;
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::Line;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use serde::Deserialize;
 
@@ -82,7 +82,7 @@ pub struct Joint {
     /// The line of its motor.
     pub line: String,
     /// What the line speaks.
-    pub speaks: Speaks,
+    pub speaks: DriveProtocol,
     /// Its motor.
     pub motor: Motor,
     /// What it obeys. `None`: it is read only.
@@ -209,7 +209,7 @@ impl Joint {
     }
 
     fn of(name: String, line: &Line, motor: u8) -> Option<Self> {
-        let speaks = Speaks::of(line)?;
+        let speaks = DriveProtocol::of(line)?;
         Some(Joint {
             name,
             line: line.line.clone(),

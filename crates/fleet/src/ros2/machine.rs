@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::exchange::Target;
 use motorlink_telemetry::share::frame::{Frame, Kind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, DropRule, Event, Happening, Line, SignalName, Text, decode,
+    Answer, Ask, DropRule, Event, EventKind, Line, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::runtime::Handle;
@@ -79,10 +80,10 @@ impl Shared {
     ) -> Arc<Self> {
         let mut orders = Vec::new();
         let motor = |joint: &Joint| {
-            let Joint { line, motor, speaks, .. } = joint.clone();
+            let target = Target::of(&joint.line, joint.motor, joint.speaks);
             let (sender, receiver) = watch::channel(None);
             orders.push(receiver);
-            (Asking { program: program.clone(), line, motor, speaks }, sender)
+            (Asking { program: program.clone(), target }, sender)
         };
         let motors = machine.commands.joints().map(motor).collect();
         let (machine, wake, runtime) = (Mutex::new(machine), Notify::new(), Handle::current());
@@ -174,7 +175,7 @@ impl Shared {
                             if let Some(since) = since {
                                 machine.readings.doubt(&line, motor, since);
                             }
-                            if let (Happening::Stopping, Some(by)) =
+                            if let (EventKind::Stopping, Some(by)) =
                                 (event, by.filter(|it| it != NAME))
                             {
                                 machine.stopped_by(now, &line, motor, &by);

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::Target;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
@@ -92,7 +93,7 @@ async fn stop_all(shared: &Arc<Shared>) -> Vec<String> {
 async fn clear_faults(shared: &Arc<Shared>) -> Vec<String> {
     let motors = shared.with(|machine, _| {
         let of_lines = machine.lines.iter().flat_map(|line| {
-            let speaks = Speaks::of(line);
+            let speaks = DriveProtocol::of(line);
             let motors =
                 line.heard.iter().filter_map(move |it| Some((speaks?, speaks?.motor(*it)?)));
             motors.map(|(speaks, motor)| (line.line.clone(), speaks, motor))
@@ -107,7 +108,8 @@ async fn clear_faults(shared: &Arc<Shared>) -> Vec<String> {
             continue;
         }
         let place = format!("{line}, motor {}", motor.number());
-        let asking = Asking { program: shared.program.clone(), line, motor, speaks };
+        let target = Target::of(&line, motor, speaks);
+        let asking = Asking { program: shared.program.clone(), target };
         match asking.clear_faults().await {
             Ok(None) => {}
             Ok(Some(left)) => failures.push(format!("{place}: {left}")),

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_telemetry::share::data::{Data, TIMES};
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::Group;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use crate::directory::Run;
@@ -135,7 +135,7 @@ impl Picture {
         for (run, Node { info, .. }) in &self.nodes {
             let node = &run.0;
             for line in &info.lines {
-                let Some(speaks) = Speaks::of(line) else { continue };
+                let Some(speaks) = DriveProtocol::of(line) else { continue };
                 for motor in line.heard.iter().filter_map(|number| speaks.motor(*number)) {
                     let key = (node.clone(), line.line.clone(), motor.number());
                     let values = self.values.get(&key).filter(|_| !self.has_twins(node));

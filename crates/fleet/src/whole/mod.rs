@@ -1,11 +1,11 @@
 //! All nodes of a network as one share: for programs that show or command a fleet.
 //!
 //! Its lines are `NODE/LINE`. A node that goes away keeps its lines, and its subscriptions go on when it is
-//! back. `merge` decides, without sockets and clocks.
+//! back. `aggregate` decides, without sockets and clocks.
 
+mod aggregate;
 mod latches;
 mod member;
-mod merge;
 mod names;
 mod round;
 mod serve;
@@ -18,8 +18,8 @@ use motorlink_telemetry::share::address::{Address, Unreachable};
 use crate::key::Name;
 use crate::network::Network;
 use crate::remote::{self, Remote};
+use aggregate::Aggregate;
 use latches::Latches;
-use merge::Merge;
 use serve::{Known, Serving};
 
 /// The nodes of a network.
@@ -58,8 +58,8 @@ impl Address for Whole {
         let zenoh = remote::zenoh_of(&pattern.network)
             .map_err(|error| Unreachable::Missing(format!("no node can be reached: {error}")))?;
         let (own, other) = remote::pair()?;
-        let merge = Merge::new(pattern.who.to_string(), latches);
-        let serving = Serving::open(merge, pattern, is_meant, known, zenoh, own);
+        let aggregate = Aggregate::new(pattern.who.to_string(), latches);
+        let serving = Serving::open(aggregate, pattern, is_meant, known, zenoh, own);
         let opened = remote::runtime()?.block_on(serving);
         opened.map_err(|error| Unreachable::Failed(error.to_string()))?;
         Ok(other)

@@ -1,6 +1,6 @@
 //! Names of lines: `st0` of node `arm1` is `arm1/st0` of the fleet.
 
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::message::{Answer, Ask, Event, StoppedMotor};
 
 use crate::key::Name;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::message::{Answer, Reason};
 
 use super::member::Member;

@@ -19,7 +19,7 @@ use zenoh::handlers::{FifoChannelHandler, RingChannel, RingChannelHandler};
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
-use super::merge::{Merge, Out};
+use super::aggregate::{Aggregate, Out};
 use crate::clock::{Boot, Clock};
 use crate::directory::{self, Run};
 use crate::key::{self, Name};
@@ -68,7 +68,7 @@ struct Link {
 
 /// A program that sees all nodes.
 pub(super) struct Serving {
-    merge: Merge,
+    aggregate: Aggregate,
     /// What a node is, besides its name.
     pattern: Remote,
     is_meant: Box<dyn Fn(&Name) -> bool + Send + Sync>,
@@ -103,7 +103,7 @@ pub(super) struct Absent {
 impl Serving {
     /// Looks for nodes, and serves the socket from then on. `known` has nodes that were there before.
     pub(super) async fn open(
-        merge: Merge,
+        aggregate: Aggregate,
         pattern: Remote,
         is_meant: impl Fn(&Name) -> bool + Send + Sync + 'static,
         known: Known,
@@ -120,7 +120,7 @@ impl Serving {
         let (reader, writer) = UnixStream::from_std(socket)?.into_split();
         let (told, news) = channel(QUEUE);
         let mut serving = Serving {
-            merge,
+            aggregate,
             pattern,
             is_meant: Box::new(is_meant),
             here: BTreeSet::new(),
@@ -190,19 +190,19 @@ impl Serving {
 
     /// Takes the requests of the program. `false`: it leaves.
     fn requests(&mut self) -> io::Result<bool> {
-        self.merge.at(Boot.now(), Boot.wall());
+        self.aggregate.at(Boot.now(), Boot.wall());
         while let Some(frame) = self.frames.take().map_err(io::Error::other)? {
             let request: Request = decode(&frame.payload).map_err(io::Error::other)?;
-            if !self.merge.asked(request) {
+            if !self.aggregate.asked(request) {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// Passes on what the merge says.
+    /// Passes on what the aggregate says.
     fn pass(&mut self) {
-        for out in self.merge.take() {
+        for out in self.aggregate.take() {
             match out {
                 Out::Program(Frame { kind, payload }) => {
                     // It was made from messages that were not too long.
@@ -241,7 +241,7 @@ impl Serving {
         }
         let name = self.name_of(&run);
         self.here.insert(run.clone());
-        self.merge.coming(name.clone());
+        self.aggregate.coming(name.clone());
         let (now, (node, boot)) = (Instant::now(), run);
         let new = Link { node, boot: None, run: 0, requests: None, next: Some(now) };
         let link = self.links.entry(name).or_insert(new);
@@ -290,7 +290,7 @@ impl Serving {
                 let next = Some(Instant::now() + AGAIN);
                 let link = Link { node, boot: Some(boot), run: 0, requests: None, next };
                 self.links.insert(name.clone(), link);
-                self.merge.remember(name, lines);
+                self.aggregate.remember(name, lines);
             }
         }
     }
@@ -324,14 +324,14 @@ impl Serving {
     }
 
     fn heard(&mut self, News { node, run, what }: News) {
-        self.merge.at(Boot.now(), Boot.wall());
+        self.aggregate.at(Boot.now(), Boot.wall());
         if self.links.get(&node).is_none_or(|link| link.run != run) {
             return;
         }
         let lost = match what {
-            What::Said(frame) => return self.merge.heard(&node, frame),
+            What::Said(frame) => return self.aggregate.heard(&node, frame),
             What::Connected(Ok(socket)) => match self.begin(&node, run, socket) {
-                Ok(()) => return self.merge.came(&node),
+                Ok(()) => return self.aggregate.came(&node),
                 Err(error) => error.to_string(),
             },
             What::Connected(Err(error)) => error.to_string(),
@@ -341,8 +341,8 @@ impl Serving {
             link.requests = None;
             link.next = Some(Instant::now() + AGAIN);
         }
-        self.merge.gone(&node, &lost);
-        let lines = self.merge.lines_of(&node).filter(|lines| !lines.is_empty());
+        self.aggregate.gone(&node, &lost);
+        let lines = self.aggregate.lines_of(&node).filter(|lines| !lines.is_empty());
         let run = self.links.get(&node).and_then(|it| Some((it.node.clone(), it.boot.clone()?)));
         if let Some((lines, run)) = lines.zip(run) {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);

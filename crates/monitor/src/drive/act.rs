@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use motorlink_proto::st::{Command as StCommand, Request as StRequest, Starting};
+use motorlink_proto::st::{Command as StCommand, Request as StRequest};
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::{Program, Refusal};
 
 use super::commands::Command;
 use super::control::{Control, Motion, Permitted};
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
-use super::target::Target;
 use crate::message::Value;
 
 /// A command of a page.
@@ -88,25 +87,14 @@ impl Act {
     }
 }
 
-/// Checks that a START_MOTOR had an effect: a drive acknowledges it in any case.
+/// Checks that a START_MOTOR had an effect.
 pub(super) async fn started(reads: &Exchanges<'_>) -> Result<(), Refusal> {
-    let mut starting = Starting::default();
-    let _ = starting.replied(0);
-    let Some((motor, profile)) = reads.of_st() else { return Ok(()) };
-    loop {
-        let StRequest::GetRegister(register) = starting.request() else { return Ok(()) };
-        let reply = reads.st(motor.number(), &starting.request()).await?;
-        let bits = register.decode(profile, &reply).ok_or_else(|| reads.unfit())?;
-        let Some(result) = starting.replied(bits) else { continue };
-        reads.carried_out().await?;
-        return match result {
-            Ok(_) => Ok(()),
-            Err(why) => {
-                let message = format!("{}: the motor did not start: {why}", reads.place());
-                Err(Refusal::new(Reason::Refused, message))
-            }
-        };
-    }
+    let result = reads.started().await?;
+    reads.carried_out().await?;
+    result.map(drop).map_err(|why| {
+        let message = format!("{}: the motor did not start: {why}", reads.place());
+        Refusal::new(Reason::Refused, message)
+    })
 }
 
 fn is_start(request: &Request) -> bool {

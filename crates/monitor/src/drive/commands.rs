@@ -11,11 +11,11 @@ use motorlink_proto::st::{
 use motorlink_proto::units::{Rounding, Scale};
 use motorlink_spec::st_messages::{self, Content, Value as StField};
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::Target;
 use motorlink_telemetry::share::program::Refusal;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
-use super::target::Target;
 use super::value;
 use crate::message::{self, Field, Value};
 
@@ -32,8 +32,8 @@ pub(super) enum Command {
 
 impl Command {
     /// All commands of the drives of a line.
-    pub(super) fn all(speaks: Speaks) -> Vec<Self> {
-        let Speaks::St(profile) = speaks else {
+    pub(super) fn all(speaks: DriveProtocol) -> Vec<Self> {
+        let DriveProtocol::St(profile) = speaks else {
             return COMMANDS.iter().map(Command::Rmd).collect();
         };
         let executed = st::Command::ALL.iter().filter(|command| command.is_in(profile));

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target};
 use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 
-use super::exchange::{ATTEMPTS, Exchanges};
 use super::limits::Limited;
-use super::target::Target;
 use crate::message::Ran;
+
+/// A command that may move a motor is not sent later than this, in seconds.
+pub(super) const MOTION: f64 = 0.3;
 
 /// How a page's motion is permitted.
 pub trait Motion: Send + Sync {
@@ -156,7 +158,7 @@ impl<'a, M: Motion> Permitted<'a, M> {
         control: &Control,
         request: &Request,
     ) -> Result<Vec<u8>, Refusal> {
-        let exchanges = Exchanges::new(&self.program, self.stops.target).motion();
+        let exchanges = Exchanges::new(&self.program, self.stops.target).within(MOTION);
         let mut attempt = 1;
         loop {
             exchanges.touch().await?;

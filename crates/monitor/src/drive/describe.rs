@@ -4,14 +4,14 @@ use motorlink_proto::rmd::Errors;
 use motorlink_proto::st::{Flags, Ramp, Status};
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity as _};
 use motorlink_telemetry::overview;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::signal::{Motor, Source};
 
 use super::commands::Command;
 use super::registers;
 use crate::message::{Controlled, Description, Fault, Mode, Overview, State};
 
-pub(super) fn describe(line: &str, speaks: Speaks) -> Description {
+pub(super) fn describe(line: &str, speaks: DriveProtocol) -> Description {
     let motor = speaks.motor(1).expect("a line can have motor 1");
     let main = overview::Overview::of(motor);
     let name = |source: Source| source.to_string();

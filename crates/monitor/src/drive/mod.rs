@@ -9,13 +9,11 @@ mod act;
 mod commands;
 mod control;
 mod describe;
-mod exchange;
 mod limits;
 mod registers;
 mod run;
 mod search;
 mod settings;
-mod target;
 mod value;
 mod write;
 
@@ -23,27 +21,26 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use motorlink::settings::Dump;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::{Exchanges, Target};
 use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::words::Speaks;
 
 use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
 use control::Control;
-use exchange::Exchanges;
-use target::Target;
 
 pub use control::Motion;
 
 /// Carries out the requests of pages about drives. Copies are the same drives.
 #[derive(Clone)]
 pub struct Drives {
-    lines: Arc<BTreeMap<String, Speaks>>,
+    lines: Arc<BTreeMap<String, DriveProtocol>>,
     control: Arc<Control>,
 }
 
 impl Drives {
     /// The names of the lines, and what their drives speak.
-    pub fn lines(&self) -> Vec<(String, Speaks)> {
+    pub fn lines(&self) -> Vec<(String, DriveProtocol)> {
         self.lines.iter().map(|(name, speaks)| (name.clone(), *speaks)).collect()
     }
 
@@ -54,7 +51,8 @@ impl Drives {
 
     /// The drives of these lines.
     pub fn new(lines: Vec<Line>) -> Self {
-        let lines = lines.iter().filter_map(|line| Some((line.line.clone(), Speaks::of(line)?)));
+        let lines =
+            lines.iter().filter_map(|line| Some((line.line.clone(), DriveProtocol::of(line)?)));
         Drives { lines: Arc::new(lines.collect()), control: Arc::default() }
     }
 
@@ -187,7 +185,7 @@ impl Drives {
         self.control.forget();
     }
 
-    fn speaks(&self, line: &str) -> Result<Speaks, Refusal> {
+    fn speaks(&self, line: &str) -> Result<DriveProtocol, Refusal> {
         self.lines.get(line).copied().ok_or_else(|| {
             let names: Vec<&str> = self.lines.keys().map(String::as_str).collect();
             Refusal::usage(format!("no line `{line}`; the lines are {}", names.join(", ")))

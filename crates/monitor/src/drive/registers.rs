@@ -7,13 +7,14 @@ use motorlink_proto::st::{
     self, Features, Profile, Reading, RegisterId, Request as StRequest, find_register,
 };
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::{
+    ATTEMPTS, Exchanges, Target, is_refused_by_motor, is_worth_repeating,
+};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::Refusal;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Quantity};
 
-use super::exchange::{ATTEMPTS, Exchanges, is_refused_by_motor, is_worth_repeating};
-use super::target::Target;
 use super::value;
 use crate::message::{Register, Value};
 
@@ -36,7 +37,7 @@ impl Place {
     /// The place with this name.
     pub(super) fn named(target: &Target, name: &str) -> Result<Self, Refusal> {
         let (found, why) = match (target.motor, target.speaks) {
-            (Motor::St(motor), Speaks::St(profile)) => {
+            (Motor::St(motor), DriveProtocol::St(profile)) => {
                 let tuning = StTuning { motor, profile };
                 let phase =
                     |block: &Block<st::Setting>| matches!(block.id, st::Setting::RevupPhase(_));
@@ -216,7 +217,7 @@ pub(super) fn is_writable(shape: &Shape, profile: Profile) -> bool {
 }
 
 /// The registers of the motors of a line.
-pub(super) fn all(speaks: Speaks) -> Vec<Register> {
+pub(super) fn all(speaks: DriveProtocol) -> Vec<Register> {
     match speaks.motor(1) {
         Some(Motor::St(motor)) => {
             let profile = speaks.profile().unwrap_or_default();

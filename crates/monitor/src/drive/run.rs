@@ -16,17 +16,16 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
 use super::act::started;
-use super::control::{Control, Motion, Permitted, Running, send};
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
-use super::target::Target;
+use super::control::{Control, MOTION, Motion, Permitted, Running, send};
 use crate::message::{Answer, Mode, Ran};
 
 /// The time between two references.
@@ -101,10 +100,10 @@ impl Run {
             }
             (Motor::Rmd(id), _, Mode::Position) => (begun.position(id).await?, false),
             (Motor::St(motor), _, Mode::Speed) => (begun.st_speed(motor).await?, false),
-            (Motor::St(motor), Speaks::St(Profile::Mcsdk54), Mode::Torque) => {
+            (Motor::St(motor), DriveProtocol::St(Profile::Mcsdk54), Mode::Torque) => {
                 (begun.st_torque_ramp(motor).await?, false)
             }
-            (Motor::St(motor), Speaks::St(Profile::Spec), Mode::Torque) => {
+            (Motor::St(motor), DriveProtocol::St(Profile::Spec), Mode::Torque) => {
                 (begun.st_current(motor).await?, true)
             }
             (Motor::St(_), ..) => return Err(no_position()),
@@ -177,7 +176,7 @@ impl<M: Motion> Begun<'_, M> {
     }
 
     async fn command(&self, request: &Request) -> Result<(), Refusal> {
-        let exchanges = self.reads().motion().continues();
+        let exchanges = self.reads().within(MOTION).continues();
         send(self.control, &exchanges, request).await.map(drop)
     }
 
@@ -393,7 +392,7 @@ impl References {
 
     /// Sends one. The replies so far are confirmed with the last one.
     async fn send_one(&self, reference: f64, is_last: bool) -> Result<(), Refusal> {
-        let exchanges = Exchanges::new(&self.program, &self.target).motion().continues();
+        let exchanges = Exchanges::new(&self.program, &self.target).within(MOTION).continues();
         let request = self.stream.request(reference)?;
         if !is_last {
             return send(&self.control, &exchanges, &request).await.map(drop);

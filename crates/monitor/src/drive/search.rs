@@ -2,20 +2,22 @@
 
 use motorlink_proto::rmd::{Command, MotorSet, ReadStatus};
 use motorlink_proto::st::{ErrorCode, RegisterId, Request};
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::words::Speaks;
 use tokio::task::JoinSet;
-
-use super::exchange::{ATTEMPTS, Exchanges, is_worth_repeating};
-use super::target::Target;
 
 /// The motors that reply.
 ///
 /// # Errors
 /// The line fails. No motor replies.
-pub(super) async fn motors(view: &Program, line: &str, speaks: Speaks) -> Result<Vec<u8>, Refusal> {
+pub(super) async fn motors(
+    view: &Program,
+    line: &str,
+    speaks: DriveProtocol,
+) -> Result<Vec<u8>, Refusal> {
     match speaks {
-        Speaks::St(_) => {
+        DriveProtocol::St(_) => {
             let mut attempt = 1;
             loop {
                 match st_motors(view, line, speaks).await {
@@ -24,11 +26,11 @@ pub(super) async fn motors(view: &Program, line: &str, speaks: Speaks) -> Result
                 }
             }
         }
-        Speaks::Rmd => rmd_motors(view, line).await,
+        DriveProtocol::Rmd => rmd_motors(view, line).await,
     }
 }
 
-async fn st_motors(view: &Program, line: &str, speaks: Speaks) -> Result<Vec<u8>, Refusal> {
+async fn st_motors(view: &Program, line: &str, speaks: DriveProtocol) -> Result<Vec<u8>, Refusal> {
     let mut found = Vec::new();
     let targets: Vec<_> =
         (1..=u8::MAX).map_while(|number| Target::new(line, number, speaks).ok()).collect();
@@ -56,7 +58,7 @@ async fn st_motors(view: &Program, line: &str, speaks: Speaks) -> Result<Vec<u8>
 async fn rmd_motors(view: &Program, line: &str) -> Result<Vec<u8>, Refusal> {
     let mut asked = JoinSet::new();
     for id in MotorSet::ALL {
-        let (view, target) = (view.clone(), Target::new(line, id.number(), Speaks::Rmd)?);
+        let (view, target) = (view.clone(), Target::new(line, id.number(), DriveProtocol::Rmd)?);
         asked.spawn(async move {
             let exchanges = Exchanges::new(&view, &target);
             // On a busy machine one reply may be late.

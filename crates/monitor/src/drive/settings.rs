@@ -9,14 +9,13 @@ use motorlink::settings::{
     identify,
 };
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::exchange::{Exchanges, Target, is_refused_by_motor};
 use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::program::{Program, Refusal};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::control::Control;
-use super::exchange::{Exchanges, is_refused_by_motor};
-use super::target::Target;
 use crate::message::{self, Answer};
 
 /// The settings of a motor of either protocol.
@@ -42,7 +41,7 @@ impl Tuned for RmdTuning {
 macro_rules! tuned {
     ($target:expr, |$tuning:ident| $then:expr) => {
         match ($target.motor, $target.speaks) {
-            (Motor::St(motor), Speaks::St(profile)) => {
+            (Motor::St(motor), DriveProtocol::St(profile)) => {
                 let $tuning = StTuning { motor, profile };
                 $then
             }
@@ -50,7 +49,7 @@ macro_rules! tuned {
                 let $tuning = RmdTuning { motor };
                 $then
             }
-            (Motor::St(_), Speaks::Rmd) => {
+            (Motor::St(_), DriveProtocol::Rmd) => {
                 Err(Refusal::usage("the line has drives of another protocol"))
             }
         }

@@ -5,14 +5,13 @@ use motorlink_proto::st::{
     parse_value,
 };
 use motorlink_telemetry::line::Request;
+use motorlink_telemetry::share::exchange::{Exchanges, Target};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::program::{Program, Refusal};
 
 use super::control::{Control, Motion, Permitted, send};
-use super::exchange::Exchanges;
 use super::registers::{self, Place};
 use super::settings;
-use super::target::Target;
 use super::value;
 use crate::message::Value;
 
@@ -84,9 +83,7 @@ async fn written(
             vec![value::text(&register.to_string(), "written; it cannot be read back")]
         }
         write => {
-            let motor = exchanges.target.name.motor;
-            let reply = exchanges.st(motor, &StRequest::GetRegister(register)).await?;
-            let read = register.decode(profile, &reply).ok_or_else(|| exchanges.unfit())?;
+            let read = exchanges.register(register).await?;
             // The drive changes references and modes itself.
             if let Ok(write) = write
                 && write.expected() != read

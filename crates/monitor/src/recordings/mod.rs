@@ -3,10 +3,10 @@
 //! [`Recordings`] belongs to the server, not to a page: a recording goes on when the page that asked for
 //! it has gone. Nothing else waits for it.
 
+mod downsample;
 mod folder;
 mod make;
 mod part;
-mod thin;
 
 use std::fs::File;
 use std::io;

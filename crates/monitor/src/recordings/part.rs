@@ -10,7 +10,7 @@ use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{self, Kind};
 use motorlink_telemetry::share::message::encode;
 
-use super::thin::{FEWEST, Point, Thin};
+use super::downsample::{Downsample, FEWEST, Point};
 use crate::message::{RecordedEvent, RecordedSignal, RecordingContent, RecordingPart};
 
 /// The most points of a signal.
@@ -99,9 +99,9 @@ pub fn read(
     let time = |t: f64| first.saturating_add((t.max(0.0) * 1e9) as u64);
 
     let points = wanted.points.clamp(FEWEST, MOST_POINTS);
-    let mut columns: BTreeMap<usize, Thin> = BTreeMap::new();
+    let mut columns: BTreeMap<usize, Downsample> = BTreeMap::new();
     for number in wanted.signals.iter().filter(|number| **number < signals.len()) {
-        columns.insert(*number, Thin::new(from, to, points));
+        columns.insert(*number, Downsample::new(from, to, points));
     }
     let mut events: Vec<RecordedEvent> = Vec::new();
     let mut more_events = 0;

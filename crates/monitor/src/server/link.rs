@@ -8,7 +8,7 @@ use std::time::Duration;
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::frame::Kind;
 use motorlink_telemetry::share::message::{
-    Answer, Ask, Happening, Line, Reason, Request, StoppedMotor, Text, decode,
+    Answer, Ask, EventKind, Line, Reason, Request, StoppedMotor, Text, decode,
 };
 use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, watch};
@@ -189,10 +189,10 @@ impl Link {
             }
             let Ok(Text::Event(event)) = decode(&frame.payload) else { continue };
             match event.event {
-                Happening::Latched => self.is_latched.store(true, Ordering::SeqCst),
-                Happening::Released => self.is_latched.store(false, Ordering::SeqCst),
+                EventKind::Latched => self.is_latched.store(true, Ordering::SeqCst),
+                EventKind::Released => self.is_latched.store(false, Ordering::SeqCst),
                 // An event that comes before the answer happened before it.
-                Happening::Opened | Happening::Closed => {
+                EventKind::Opened | EventKind::Closed => {
                     return Ok(lines(program, listener).await?.0);
                 }
                 _ => {}

@@ -2,7 +2,7 @@
 //!
 //! [`Server::start`] serves in threads of its own, until it is dropped.
 
-mod door;
+mod auth;
 pub mod link;
 mod recordings;
 mod routes;
@@ -21,13 +21,13 @@ use std::time::Duration;
 use motorlink_telemetry::share::address::Address;
 use tokio::runtime::{Builder, Runtime};
 
-pub use door::random_word;
+pub use auth::random_word;
 pub use state::Settings;
 pub use tls::{Tls, TlsError};
 
 use crate::message::Role;
 use crate::recordings::Recordings;
-use door::Door;
+use auth::Auth;
 use link::Link;
 use state::State;
 
@@ -71,9 +71,9 @@ impl Server {
         let Options { listener, tls, names, foxglove, share, recordings, settings } = options;
         let address = listener.local_addr()?;
         let bare_address = foxglove.as_ref().map(TcpListener::local_addr).transpose()?;
-        let door = Door::new(address.port(), tls.is_some(), names)?;
+        let auth = Auth::new(address.port(), tls.is_some(), names)?;
         let recordings = Recordings::new(recordings, Arc::clone(&share));
-        let state = Arc::new(State::new(door, Link::new(share), recordings, settings)?);
+        let state = Arc::new(State::new(auth, Link::new(share), recordings, settings)?);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("monitor")
@@ -96,14 +96,14 @@ impl Server {
 
     /// The address that a person of this role opens. `host` is this machine.
     pub fn url(&self, host: &str, role: Role) -> String {
-        let (port, token) = (self.address.port(), self.state.door.token(role));
-        format!("{}://{host}:{port}/?token={token}", self.state.door.scheme())
+        let (port, token) = (self.address.port(), self.state.auth.token(role));
+        format!("{}://{host}:{port}/?token={token}", self.state.auth.scheme())
     }
 
     /// The address for programs that speak Foxglove's protocol: with the token of viewers.
     pub fn foxglove_url(&self, host: &str) -> String {
-        let (port, token) = (self.address.port(), self.state.door.token(Role::Viewer));
-        let scheme = if self.state.door.scheme() == "https" { "wss" } else { "ws" };
+        let (port, token) = (self.address.port(), self.state.auth.token(Role::Viewer));
+        let scheme = if self.state.auth.scheme() == "https" { "wss" } else { "ws" };
         format!("{scheme}://{host}:{port}{}?token={token}", routes::VIEWER_PATH)
     }
 

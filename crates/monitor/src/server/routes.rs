@@ -16,7 +16,7 @@ use axum::{Extension, Json, Router};
 use motorlink_telemetry::share::message::StoppedMotor;
 use serde::{Deserialize, Serialize};
 
-use super::door::is_local_origin;
+use super::auth::is_local_origin;
 use super::socket::{self, LONGEST_TEXT};
 use super::state::State;
 use super::transport::Arrival;
@@ -97,7 +97,7 @@ fn has_place(request: &Request) -> bool {
 /// reads the drives.
 async fn admit_bare(Shared(state): Shared<Arc<State>>, request: Request, next: Next) -> Response {
     let headers = request.headers();
-    let is_own_host = request.uri().authority().is_none() && state.door.is_own_host(headers);
+    let is_own_host = request.uri().authority().is_none() && state.auth.is_own_host(headers);
     let mut response = match is_own_host && is_local_origin(headers).unwrap_or(true) {
         true => next.run(request).await,
         false => (StatusCode::FORBIDDEN, "Only programs may use this server.\n").into_response(),
@@ -111,7 +111,7 @@ async fn admit_bare(Shared(state): Shared<Arc<State>>, request: Request, next: N
 fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
     let refuse = |code, why: &'static str| Err(Box::new((code, why).into_response()));
     let headers = request.headers();
-    if request.uri().authority().is_some() || !state.door.is_own_host(headers) {
+    if request.uri().authority().is_some() || !state.auth.is_own_host(headers) {
         return refuse(StatusCode::FORBIDDEN, "This server does not have this name.\n");
     }
     // No other page knows a token. Viewers that are pages themselves have another origin.
@@ -123,16 +123,16 @@ fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
     // Browsers send it with what another page could misuse.
     let needs_origin =
         request.method() != Method::GET || matches!(request.uri().path(), "/ws" | VIEWER_PATH);
-    if !state.door.is_own_origin(headers).unwrap_or(!needs_origin) {
+    if !state.auth.is_own_origin(headers).unwrap_or(!needs_origin) {
         return refuse(StatusCode::FORBIDDEN, "Another page may not use this server.\n");
     }
     if request.uri().path() == "/"
         && let Some(role) = given_role(state, request)
     {
-        let cookie = [(LOCATION, "/".to_owned()), (SET_COOKIE, state.door.set_cookie(role))];
+        let cookie = [(LOCATION, "/".to_owned()), (SET_COOKIE, state.auth.set_cookie(role))];
         return Err(Box::new((StatusCode::SEE_OTHER, cookie).into_response()));
     }
-    match state.door.role(headers) {
+    match state.auth.role(headers) {
         Some(role) => Ok(role),
         None => refuse(
             StatusCode::UNAUTHORIZED,
@@ -144,7 +144,7 @@ fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
 /// The role of the token in the address.
 fn given_role(state: &State, request: &Request) -> Option<Role> {
     let Query(Given { token }) = Query::try_from_uri(request.uri()).ok()?;
-    state.door.role_of(&token?)
+    state.auth.role_of(&token?)
 }
 
 async fn page(headers: HeaderMap) -> Response {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
-use super::door::{Door, random_word};
+use super::auth::{Auth, random_word};
 use super::link::Link;
 use crate::foxglove::Viewers;
 use crate::page::Page;
@@ -31,7 +31,7 @@ pub struct Settings {
 
 /// A server with its pages.
 pub struct State {
-    pub door: Door,
+    pub auth: Auth,
     pub link: Arc<Link>,
     pub settings: Settings,
     pub recordings: Arc<Recordings>,
@@ -49,7 +49,7 @@ impl State {
     /// # Errors
     /// The system has no random numbers.
     pub fn new(
-        door: Door,
+        auth: Auth,
         link: Link,
         recordings: Recordings,
         settings: Settings,
@@ -57,7 +57,7 @@ impl State {
         let (link, run) = (Arc::new(link), random_word()?);
         let viewers = Viewers::new(Arc::clone(&link), settings.program.clone(), run.clone());
         Ok(State {
-            door,
+            auth,
             link,
             settings,
             recordings: Arc::new(recordings),

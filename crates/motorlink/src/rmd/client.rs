@@ -117,7 +117,7 @@ impl Client {
     /// `look` may use this bus, as a signal's handler does. The call that waits then ends with
     /// [`PortError::Overtaken`]. If `look` does not use the bus, that call continues. Other threads
     /// wait until the bus is free.
-    pub fn looking(
+    pub fn with_interrupt_hook(
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
     ) -> Self {
@@ -125,7 +125,7 @@ impl Client {
         self
     }
 
-    /// Gives up the exchanges that this thread has under way while it [looks](Self::looking); replies
+    /// Gives up the exchanges that this thread has under way while it [looks](Self::with_interrupt_hook); replies
     /// may still come. Waits for exchanges of other threads.
     pub fn abandon(&self) {
         self.turns.take().abandon();

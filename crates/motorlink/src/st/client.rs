@@ -125,7 +125,7 @@ impl Client {
     /// `look` may use this client, as a signal's handler does. The exchange that waits is given up
     /// then and ends with [`PortError::Overtaken`]. If `look` does not use the client, the exchange goes
     /// on. Other threads wait for their turn.
-    pub fn looking(
+    pub fn with_interrupt_hook(
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
     ) -> Self {
@@ -134,7 +134,7 @@ impl Client {
     }
 
     /// Gives up the exchange that this thread has under way while it
-    /// [looks](Self::looking); its reply may still come. Waits for exchanges of other threads.
+    /// [looks](Self::with_interrupt_hook); its reply may still come. Waits for exchanges of other threads.
     pub fn abandon(&self) {
         self.turns.take().abandon();
     }

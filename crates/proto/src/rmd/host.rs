@@ -37,11 +37,11 @@
 //! with [`Failure::Echo`].
 
 use super::command::{Code, Command, ReadMotionStatus, ReadStatus, SetTorque};
-use super::doubt::{Admitted, Doubt, answers};
 use super::limits::Limits;
 use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Failure, Output, RequestError};
+use super::reply_trust::{Admitted, ReplyTrust, answers};
 use crate::can::CanFrame;
 use crate::time::{Instant, Micros};
 
@@ -60,7 +60,7 @@ struct Slot {
     deadline: Instant,
     /// The failure so far. A timeout means that nothing was received instead of the reply.
     failure: Failure,
-    doubt: Doubt,
+    trust: ReplyTrust,
     limits: Limits,
 }
 
@@ -99,7 +99,7 @@ impl Host {
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
             failure: Failure::Timeout,
-            doubt: Doubt::UNKNOWN,
+            trust: ReplyTrust::UNKNOWN,
             limits: Limits { current: None, speed: None, angle: None },
         };
         Host {
@@ -272,7 +272,7 @@ impl Host {
     /// Declares that these motors have no pending reply to any host.
     pub fn trust(&mut self, ids: MotorSet) {
         for id in ids {
-            self.slot(id).doubt = Doubt::NONE;
+            self.slot(id).trust = ReplyTrust::NONE;
             self.strays.remove(id);
         }
     }
@@ -282,7 +282,7 @@ impl Host {
     pub fn reopened(&mut self, now: Instant) {
         for id in MotorSet::ALL {
             self.cancel(now, id);
-            self.slot(id).doubt = Doubt::UNKNOWN;
+            self.slot(id).trust = ReplyTrust::UNKNOWN;
         }
     }
 
@@ -307,12 +307,12 @@ impl Host {
 
     /// Whether a motor may have pending replies to a former host.
     pub fn is_unknown(&self, id: MotorId) -> bool {
-        self.slots[id.index()].doubt.is_unknown()
+        self.slots[id.index()].trust.is_unknown()
     }
 
     /// Whether no late reply of a motor is pending, so that a request to it is sent at once.
     pub fn is_trusted(&self, id: MotorId) -> bool {
-        self.slots[id.index()].doubt.is_none()
+        self.slots[id.index()].trust.is_none()
     }
 
     /// The motors with an open exchange or with a result that was not yet polled. While a frame of
@@ -386,7 +386,7 @@ impl Host {
                 return;
             }
             if self.questioned.contains(id)
-                && slot.doubt.is_unknown()
+                && slot.trust.is_unknown()
                 && Code::from(slot.data[0]) != Code::ReadMotionStatus
             {
                 // Two different questions: the reply to the first may belong to a former host.
@@ -395,11 +395,11 @@ impl Host {
                 return;
             }
             slot.data = *data;
-            slot.doubt.answered(now);
+            slot.trust.answered(now);
             self.replied.insert(id);
             return;
         }
-        let late = slot.doubt.late_reply(now, data[0]);
+        let late = slot.trust.late_reply(now, data[0]);
         if !late {
             self.strays.insert(id);
         }
@@ -430,9 +430,9 @@ impl Host {
         }
         self.check_clock(now);
         let quarantine = self.quarantine;
-        let doubt = &mut self.slot(id).doubt;
-        let was_trusted = doubt.is_none();
-        let admitted = doubt.admit(now, quarantine, data[0]);
+        let trust = &mut self.slot(id).trust;
+        let was_trusted = trust.is_none();
+        let admitted = trust.admit(now, quarantine, data[0]);
         if !was_trusted && admitted == Ok(Admitted::Request) {
             self.strays.remove(id);
         }
@@ -468,7 +468,7 @@ impl Host {
             self.earliest = now;
             for slot in &mut self.slots {
                 slot.deadline = now;
-                slot.doubt.begin_anew(now, self.quarantine);
+                slot.trust.begin_anew(now, self.quarantine);
             }
         }
         self.seen = now;
@@ -492,7 +492,7 @@ impl Host {
     fn expect_late(&mut self, now: Instant, id: MotorId) {
         let quarantine = self.quarantine;
         let slot = self.slot(id);
-        slot.doubt.missed(now, quarantine, slot.data[0]);
+        slot.trust.missed(now, quarantine, slot.data[0]);
     }
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {

@@ -41,7 +41,6 @@
 mod arrival;
 mod command;
 mod describe;
-mod doubt;
 mod drive;
 mod encoder;
 mod gear;
@@ -52,6 +51,7 @@ mod motor;
 mod outcome;
 mod payload;
 mod reply;
+mod reply_trust;
 mod way;
 
 pub use arrival::{

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use motorlink_capture::{Captured, Direction, Stamp, Wire};
 use motorlink_link::printable;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 
 use super::message::Messages;
 use super::recording::Recording;
@@ -19,7 +19,7 @@ pub struct Line {
     /// The label of its port.
     pub label: Arc<str>,
     /// What its drives speak.
-    pub speaks: Speaks,
+    pub speaks: DriveProtocol,
 }
 
 /// Frames of several lines may be out of order by this time: each line is recorded in turns.
@@ -48,8 +48,8 @@ impl<R: Read + Seek> Recording<R> {
             let schema = self.schema(channel)?;
             let fact = |key| channel.metadata.get(key).map(String::as_str);
             let speaks = match fact(drive::PROTOCOL)? {
-                drive::ST => Speaks::St(fact(drive::PROFILE)?.parse().ok()?),
-                drive::RMD => Speaks::Rmd,
+                drive::ST => DriveProtocol::St(fact(drive::PROFILE)?.parse().ok()?),
+                drive::RMD => DriveProtocol::Rmd,
                 _ => return None,
             };
             // It becomes a part of captures and of lines on a terminal.
@@ -125,8 +125,8 @@ impl Frame {
             channel: Some(Arc::clone(&line.label)),
             direction: Some(direction),
             wire: match line.speaks {
-                Speaks::St(_) => Wire::Serial(self.data),
-                Speaks::Rmd => Wire::Can(self.as_can()),
+                DriveProtocol::St(_) => Wire::Serial(self.data),
+                DriveProtocol::Rmd => Wire::Can(self.as_can()),
             },
         }
     }

@@ -15,7 +15,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::owner::{RETRY, RmdOwner};
 use motorlink_telemetry::line::{RmdLine, StLine, StOver, StRelay};
 use motorlink_telemetry::runner::Remote;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::signal::Motor;
 
 use super::frames::{Outlet, Plug};
@@ -93,10 +93,10 @@ enum Turn {
 
 impl Client {
     /// What its drives speak.
-    pub(super) fn speaks(&self) -> Speaks {
+    pub(super) fn speaks(&self) -> DriveProtocol {
         match &self.kind {
-            Kind::St { profile, .. } => Speaks::St(*profile),
-            Kind::Rmd { .. } => Speaks::Rmd,
+            Kind::St { profile, .. } => DriveProtocol::St(*profile),
+            Kind::Rmd { .. } => DriveProtocol::Rmd,
         }
     }
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use motorlink_proto::st::FullScale;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::sample::Sample;
-use motorlink_telemetry::share::message::Happening;
-use motorlink_telemetry::share::words::{Speaks, Told};
+use motorlink_telemetry::share::event_text::{DriveProtocol, Told};
+use motorlink_telemetry::share::message::EventKind;
 use motorlink_telemetry::signal::{Motor, Signal};
 
 use super::choice::Group;
@@ -29,7 +29,7 @@ pub struct Line {
     /// The name of its port.
     pub port: String,
     /// What its drives speak.
-    pub speaks: Speaks,
+    pub speaks: DriveProtocol,
     /// Its motors.
     pub motors: Vec<Motor>,
     /// The current of digit 32767 of an ST drive, if it is known.
@@ -204,8 +204,8 @@ impl Content {
     /// An event.
     pub(super) fn told(&mut self, stamp: Time, told: Told, put: &mut dyn FnMut(Entry)) {
         let silent = match told.event {
-            Happening::Silent | Happening::Lost | Happening::Closed => Some(true),
-            Happening::Answers | Happening::Back => Some(false),
+            EventKind::Silent | EventKind::Lost | EventKind::Closed => Some(true),
+            EventKind::Answers | EventKind::Back => Some(false),
             _ => None,
         };
         if let Some(is_silent) = silent {
@@ -299,8 +299,8 @@ impl Line {
     /// What is known of the line.
     pub fn pairs(&self) -> Pairs {
         let (protocol, profile) = match self.speaks {
-            Speaks::St(profile) => (drive::ST, Some(profile.name())),
-            Speaks::Rmd => (drive::RMD, None),
+            DriveProtocol::St(profile) => (drive::ST, Some(profile.name())),
+            DriveProtocol::Rmd => (drive::RMD, None),
         };
         let pairs = [
             (drive::LABEL, Some(self.label.as_str())),
@@ -316,12 +316,12 @@ impl Line {
 
     fn log(&self, stamp: Time, told: Told) -> Log {
         let severity = match told.event {
-            Happening::StopFailed => Severity::Error,
-            Happening::Lost
-            | Happening::Closed
-            | Happening::Silent
-            | Happening::Refused
-            | Happening::Doubtful => Severity::Warn,
+            EventKind::StopFailed => Severity::Error,
+            EventKind::Lost
+            | EventKind::Closed
+            | EventKind::Silent
+            | EventKind::Refused
+            | EventKind::Doubtful => Severity::Warn,
             _ => Severity::Info,
         };
         Log {

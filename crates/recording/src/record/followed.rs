@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use motorlink_telemetry::sample::Sample;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::message::{Event, Happening, SignalRate};
+use motorlink_telemetry::share::event_text::Told;
+use motorlink_telemetry::share::message::{Event, EventKind, SignalRate};
 use motorlink_telemetry::share::stream::{Followed as Target, Item, Stream, Wanted};
-use motorlink_telemetry::share::words::Told;
 use motorlink_telemetry::signal::Signal;
 
 use super::choice::Group;
@@ -101,16 +101,16 @@ impl Followed {
             Item::Rates(_) if now.0.saturating_sub(self.since.0) < RATES_FROM => {}
             Item::Rates(rates) => self.rates(&rates),
             Item::Event(time, event) => self.event(Time(time), event, put),
-            Item::Down(why) => self.content.told(now, of_line(Happening::Lost, why), put),
+            Item::Down(why) => self.content.told(now, of_line(EventKind::Lost, why), put),
             Item::Up => {
                 let back = "the share is there again".to_owned();
-                self.content.told(now, of_line(Happening::Back, back), put);
+                self.content.told(now, of_line(EventKind::Back, back), put);
             }
             Item::Late(since) => {
                 let waited = now.0.saturating_sub(since) as f64 / 1e9;
                 let message =
                     format!("values of the last {waited:.1} s come late: they waited at the share");
-                self.content.told(now, of_line(Happening::Late, message), put);
+                self.content.told(now, of_line(EventKind::Late, message), put);
             }
             Item::Clock { ahead, within } => {
                 let (by, way) = (ahead.abs(), if ahead < 0.0 { "behind" } else { "ahead" });
@@ -118,7 +118,7 @@ impl Followed {
                     "the wall clock of the share is {by:.3} s {way} (within {within:.3} s); times here \
                      are by the clock of this computer"
                 );
-                self.content.told(now, of_line(Happening::Clock, message), put);
+                self.content.told(now, of_line(EventKind::Clock, message), put);
             }
         }
     }

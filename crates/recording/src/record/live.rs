@@ -11,8 +11,8 @@ use motorlink::rmd::MotorSet;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::search;
 use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::stream::Stream;
-use motorlink_telemetry::share::words::Speaks;
 
 use super::choice::{self, Group};
 use super::content::{Content, Line};
@@ -73,7 +73,7 @@ impl Live {
     pub fn start(
         config: &Config,
         share: &Arc<dyn Address>,
-        lines: impl IntoIterator<Item = (String, Speaks)>,
+        lines: impl IntoIterator<Item = (String, DriveProtocol)>,
         put: impl FnMut(Item) + Send + 'static,
     ) -> io::Result<Self> {
         let (day, ends) = (DayInUse::new(), Arc::new(AtomicBool::new(false)));
@@ -112,7 +112,7 @@ impl Drop for Live {
 struct Seeker {
     name: String,
     port: String,
-    speaks: Speaks,
+    speaks: DriveProtocol,
     config: Config,
     ends: Arc<AtomicBool>,
     found: Sender<(String, Result<Found, String>)>,

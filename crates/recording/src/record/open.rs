@@ -11,9 +11,9 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{LineError, RmdLine, StLine};
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::search;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::share::port::place_of;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
@@ -126,7 +126,7 @@ pub(super) fn unsearched(
             let wrap = move |link| around.around_line(link);
             let client = st::EventClient::open_wrapped(&port.name, wrap, options);
             let line = StLine::new(client.map_err(LineError::from)?);
-            (Acquisition::new(Box::new(line)), Speaks::St(port.profile))
+            (Acquisition::new(Box::new(line)), DriveProtocol::St(port.profile))
         }
         Protocol::Rmd => {
             let mut options = rmd::Options::default();
@@ -134,7 +134,7 @@ pub(super) fn unsearched(
             let wrap = move |link| around.around_bus(link);
             let client = rmd::EventClient::open_wrapped(&port.name, wrap, options);
             let line = RmdLine::new(client.map_err(LineError::from)?);
-            (Acquisition::new(Box::new(line)), Speaks::Rmd)
+            (Acquisition::new(Box::new(line)), DriveProtocol::Rmd)
         }
     };
     let anchor = Anchor::now(acquisition.clock());
@@ -167,7 +167,7 @@ fn of_client(
 fn found(
     runner: &Runner,
     port: &str,
-    speaks: Speaks,
+    speaks: DriveProtocol,
     given: &[Motor],
     by: &Arc<str>,
     abort: &Abort,

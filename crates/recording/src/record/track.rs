@@ -5,7 +5,7 @@ use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::event::Event;
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::rows::{Item, MotorRows};
-use motorlink_telemetry::share::words::Words;
+use motorlink_telemetry::share::event_text::EventText;
 use motorlink_telemetry::signal::Signal;
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
 
@@ -32,7 +32,7 @@ pub struct Track {
     taps: Taps,
     splitter: Splitter,
     frames: usize,
-    words: Words,
+    words: EventText,
     /// Losses in the queues that are counted.
     known_lost: u64,
 }
@@ -58,7 +58,7 @@ impl Track {
         let (label, pairs) = (line.label.clone(), line.pairs());
         let content = Content::new(line, groups, topics);
         let frames = topics.frames(&label, pairs);
-        let (splitter, words) = (Splitter::default(), Words::default());
+        let (splitter, words) = (Splitter::default(), EventText::default());
         Track { content, anchor, feeds, taps, splitter, frames, words, known_lost: 0 }
     }
 

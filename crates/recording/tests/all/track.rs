@@ -18,7 +18,7 @@ use motorlink_recording::schema::{
 };
 use motorlink_recording::write::Entry;
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::words::Speaks;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::signal::Motor;
 use motorlink_testbench::Bench;
 
@@ -47,16 +47,16 @@ impl Recording {
         let taps = Taps::anchored(Anchor::new(Instant(0), Time(0)));
         let link = taps.around_line(Box::new(Polled(bench.bytes(&spec(faults)))));
         let engine = Engine::st(link, st_options(bench.profile()));
-        Self::new(engine, taps, Speaks::St(Profile::Spec), st(1))
+        Self::new(engine, taps, DriveProtocol::St(Profile::Spec), st(1))
     }
 
     fn rmd(bench: &Bench, faults: &str) -> Self {
         let taps = Taps::anchored(Anchor::new(Instant(0), Time(0)));
         let link = taps.around_bus(Box::new(Polled(bench.can(&spec(faults)))));
-        Self::new(Engine::rmd(link), taps, Speaks::Rmd, rmd(1))
+        Self::new(Engine::rmd(link), taps, DriveProtocol::Rmd, rmd(1))
     }
 
-    fn new(mut engine: Engine, taps: Taps, speaks: Speaks, motor: Motor) -> Self {
+    fn new(mut engine: Engine, taps: Taps, speaks: DriveProtocol, motor: Motor) -> Self {
         let line = Line {
             label: "line".to_owned(),
             port: "virtual".to_owned(),

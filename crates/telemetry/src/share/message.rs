@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use json::is_false;
 
-pub use events::{Event, Happening, Reason};
+pub use events::{Event, EventKind, Reason};
 pub use frames::{WireFrame, WireLoad, WireResult, WireWay};
 pub use json::{MessageError, decode, encode};
 pub use lines::{Finding, FoundPort, Line, LineCounts, Protocol};

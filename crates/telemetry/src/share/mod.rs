@@ -2,17 +2,19 @@
 //!
 //! The page docs/SHARE-PROTOCOL.md describes them. [`message`] has the texts (JSON), [`data`] the samples
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
-//! [`server`] connects programs to it through a Unix socket. [`dialogue`] is a program without a socket,
+//! [`server`] connects programs to it through a Unix socket. [`client_codec`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port, [`address`] the
-//! way to a share. With the feature `tokio` `program` is a program that does not block. [`request`] reads
-//! the bytes of a command.
-//! [`opening`] opens the ports of lines, [`scan`] asks what answers on others. [`words`] makes sentences
-//! of the events of an engine. [`wire`] keeps the frames of a line.
+//! way to a share. With the feature `tokio` `program` is a program that does not block, and `exchange`
+//! its requests to a motor. [`request`] reads the bytes of a command. [`opening`] opens the ports of lines,
+//! [`scan`] asks what answers on others. [`event_text`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
 
 pub mod address;
+pub mod client_codec;
 pub mod clock;
 pub mod data;
-pub mod dialogue;
+pub mod event_text;
+#[cfg(feature = "tokio")]
+pub mod exchange;
 pub mod frame;
 pub mod hub;
 pub mod message;
@@ -25,7 +27,6 @@ pub mod scan;
 pub mod server;
 pub mod stream;
 pub mod wire;
-pub mod words;
 
 /// The version of the messages.
 pub const VERSION: u32 = 1;

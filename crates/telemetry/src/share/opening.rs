@@ -6,9 +6,9 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink::{rmd, st};
 
+use super::event_text::DriveProtocol;
 use super::message::Protocol;
 use super::wire::Tap;
-use super::words::Speaks;
 use crate::acquisition::Acquisition;
 use crate::line::{RmdLine, StLine};
 
@@ -39,7 +39,7 @@ pub struct Opened {
     /// The port.
     pub port: PortName,
     /// What its drives speak.
-    pub speaks: Speaks,
+    pub speaks: DriveProtocol,
     /// The engine.
     pub engine: Acquisition,
     /// What is around the port.
@@ -79,7 +79,7 @@ impl Wish {
                 let options = st::Options { profile, timeout, limits, ..defaults };
                 let wrap = move |link| around.around_line(link);
                 let client = st::EventClient::open_wrapped(&self.port, wrap, options)?;
-                (Speaks::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
+                (DriveProtocol::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
             }
             Protocol::Rmd => {
                 let defaults = rmd::Options::default();
@@ -88,7 +88,7 @@ impl Wish {
                 let options = rmd::Options { timeout, limits, ..defaults };
                 let wrap = move |link| around.around_bus(link);
                 let client = rmd::EventClient::open_wrapped(&self.port, wrap, options)?;
-                (Speaks::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))
+                (DriveProtocol::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))
             }
         };
         Ok(Opened { port: self.port.clone(), speaks, engine, tap })

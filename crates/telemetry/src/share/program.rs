@@ -17,7 +17,7 @@ use super::address::Address;
 use super::frame::{self, Frame, Kind, Reader};
 use super::message::{self, Answer, Ask, Line, Reason, Request, Text};
 
-pub use super::dialogue::Refusal;
+pub use super::client_codec::Refusal;
 
 /// Ids of requests of this side begin here. Those below belong to whoever passes requests on.
 pub const OWN_IDS: u32 = 1 << 31;

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{Frame, MAX_FRAME, MAX_PAYLOAD, MotorNumber, RegisterId};
 
-use super::words::Speaks;
+use super::event_text::DriveProtocol;
 use crate::line::Request;
 use crate::signal::Motor;
 
@@ -44,7 +44,7 @@ impl Kind {
     }
 
     /// What the bytes of a command do. Of bytes that are no request nothing is known.
-    pub fn of_bytes(speaks: Speaks, motor: u8, bytes: &[u8]) -> Self {
+    pub fn of_bytes(speaks: DriveProtocol, motor: u8, bytes: &[u8]) -> Self {
         let segments = |_| Some(Vec::new());
         of(speaks, motor, bytes, segments).map_or(Kind::Changes, |(request, _)| Kind::of(&request))
     }
@@ -53,14 +53,14 @@ impl Kind {
 /// The request of these bytes, and what it does besides. `segments` are the registers of the data
 /// segments of the program.
 pub(super) fn of(
-    speaks: Speaks,
+    speaks: DriveProtocol,
     motor: u8,
     bytes: &[u8],
     segments: impl Fn(u8) -> Option<Vec<RegisterId>>,
 ) -> Result<(Request, Option<Configures>), String> {
     let profile = match speaks {
-        Speaks::St(profile) => profile,
-        Speaks::Rmd => {
+        DriveProtocol::St(profile) => profile,
+        DriveProtocol::Rmd => {
             let id = rmd_motor(motor)?;
             let bytes = <[u8; 8]>::try_from(bytes)
                 .map_err(|_| format!("a request has 8 bytes, not {}", bytes.len()))?;
@@ -104,12 +104,12 @@ pub(super) fn of(
 }
 
 /// The motor of this number.
-pub(super) fn motor(speaks: Speaks, number: u8) -> Result<Motor, String> {
+pub(super) fn motor(speaks: DriveProtocol, number: u8) -> Result<Motor, String> {
     match speaks {
-        Speaks::St(_) => MotorNumber::new(number)
+        DriveProtocol::St(_) => MotorNumber::new(number)
             .map(Motor::St)
             .ok_or_else(|| "an ST motor of a share has a number from 1 to 7".to_owned()),
-        Speaks::Rmd => rmd_motor(number).map(Motor::Rmd),
+        DriveProtocol::Rmd => rmd_motor(number).map(Motor::Rmd),
     }
 }
 

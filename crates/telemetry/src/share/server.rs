@@ -14,7 +14,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use super::frame::{self, LONGEST_REQUEST, Reader};
-use super::hub::{Held, Hub, LineEnded, SessionId};
+use super::hub::{Hub, LineEnded, SessionId, SharedLine};
 use super::message::{self, Event, Line, Text};
 use super::opening::Limits;
 use crate::line::Stopped;
@@ -85,7 +85,7 @@ impl Server {
     ///
     /// # Errors
     /// Somebody serves `path`, another file is there, or the system gives no socket.
-    pub fn open(path: &Path, share: &str, lines: Vec<Held>) -> Result<Self, ServerError> {
+    pub fn open(path: &Path, share: &str, lines: Vec<SharedLine>) -> Result<Self, ServerError> {
         let socket = UnixServer::open(path)?;
         let (wake, woken) = UnixStream::pair()?;
         wake.set_nonblocking(true)?;

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::client_codec::{ClientCodec, Ended, Heard, Refusal};
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::dialogue::{Dialogue, Ended, Heard, Refusal};
 use motorlink_telemetry::share::frame::{Kind, append};
 use motorlink_telemetry::share::message::*;
 
@@ -42,7 +42,7 @@ impl Connection for UnixStream {
 
 pub struct Asker {
     connection: Box<dyn Connection>,
-    dialogue: Dialogue,
+    codec: ClientCodec,
     pub events: VecDeque<Event>,
     pub ended: VecDeque<Ended>,
     pub groups: Vec<Group>,
@@ -72,7 +72,7 @@ impl Asker {
     pub fn silent(connection: Box<dyn Connection>) -> Self {
         Asker {
             connection,
-            dialogue: Dialogue::default(),
+            codec: ClientCodec::default(),
             events: VecDeque::new(),
             ended: VecDeque::new(),
             groups: Vec::new(),
@@ -90,7 +90,7 @@ impl Asker {
     pub fn send_all(&mut self, asks: impl IntoIterator<Item = Ask>) -> Vec<u32> {
         let (mut ids, mut stream) = (Vec::new(), Vec::new());
         for ask in asks {
-            let (id, bytes) = self.dialogue.request(ask).unwrap();
+            let (id, bytes) = self.codec.request(ask).unwrap();
             ids.push(id);
             stream.extend(bytes);
         }
@@ -121,7 +121,7 @@ impl Asker {
         })
     }
 
-    pub fn event(&mut self, happening: Happening) -> Event {
+    pub fn event(&mut self, happening: EventKind) -> Event {
         self.until(|it| {
             let at = it.events.iter().position(|it| it.event == happening)?;
             it.events.remove(at)
@@ -178,7 +178,7 @@ impl Asker {
     /// Waits for the next message. Gives whether one came before the end.
     pub fn hear(&mut self) -> bool {
         loop {
-            match self.dialogue.hear().unwrap() {
+            match self.codec.hear().unwrap() {
                 Some(Heard::Ended(ended)) => self.ended.push_back(ended),
                 Some(Heard::Data(data)) => self.samples.push_back(data),
                 Some(Heard::Text(Text::Event(event))) => self.events.push_back(event),
@@ -191,7 +191,7 @@ impl Asker {
                     if bytes.is_empty() {
                         return false;
                     }
-                    self.dialogue.push(&bytes);
+                    self.codec.push(&bytes);
                     continue;
                 }
             }

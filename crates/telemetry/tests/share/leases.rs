@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::asking::{Asker, command};
 use crate::shared::PATIENT;
 use crate::virtual_share::VirtualShare;
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::message::*;
 
 const RAMP: [u8; 7] = [7, 220, 5, 0, 0, 100, 0];
@@ -108,7 +108,7 @@ fn a_command_that_is_refused_gives_no_lease() {
 fn a_motor_is_taken_explicitly_and_the_log_says_so() {
     let (share, mut alice, mut bob) = turning_for_alice(Duration::from_secs(3600));
     bob.ask(Ask::Take { motor: motor() }).unwrap();
-    let taken = alice.event(Happening::Taken);
+    let taken = alice.event(EventKind::Taken);
     assert_eq!(taken.message, "st0, motor 1: bob takes it from alice");
     assert_eq!((taken.by.as_deref(), taken.motor), (Some("bob"), Some(1)));
     held(&mut alice, &RAMP);
@@ -116,7 +116,7 @@ fn a_motor_is_taken_explicitly_and_the_log_says_so() {
     share.reaches("st1.speed_rpm", |rpm| rpm > 1900.0);
     // It turns for bob now, who has not started it.
     drop(alice);
-    bob.event(Happening::Left);
+    bob.event(EventKind::Left);
     bob.ask(command("st0", 1, &RAMP)).unwrap();
     share.reaches("st1.speed_rpm", |rpm| (1400.0..1600.0).contains(&rpm));
     drop(bob);
@@ -129,7 +129,7 @@ fn a_taken_motor_stops_with_the_program_that_took_it() {
     bob.ask(Ask::Take { motor: motor() }).unwrap();
     drop(bob);
     // Alice is still there.
-    let stop = alice.event(Happening::Stopped);
+    let stop = alice.event(EventKind::Stopped);
     assert_eq!((stop.motor, stop.line.as_deref()), (Some(1), Some("st0")));
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::asking::{Asker, command};
 use crate::virtual_share::VirtualShare;
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::message::*;
 
 /// The id of requests with an age.
@@ -60,7 +60,7 @@ fn a_program_that_gives_no_sign_of_life_lapses_at_its_deadline() {
     }
     turns(&share);
     let heard = share.now();
-    let Event { message, .. } = watcher.event(Happening::Left);
+    let Event { message, .. } = watcher.event(EventKind::Left);
     let lapsed = share.now() - heard;
     assert!((0.45..0.56).contains(&lapsed.as_secs_f64()), "{lapsed:?}");
     let (_, why) = message.split_once("turns left: no sign of life for ").expect(&message);
@@ -83,7 +83,7 @@ fn a_stream_that_ends_lapses_though_the_program_lives() {
         program.send(Ask::Alive);
         program.ask(command("rmd0", 1, &READ)).unwrap();
     }
-    let Event { message, .. } = watcher.event(Happening::Left);
+    let Event { message, .. } = watcher.event(EventKind::Left);
     assert!(message.starts_with("turns left: rmd0, motor 1: no new command for 3"), "{message}");
     stands(&share);
 }
@@ -93,13 +93,13 @@ fn what_another_program_passes_on_is_as_old_as_it_says() {
     let (share, mut watcher, mut program) = turning(Some(0.5), Some(1.0));
     wait(&share, 0.4);
     send_aged(&mut program, 0.35, Ask::Alive);
-    let mut event = watcher.event(Happening::Left);
+    let mut event = watcher.event(EventKind::Left);
     assert!(event.message.contains("no sign of life for 5"), "{event:?}");
     let mut stream = share.join("streams");
     stream.ask(Ask::Deadline { silence: None, motion: Some(0.5) }).unwrap();
     ask_aged(&mut stream, 0.4, command("rmd0", 1, &TURN)).unwrap();
     let sent = share.now();
-    event = watcher.event(Happening::Left);
+    event = watcher.event(EventKind::Left);
     assert!(event.message.contains("motor 1: no new command for 5"), "{event:?}");
     assert!(share.now() - sent < Duration::from_millis(200));
     let mut late = share.join("late");
@@ -131,7 +131,7 @@ fn requests_of_others_that_are_refused_keep_no_owner_alive() {
         assert!(matches!(why, Reason::Refused | Reason::Overtaken), "{why:?}");
         sent.push(other.send(unknown()));
     }
-    let Event { message, .. } = watcher.event(Happening::Left);
+    let Event { message, .. } = watcher.event(EventKind::Left);
     assert!(message.contains("no sign of life for 5"), "{message}");
     // It rests already.
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
@@ -161,7 +161,7 @@ fn only_commands_that_are_carried_out_keep_a_stream_alive() {
             });
             wait(&share, 0.05);
         }
-        let Event { message, .. } = watcher.event(Happening::Left);
+        let Event { message, .. } = watcher.event(EventKind::Left);
         assert!(message.contains("motor 1: no new command for 3"), "{what}: {message}");
     }
 }
@@ -174,7 +174,7 @@ fn a_motor_that_is_taken_while_its_start_is_under_way_needs_commands() {
     takes.ask(Ask::Deadline { silence: None, motion: Some(0.3) }).unwrap();
     starts.send(command("rmd0", 1, &TURN));
     takes.ask(Ask::Take { motor: MotorName { line: "rmd0".to_owned(), motor: 1 } }).unwrap();
-    let Event { message, .. } = starts.event(Happening::Left);
+    let Event { message, .. } = starts.event(EventKind::Left);
     assert!(message.contains("takes left: rmd0, motor 1: no new command for 3"), "{message}");
     stands(&share);
 }
@@ -189,7 +189,7 @@ fn nobody_lapses_who_owns_no_motor_or_lets_them_turn() {
     wait(&share, 1.0);
     turns(&share);
     watcher.ask(Ask::Lines).unwrap();
-    let left = watcher.events.iter().find(|event| event.event == Happening::Left);
+    let left = watcher.events.iter().find(|event| event.event == EventKind::Left);
     assert!(left.is_none(), "{left:?}");
 }
 

@@ -5,7 +5,7 @@ use crate::drives::{path, served};
 use crate::shared::Share;
 use crate::stopping::eventually;
 use crate::virtual_share::VirtualShare;
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::message::*;
 
 fn opened(answer: Result<Answer, Refusal>) -> String {
@@ -28,7 +28,7 @@ fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
     let mut other = Asker::join(&share.path, "sees");
     assert_eq!(opened(program.ask(open(&st, Protocol::St))), "st1");
     assert_eq!(opened(program.ask(open(&format!("slcan:{rmd}"), Protocol::Rmd))), "rmd1");
-    let event = other.event(Happening::Opened);
+    let event = other.event(EventKind::Opened);
     assert_eq!((event.line.as_deref(), event.by.as_deref()), (Some("st1"), Some("opens")));
     assert_eq!(other.names(), ["st0", "rmd0", "st1", "rmd1"]);
     other.ask(command("st1", 1, &[2, 30])).unwrap();
@@ -50,10 +50,10 @@ fn a_line_is_opened_used_and_closed_and_everybody_is_told() {
     let Ok(Answer::Close { motors }) = program.ask(close("st1")) else { panic!("no answer") };
     let motor = MotorName { line: "st1".to_owned(), motor: 1 };
     assert_eq!(motors, [StoppedMotor { motor, failure: None, absent: false }]);
-    assert_eq!(other.event(Happening::Stopped).motor, Some(1));
+    assert_eq!(other.event(EventKind::Stopped).motor, Some(1));
     let speed = bench.signals().iter().position(|it| it.name == "st1.speed_rpm").unwrap();
     eventually(|| bench.values()[speed].abs() < 10.0);
-    assert_eq!(other.event(Happening::Closed).line.as_deref(), Some("st1"));
+    assert_eq!(other.event(EventKind::Closed).line.as_deref(), Some("st1"));
     assert_eq!(other.names(), ["st0", "rmd0", "rmd1"]);
     let (reason, why) = refused(other.ask(command("st1", 1, &[2, 30])));
     assert_eq!(
@@ -97,7 +97,7 @@ fn a_scan_says_what_answers_and_leaves_the_port_free() {
     // A pty has no rate.
     let (finding, motors, rate, port) = scanned(program.ask(scan(&st, Protocol::St, None)));
     assert_eq!((finding, motors, rate), (Finding::Drive, vec![], None));
-    let event = other.event(Happening::Scanned);
+    let event = other.event(EventKind::Scanned);
     assert_eq!(event.by.as_deref(), Some("scans"));
     assert!(event.message.contains(&port) && event.message.contains("MC SDK"), "{event:?}");
     let (reason, why) = refused(program.ask(scan(&st, Protocol::St, Some(9600))));

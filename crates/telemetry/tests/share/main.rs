@@ -14,7 +14,7 @@ mod life;
 mod lines;
 mod messages;
 mod model;
-mod owed;
+mod pending_stops;
 mod port;
 mod programs;
 mod scripted;

@@ -4,7 +4,7 @@ use motorlink_telemetry::share::data::{Data, DataError};
 use motorlink_telemetry::share::frame::{
     Frame, FrameError, HEADER, Kind, LONGEST, LONGEST_REQUEST, Reader, append,
 };
-use motorlink_telemetry::share::message::{Happening, Request, Text, decode, encode};
+use motorlink_telemetry::share::message::{EventKind, Request, Text, decode, encode};
 use proptest::prelude::*;
 
 const PAGE: &str = include_str!("../../../../docs/SHARE-PROTOCOL.md");
@@ -63,7 +63,7 @@ fn texts_of_later_versions_are_told_apart_from_damage() {
     let text = |json: &str| decode::<Text>(json.as_bytes());
     assert_eq!(text(r#"{"kind":"news","x":1}"#).unwrap(), Text::Later);
     let event = text(r#"{"kind":"event","wall":1,"event":"landed","message":"it has landed"}"#);
-    assert!(matches!(event, Ok(Text::Event(event)) if event.event == Happening::Later));
+    assert!(matches!(event, Ok(Text::Event(event)) if event.event == EventKind::Later));
     assert!(text(r#"{"kind":7}"#).is_err());
     assert!(text(r#"{"kind":"missed"}"#).is_err());
 }

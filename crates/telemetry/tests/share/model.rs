@@ -21,12 +21,12 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::runner::Remote;
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::frame::{Frame as Message, Kind};
-use motorlink_telemetry::share::hub::{Held, Hub, SessionId};
+use motorlink_telemetry::share::hub::{Hub, SessionId, SharedLine};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::wire::Tap;
-use motorlink_telemetry::share::words::Speaks;
 
 use crate::engine::Polled;
 
@@ -210,15 +210,15 @@ impl World {
         let options = motorlink::st::Options { timeout, ..Default::default() };
         let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
         let engine = Acquisition::new(Box::new(StLine::new(client)));
-        let (port, speaks) = ("/dev/st".parse().unwrap(), Speaks::St(Profile::Spec));
-        let (st, st_engine) = Held::here("st0", Opened { port, speaks, engine, tap });
+        let (port, speaks) = ("/dev/st".parse().unwrap(), DriveProtocol::St(Profile::Spec));
+        let (st, st_engine) = SharedLine::here("st0", Opened { port, speaks, engine, tap });
         let tap = Tap::default();
         let link = tap.around_bus(Box::new(Polled(Wire::to(drives))));
         let options = motorlink::rmd::Options { timeout, ..Default::default() };
         let client = motorlink::rmd::EventClient::over("rmd", link, options);
         let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-        let (port, speaks) = ("slcan:/dev/rmd".parse().unwrap(), Speaks::Rmd);
-        let (rmd, rmd_engine) = Held::here("rmd0", Opened { port, speaks, engine, tap });
+        let (port, speaks) = ("slcan:/dev/rmd".parse().unwrap(), DriveProtocol::Rmd);
+        let (rmd, rmd_engine) = SharedLine::here("rmd0", Opened { port, speaks, engine, tap });
         World {
             drives: Arc::clone(drives),
             hub: RefCell::new(Hub::new("model", vec![st, rmd], || {})),

@@ -21,7 +21,7 @@ use motorlink_telemetry::event::{CommandError, What};
 use motorlink_telemetry::line::{self, RmdLine, StLine};
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::share::message::{
-    self, Answer, Ask, Happening, Line, MotorName, Protocol, WireFrame,
+    self, Answer, Ask, EventKind, Line, MotorName, Protocol, WireFrame,
 };
 use motorlink_telemetry::share::port;
 use motorlink_telemetry::signal::{Motor, Signal};
@@ -53,7 +53,7 @@ fn latched(share: &Share) -> Asker {
 fn stops(witness: &mut Asker) -> usize {
     witness.ask(Ask::Latch).unwrap();
     witness.lines();
-    witness.events.drain(..).filter(|event| event.event == Happening::Stopping).count()
+    witness.events.drain(..).filter(|event| event.event == EventKind::Stopping).count()
 }
 
 fn start(client: &st::Client) {
@@ -178,7 +178,7 @@ fn a_share_ends_the_motion_of_a_client_as_the_client_has_declared() {
         share.reaches("rmd1.speed_dps", |dps| dps > 350.0);
         // As if it was killed.
         drop(client);
-        witness.event(Happening::Left);
+        witness.event(EventKind::Left);
         match ending {
             Ending::Nothing => share.reaches("rmd1.speed_dps", |dps| dps > 350.0),
             _ => share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0),

@@ -5,8 +5,8 @@ use crate::faulty::repeats;
 use crate::shared::PATIENT;
 use crate::virtual_share::VirtualShare;
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::wire::MOST_FRAMES;
 
@@ -69,7 +69,7 @@ fn programs_see_lines_and_signals_and_each_other() {
         assert!(signals.iter().any(|it| it.name == wanted && it.unit == unit), "{signals:?}");
     }
     drop(second);
-    assert_eq!(first.event(Happening::Left).by.as_deref(), Some("tuner 2"));
+    assert_eq!(first.event(EventKind::Left).by.as_deref(), Some("tuner 2"));
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn rows_of_a_line_that_repeats_replies_have_no_wrong_value() {
         assert!(data.columns[2].iter().all(|value| *value == expected), "{group:?}: {data:?}");
         count += data.rows();
     }
-    let told = viewer.events.iter().any(|it| it.event == Happening::Doubtful);
+    let told = viewer.events.iter().any(|it| it.event == EventKind::Doubtful);
     assert!(told, "a reply came twice");
 }
 
@@ -227,7 +227,7 @@ fn the_motors_of_a_program_that_goes_stop_and_no_others() {
     share.reaches("rmd2.speed_dps", |dps| dps.abs() < 5.0);
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
     share.reaches("rmd1.speed_dps", |dps| dps > 300.0);
-    assert_eq!(watcher.event(Happening::Left).by.as_deref(), Some("goes"));
+    assert_eq!(watcher.event(EventKind::Left).by.as_deref(), Some("goes"));
 }
 
 #[test]
@@ -245,10 +245,10 @@ fn a_program_that_leaves_says_why_its_motors_stop() {
     assert_eq!(page.closing(), None);
     share.reaches("rmd1.speed_dps", |dps| dps.abs() < 5.0);
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
-    let left = watcher.event(Happening::Left);
+    let left = watcher.event(EventKind::Left);
     assert_eq!(left.by.as_deref(), Some("page 4 (control)"));
     assert_eq!(left.message, "page 4 (control) left: the page gave no sign of life for 300 ms");
-    let mut stopping = [(); 2].map(|()| watcher.event(Happening::Stopping).message);
+    let mut stopping = [(); 2].map(|()| watcher.event(EventKind::Stopping).message);
     stopping.sort();
     let why = "page 4 (control) has left: the page gave no sign of life for 300 ms";
     let expected = ["rmd0", "st0"];
@@ -261,8 +261,8 @@ fn a_program_that_leaves_says_why_its_motors_stop() {
     let mut other = share.join("other");
     other.ask(turn(1, 360)).unwrap();
     drop(other);
-    assert_eq!(watcher.event(Happening::Left).message, "other left");
-    let stopping = watcher.event(Happening::Stopping).message;
+    assert_eq!(watcher.event(EventKind::Left).message, "other left");
+    let stopping = watcher.event(EventKind::Stopping).message;
     assert_eq!(stopping, "rmd0, motor 1: the share stops it, because other has left");
 }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::asking::{Asker, command, hello, turn};
 use crate::shared::{LIMIT, Share};
 use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::dialogue::Refusal;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::frame::{Kind, append};
 use motorlink_telemetry::share::message::*;
 

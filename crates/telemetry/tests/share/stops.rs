@@ -62,9 +62,9 @@ fn a_number_that_the_drive_does_not_have_is_absent_and_no_event() {
         assert_eq!(stopped, motors("st0", &[(1, "confirmed"), (5, "absent")]));
     }
     for _ in 0..2 {
-        program.event(Happening::Stopped);
+        program.event(EventKind::Stopped);
     }
-    let is_stop = |event: &&Event| event.motor == Some(5) && event.event != Happening::Commanded;
+    let is_stop = |event: &&Event| event.motor == Some(5) && event.event != EventKind::Commanded;
     let told: Vec<_> = program.events.iter().filter(is_stop).collect();
     assert!(told.is_empty(), "{told:?}");
 }
@@ -88,7 +88,7 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
     }
     let absent = stops(&mut program, 5);
     assert!(absent <= 3, "{absent} stops to a number that the drive does not have");
-    assert_eq!(program.event(Happening::StopFailed).motor, Some(1));
+    assert_eq!(program.event(EventKind::StopFailed).motor, Some(1));
     let mut other = share.join("comes later");
     assert_eq!(heard_and_unstopped(&mut other, "st0"), (vec![1], vec![1]));
     cut.store(false, Ordering::SeqCst);
@@ -99,7 +99,7 @@ fn a_motor_that_answered_and_is_silent_now_may_turn() {
 /// The next motor of st0 that confirms a stop.
 fn stopped_on_st0(program: &mut Asker) -> Option<u8> {
     loop {
-        let event = program.event(Happening::Stopped);
+        let event = program.event(EventKind::Stopped);
         if event.line.as_deref() == Some("st0") {
             return event.motor;
         }
@@ -173,7 +173,7 @@ fn a_motor_without_owner_stops_with_the_program_that_changed_its_speed() {
     let mut program = share.join("ramps");
     program.ask(command("st0", 2, &RAMP)).unwrap();
     drop(program);
-    let stop = watcher.event(Happening::Stopped);
+    let stop = watcher.event(EventKind::Stopped);
     assert_eq!((stop.motor, stop.line.as_deref()), (Some(2), Some("st0")));
     share.reaches("st2.speed_rpm", |rpm| rpm.abs() < 30.0);
 }
@@ -187,9 +187,9 @@ fn a_motor_belongs_to_the_program_that_changed_its_speed_last() {
     first.ask(command("st0", 1, &START)).unwrap();
     last.ask(command("st0", 1, &RAMP)).unwrap();
     drop(first);
-    last.event(Happening::Left);
+    last.event(EventKind::Left);
     share.reaches("st1.speed_rpm", |rpm| rpm > 700.0);
-    let stopped = last.events.iter().find(|it| it.event == Happening::Stopping);
+    let stopped = last.events.iter().find(|it| it.event == EventKind::Stopping);
     assert!(stopped.is_none(), "{stopped:?}");
     drop(last);
     share.reaches("st1.speed_rpm", |rpm| rpm.abs() < 30.0);
@@ -204,7 +204,7 @@ fn a_motor_that_holds_after_a_stop_of_another_program_stays_with_its_owner() {
         owner.ask(command("rmd0", 1, &TURN)).unwrap();
         other.ask(command("rmd0", 1, &HOLD)).unwrap();
         drop(owner);
-        other.event(Happening::Left);
+        other.event(EventKind::Left);
         other.ask(command("rmd0", 1, &READ)).unwrap();
         let frames = other.frames("rmd0", None, None);
         let sent = frames.iter().filter(|frame| frame.direction == WireWay::ToDrive);
@@ -248,7 +248,7 @@ fn a_command_that_is_under_way_when_the_owner_leaves_goes_on() {
     lives.end_of(sent).unwrap();
     share.reaches("rmd1.speed_dps", |dps| dps > 8.0);
     lives.lines();
-    let stop = lives.events.iter().find(|event| event.event == Happening::Stopping);
+    let stop = lives.events.iter().find(|event| event.event == EventKind::Stopping);
     assert!(stop.is_none(), "{stop:?}");
     drop(lives);
     share.reaches("rmd1.speed_dps", |dps| dps.abs() < 1.0);

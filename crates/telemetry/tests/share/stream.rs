@@ -11,10 +11,10 @@ use crate::shared::{LIMIT, Share};
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::data::Data;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::frame::{Kind, append};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_telemetry::signal::{Motor, Signal};
 
 fn now() -> u64 {
@@ -42,7 +42,7 @@ fn target(path: &Path, line: &str) -> Followed {
     Followed {
         share: Arc::new(Local(path.to_owned())),
         line: line.to_owned(),
-        speaks: Speaks::Rmd,
+        speaks: DriveProtocol::Rmd,
         name: "follower".to_owned(),
         wanted: vec![
             wanted(&["speed_dps", "multi_turn_angle_degrees"], 0.01),
@@ -92,8 +92,8 @@ fn events_of_the_line_and_of_the_share_are_told() {
     let is = |wanted| move |item: &Item| matches!(item, Item::Event(_, it) if it.event == wanted);
     until(&mut other, is_row);
     drop(other);
-    let items = until(&mut stream, is(Happening::Left));
-    assert!(items.iter().any(is(Happening::Joined)));
+    let items = until(&mut stream, is(EventKind::Left));
+    assert!(items.iter().any(is(EventKind::Joined)));
     share.reaches("rmd2.speed_dps", |dps| dps == 0.0);
 }
 

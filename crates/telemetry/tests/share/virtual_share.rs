@@ -11,11 +11,11 @@ use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::runner::Remote;
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::frame::{Reader, append};
-use motorlink_telemetry::share::hub::{Held, Hub, SessionId};
+use motorlink_telemetry::share::hub::{Hub, SessionId, SharedLine};
 use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::wire::Tap;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_testbench::{Bench, BenchConfig};
 
 use crate::asking::{Asker, Connection};
@@ -99,7 +99,7 @@ fn st(
     bench: &Bench,
     timeout: Duration,
     around: impl FnOnce(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
-) -> (Held, Remote) {
+) -> (SharedLine, Remote) {
     let port = "/dev/st".parse().unwrap();
     let tap = Tap::default();
     let mut link = Some(tap.around_line(around(Box::new(Polled(bench.bytes(&Faults::NONE))))));
@@ -107,17 +107,17 @@ fn st(
     let options = motorlink::st::Options { timeout, ..Default::default() };
     let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
     let engine = Acquisition::new(Box::new(StLine::new(client)));
-    Held::here("st0", Opened { port, speaks: Speaks::St(Profile::Spec), engine, tap })
+    SharedLine::here("st0", Opened { port, speaks: DriveProtocol::St(Profile::Spec), engine, tap })
 }
 
-fn rmd(bench: &Bench, timeout: Duration) -> (Held, Remote) {
+fn rmd(bench: &Bench, timeout: Duration) -> (SharedLine, Remote) {
     let port = "slcan:/dev/rmd".parse().unwrap();
     let tap = Tap::default();
     let link = tap.around_bus(Box::new(Polled(bench.can(&Faults::NONE))));
     let options = motorlink::rmd::Options { timeout, ..Default::default() };
     let client = motorlink::rmd::EventClient::over("rmd", link, options);
     let engine = Acquisition::new(Box::new(RmdLine::new(client)));
-    Held::here("rmd0", Opened { port, speaks: Speaks::Rmd, engine, tap })
+    SharedLine::here("rmd0", Opened { port, speaks: DriveProtocol::Rmd, engine, tap })
 }
 
 impl World {

@@ -13,11 +13,11 @@ use motorlink::st::{EventClient, Options};
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
-use motorlink_telemetry::share::hub::Held;
+use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::opening::Opened;
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
-use motorlink_telemetry::share::words::Speaks;
 use motorlink_testbench::{Bench, BenchConfig, Serving};
 
 use crate::drives::{path, served_by};
@@ -84,8 +84,8 @@ impl Share {
         let options = Options { profile, timeout: st_timeout, ..Options::default() };
         let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, options);
         let engine = Acquisition::new(Box::new(StLine::new(client.unwrap())));
-        let (port, speaks) = (st.parse().unwrap(), Speaks::St(profile));
-        let st = Held::start("st0", Opened { port, speaks, engine, tap }).unwrap();
+        let (port, speaks) = (st.parse().unwrap(), DriveProtocol::St(profile));
+        let st = SharedLine::start("st0", Opened { port, speaks, engine, tap }).unwrap();
         let tap = Tap::default();
         let wrap = {
             let tap = tap.clone();
@@ -95,7 +95,9 @@ impl Share {
         let port: PortName = format!("slcan:{rmd}").parse().unwrap();
         let client = motorlink::rmd::EventClient::open_wrapped(&port, wrap, options);
         let engine = Acquisition::new(Box::new(RmdLine::new(client.unwrap())));
-        let rmd = Held::start("rmd0", Opened { port, speaks: Speaks::Rmd, engine, tap }).unwrap();
+        let rmd =
+            SharedLine::start("rmd0", Opened { port, speaks: DriveProtocol::Rmd, engine, tap })
+                .unwrap();
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         if let Some(lease) = lease {

@@ -7,11 +7,11 @@ use motorlink_proto::Motion;
 use motorlink_proto::time::{Instant, Micros};
 
 use super::Hub;
-use super::asked::{Refused, usage};
-use super::leases::Lease;
-use super::line::Held;
-use super::place::SessionId;
-use crate::share::message::{Answer, Happening, MotorName, Reason};
+use super::ids::SessionId;
+use super::line::SharedLine;
+use super::motors::Lease;
+use super::requests::{Refused, usage};
+use crate::share::message::{Answer, EventKind, MotorName, Reason};
 use crate::signal::Motor;
 
 impl Hub {
@@ -50,10 +50,8 @@ impl Hub {
     /// The command with which a program got a motor was refused.
     pub(super) fn give_lease_back(&mut self, session: SessionId, line: usize, motor: Motor) {
         let Some(held) = self.lines.get_mut(&line) else { return };
-        if held.leases.get(&motor).is_some_and(|lease| lease.session == session)
-            && !held.owners.is_own(motor, session)
-        {
-            held.leases.remove(&motor);
+        if !held.owners.is_own(motor, session) {
+            held.motor_state(motor).lease.take_if(|lease| lease.session == session);
         }
     }
 
@@ -84,7 +82,7 @@ impl Hub {
 
     /// The motor is the program's without a command. If it was before, that makes no command younger.
     fn owns_now(&mut self, session: SessionId, (line, motor): (usize, Motor), was_own: bool) {
-        let is_own = |held: &Held| held.owners.is_own(motor, session);
+        let is_own = |held: &SharedLine| held.owners.is_own(motor, session);
         if !was_own
             && self.lines.get(&line).is_some_and(is_own)
             && let Some(session) = self.sessions.get_mut(&session)
@@ -113,17 +111,19 @@ impl Hub {
         let (of, number) = (held.name.clone(), motor.number());
         if let Some(before) = before.filter(|_| is_held) {
             let message = format!("{of}, motor {number}: {name} takes it from {}", before.name);
-            self.say_of((Some(&of), Some(number)), Happening::Taken, name, message);
+            self.say_of((Some(&of), Some(number)), EventKind::Taken, name, message);
         }
         self.owns_now(session, (line, motor), was_own);
         Ok(Some(Answer::Take))
     }
 }
 
-impl Held {
+impl SharedLine {
     /// A program has left.
     pub(super) fn give_leases_back(&mut self, gone: SessionId) {
-        self.leases.retain(|_, lease| lease.session != gone);
+        for (_, state) in self.motors.iter_mut() {
+            state.lease.take_if(|lease| lease.session == gone);
+        }
     }
 
     /// A program has a motor until this time. Gives the lease before.
@@ -133,12 +133,15 @@ impl Held {
         (session, name): (SessionId, &Arc<str>),
         until: Instant,
     ) -> Option<Lease> {
-        self.leases.insert(motor, Lease { session, name: Arc::clone(name), until })
+        self.motor_state(motor).lease.replace(Lease { session, name: Arc::clone(name), until })
     }
 
     /// Who has a motor, if it is another program than this one.
     fn lease_of_another(&self, motor: Motor, own: SessionId, now: Instant) -> Option<String> {
-        let lease = self.leases.get(&motor).filter(|lease| lease.session != own)?;
+        let lease = self.motors.get(&motor)?.lease.as_ref()?;
+        if lease.session == own {
+            return None;
+        }
         let (line, number, name) = (&self.name, motor.number(), &lease.name);
         if self.owners.owner(motor) == Some(lease.session) && !self.owners.is_held(motor) {
             return Some(format!(

@@ -9,7 +9,7 @@ use litemap::LiteMap as Map;
 use motorlink::port::{Carries, Place, PortName};
 use motorlink_link::list;
 
-use super::place::SessionId;
+use super::ids::SessionId;
 use crate::line::Stopped;
 use crate::share::message::{FoundPort, Protocol};
 use crate::share::opening::{OpenError, Opened};

@@ -2,16 +2,16 @@
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::line::Held;
-use super::place::SessionId;
-use super::{Hub, words};
+use super::ids::SessionId;
+use super::line::SharedLine;
+use super::{Hub, event_text};
 use crate::share::message::Ending;
 use crate::signal::Motor;
 
 /// The hub did not run for so long: no program could give it a sign of life.
 const PAUSE: Micros = Micros::from_millis(200);
 
-impl Held {
+impl SharedLine {
     /// The motors of a program that it has not stopped.
     fn turning_for(&self, id: SessionId) -> Vec<Motor> {
         // The requests of others may all be refused.
@@ -59,12 +59,12 @@ impl Hub {
         if let Some(silent) = session.life.silent(self.now)
             && self.lines.values().any(|held| !held.turning_for(id).is_empty())
         {
-            return Some(words::silent(silent));
+            return Some(event_text::silent(silent));
         }
         session.life.late(self.now).find_map(|((line, motor), age)| {
             let held =
                 self.lines.get(&line).filter(|held| held.turning_for(id).contains(&motor))?;
-            Some(words::late(&held.name, motor.number(), age))
+            Some(event_text::late(&held.name, motor.number(), age))
         })
     }
 }

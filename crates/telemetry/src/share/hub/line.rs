@@ -1,6 +1,5 @@
 //! A line that a share holds, and whose motors are whose.
 
-use std::collections::BTreeSet;
 use std::convert::Infallible;
 use std::io;
 use std::sync::{Arc, mpsc};
@@ -14,20 +13,20 @@ use motorlink_proto::Motion;
 use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
-use super::leases::Lease;
-use super::owed::{Owed, UnansweredStop};
-use super::place::{SessionId, seconds, wall_now};
+use super::ids::{SessionId, seconds, wall_now};
+use super::motors::{MotorState, Presence};
+use super::pending_stops::{LineStop, PendingStop};
 use super::reasons::may_be_executed;
 use crate::acquisition::{Acquisition, Tally};
 use crate::event::{CommandError, What};
 use crate::line::{LineError, Request, Stopped};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
-use crate::share::message::{ANY_MOTOR, Answer, Event, Happening, Line};
+use crate::share::event_text::{DriveProtocol, EventText, Told};
+use crate::share::message::{ANY_MOTOR, Answer, Event, EventKind, Line};
 use crate::share::opening::Opened;
 use crate::share::request::{self, Configures};
 use crate::share::wire::{self, Part, Tap};
-use crate::share::words::{Speaks, Told, Words};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
 
@@ -35,14 +34,14 @@ use crate::subscription::{Full, Record, Subscription};
 const EVENTS: usize = 10_000;
 
 /// Lines by numbers that are never used again.
-pub(super) type Lines = Map<usize, Held>;
+pub(super) type Lines = Map<usize, SharedLine>;
 
 /// A line that a share holds.
-pub struct Held {
+pub struct SharedLine {
     pub(super) name: String,
     pub(super) port: PortName,
     opened_at: Place,
-    pub(super) speaks: Speaks,
+    pub(super) speaks: DriveProtocol,
     timeout: Duration,
     runner: Runner,
     clock: Clock,
@@ -51,30 +50,17 @@ pub struct Held {
     /// One moment by both clocks.
     anchor: (Instant, f64),
     events: Subscription,
-    pub(super) words: Words,
+    pub(super) words: EventText,
     /// Whose the motors are. An owner that has left waits for their stops.
     pub(super) owners: Ownership<Motor, SessionId>,
-    /// Who may change a motor, if one program at a time may.
-    pub(super) leases: Map<Motor, Lease>,
-    /// The motors that were read or commanded.
-    pub(super) known: BTreeSet<Motor>,
-    /// The motors that have answered.
-    pub(super) heard: BTreeSet<Motor>,
-    /// The motors that programs commanded to move, unless that was refused.
-    pub(super) moved: BTreeSet<Motor>,
-    /// Numbers for which the drive says that it has no such motor.
-    pub(super) absent: BTreeSet<Motor>,
-    /// How many stops of a motor are under way.
-    pub(super) stops: Map<Motor, usize>,
+    pub(super) motors: Map<Motor, MotorState>,
     /// A stop of all motors that is repeated until something on the line answers.
-    pub(super) unanswered_stop: Option<UnansweredStop>,
-    /// The stops that motors have not confirmed: they are under way, or are repeated.
-    pub(super) owed: Map<Motor, Owed>,
+    pub(super) line_stop: Option<LineStop>,
     /// A number that may have no motor, and that a stop is sent to now.
     pub(super) searched: Option<Motor>,
 }
 
-impl Held {
+impl SharedLine {
     /// Starts the engine of an open line.
     ///
     /// # Errors
@@ -99,7 +85,7 @@ impl Held {
         let clock = acquisition.clock().clone();
         let events = Subscription::new(EVENTS, Full::DropOldest);
         acquisition.subscribe(events.clone(), Wants::new());
-        Ok(Held {
+        Ok(SharedLine {
             name: name.to_owned(),
             opened_at: port.place(),
             port,
@@ -110,19 +96,51 @@ impl Held {
             tap,
             tally: acquisition.tally().clone(),
             events,
-            words: Words::default(),
+            words: EventText::default(),
             owners: Ownership::default(),
-            leases: Map::new(),
-            known: BTreeSet::new(),
-            heard: BTreeSet::new(),
-            moved: BTreeSet::new(),
-            absent: BTreeSet::new(),
-            stops: Map::new(),
-            unanswered_stop: None,
-            owed: Map::new(),
+            motors: Map::new(),
+            line_stop: None,
             searched: None,
             runner: start(acquisition)?,
         })
+    }
+
+    /// What is known of a motor.
+    pub(super) fn motor_state(&mut self, motor: Motor) -> &mut MotorState {
+        self.motors.entry(motor).or_default()
+    }
+
+    fn presence(&self, motor: Motor) -> Presence {
+        self.motors.get(&motor).map_or(Presence::Unknown, |state| state.presence)
+    }
+
+    /// Whether a motor has answered.
+    pub(super) fn has_heard(&self, motor: Motor) -> bool {
+        self.presence(motor) == Presence::Answered
+    }
+
+    /// Whether a program has read or commanded a motor.
+    pub(super) fn is_known(&self, motor: Motor) -> bool {
+        self.motors.get(&motor).is_some_and(|state| state.is_known)
+    }
+
+    fn was_moved(&self, motor: Motor) -> bool {
+        self.motors.get(&motor).is_some_and(|state| state.was_moved)
+    }
+
+    /// Whether a stop of a motor is under way.
+    pub(super) fn is_stopping(&self, motor: Motor) -> bool {
+        self.motors.get(&motor).is_some_and(|state| state.stops > 0)
+    }
+
+    /// The stop that a motor has not confirmed.
+    pub(super) fn pending_stop(&self, motor: Motor) -> Option<&PendingStop> {
+        self.motors.get(&motor)?.pending_stop.as_ref()
+    }
+
+    /// The stops that motors have not confirmed.
+    pub(super) fn pending_stops(&self) -> impl Iterator<Item = (Motor, &PendingStop)> {
+        self.motors.iter().filter_map(|(motor, it)| Some((*motor, it.pending_stop.as_ref()?)))
     }
 
     /// Records a command of a program to a motor.
@@ -147,28 +165,27 @@ impl Held {
     pub(super) fn ended(&mut self, motor: Motor, motion: Motion, result: &CommandResult) {
         match result {
             Ok(_) => {
-                self.heard.insert(motor);
-                self.absent.remove(&motor);
+                self.motor_state(motor).answered();
             }
-            Err(error) if error.is_of_no_motor() => drop(self.absent.insert(motor)),
+            Err(error) if error.is_of_no_motor() => self.motor_state(motor).missing(),
             Err(_) => {}
         }
         // One that was too old waited for a motor that did not answer: somebody knows that it is there.
         let is_for_a_motor =
             |error| may_be_executed(error) || matches!(error, CommandError::Expired);
         if motion.may_move() && result.as_ref().err().is_none_or(is_for_a_motor) {
-            self.moved.insert(motor);
+            self.motor_state(motor).was_moved = true;
         }
     }
 
     /// Whether a program turned a motor, or tried to.
     pub(super) fn may_turn(&self, motor: Motor) -> bool {
-        self.owners.is_under_way(motor) || self.moved.contains(&motor)
+        self.owners.is_under_way(motor) || self.was_moved(motor)
     }
 
     /// Whether the drive says that it has no such motor, no program turned it and it has never answered.
     pub(super) fn is_absent(&self, motor: Motor) -> bool {
-        self.absent.contains(&motor) && !self.is_there(motor)
+        self.presence(motor) == Presence::Absent && !self.is_there(motor)
     }
 
     /// What its port occupies now.
@@ -197,10 +214,13 @@ impl Held {
         let (line, port) = (self.name.clone(), self.port.to_string());
         let timeout = self.timeout.as_secs_f64();
         let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
-        let heard = self.heard.iter().map(|motor| motor.number()).collect();
+        let has_answered =
+            |(_, state): &(&Motor, &MotorState)| state.presence == Presence::Answered;
+        let heard =
+            self.motors.iter().filter(has_answered).map(|(motor, _)| motor.number()).collect();
         // A stop of all motors is also sent to addresses where no motor has ever answered.
-        let unstopped = self.owing().map(|(motor, _)| motor.number());
-        let any = self.unanswered_stop.as_ref().filter(|_| !self.has_answered());
+        let unstopped = self.unconfirmed_stops().map(|(motor, _)| motor.number());
+        let any = self.line_stop.as_ref().filter(|_| !self.has_answered());
         let unstopped = any.map(|_| ANY_MOTOR).into_iter().chain(unstopped).collect();
         Line { line, protocol, port, profile, timeout, t, wall, counts, heard, unstopped }
     }
@@ -227,21 +247,22 @@ impl Held {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
-            let motors = self.owners.motors().chain(self.owed.keys().copied());
+            let motors = self.owners.motors().chain(self.pending_stops().map(|(motor, _)| motor));
             self.words.retries(&event.what, motors, retry);
             match &event.what {
                 What::Lost(_) => {
                     doubts.push(None);
                     // It may be another drive after that.
-                    self.absent.clear();
+                    for (_, state) in self.motors.iter_mut() {
+                        if state.presence == Presence::Absent {
+                            state.presence = Presence::Unknown;
+                        }
+                    }
                 }
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
-                What::Heard(motor) => {
-                    self.heard.insert(*motor);
-                    self.absent.remove(motor);
-                }
+                What::Heard(motor) => self.motor_state(*motor).answered(),
                 _ => {}
             }
             let told = self.words.of(self.speaks, &event.what);
@@ -249,7 +270,7 @@ impl Held {
                 (&event.what, told.as_ref().and_then(|told| told.motor))
                 && why.is_of_no_motor()
             {
-                self.absent.insert(motor);
+                self.motor_state(motor).missing();
             }
             let told = told.filter(|told| !self.is_of_no_motor(told));
             events.extend(told.map(|told| self.message(event.time, told)));
@@ -279,17 +300,17 @@ impl Held {
     /// Whether it is the stop of a number that the drive does not have, or of an ID that never answered and
     /// that no program turned. Only the program that asked for the stop gets the failure.
     fn is_of_no_motor(&self, told: &Told) -> bool {
-        let is_of_stop = matches!(told.event, Happening::Stopping | Happening::StopFailed);
+        let is_of_stop = matches!(told.event, EventKind::Stopping | EventKind::StopFailed);
         let Some(motor) = told.motor.filter(|_| is_of_stop) else { return false };
-        let is_unheard = self.speaks == Speaks::Rmd && !self.heard.contains(&motor);
+        let is_unheard = self.speaks == DriveProtocol::Rmd && !self.has_heard(motor);
         self.is_absent(motor) || is_unheard && !self.may_turn(motor)
     }
 
     /// The motor, if replies say which motor they are from; `None` means all motors of the line.
     pub(super) fn lane(&self, motor: Motor) -> Option<Motor> {
         match self.speaks {
-            Speaks::St(_) => None,
-            Speaks::Rmd => Some(motor),
+            DriveProtocol::St(_) => None,
+            DriveProtocol::Rmd => Some(motor),
         }
     }
 
@@ -316,22 +337,23 @@ impl Held {
         // The engine stops those that programs moved.
         let by: Arc<str> = "share".into();
         let is_claimed = |motor: &Motor| {
-            !(self.moved.contains(motor)
-                || self.owed.contains_key(motor)
+            !(self.was_moved(*motor)
+                || self.pending_stop(*motor).is_some()
                 || self.owners.is_held(*motor))
         };
         let claimed = self.owners.motors().filter(is_claimed).map(|motor| (motor, &by));
-        let owing = self.owing().filter(|(motor, _)| !self.moved.contains(motor));
-        for (motor, by) in owing.chain(claimed) {
+        let unconfirmed_stops =
+            self.unconfirmed_stops().filter(|(motor, _)| !self.was_moved(*motor));
+        for (motor, by) in unconfirmed_stops.chain(claimed) {
             let ended = ended.clone();
             let tell = move |result| drop(ended.send((motor, result)));
             // An engine that has ended has stopped its motors.
             let _ = self.remote().stop_then(by, Request::stop(motor), tell);
         }
         drop(ended);
-        let owed = std::iter::from_fn(|| self.remote().next(&results)).collect::<Vec<_>>();
+        let pending = std::iter::from_fn(|| self.remote().next(&results)).collect::<Vec<_>>();
         let mut stopped = self.runner.end();
-        for (motor, result) in owed {
+        for (motor, result) in pending {
             if stopped.iter().all(|one| one.motor != motor) {
                 let result = result.map(drop).map_err(|error| match error {
                     CommandError::Line(error) => error,

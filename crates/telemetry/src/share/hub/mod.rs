@@ -2,19 +2,19 @@
 //!
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 
-mod asked;
 mod claims;
-mod coming;
-mod ended;
+mod completions;
 mod feed;
+mod ids;
 mod jobs;
 mod lapses;
-mod leases;
 mod life;
 mod line;
-mod owed;
-mod place;
+mod line_lifecycle;
+mod motors;
+mod pending_stops;
 mod reasons;
+mod requests;
 mod session;
 mod stopping;
 mod work;
@@ -26,25 +26,25 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 
+use super::event_text;
 use super::frame::Frame;
-use super::message::{self, Ending, Event, Happening};
+use super::message::{self, Ending, Event, EventKind};
 use super::opening::Limits;
-use super::words;
 use crate::event::CommandError;
 use crate::line::{Request, Stopped};
 use crate::runner::Ended;
 use crate::schedule::Quiet;
 use crate::signal::Motor;
+use ids::wall_now;
 use jobs::Jobs;
 use line::Lines;
-use owed::{LONGEST_PAUSE, OwedPorts};
-use place::wall_now;
+use pending_stops::{LONGEST_PAUSE, PendingPortStops};
 use session::{Part, Session};
 use work::{Done, News, Work};
 
-pub use line::Held;
-pub use place::SessionId;
-pub(super) use place::seconds;
+pub use ids::SessionId;
+pub(super) use ids::seconds;
+pub use line::SharedLine;
 
 /// The engine of a line has ended: its thread is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -69,7 +69,7 @@ pub struct Hub {
     /// What no request may exceed on a line that a program opens.
     limits: Limits,
     log: VecDeque<Event>,
-    owed: OwedPorts,
+    pending_stops: PendingPortStops,
     /// When it was looked at last.
     now: Instant,
     has_paused: bool,
@@ -94,7 +94,11 @@ enum Why {
 impl Hub {
     /// Holds these lines. `share` is the name of this program. `wake` is called from other threads when
     /// [`advance`](Self::advance) should be called.
-    pub fn new(share: &str, lines: Vec<Held>, wake: impl Fn() + Send + Sync + 'static) -> Self {
+    pub fn new(
+        share: &str,
+        lines: Vec<SharedLine>,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
         let (done, ended) = mpsc::channel();
         Hub {
             share: share.to_owned(),
@@ -109,7 +113,7 @@ impl Hub {
             lease: None,
             limits: Limits::default(),
             log: VecDeque::new(),
-            owed: OwedPorts::default(),
+            pending_stops: PendingPortStops::default(),
             now: Instant(0),
             has_paused: false,
             lapsed: Vec::new(),
@@ -122,7 +126,7 @@ impl Hub {
 
     /// The lines.
     pub fn lines(&self) -> Vec<message::Line> {
-        self.lines.values().map(Held::info).collect()
+        self.lines.values().map(SharedLine::info).collect()
     }
 
     /// Lines that programs open have these limits. Those of the start were opened with theirs.
@@ -165,8 +169,8 @@ impl Hub {
         }
         let Some(name) = session.name else { return };
         let left = why.map_or_else(|| format!("{name} left"), |why| format!("{name} left: {why}"));
-        self.say(Happening::Left, &name, left);
-        let by = words::after(&name);
+        self.say(EventKind::Left, &name, left);
+        let by = event_text::after(&name);
         let ending = session.ending;
         if ending == Ending::Off {
             // A command of another program may be under way: if it is refused, the motor is stopped then.
@@ -180,7 +184,7 @@ impl Hub {
         for (line, motor) in self.take_own(id, ending) {
             let Some(held) = self.lines.get_mut(&line) else { continue };
             if ending == Ending::Off {
-                held.owe_off(motor, &by);
+                held.begin_switch_off(motor, &by);
             }
             if let Some(why) = why {
                 held.words.explain(motor, &by, why);
@@ -270,7 +274,7 @@ impl Hub {
             if let Some(motor) = self.lines.get_mut(&line).and_then(|held| held.due_search(now)) {
                 self.search(line, motor);
             }
-            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_stop(now)) {
+            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_line_stop(now)) {
                 self.stop_line(line, None, &by);
             }
         }
@@ -280,7 +284,7 @@ impl Hub {
     fn stop_line(&mut self, line: usize, but: Option<Motor>, by: &Arc<str>) {
         let Some(held) = self.lines.get(&line) else { return };
         // Those that are under way have more tries.
-        let is_meant = |motor: &Motor| Some(*motor) != but && !held.stops.contains_key(motor);
+        let is_meant = |motor: &Motor| Some(*motor) != but && !held.is_stopping(*motor);
         let motors: Vec<Motor> = held.stoppable().filter(is_meant).collect();
         for motor in motors {
             self.stop(Why::OfAll, line, motor, SessionId::default(), None, by);
@@ -294,10 +298,10 @@ impl Hub {
             let events = held.take_events(&mut retry, &mut doubts);
             let events = events.ok_or_else(|| LineEnded(held.name.clone()))?;
             // It may be another drive, whose motors turn.
-            if events.iter().any(|event| event.event == Happening::Back)
+            if events.iter().any(|event| event.event == EventKind::Back)
                 && let Some(by) = &self.latch
             {
-                held.owe_stop(by, Micros(0));
+                held.begin_line_stop(by, Micros(0));
             }
             for motor in doubts {
                 self.doubt(line, motor);
@@ -341,7 +345,7 @@ impl Hub {
         self.log.push_back(event);
     }
 
-    fn say(&mut self, event: Happening, by: &str, message: String) {
+    fn say(&mut self, event: EventKind, by: &str, message: String) {
         self.say_of((None, None), event, by, message);
     }
 
@@ -349,7 +353,7 @@ impl Hub {
     fn say_of(
         &mut self,
         (line, motor): (Option<&str>, Option<u8>),
-        event: Happening,
+        event: EventKind,
         by: &str,
         message: String,
     ) {
@@ -364,10 +368,10 @@ impl Hub {
     fn stop_again(&mut self, line: usize, motor: Motor, why: Why) {
         let Some(held) = self.lines.get_mut(&line) else { return };
         // One that is under way has another try if it fails.
-        if held.stops.contains_key(&motor) {
+        if held.is_stopping(motor) {
             return;
         }
-        match held.owed.get(&motor).map(|owed| Arc::clone(&owed.by)) {
+        match held.pending_stop(motor).map(|stop| Arc::clone(&stop.by)) {
             Some(by) => self.stop(why, line, motor, SessionId::default(), None, &by),
             None => self.stop_if_orphaned(line, motor, why, false),
         }
@@ -386,7 +390,7 @@ impl Hub {
             if self.switch_off.contains(&owner)
                 && let Some(held) = self.lines.get_mut(&line)
             {
-                held.owe_off(motor, &by);
+                held.begin_switch_off(motor, &by);
             }
             self.stop(why, line, motor, owner, None, &by);
         }
@@ -404,8 +408,8 @@ impl Hub {
         let tell = self.teller(session, None, line);
         let Some(held) = self.lines.get_mut(&line) else { return };
         held.owners.interrupt(motor);
-        held.owe(motor, by);
-        *held.stops.entry(motor).or_default() += 1;
+        held.begin_stop(motor, by);
+        held.motor_state(motor).stops += 1;
         let quiet = match why {
             Why::OfAll if held.is_doubtful(motor) => Some(Quiet::Precaution),
             Why::Repeated => Some(Quiet::Again),
@@ -434,7 +438,8 @@ impl Hub {
     fn search(&mut self, line: usize, motor: Motor) {
         let tell = self.teller(SessionId::default(), None, line);
         let Some(held) = self.lines.get(&line) else { return };
-        let by = held.owed.get(&motor).map_or_else(|| "share".into(), |owed| Arc::clone(&owed.by));
+        let stop = held.pending_stop(motor);
+        let by = stop.map_or_else(|| "share".into(), |stop| Arc::clone(&stop.by));
         let ended = move |result| tell(Work::Search(motor, result));
         // If the engine has ended, the share ends.
         let _ = held.remote().command_then(&by, Request::stop(motor), LONGEST_PAUSE, ended);

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::ids::SessionId;
 use super::jobs::JobId;
-use super::place::SessionId;
 use super::session::Part;
 use motorlink_proto::Motion;
 use motorlink_proto::time::Instant;

@@ -26,7 +26,7 @@ pub struct Event {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by: Option<String>,
     /// What happened.
-    pub event: Happening,
+    pub event: EventKind,
     /// The same in words.
     pub message: String,
 }
@@ -35,7 +35,7 @@ pub struct Event {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub enum Happening {
+pub enum EventKind {
     /// A program came.
     Joined,
     /// A program left, or was killed.
@@ -81,7 +81,7 @@ pub enum Happening {
     Later,
 }
 
-impl Happening {
+impl EventKind {
     /// One word for programs, as in the messages, with `_`: `stop_failed`.
     pub fn slug(self) -> String {
         word(self).replace('-', "_")

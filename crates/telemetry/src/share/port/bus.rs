@@ -13,7 +13,7 @@ use motorlink_proto::rmd::{
 
 use super::connection::Connection;
 use super::place::Place;
-use crate::share::dialogue::{Ended, Refusal};
+use crate::share::client_codec::{Ended, Refusal};
 use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a host into commands, and their answers into replies.

@@ -11,10 +11,10 @@ use motorlink::st::Profile;
 use super::place::{Deadlines, Place};
 use super::pulse::Socket;
 use crate::share::VERSION;
-use crate::share::dialogue::{Dialogue, DialogueError, Ended, Heard};
+use crate::share::client_codec::{ClientCodec, CodecError, Ended, Heard};
+use crate::share::event_text::DriveProtocol;
 use crate::share::message::{Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Text};
 use crate::share::request::Kind;
-use crate::share::words::Speaks;
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
@@ -26,7 +26,7 @@ const TIME_TO_LIVE: Duration = Duration::from_secs(1);
 pub(super) struct Connection {
     port: Place,
     socket: Socket,
-    dialogue: Dialogue,
+    codec: ClientCodec,
     holder: Holder,
     /// The time to live of the next request, if it is shorter.
     expires: Cell<Duration>,
@@ -53,7 +53,7 @@ impl Connection {
             socket: Socket::new(FdLink::new(stream, port.name())?),
             has_deadlines: false,
             port: port.clone(),
-            dialogue: Dialogue::default(),
+            codec: ClientCodec::default(),
             holder: Holder { patience: OPENING, profile: None },
             expires: Cell::new(TIME_TO_LIVE),
             is_own: Cell::new(false),
@@ -174,15 +174,15 @@ impl Connection {
 
     fn changes(&self, motor: u8, bytes: &[u8]) -> bool {
         let speaks = match self.port.protocol {
-            Protocol::St => Speaks::St(self.holder.profile.unwrap_or_default()),
-            Protocol::Rmd => Speaks::Rmd,
+            Protocol::St => DriveProtocol::St(self.holder.profile.unwrap_or_default()),
+            Protocol::Rmd => DriveProtocol::Rmd,
         };
         Kind::of_bytes(speaks, motor, bytes).changes()
     }
 
     /// Sends a request; gives its id.
     pub(super) fn ask(&mut self, ask: Ask) -> Result<u32, PortError> {
-        let request = self.dialogue.request(ask);
+        let request = self.codec.request(ask);
         let (id, stream) = request.map_err(|error| self.port.failed(error.to_string()))?;
         match self.socket.write(&stream) {
             Ok(()) => Ok(id),
@@ -203,8 +203,8 @@ impl Connection {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut bytes = [0; 4096];
         loop {
-            let damaged = |error: DialogueError| self.port.failed(error.to_string());
-            while let Some(heard) = self.dialogue.hear().map_err(damaged)? {
+            let damaged = |error: CodecError| self.port.failed(error.to_string());
+            while let Some(heard) = self.codec.hear().map_err(damaged)? {
                 match heard {
                     Heard::Ended(ended) => return Ok(Some(ended)),
                     Heard::Text(Text::Closing { message }) => self.closing = Some(message),
@@ -214,7 +214,7 @@ impl Connection {
             let left = deadline.map(|at| at.saturating_duration_since(Instant::now()));
             match self.socket.read(&mut bytes, left) {
                 Ok(0) => return Ok(None),
-                Ok(size) => self.dialogue.push(&bytes[..size]),
+                Ok(size) => self.codec.push(&bytes[..size]),
                 Err(PortError::Closed { .. }) => return Err(self.gone()),
                 Err(error) => return Err(error),
             }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use motorlink::port::{NotDone, PortError};
 
 use crate::share::address::{Address, Unreachable};
-use crate::share::dialogue::Refusal;
+use crate::share::client_codec::Refusal;
 use crate::share::message::{Protocol, Reason};
 
 /// When a share ends the motion of a program that is connected and does not seem to live.

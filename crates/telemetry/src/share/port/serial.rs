@@ -9,7 +9,7 @@ use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, 
 
 use super::connection::Connection;
 use super::place::Place;
-use crate::share::dialogue::Ended;
+use crate::share::client_codec::Ended;
 use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a master into commands, and their answers into replies.

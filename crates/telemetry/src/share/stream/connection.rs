@@ -9,9 +9,9 @@ use motorlink_proto::st::Profile;
 
 use super::target::{Followed, Item, Wanted};
 use crate::share::VERSION;
+use crate::share::client_codec::{ClientCodec, Ended, Heard};
 use crate::share::clock::Clock;
 use crate::share::data::{Data, TIMES};
-use crate::share::dialogue::{Dialogue, Ended, Heard};
 use crate::share::message::{Answer, Ask, DropRule, Group, LONGEST_QUEUE, Line, SignalName, Text};
 use crate::signal::{Motor, Signal};
 
@@ -27,7 +27,7 @@ const WORTH_TELLING: f64 = 0.005;
 #[derive(Debug)]
 pub(super) struct Connection {
     socket: UnixStream,
-    dialogue: Dialogue,
+    codec: ClientCodec,
     /// Requests without an answer, and when they were sent.
     pending: Map<u32, (Asked, u64)>,
     /// When bytes came, or when it was connected.
@@ -68,11 +68,11 @@ impl Connection {
     /// Asks for everything at once.
     pub(super) fn begin(socket: UnixStream, followed: &Followed, now: u64) -> Result<Self, String> {
         let (pending, subscriptions, groups) = (Map::new(), Map::new(), Map::new());
-        let dialogue = Dialogue::default();
+        let codec = ClientCodec::default();
         let (clock, told, silent, closing) = (None, None, None, None);
         let mut begun = Connection {
             socket,
-            dialogue,
+            codec,
             pending,
             heard: now,
             clock,
@@ -136,7 +136,7 @@ impl Connection {
     }
 
     fn ask(&mut self, asked: Asked, ask: Ask, now: u64) -> Result<(), String> {
-        let (id, bytes) = self.dialogue.request(ask).map_err(|error| error.to_string())?;
+        let (id, bytes) = self.codec.request(ask).map_err(|error| error.to_string())?;
         self.socket.write_all(&bytes).map_err(|error| error.to_string())?;
         self.pending.insert(id, (asked, now));
         Ok(())
@@ -170,8 +170,8 @@ impl Connection {
                 Err(_) => return Err(self.gone()),
             };
             (taken, self.heard) = (taken + size, now);
-            self.dialogue.push(&bytes[..size]);
-            while let Some(heard) = self.dialogue.hear().map_err(|error| error.to_string())? {
+            self.codec.push(&bytes[..size]);
+            while let Some(heard) = self.codec.hear().map_err(|error| error.to_string())? {
                 self.heard(heard, followed, now, items)?;
             }
         }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::share::address::Address;
+use crate::share::event_text::DriveProtocol;
 use crate::share::message::{Event, SignalRate};
-use crate::share::words::Speaks;
 use crate::signal::{Motor, Signal};
 
 /// Signals of a line that are read with the same period.
@@ -24,7 +24,7 @@ pub struct Followed {
     /// The name of the line.
     pub line: String,
     /// What its drives speak.
-    pub speaks: Speaks,
+    pub speaks: DriveProtocol,
     /// The name of this program.
     pub name: String,
     /// The signals, each with its period.

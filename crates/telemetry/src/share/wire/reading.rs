@@ -14,9 +14,9 @@ use motorlink_proto::time::{Instant, Micros};
 use super::memory::{Block, Configured};
 use super::record::{Seen, What, records};
 use super::{MOST_FRAMES, Tap};
+use crate::share::event_text::DriveProtocol;
 use crate::share::hub::seconds;
 use crate::share::message::{Answer, WireFrame, WireLoad, WireResult, WireWay};
-use crate::share::words::Speaks;
 
 /// The most text of an answer, about. A message has room for several times as much.
 const MOST_TEXT: usize = 256 << 10;
@@ -124,7 +124,7 @@ enum Meaning {
 /// The frames of a line. `now` is the time of its clock.
 pub(in crate::share) fn read(
     tap: &Tap,
-    speaks: Speaks,
+    speaks: DriveProtocol,
     timeout: Micros,
     now: Instant,
     part: Part,
@@ -161,10 +161,10 @@ pub(in crate::share) fn read(
 }
 
 impl Reading {
-    fn new(speaks: Speaks, timeout: Micros) -> Self {
+    fn new(speaks: DriveProtocol, timeout: Micros) -> Self {
         let meaning = match speaks {
-            Speaks::St(profile) => Meaning::St(Duplex::default(), Transcript::new(profile)),
-            Speaks::Rmd => Meaning::Rmd,
+            DriveProtocol::St(profile) => Meaning::St(Duplex::default(), Transcript::new(profile)),
+            DriveProtocol::Rmd => Meaning::Rmd,
         };
         Reading { timeout, meaning, number: 0, frames: Vec::new(), open: Vec::new() }
     }

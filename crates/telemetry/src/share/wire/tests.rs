@@ -5,8 +5,8 @@ use motorlink_proto::st::{HEADER_ACK, MAX_FRAME, Profile, RegisterId};
 use motorlink_proto::time::Instant;
 
 use super::*;
+use crate::share::event_text::DriveProtocol;
 use crate::share::message::{Answer, WireFrame, WireLoad, WireResult, WireWay};
-use crate::share::words::Speaks;
 
 const TIMEOUT: Micros = Micros::from_millis(50);
 const ALL: Part = Part { from: None, to: None, after: None, most: MOST_FRAMES };
@@ -18,7 +18,7 @@ const NACK: [u8; 4] = [0xFF, 0x01, 0x0B, 0x0C];
 struct Line {
     tap: Tap,
     clock: Clock,
-    speaks: Speaks,
+    speaks: DriveProtocol,
 }
 
 struct Got {
@@ -29,12 +29,12 @@ struct Got {
 }
 
 impl Line {
-    fn new(speaks: Speaks) -> Self {
+    fn new(speaks: DriveProtocol) -> Self {
         Line { tap: Tap::default(), clock: Clock::virtual_time(), speaks }
     }
 
     fn st() -> Self {
-        Self::new(Speaks::St(Profile::Spec))
+        Self::new(DriveProtocol::St(Profile::Spec))
     }
 
     fn at(&self, ms: u64) -> &Self {
@@ -194,7 +194,7 @@ fn values_of_a_data_segment_have_names_long_after_it_was_configured() {
 
 #[test]
 fn motors_of_a_bus_answer_on_their_own() {
-    let line = Line::new(Speaks::Rmd);
+    let line = Line::new(DriveProtocol::Rmd);
     let read = [0x9A, 0, 0, 0, 0, 0, 0, 0];
     let status = [0x9A, 25, 0, 240, 0, 0, 0, 0];
     line.at(0).can(Way::Sent, 1, read).can(Way::Sent, 2, read);

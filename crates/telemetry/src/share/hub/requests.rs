@@ -8,9 +8,9 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::feed::Feed;
-use super::line::Held;
-use super::owed::AGAIN;
-use super::place::SessionId;
+use super::ids::SessionId;
+use super::line::SharedLine;
+use super::pending_stops::AGAIN;
 use super::reasons::reason;
 use super::session::{NO_MOTOR, Session, UNANSWERED};
 use super::work::{Sent, Work};
@@ -22,7 +22,7 @@ use crate::line::Request;
 use crate::share::VERSION;
 use crate::share::frame::{Frame, Kind};
 use crate::share::message::{
-    self, ANY_MOTOR, Answer, Ask, Column, DropRule, Happening, LONGEST_DEADLINE, LONGEST_NAME,
+    self, ANY_MOTOR, Answer, Ask, Column, DropRule, EventKind, LONGEST_DEADLINE, LONGEST_NAME,
     LONGEST_QUEUE, LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS,
     MotorName, Reason, SHORTEST_DEADLINE, SignalName, StoppedMotor,
 };
@@ -123,7 +123,7 @@ impl Hub {
         if let Some(session) = self.sessions.get_mut(&id) {
             session.name = Some(own.as_str().into());
         }
-        self.say(Happening::Joined, &own, format!("{own} joined"));
+        self.say(EventKind::Joined, &own, format!("{own} joined"));
         Ok(Some(Answer::Hello { protocol: VERSION, share: self.share.clone(), name: own }))
     }
 
@@ -319,7 +319,9 @@ impl Hub {
         let mut feed = Feed::new(session.last_feed, rows);
         for (line, signals) in wanted {
             if let Some(held) = self.lines.get_mut(&line) {
-                held.known.extend(signals.iter().map(|signal| signal.motor));
+                for signal in &signals {
+                    held.motor_state(signal.motor).is_known = true;
+                }
             }
             feed.add(&self.lines, line, signals, period, (queue as usize, full)).map_err(ended)?;
         }
@@ -370,7 +372,9 @@ impl Hub {
             held.follow((motor, session), motion, continues)
                 .map_err(|why| (Reason::Overtaken, why))?;
         }
-        held.known.extend(motor);
+        if let Some(motor) = motor {
+            held.motor_state(motor).is_known = true;
+        }
         let leases = self.lease_by((session, name), line, changed);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         let sent = Sent { motor, motion, configures, made: made(self.now, age), leases };
@@ -412,7 +416,7 @@ impl Hub {
                     .map(|(_, value)| value)
                     .filter(|held| !held.has_answered())
                 {
-                    held.owe_stop(name, AGAIN);
+                    held.begin_line_stop(name, AGAIN);
                 }
                 let lines = self.lines.iter();
                 let all =
@@ -424,7 +428,7 @@ impl Hub {
         let why = if of_all { Why::OfAll } else { Why::Asked };
         let mut unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
         // The drive says of each number that it has no such motor.
-        let is_left = |(line, held): &(&usize, &Held)| {
+        let is_left = |(line, held): &(&usize, &SharedLine)| {
             of_all && !held.has_answered() && !awaited.iter().any(|(of, _)| of == *line)
         };
         unreached.extend(self.lines.iter().filter(is_left).map(|(_, held)| StoppedMotor {
@@ -486,7 +490,7 @@ impl Hub {
     }
 }
 
-impl Held {
+impl SharedLine {
     /// The signals of a motor.
     fn columns(&self) -> Vec<Column> {
         let motor = self.speaks.motor(1);

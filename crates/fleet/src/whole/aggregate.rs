@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use motorlink_telemetry::share::VERSION;
+use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::data;
-use motorlink_telemetry::share::dialogue::Refusal;
 use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, Event, Happening, Line, Reason, Request, SignalName, Text, decode, encode,
+    Answer, Ask, Event, EventKind, Line, Reason, Request, SignalName, Text, decode, encode,
 };
 
 use super::latches::Latches;
@@ -72,7 +72,7 @@ struct Subscription {
 }
 
 #[derive(Debug)]
-pub(super) struct Merge {
+pub(super) struct Aggregate {
     /// The name of the program in the log of each node.
     who: String,
     members: BTreeMap<Name, Member>,
@@ -97,9 +97,9 @@ pub(super) struct Merge {
     out: Vec<Out>,
 }
 
-impl Merge {
+impl Aggregate {
     pub(super) fn new(who: String, latches: Latches) -> Self {
-        Merge {
+        Aggregate {
             who,
             members: BTreeMap::new(),
             last_id: 0,
@@ -230,7 +230,7 @@ impl Merge {
         let lines = self.lines_of(node).unwrap_or_default();
         for line in lines.iter().map(|line| line.line.clone()).collect::<Vec<_>>() {
             let message = format!("node {node} is away: {why}");
-            self.tell(node, Happening::Lost, &line, message);
+            self.tell(node, EventKind::Lost, &line, message);
         }
     }
 
@@ -300,7 +300,7 @@ impl Merge {
             }
             Text::Event(event) => {
                 // A busy line tells late of a release that came before a newer latch: the node knows.
-                if event.event == Happening::Released
+                if event.event == EventKind::Released
                     && let Some(number) = self.latches.watched_by(&self.program)
                 {
                     self.ask(node, Ask::Lines, Of::Released(number));
@@ -436,12 +436,12 @@ impl Merge {
         };
         for line in before.iter().filter(|line| !is_in(lines, line)) {
             let message = format!("node {node} has no such line any more");
-            self.tell(node, Happening::Closed, &line.line, message);
+            self.tell(node, EventKind::Closed, &line.line, message);
         }
         for line in lines {
             let (event, words) = match is_in(before, line) {
-                true => (Happening::Back, "is there again"),
-                false => (Happening::Opened, "is there"),
+                true => (EventKind::Back, "is there again"),
+                false => (EventKind::Opened, "is there"),
             };
             self.tell(node, event, &line.line, format!("node {node} {words}"));
         }
@@ -608,7 +608,7 @@ impl Merge {
     }
 
     /// Something happened to a line of a node.
-    fn tell(&mut self, node: &Name, event: Happening, line: &str, message: String) {
+    fn tell(&mut self, node: &Name, event: EventKind, line: &str, message: String) {
         let line = names::in_fleet(node, line);
         let message = format!("{line}: {message}");
         self.say(&Text::Event(Event {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use motorlink::ownership::Carried;
 use motorlink_proto::Motion;
 
-use super::line::Held;
-use super::place::SessionId;
+use super::ids::SessionId;
+use super::line::SharedLine;
 use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
 use super::stopping::Address;
@@ -157,8 +157,8 @@ impl Hub {
             if leases && carried == Carried::Never {
                 self.give_lease_back(session, line, motor);
             }
-            let is_owed = |held: &Held| held.owed.contains_key(&motor);
-            if result.is_ok() && self.lines.get(&line).is_some_and(is_owed) {
+            let is_pending = |held: &SharedLine| held.pending_stop(motor).is_some();
+            if result.is_ok() && self.lines.get(&line).is_some_and(is_pending) {
                 self.stop_again(line, motor, Why::Asked);
             }
             self.told_of(line, motor, &result);
@@ -226,7 +226,7 @@ impl Hub {
             }
             Ok(_) if motion == Motion::Starts => {
                 held.started(motor);
-                if let Some(by) = held.take_unanswered_stop() {
+                if let Some(by) = held.take_line_stop() {
                     self.stop_line(line, Some(motor), &by);
                 }
             }

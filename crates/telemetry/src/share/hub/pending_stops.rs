@@ -12,7 +12,7 @@ pub(super) const AGAIN: Micros = Micros::from_millis(1_000);
 pub(super) const LONGEST_PAUSE: Micros = Micros::from_millis(60_000);
 
 /// A stop that a motor has not confirmed.
-pub(super) struct Owed {
+pub(super) struct PendingStop {
     pub(super) by: Arc<str>,
     /// Whether it switches an RMD motor off.
     pub(super) is_off: bool,
@@ -29,15 +29,15 @@ enum Next {
     Search(Instant),
 }
 
-impl Owed {
+impl PendingStop {
     /// It is asked for now.
     pub(super) fn new(by: &Arc<str>) -> Self {
-        Owed { by: Arc::clone(by), is_off: false, next: Next::Answer, pause: AGAIN }
+        PendingStop { by: Arc::clone(by), is_off: false, next: Next::Answer, pause: AGAIN }
     }
 
     /// Whether it switches an RMD motor off.
     pub(super) fn off(self, is_off: bool) -> Self {
-        Owed { is_off, ..self }
+        PendingStop { is_off, ..self }
     }
 
     pub(super) fn await_answer(&mut self) {
@@ -70,9 +70,9 @@ impl Owed {
 
 /// Ports whose motors have to be stopped when they are opened, and who asked for it.
 #[derive(Default)]
-pub(super) struct OwedPorts(Vec<(Place, Arc<str>)>);
+pub(super) struct PendingPortStops(Vec<(Place, Arc<str>)>);
 
-impl OwedPorts {
+impl PendingPortStops {
     pub(super) fn add(&mut self, place: Place, by: &Arc<str>) {
         self.take(&place);
         self.0.push((place, Arc::clone(by)));
@@ -86,7 +86,7 @@ impl OwedPorts {
 }
 
 /// A stop of all motors while no motor of the line had ever answered.
-pub(super) struct UnansweredStop {
+pub(super) struct LineStop {
     pub(super) by: Arc<str>,
     /// When it is repeated.
     pub(super) next: Instant,

@@ -37,7 +37,7 @@ impl Point {
 /// While there are few samples, all are kept. Then a stretch of time keeps its extremes: a spike of one
 /// sample stays. Each gap stays, too, at least as wide as a stretch.
 #[derive(Debug)]
-pub struct Thin {
+pub struct Downsample {
     from: f64,
     to: f64,
     most: usize,
@@ -65,10 +65,10 @@ struct Stretch {
     between: Option<f64>,
 }
 
-impl Thin {
+impl Downsample {
     /// At most `most` points between `from` and `to`, [`FEWEST`] at least.
     pub fn new(from: f64, to: f64, most: usize) -> Self {
-        Thin {
+        Downsample {
             from,
             to,
             most: most.max(FEWEST),
@@ -233,10 +233,10 @@ mod tests {
         Point { t, span: 0.0, value }
     }
 
-    fn thin(samples: &[Point], from: f64, to: f64, most: usize) -> Vec<Point> {
-        let mut thin = Thin::new(from, to, most);
-        samples.iter().for_each(|point| thin.push(*point));
-        thin.finish()
+    fn downsample(samples: &[Point], from: f64, to: f64, most: usize) -> Vec<Point> {
+        let mut kept = Downsample::new(from, to, most);
+        samples.iter().for_each(|point| kept.push(*point));
+        kept.finish()
     }
 
     /// Samples each 10 ms. `None` is a missing one, NaN one without a value.
@@ -273,7 +273,7 @@ mod tests {
             length in 0.0..30.0,
         ) {
             let all = samples(&values);
-            let points = thin(&all, from, from + length, most);
+            let points = downsample(&all, from, from + length, most);
             prop_assert!(points.len() <= most, "{} of {most}", points.len());
             prop_assert!(points.is_sorted_by(|a, b| a.t < b.t), "{points:?}");
             // Each point was recorded.
@@ -314,7 +314,7 @@ mod tests {
             values[spike] = Some(1e9);
             let all = samples(&values);
             let to = all.last().map_or(0.0, |last| last.t);
-            let points = thin(&all, 0.0, to, 504);
+            let points = downsample(&all, 0.0, to, 504);
             let width = to / 100.0;
             for n in 0..100 {
                 let of = |points: &[Point]| {
@@ -333,17 +333,17 @@ mod tests {
     #[test]
     fn few_samples_are_all_given_with_one_beside_each_end() {
         let all = samples(&(0..20).map(|n| Some(f64::from(n))).collect::<Vec<_>>());
-        assert_eq!(thin(&all, 0.045, 0.105, 100), all[4..=11]);
-        assert_eq!(thin(&all, 0.051, 0.052, 100), all[5..=6]);
-        assert_eq!(thin(&[], 0.0, 1.0, 100), []);
+        assert_eq!(downsample(&all, 0.045, 0.105, 100), all[4..=11]);
+        assert_eq!(downsample(&all, 0.051, 0.052, 100), all[5..=6]);
+        assert_eq!(downsample(&[], 0.0, 1.0, 100), []);
         // A recording of one sample.
-        assert_eq!(thin(&all[..1], 0.0, 0.0, 100), all[..1]);
+        assert_eq!(downsample(&all[..1], 0.0, 0.0, 100), all[..1]);
     }
 
     #[test]
     fn time_within_an_outage_is_a_gap() {
         let values: Vec<_> = (0..200).map(|n| (!(50..150).contains(&n)).then_some(1.0)).collect();
-        let points = thin(&samples(&values), 0.9, 1.1, 100);
+        let points = downsample(&samples(&values), 0.9, 1.1, 100);
         assert_eq!(points.len(), 3);
         assert!(points[1].is_gap() && valid(&points).count() == 2);
     }

@@ -4,8 +4,8 @@ use super::*;
 
 const NOW: f64 = 1000.0;
 
-fn gate() -> Gate {
-    Gate::new()
+fn admission() -> Admission {
+    Admission::new()
 }
 
 fn command(number: u32, sent: f64, time_to_live: f64) -> Post {
@@ -42,15 +42,16 @@ fn reason(verdict: Verdict) -> Reason {
 
 #[test]
 fn a_command_has_its_age_and_none_is_sent_later() {
-    let mut gate = gate();
-    let request = passed(gate.post(NOW + 0.3, command(1, NOW, 1.0), Kind::Moves));
+    let mut admission = admission();
+    let request = passed(admission.post(NOW + 0.3, command(1, NOW, 1.0), Kind::Moves));
     assert!((request.age.unwrap() - 0.3).abs() < 1e-9, "{request:?}");
-    let late = gate.post(NOW + 1.1, command(2, NOW, 1.0), Kind::Moves);
+    let late = admission.post(NOW + 1.1, command(2, NOW, 1.0), Kind::Moves);
     assert_eq!(reason(late), Reason::Expired);
     // It counts: the next one follows. The shorter time to live holds.
     let mut short = command(3, NOW, 1.0);
     short.time_to_live = 0.5;
-    let Ask::Command { time_to_live, .. } = passed(gate.post(NOW, short, Kind::Reads)).ask else {
+    let Ask::Command { time_to_live, .. } = passed(admission.post(NOW, short, Kind::Reads)).ask
+    else {
         panic!()
     };
     assert_eq!(time_to_live, 0.5);
@@ -66,11 +67,11 @@ fn times_that_cannot_be_are_not_believed() {
         (NOW - LONGEST_TIME - 1.0, f64::INFINITY),
         (NOW, -1.0),
     ] {
-        let verdict = gate().post(NOW + 1e-3, command(1, sent, time_to_live), Kind::Moves);
+        let verdict = admission().post(NOW + 1e-3, command(1, sent, time_to_live), Kind::Moves);
         assert_eq!(reason(verdict), Reason::Expired, "{sent} {time_to_live}");
     }
     // From the future: it was sent just now.
-    let request = passed(gate().post(NOW, command(1, NOW + 3600.0, 1.0), Kind::Moves));
+    let request = passed(admission().post(NOW, command(1, NOW + 3600.0, 1.0), Kind::Moves));
     assert_eq!(request.age, Some(0.0));
     for (sent, old) in [(f64::INFINITY, 0.0), (f64::NAN, LONGEST_TIME), (0.0, 1000.0)] {
         assert_eq!(age(NOW, sent), old, "{sent}");
@@ -79,47 +80,47 @@ fn times_that_cannot_be_are_not_believed() {
 
 #[test]
 fn requests_are_carried_out_once_and_in_their_order() {
-    let mut gate = gate();
-    assert_eq!(gate.post(NOW, command(2, NOW, 1.0), Kind::Moves), Verdict::Early);
-    passed(gate.post(NOW, command(1, NOW, 1.0), Kind::Moves));
-    assert_eq!(gate.post(NOW, command(1, NOW, 1.0), Kind::Moves), Verdict::Again);
-    passed(gate.post(NOW, command(2, NOW, 1.0), Kind::Moves));
-    assert_eq!(gate.next(), 3);
+    let mut admission = admission();
+    assert_eq!(admission.post(NOW, command(2, NOW, 1.0), Kind::Moves), Verdict::Early);
+    passed(admission.post(NOW, command(1, NOW, 1.0), Kind::Moves));
+    assert_eq!(admission.post(NOW, command(1, NOW, 1.0), Kind::Moves), Verdict::Again);
+    passed(admission.post(NOW, command(2, NOW, 1.0), Kind::Moves));
+    assert_eq!(admission.next(), 3);
     let stop = || post(1, NOW, 1.0, Ask::Stop { motor: None });
-    assert!(matches!(gate.urgent(NOW, 2, stop()), Verdict::Pass(_)));
-    assert_eq!(gate.urgent(NOW, 2, stop()), Verdict::Again);
+    assert!(matches!(admission.urgent(NOW, 2, stop()), Verdict::Pass(_)));
+    assert_eq!(admission.urgent(NOW, 2, stop()), Verdict::Again);
 }
 
 #[test]
 fn nothing_that_was_sent_before_a_stop_moves_a_motor_after_it() {
-    let mut gate = gate();
+    let mut admission = admission();
     // The stop overtakes 1 and 2 on the network.
     let stop = post(1, NOW, 1.0, Ask::Stop { motor: None });
-    assert!(matches!(gate.urgent(NOW, 2, stop), Verdict::Pass(_)));
-    let verdict = gate.post(NOW, command(1, NOW, 1.0), Kind::Moves);
+    assert!(matches!(admission.urgent(NOW, 2, stop), Verdict::Pass(_)));
+    let verdict = admission.post(NOW, command(1, NOW, 1.0), Kind::Moves);
     assert_eq!(reason(verdict), Reason::Overtaken);
     // A read changes nothing.
-    assert!(matches!(gate.post(NOW, command(2, NOW, 1.0), Kind::Reads), Verdict::Pass(_)));
-    passed(gate.post(NOW, command(3, NOW, 1.0), Kind::Moves));
+    assert!(matches!(admission.post(NOW, command(2, NOW, 1.0), Kind::Reads), Verdict::Pass(_)));
+    passed(admission.post(NOW, command(3, NOW, 1.0), Kind::Moves));
 }
 
 #[test]
 fn a_stop_is_never_too_old() {
-    let mut gate = gate();
+    let mut admission = admission();
     let stop = post(1, NOW - 100.0, 0.1, Ask::Stop { motor: None });
-    assert!(matches!(gate.urgent(NOW, 0, stop), Verdict::Pass(_)));
+    assert!(matches!(admission.urgent(NOW, 0, stop), Verdict::Pass(_)));
     let latch = post(2, f64::NAN, 0.1, Ask::Latch);
-    assert!(matches!(gate.urgent(NOW, 0, latch), Verdict::Pass(_)));
+    assert!(matches!(admission.urgent(NOW, 0, latch), Verdict::Pass(_)));
 }
 
 #[test]
 fn stops_that_come_in_another_order_are_all_carried_out_once() {
-    let mut gate = gate();
+    let mut admission = admission();
     let stop = |number| post(number, NOW, 1.0, Ask::Stop { motor: None });
     for number in [2, 1, 3] {
-        assert!(matches!(gate.urgent(NOW, 0, stop(number)), Verdict::Pass(_)), "{number}");
+        assert!(matches!(admission.urgent(NOW, 0, stop(number)), Verdict::Pass(_)), "{number}");
     }
     for number in 1..=3 {
-        assert_eq!(gate.urgent(NOW, 0, stop(number)), Verdict::Again);
+        assert_eq!(admission.urgent(NOW, 0, stop(number)), Verdict::Again);
     }
 }

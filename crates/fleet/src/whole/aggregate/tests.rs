@@ -26,8 +26,8 @@ fn line(text: &str, heard: &[u8]) -> Line {
     }
 }
 
-/// A merge, and the answers that the test gives for nodes.
-struct Fleet(Merge);
+/// The aggregate, and the answers that the test gives for nodes.
+struct Fleet(Aggregate);
 
 impl Fleet {
     fn new() -> Self {
@@ -36,9 +36,9 @@ impl Fleet {
 
     /// Beside other programs of the process.
     fn beside(latches: Latches) -> Self {
-        let mut merge = Merge::new("me".to_owned(), latches);
-        merge.at(0.0, WALL);
-        Fleet(merge)
+        let mut aggregate = Aggregate::new("me".to_owned(), latches);
+        aggregate.at(0.0, WALL);
+        Fleet(aggregate)
     }
 
     /// With these nodes, each with a line `rmd0`, on which motor 1 was heard.
@@ -186,7 +186,7 @@ fn times_are_those_of_this_computer() {
         since: None,
         motor: Some(1),
         by: None,
-        event: Happening::Silent,
+        event: EventKind::Silent,
         message: "rmd0, motor 1: does not answer".to_owned(),
     };
     fleet.says("arm1", &Text::Event(event));
@@ -249,7 +249,7 @@ fn a_node_that_is_away_gets_no_command() {
     let (reason, message) = refused(std::slice::from_ref(lost), 1);
     assert_eq!(reason, Reason::Line);
     assert!(message.contains("node arm1 is away: the network is cut"), "{message}");
-    assert_eq!((event.event, event.line.as_deref()), (Happening::Lost, Some("arm1/rmd0")));
+    assert_eq!((event.event, event.line.as_deref()), (EventKind::Lost, Some("arm1/rmd0")));
     fleet.asked(2, command("arm1/rmd0"));
     assert_eq!(refused(&fleet.texts(), 2).0, Reason::Line);
     // Its lines stay.
@@ -263,7 +263,7 @@ fn a_node_that_is_away_gets_no_command() {
     fleet.0.came(&name("arm1"));
     fleet.lines("arm1");
     let texts = fleet.texts();
-    assert!(matches!(&texts[..], [Text::Event(it)] if it.event == Happening::Back), "{texts:?}");
+    assert!(matches!(&texts[..], [Text::Event(it)] if it.event == EventKind::Back), "{texts:?}");
 }
 
 #[test]
@@ -278,11 +278,11 @@ fn a_node_that_was_there_before_is_away_for_a_program_that_comes() {
     else {
         panic!("{texts:?}")
     };
-    assert_eq!((event.event, event.line.as_deref()), (Happening::Lost, Some("arm1/rmd0")));
+    assert_eq!((event.event, event.line.as_deref()), (EventKind::Lost, Some("arm1/rmd0")));
     fleet.0.came(&name("arm1"));
     fleet.lines("arm1");
     let texts = fleet.texts();
-    assert!(matches!(&texts[..], [Text::Event(it)] if it.event == Happening::Back), "{texts:?}");
+    assert!(matches!(&texts[..], [Text::Event(it)] if it.event == EventKind::Back), "{texts:?}");
 }
 
 #[test]
@@ -527,7 +527,7 @@ fn released() -> Text {
         since,
         motor,
         by,
-        event: Happening::Released,
+        event: EventKind::Released,
         message,
     })
 }

@@ -9,7 +9,7 @@ use motorlink_proto::rmd::{Direction, MotorId, describe};
 use motorlink_proto::st::{Frame, MAX_FRAME, MotorNumber, Profile};
 use motorlink_proto::time::{Instant, Micros};
 
-use super::message::{Happening, Line, Protocol};
+use super::message::{EventKind, Line, Protocol};
 use crate::event::What;
 use crate::line::Request;
 use crate::schedule::CommandId;
@@ -17,43 +17,43 @@ use crate::signal::Motor;
 
 /// What the drives of a line speak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Speaks {
+pub enum DriveProtocol {
     /// ST's protocol, in this profile.
     St(Profile),
     /// The RMD protocol.
     Rmd,
 }
 
-impl Speaks {
+impl DriveProtocol {
     /// What the drives of a line speak. `None`: in a profile that is not known here.
     pub fn of(line: &Line) -> Option<Self> {
         match line.protocol {
-            Protocol::Rmd => Some(Speaks::Rmd),
-            Protocol::St => Some(Speaks::St(line.profile.as_ref()?.parse().ok()?)),
+            Protocol::Rmd => Some(DriveProtocol::Rmd),
+            Protocol::St => Some(DriveProtocol::St(line.profile.as_ref()?.parse().ok()?)),
         }
     }
 
     /// The protocol, without a profile.
     pub fn protocol(self) -> Protocol {
         match self {
-            Speaks::St(_) => Protocol::St,
-            Speaks::Rmd => Protocol::Rmd,
+            DriveProtocol::St(_) => Protocol::St,
+            DriveProtocol::Rmd => Protocol::Rmd,
         }
     }
 
     /// The profile of ST drives.
     pub fn profile(self) -> Option<Profile> {
         match self {
-            Speaks::St(profile) => Some(profile),
-            Speaks::Rmd => None,
+            DriveProtocol::St(profile) => Some(profile),
+            DriveProtocol::Rmd => None,
         }
     }
 
     /// The motor with this number or ID. `None`: no motor can have it.
     pub fn motor(self, number: u8) -> Option<Motor> {
         match self {
-            Speaks::St(_) => MotorNumber::new(number).map(Motor::St),
-            Speaks::Rmd => MotorId::new(number).map(Motor::Rmd),
+            DriveProtocol::St(_) => MotorNumber::new(number).map(Motor::St),
+            DriveProtocol::Rmd => MotorId::new(number).map(Motor::Rmd),
         }
     }
 }
@@ -62,7 +62,7 @@ impl Speaks {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Told {
     /// What happened.
-    pub event: Happening,
+    pub event: EventKind,
     /// The motor; `None` for the line.
     pub motor: Option<Motor>,
     /// Who commanded it.
@@ -75,13 +75,13 @@ pub struct Told {
 
 /// The stops whose end is not known yet.
 #[derive(Debug, Default)]
-pub struct Words {
+pub struct EventText {
     stops: HashMap<CommandId, (Option<Motor>, Arc<str>)>,
     /// Why programs left whose motors the share stops next.
     reasons: HashMap<(Motor, Arc<str>), String>,
 }
 
-impl Words {
+impl EventText {
     /// The motors, among these, whose stop should be tried again after an event.
     pub(super) fn retries(
         &self,
@@ -102,35 +102,35 @@ impl Words {
     }
 
     /// The event with its sentence. Reads and confirmations are none.
-    pub fn of(&mut self, speaks: Speaks, what: &What) -> Option<Told> {
+    pub fn of(&mut self, speaks: DriveProtocol, what: &What) -> Option<Told> {
         let event = |event, motor: Option<Motor>, by: Option<&Arc<str>>, message: String| {
             Some(Told { event, motor, by: by.cloned(), since: None, message })
         };
         match what {
             What::Lost(why) => {
-                event(Happening::Lost, None, None, format!("the port failed: {why}"))
+                event(EventKind::Lost, None, None, format!("the port failed: {why}"))
             }
-            What::Back => event(Happening::Back, None, None, "the port is open again".to_owned()),
+            What::Back => event(EventKind::Back, None, None, "the port is open again".to_owned()),
             What::Silent(motor, why) => {
-                event(Happening::Silent, Some(*motor), None, format!("it does not answer: {why}"))
+                event(EventKind::Silent, Some(*motor), None, format!("it does not answer: {why}"))
             }
             What::Answers(motor) => {
-                event(Happening::Answers, Some(*motor), None, "it answers again".to_owned())
+                event(EventKind::Answers, Some(*motor), None, "it answers again".to_owned())
             }
             What::Refused(signals, why) => {
                 let motor = signals.first().map(|signal| signal.motor);
                 let names: Vec<_> = signals.iter().map(|it| it.source.to_string()).collect();
                 let message = format!("no values of {}: {why}", names.join(", "));
-                event(Happening::Refused, motor, None, message)
+                event(EventKind::Refused, motor, None, message)
             }
             What::Doubtful(motor, since) => {
                 let message = "values may be those of other signals".to_owned();
-                let told = event(Happening::Doubtful, Some(*motor), None, message)?;
+                let told = event(EventKind::Doubtful, Some(*motor), None, message)?;
                 Some(Told { since: Some(*since), ..told })
             }
             What::Commanded(_, by, request) if !request.is_read() => {
                 let message = format!("{by} sends {}", described(speaks, request));
-                event(Happening::Commanded, request.motor(), Some(by), message)
+                event(EventKind::Commanded, request.motor(), Some(by), message)
             }
             What::Unanswered(..) | What::Confirmed(..) | What::Heard(_) | What::Commanded(..) => {
                 None
@@ -143,38 +143,38 @@ impl Words {
                     Some(why) => format!("{}: {why}", stops(by)),
                     None => stops(by),
                 };
-                event(Happening::Stopping, request.motor(), Some(by), message)
+                event(EventKind::Stopping, request.motor(), Some(by), message)
             }
             What::Stopped(id) => {
                 let (motor, by) = self.stops.remove(id)?;
                 let message = "it confirmed the stop".to_owned();
-                event(Happening::Stopped, motor, Some(&by), message)
+                event(EventKind::Stopped, motor, Some(&by), message)
             }
             What::StopFailed(id, why) => {
                 let (motor, by) = self.stops.remove(id)?;
                 let message = format!("it may still be turning: {why}");
-                event(Happening::StopFailed, motor, Some(&by), message)
+                event(EventKind::StopFailed, motor, Some(&by), message)
             }
             What::Latched(by) => {
                 let message = format!("{by} refuses motion until it is released");
-                event(Happening::Latched, None, Some(by), message)
+                event(EventKind::Latched, None, Some(by), message)
             }
             What::Released(by) => {
-                event(Happening::Released, None, Some(by), format!("{by} allows motion again"))
+                event(EventKind::Released, None, Some(by), format!("{by} allows motion again"))
             }
         }
     }
 }
 
 /// A request with names and units, without its motor: the message has named it before.
-fn described(speaks: Speaks, request: &Request) -> String {
+fn described(speaks: DriveProtocol, request: &Request) -> String {
     match (request, speaks) {
-        (Request::St(_, request), Speaks::St(profile)) => {
+        (Request::St(_, request), DriveProtocol::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
             let frame = Frame::command(0, &request.request(), &mut bytes);
             frame.map_or_else(String::new, |frame| Transcript::new(profile).note(None, true, frame))
         }
-        (Request::Raw(_, code, payload), Speaks::St(profile)) => {
+        (Request::Raw(_, code, payload), DriveProtocol::St(profile)) => {
             let mut bytes = [0; MAX_FRAME];
             let frame = Frame { header: Frame::header(*code, 0), payload };
             let frame = frame.encode(&mut bytes);

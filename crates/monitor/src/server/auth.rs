@@ -20,7 +20,7 @@ pub fn random_word() -> std::io::Result<String> {
 }
 
 /// What a request needs to come in.
-pub struct Door {
+pub struct Auth {
     /// The token of each role.
     tokens: [(Role, String); 2],
     /// The name of the cookie. Cookies of all ports of a machine are in one place.
@@ -30,14 +30,14 @@ pub struct Door {
     names: Vec<String>,
 }
 
-impl Door {
-    /// A door with new tokens, for a server at this port. `names` are names of this machine that
+impl Auth {
+    /// A auth with new tokens, for a server at this port. `names` are names of this machine that
     /// browsers may use.
     ///
     /// # Errors
     /// The system has no random numbers.
     pub fn new(port: u16, is_secure: bool, names: Vec<String>) -> std::io::Result<Self> {
-        Ok(Door {
+        Ok(Auth {
             tokens: [(Role::Operator, random_word()?), (Role::Viewer, random_word()?)],
             cookie: format!("motorlink-{port}"),
             is_secure,
@@ -144,8 +144,8 @@ fn is_same(own: &str, given: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn door() -> Door {
-        Door::new(8707, false, vec!["bench.local".to_owned()]).expect("random numbers")
+    fn auth() -> Auth {
+        Auth::new(8707, false, vec!["bench.local".to_owned()]).expect("random numbers")
     }
 
     fn headers(list: &[(HeaderName, &str)]) -> HeaderMap {
@@ -160,22 +160,22 @@ mod tests {
     fn hosts_are_addresses_and_known_names() {
         let own = ["127.0.0.1:8707", "[::1]:8707", "localhost:9000", "LOCALHOST", "10.1.2.3:1"];
         for host in own.into_iter().chain(["bench.local:8707"]) {
-            assert!(door().is_own_host(&headers(&[(HOST, host)])), "{host}");
+            assert!(auth().is_own_host(&headers(&[(HOST, host)])), "{host}");
         }
         let others =
             ["evil.example:8707", "127.0.0.1.evil.example", "a@127.0.0.1", "", "2130706433x"];
         let more = ["localhost.evil.example:8707", "[::1", "127.1:8707"];
         let ports = ["127.0.0.1:8707.evil.example", "localhost:evil", "[::1]:99999", "localhost:"];
         for host in others.into_iter().chain(more).chain(ports) {
-            assert!(!door().is_own_host(&headers(&[(HOST, host)])), "{host}");
+            assert!(!auth().is_own_host(&headers(&[(HOST, host)])), "{host}");
         }
-        assert!(!door().is_own_host(&headers(&[])));
-        assert!(!door().is_own_host(&headers(&[(HOST, "localhost"), (HOST, "evil.example")])));
+        assert!(!auth().is_own_host(&headers(&[])));
+        assert!(!auth().is_own_host(&headers(&[(HOST, "localhost"), (HOST, "evil.example")])));
     }
 
     #[test]
     fn an_origin_is_the_host_itself() {
-        let check = |list: &[(HeaderName, &str)]| door().is_own_origin(&headers(list));
+        let check = |list: &[(HeaderName, &str)]| auth().is_own_origin(&headers(list));
         let host = (HOST, "127.0.0.1:8707");
         assert_eq!(check(std::slice::from_ref(&host)), None);
         assert_eq!(check(&[host.clone(), (ORIGIN, "http://127.0.0.1:8707")]), Some(true));
@@ -190,22 +190,22 @@ mod tests {
 
     #[test]
     fn a_cookie_has_one_token_of_two() {
-        let door = door();
+        let auth = auth();
         for role in [Role::Operator, Role::Viewer] {
-            let set = door.set_cookie(role);
+            let set = auth.set_cookie(role);
             assert!(set.ends_with("; HttpOnly; SameSite=Strict; Path=/"), "{set}");
             let cookie = format!("other=1; {}", set.split(';').next().unwrap_or_default());
-            assert_eq!(door.role(&headers(&[(COOKIE, &cookie)])), Some(role));
+            assert_eq!(auth.role(&headers(&[(COOKIE, &cookie)])), Some(role));
         }
-        let token = door.token(Role::Operator);
+        let token = auth.token(Role::Operator);
         assert_eq!(token.len(), 32);
-        assert_ne!(token, door.token(Role::Viewer));
+        assert_ne!(token, auth.token(Role::Viewer));
         for cookie in
             [format!("motorlink-8708={token}"), format!("motorlink-8707={token}0"), String::new()]
         {
-            assert_eq!(door.role(&headers(&[(COOKIE, &cookie)])), None, "{cookie}");
+            assert_eq!(auth.role(&headers(&[(COOKIE, &cookie)])), None, "{cookie}");
         }
-        assert_eq!(door.role_of(""), None);
-        assert_eq!(door.role_of(&token[1..]), None);
+        assert_eq!(auth.role_of(""), None);
+        assert_eq!(auth.role_of(&token[1..]), None);
     }
 }

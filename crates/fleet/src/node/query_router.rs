@@ -13,8 +13,8 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::query::Query;
 use zenoh::sample::SampleKind;
 
+use super::admission::Admission;
 use super::common::{Common, answer};
-use super::gate::Gate;
 use super::outbox::Outbox;
 use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
@@ -36,26 +36,26 @@ const LONGEST_PROGRAM: usize = 20;
 /// Takes queries from now on.
 pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {
     let zenoh = &common.zenoh;
-    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
-    let asked = move |query: Query| door.asked(query, &handle);
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
+    let asked = move |query: Query| router.asked(query, &handle);
     zenoh
         .declare_queryable(key::all_asks(&common.name, &common.boot))
         .callback(asked)
         .background()
         .wait()?;
-    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
     let said = move |query: Query| {
-        let door = Arc::clone(&door);
-        handle.spawn(async move { door.say_info(&query).await });
+        let router = Arc::clone(&router);
+        handle.spawn(async move { router.say_info(&query).await });
     };
     let info = key::info(&common.name, &common.boot);
     zenoh.declare_queryable(info).callback(said).background().wait()?;
-    let (door, handle) = (Arc::clone(common), runtime.handle().clone());
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
     let here = move |sample: zenoh::sample::Sample| {
         if sample.kind() == SampleKind::Delete
             && let Some((who, session)) = key::present_of(sample.key_expr().as_str())
         {
-            door.gone(&who, &session, &handle);
+            router.gone(&who, &session, &handle);
         }
     };
     let all = key::all_here(&common.name, &common.boot);
@@ -149,7 +149,7 @@ impl Common {
                 let _ = program.pass(&Request::new(UNAWAITED, ask)).await;
                 let served = Session {
                     common: Arc::clone(&self),
-                    gate: Gate::new(),
+                    admission: Admission::new(),
                     heard: self.clock.now(),
                     has_commanded: false,
                     deadline,

@@ -9,14 +9,14 @@ use motorlink::st::Profile;
 use motorlink_proto::time::Micros;
 
 use super::Hub;
-use super::asked::{Refused, usage};
+use super::ids::SessionId;
 use super::jobs::{Asker, Closed, Does, End, Job, JobId, Scanned, found_ports};
-use super::line::Held;
-use super::place::SessionId;
+use super::line::SharedLine;
+use super::requests::{Refused, usage};
 use super::work::News;
 use crate::line::Stopped;
 use crate::share::message::{
-    ANY_MOTOR, Answer, FoundPort, Happening, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
+    ANY_MOTOR, Answer, EventKind, FoundPort, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
     Protocol, Reason, StoppedMotor,
 };
 use crate::share::opening::{OpenError, Opened, Wish};
@@ -158,8 +158,8 @@ impl Hub {
         // Events of the line come before its end.
         let _ = self.collect_events();
         let Some(held) = self.lines.remove(&line) else { return Ok(None) };
-        if let Some(by) = held.owed_stop() {
-            self.owed.add(held.places(), &by);
+        if let Some(by) = held.pending_stop_by() {
+            self.pending_stops.add(held.places(), &by);
         }
         self.sessions.iter_mut().for_each(|(_, session)| session.forget(line));
         let place = held.places();
@@ -215,7 +215,8 @@ impl Hub {
 
     fn listed(&self, ports: Vec<(FoundPort, Option<Place>)>) -> Answer {
         let with_line = |(port, place): (FoundPort, Option<Place>)| {
-            let is_there = |held: &&Held| place.as_ref().is_some_and(|it| it.is(&held.place()));
+            let is_there =
+                |held: &&SharedLine| place.as_ref().is_some_and(|it| it.is(&held.place()));
             let held = self.lines.values().find(is_there);
             FoundPort { line: held.map(|held| held.name.clone()), ..port }
         };
@@ -230,7 +231,7 @@ impl Hub {
         let Found { finding, text, motors } =
             found.map_err(|error| (Reason::Line, error.to_string()))?;
         let port = port.to_string();
-        self.say(Happening::Scanned, by, format!("{by} asked what answers on {port}: {text}"));
+        self.say(EventKind::Scanned, by, format!("{by} asked what answers on {port}: {text}"));
         Ok(Answer::Scan { port, rate, finding, text, motors, rates })
     }
 
@@ -242,35 +243,35 @@ impl Hub {
         let opened = opened.map_err(|error| (Reason::Line, error.to_string()))?;
         let port = opened.port.to_string();
         let name = self.free_name(opened.speaks.protocol());
-        let held = Held::start(&name, opened);
+        let held = SharedLine::start(&name, opened);
         let mut held = held.map_err(|error| (Reason::Line, no_thread(&error)))?;
         if let Some(by) = &self.latch {
             // If its engine has ended, the share ends.
             let _ = held.remote().latch_then(by, || {});
         }
         // Under a latch nothing turns.
-        if let Some(by) = self.owed.take(&held.place()).as_ref().or(self.latch.as_ref()) {
-            held.owe_stop(by, Micros(0));
+        if let Some(by) = self.pending_stops.take(&held.place()).as_ref().or(self.latch.as_ref()) {
+            held.begin_line_stop(by, Micros(0));
         }
         self.last_line += 1;
         self.lines.insert(self.last_line, held);
         self.names.insert(name.clone());
         let message = format!("{name}: {by} opened {port}");
-        self.say_of((Some(&name), None), Happening::Opened, by, message);
+        self.say_of((Some(&name), None), EventKind::Opened, by, message);
         Ok(Answer::Open { line: name })
     }
 
     fn closed(&mut self, by: &Arc<str>, closed: Closed) -> Answer {
         let Closed { name, port, place, stopped } = closed;
         if stopped.iter().any(|one| one.result.is_err()) {
-            self.owed.add(place, by);
+            self.pending_stops.add(place, by);
         }
         let mut motors = Vec::new();
         for Stopped { motor, result } in stopped {
             let number = motor.number();
             let (event, words) = match &result {
-                Ok(()) => (Happening::Stopped, "it confirmed the stop".to_owned()),
-                Err(error) => (Happening::StopFailed, format!("it may still be turning: {error}")),
+                Ok(()) => (EventKind::Stopped, "it confirmed the stop".to_owned()),
+                Err(error) => (EventKind::StopFailed, format!("it may still be turning: {error}")),
             };
             let message = format!("{name}, motor {number}: {words}");
             self.say_of((Some(&name), Some(number)), event, by, message);
@@ -279,7 +280,7 @@ impl Hub {
             motors.push(StoppedMotor { motor, failure, absent: false });
         }
         let message = format!("{name}: {by} closed {port}");
-        self.say_of((Some(&name), None), Happening::Closed, by, message);
+        self.say_of((Some(&name), None), EventKind::Closed, by, message);
         Answer::Close { motors }
     }
 
@@ -297,7 +298,7 @@ impl Hub {
             };
             let motor = MotorName { line: place.to_string(), motor: ANY_MOTOR };
             motors.push(StoppedMotor { motor, failure: Some(failure), absent: false });
-            self.owed.add(place.clone(), by);
+            self.pending_stops.add(place.clone(), by);
         }
         motors
     }

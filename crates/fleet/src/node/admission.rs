@@ -14,7 +14,7 @@ const URGENT: usize = 1024;
 
 /// The rules of one session.
 #[derive(Debug)]
-pub struct Gate {
+pub struct Admission {
     /// The next post in the order.
     next: u32,
     /// The urgent requests that the node has. They may come in any order.
@@ -36,10 +36,10 @@ pub enum Verdict {
     Early,
 }
 
-impl Gate {
+impl Admission {
     /// A session that begins.
     pub fn new() -> Self {
-        Gate { next: 1, urgent: BTreeSet::new(), overtaken: 0 }
+        Admission { next: 1, urgent: BTreeSet::new(), overtaken: 0 }
     }
 
     /// The next post that is taken.

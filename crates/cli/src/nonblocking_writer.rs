@@ -20,7 +20,7 @@ const WAITING: usize = 256;
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// A stream to print on.
-pub struct Voice {
+pub struct NonblockingWriter {
     words: SyncSender<Word>,
     state: Arc<State>,
 }
@@ -39,14 +39,14 @@ enum Word {
     End(SyncSender<()>),
 }
 
-impl Voice {
+impl NonblockingWriter {
     /// Prints on `out`; `missed` puts into words how many lines were dropped.
     pub fn new(out: impl Write + AsFd + Send + 'static, missed: fn(u64) -> String) -> Self {
         let (words, spoken) = sync_channel(WAITING);
         let state = Arc::new(State::default());
         let shared = Arc::clone(&state);
         std::thread::spawn(move || speak(out, &spoken, &shared, missed));
-        Voice { words, state }
+        NonblockingWriter { words, state }
     }
 
     /// Prints a line, unless too many wait already.
@@ -125,19 +125,19 @@ mod tests {
     #[test]
     fn what_nobody_reads_is_dropped_and_counted_and_nothing_waits() {
         let (near, far) = UnixStream::pair().unwrap();
-        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        let writer = NonblockingWriter::new(near, |lines| format!("{lines} missed"));
         let said = 20_000;
         for n in 0..said {
-            voice.say(format_args!("{n} {}", "x".repeat(200)));
+            writer.say(format_args!("{n} {}", "x".repeat(200)));
         }
-        assert!(!voice.has_room());
+        assert!(!writer.has_room());
         let mut reader = BufReader::new(far).lines().map(Result::unwrap);
         let mut lines = Vec::new();
-        while !voice.has_room() {
+        while !writer.has_room() {
             lines.extend(reader.next());
         }
-        voice.say("last");
-        drop(voice);
+        writer.say("last");
+        drop(writer);
         lines.extend(reader);
         let missed = lines.iter().filter_map(|line| line.strip_suffix(" missed"));
         let missed: Vec<u64> = missed.map(|lines| lines.parse().unwrap()).collect();
@@ -150,16 +150,16 @@ mod tests {
     #[test]
     fn the_end_waits_for_what_is_written_and_not_for_a_reader_that_takes_nothing() {
         let (near, far) = UnixStream::pair().unwrap();
-        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        let writer = NonblockingWriter::new(near, |lines| format!("{lines} missed"));
         // More than the socket takes.
-        voice.say("x".repeat(1 << 20));
-        voice.say("last");
-        voice.finish();
+        writer.say("x".repeat(1 << 20));
+        writer.say("last");
+        writer.finish();
         // It has not waited for it. A reader that reads gets all of it.
         let reader =
             std::thread::spawn(move || BufReader::new(far).lines().last().unwrap().unwrap());
-        voice.finish();
-        drop(voice);
+        writer.finish();
+        drop(writer);
         assert_eq!(reader.join().unwrap(), "last");
     }
 
@@ -167,12 +167,12 @@ mod tests {
     fn a_reader_that_is_gone_ends_nothing() {
         let (near, far) = UnixStream::pair().unwrap();
         drop(far);
-        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        let writer = NonblockingWriter::new(near, |lines| format!("{lines} missed"));
         for n in 0..1000 {
-            voice.say(n);
+            writer.say(n);
         }
-        voice.finish();
-        while !voice.has_room() {
+        writer.finish();
+        while !writer.has_room() {
             std::thread::yield_now();
         }
     }

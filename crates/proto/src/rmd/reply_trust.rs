@@ -16,7 +16,7 @@ use crate::time::{Instant, Micros};
 
 /// Which late replies a motor may still send.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Doubt {
+pub(super) struct ReplyTrust {
     pending: Pending,
     /// Whether replies to Off and to Stop are pending.
     off: bool,
@@ -50,15 +50,16 @@ pub(super) enum Admitted {
     Both,
 }
 
-impl Doubt {
-    pub(super) const NONE: Doubt = Doubt {
+impl ReplyTrust {
+    pub(super) const NONE: ReplyTrust = ReplyTrust {
         pending: Pending::Nothing,
         off: false,
         stop: false,
         until: Instant(0),
         heard: None,
     };
-    pub(super) const UNKNOWN: Doubt = Doubt { pending: Pending::Unknown, ..Doubt::NONE };
+    pub(super) const UNKNOWN: ReplyTrust =
+        ReplyTrust { pending: Pending::Unknown, ..ReplyTrust::NONE };
 
     pub(super) const fn is_none(&self) -> bool {
         matches!(self.pending, Pending::Nothing)
@@ -102,7 +103,7 @@ impl Doubt {
     /// Takes a reply with this code for which no exchange is open. Returns whether it was pending.
     pub(super) fn late_reply(&mut self, now: Instant, code: u8) -> bool {
         match self.pending {
-            Pending::One(pending) if answers(pending, code) => *self = Doubt::NONE,
+            Pending::One(pending) if answers(pending, code) => *self = ReplyTrust::NONE,
             Pending::Several(pending) if answers(pending, code) => self.heard = Some(now),
             Pending::Mixed => self.heard = Some(now),
             // Before the first answer of the motor, this may be another host's frame.
@@ -124,7 +125,7 @@ impl Doubt {
         }
         let silent = self.heard.map(|heard| heard + quarantine);
         if silent.is_some_and(|silent| now >= silent) {
-            *self = Doubt::NONE;
+            *self = ReplyTrust::NONE;
             return Ok(Admitted::Request);
         }
         let own = match Code::from(code) {

@@ -84,7 +84,7 @@ fn a_motor_that_is_read_and_has_never_answered_is_not_heard() {
     program.ask(read("st0", &[2])).unwrap();
     program.ask(read("rmd0", &[9])).unwrap();
     for _ in 0..2 {
-        program.event(Happening::Silent);
+        program.event(EventKind::Silent);
     }
     for line in ["st0", "rmd0"] {
         assert!(heard_and_unstopped(&mut program, line).0.is_empty(), "{line}");

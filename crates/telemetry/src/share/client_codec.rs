@@ -6,7 +6,7 @@ use super::message::{self, Answer, Ask, MessageError, Reason, Request, Text};
 
 /// The requests of a program, and what it receives.
 #[derive(Debug, Default)]
-pub struct Dialogue {
+pub struct ClientCodec {
     reader: Reader,
     last_id: u32,
 }
@@ -57,7 +57,7 @@ impl Refusal {
 
 /// The bytes are not those of a share.
 #[derive(Debug, thiserror::Error)]
-pub enum DialogueError {
+pub enum CodecError {
     /// The stream.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -69,7 +69,7 @@ pub enum DialogueError {
     Data(#[from] DataError),
 }
 
-impl Dialogue {
+impl ClientCodec {
     /// The id of a request, and its bytes for the socket.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl Dialogue {
     ///
     /// # Errors
     /// The stream is damaged, or nothing that a share sends.
-    pub fn hear(&mut self) -> Result<Option<Heard>, DialogueError> {
+    pub fn hear(&mut self) -> Result<Option<Heard>, CodecError> {
         let Some(frame) = self.reader.take()? else { return Ok(None) };
         Ok(Some(match frame.kind {
             Kind::Data => Heard::Data(Data::decode(&frame.payload)?),

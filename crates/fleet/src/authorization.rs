@@ -2,20 +2,22 @@
 
 use std::collections::BTreeMap;
 
+use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::message::{Ask, Line};
 use motorlink_telemetry::share::request::Kind;
-use motorlink_telemetry::share::words::Speaks;
 
 use crate::key::Scope;
 
 /// What the drives of each line speak.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Lines(BTreeMap<String, Speaks>);
+pub struct Lines(BTreeMap<String, DriveProtocol>);
 
 impl Lines {
     /// What the node says of its lines. A line in a profile that is not known here is left out.
     pub fn of(lines: &[Line]) -> Self {
-        Lines(lines.iter().filter_map(|it| Some((it.line.clone(), Speaks::of(it)?))).collect())
+        Lines(
+            lines.iter().filter_map(|it| Some((it.line.clone(), DriveProtocol::of(it)?))).collect(),
+        )
     }
 
     /// What a request does. Of a line that is not known, every command may move a motor.

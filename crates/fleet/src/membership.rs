@@ -11,7 +11,7 @@ const MOST: usize = 256;
 
 /// Who is there, who has ended, and who went away without an end.
 #[derive(Debug, Default)]
-pub(crate) struct Roll {
+pub(crate) struct Membership {
     here: BTreeSet<Run>,
     ended: VecDeque<Run>,
     away: BTreeMap<Run, Gone>,
@@ -25,7 +25,7 @@ struct Gone {
     twins: BTreeSet<Run>,
 }
 
-impl Roll {
+impl Membership {
     /// A run of a node is there. On the same computer it is the node that went away, started again.
     pub(crate) fn came(&mut self, run: Run) {
         self.away.retain(|other, gone| {
@@ -85,87 +85,87 @@ mod tests {
         run_at(node, 1, boot)
     }
 
-    fn away(roll: &Roll) -> Vec<(String, f64)> {
-        roll.away().into_iter().map(|it| (it.node, it.since)).collect()
+    fn away(members: &Membership) -> Vec<(String, f64)> {
+        members.away().into_iter().map(|it| (it.node, it.since)).collect()
     }
 
     #[test]
     fn a_node_that_vanishes_is_away_until_it_is_back() {
-        let mut roll = Roll::default();
-        roll.came(run("arm1", "a"));
-        roll.came(run("arm2", "b"));
-        assert_eq!(away(&roll), []);
-        roll.went(run("arm2", "b"), 7.0);
-        assert_eq!(away(&roll), [("arm2".to_owned(), 7.0)]);
+        let mut members = Membership::default();
+        members.came(run("arm1", "a"));
+        members.came(run("arm2", "b"));
+        assert_eq!(away(&members), []);
+        members.went(run("arm2", "b"), 7.0);
+        assert_eq!(away(&members), [("arm2".to_owned(), 7.0)]);
         // The same run: the network was cut. Another run: it was started again.
         for boot in ["b", "c"] {
-            roll.came(run("arm2", boot));
-            assert_eq!(away(&roll), []);
-            roll.went(run("arm2", boot), 9.0);
-            assert_eq!(away(&roll), [("arm2".to_owned(), 9.0)]);
+            members.came(run("arm2", boot));
+            assert_eq!(away(&members), []);
+            members.went(run("arm2", boot), 9.0);
+            assert_eq!(away(&members), [("arm2".to_owned(), 9.0)]);
         }
     }
 
     #[test]
     fn a_node_that_ends_is_not_away_whichever_is_heard_first() {
-        let mut roll = Roll::default();
-        roll.came(run("arm1", "a"));
-        roll.ended(run("arm1", "a"));
-        roll.went(run("arm1", "a"), 1.0);
-        assert_eq!(away(&roll), []);
-        roll.came(run("arm1", "b"));
-        roll.went(run("arm1", "b"), 2.0);
-        roll.ended(run("arm1", "b"));
-        assert_eq!(away(&roll), []);
+        let mut members = Membership::default();
+        members.came(run("arm1", "a"));
+        members.ended(run("arm1", "a"));
+        members.went(run("arm1", "a"), 1.0);
+        assert_eq!(away(&members), []);
+        members.came(run("arm1", "b"));
+        members.went(run("arm1", "b"), 2.0);
+        members.ended(run("arm1", "b"));
+        assert_eq!(away(&members), []);
         // The end of an earlier run says nothing about this one.
-        roll.came(run("arm1", "c"));
-        roll.went(run("arm1", "c"), 3.0);
-        roll.ended(run("arm1", "b"));
-        assert_eq!(away(&roll), [("arm1".to_owned(), 3.0)]);
+        members.came(run("arm1", "c"));
+        members.went(run("arm1", "c"), 3.0);
+        members.ended(run("arm1", "b"));
+        assert_eq!(away(&members), [("arm1".to_owned(), 3.0)]);
     }
 
     #[test]
     fn a_node_that_was_there_before_is_known_when_it_vanishes() {
-        let mut roll = Roll::default();
-        roll.went(run("arm1", "a"), 1.0);
-        assert_eq!(away(&roll), [("arm1".to_owned(), 1.0)]);
+        let mut members = Membership::default();
+        members.went(run("arm1", "a"), 1.0);
+        assert_eq!(away(&members), [("arm1".to_owned(), 1.0)]);
     }
 
     #[test]
     fn a_node_with_the_name_of_one_that_vanished_does_not_hide_it() {
-        let mut roll = Roll::default();
+        let mut members = Membership::default();
         // Both were there at the same time, on one computer or on two.
         for (first, other) in [("a", run("arm1", "b")), ("e", run_at("arm1", 2, "b"))] {
-            roll.came(run("arm1", first));
-            roll.came(other.clone());
-            roll.went(run("arm1", first), 1.0);
+            members.came(run("arm1", first));
+            members.came(other.clone());
+            members.went(run("arm1", first), 1.0);
             // The network of the other one is cut for a moment.
-            roll.went(other.clone(), 2.0);
-            roll.came(other.clone());
-            assert_eq!(away(&roll), [("arm1".to_owned(), 1.0)], "{other:?}");
-            roll.ended(run("arm1", first));
-            roll.ended(other.clone());
-            roll.went(other, 2.0);
+            members.went(other.clone(), 2.0);
+            members.came(other.clone());
+            assert_eq!(away(&members), [("arm1".to_owned(), 1.0)], "{other:?}");
+            members.ended(run("arm1", first));
+            members.ended(other.clone());
+            members.went(other, 2.0);
         }
         // A copy of the computer takes its place.
-        roll.came(run("arm1", "c"));
-        roll.went(run("arm1", "c"), 3.0);
-        roll.came(run_at("arm1", 2, "d"));
-        assert_eq!(away(&roll), [("arm1".to_owned(), 3.0)]);
+        members.came(run("arm1", "c"));
+        members.went(run("arm1", "c"), 3.0);
+        members.came(run_at("arm1", 2, "d"));
+        assert_eq!(away(&members), [("arm1".to_owned(), 3.0)]);
         // It is back, also started again.
-        roll.came(run("arm1", "f"));
-        assert_eq!(away(&roll), []);
+        members.came(run("arm1", "f"));
+        assert_eq!(away(&members), []);
     }
 
     #[test]
     fn many_nodes_do_not_take_all_memory() {
-        let mut roll = Roll::default();
+        let mut members = Membership::default();
         for number in 0..3 * MOST {
-            roll.went(run(&format!("n{number}"), "a"), number as f64);
-            roll.ended(run(&format!("e{number}"), "a"));
+            members.went(run(&format!("n{number}"), "a"), number as f64);
+            members.ended(run(&format!("e{number}"), "a"));
         }
-        assert_eq!(roll.away().len(), MOST);
-        assert_eq!(roll.ended.len(), MOST);
-        assert!(roll.away().iter().all(|it| it.since >= 2.0 * MOST as f64));
+        assert_eq!(members.away().len(), MOST);
+        assert_eq!(members.ended.len(), MOST);
+        assert!(members.away().iter().all(|it| it.since >= 2.0 * MOST as f64));
     }
 }
