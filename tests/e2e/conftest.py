@@ -35,7 +35,8 @@ def motorlink():
 def run(motorlink):
     """Runs the program to its end: `run("st", "-p", port, "info")`."""
 
-    def run(*arguments, within=20, stdin="", **variables):
+    # One that hangs ends.
+    def run(*arguments, within=120, stdin="", **variables):
         done = subprocess.run(
             [motorlink, *map(str, arguments)],
             input=stdin,
@@ -53,7 +54,7 @@ def run(motorlink):
 def piped(motorlink):
     """Runs the program with its stdout redirected by a shell: `piped("st registers", "| head -n 2")`."""
 
-    def piped(words, out, within=30):
+    def piped(words, out, within=120):
         done = subprocess.run(
             ["bash", "-c", f"{motorlink} {words} {out}; exit ${{PIPESTATUS[0]}}"],
             capture_output=True,

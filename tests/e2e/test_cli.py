@@ -9,7 +9,7 @@ import pytest
 from program import eventually
 from terminal import LAST, Terminal
 
-DEMO_ENDS_WITHIN = 30
+DEMO_ENDS_WITHIN = 120
 
 
 def demo_on_a_terminal(motorlink, columns=100, until=None, **variables):

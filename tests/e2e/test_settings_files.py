@@ -203,7 +203,7 @@ def test_a_cable_that_is_pulled_leaves_the_state_that_the_message_says(run, sim,
             return reply if len(writes) < 4 else None
 
         with device(tmp_path / "cable", passed_on) as cable:
-            told = run("st", "-p", cable, "restore", file, "--json", within=60).ended(3)
+            told = run("st", "-p", cable, "restore", file, "--json").ended(3)
     check(told.out + told.err)
     state = told.lines[-1]
     assert (state["ok"], state["changed"], state["unknown"]) == (False, ["SPEED_KP", "SPEED_KI", "TORQUE_KP"], ["TORQUE_KI"])

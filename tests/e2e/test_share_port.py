@@ -78,7 +78,13 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     direct.until(event("stopped", line="rmd0", motor=3))
     waited = run("rmd", "-p", share.rmd, "--id", "3", "position", "90", "--max-speed", "360", "--wait")
     assert said not in waited.ended(0).err
-    assert said not in run("st", "-p", share.st, "ramp", "1000", "100").ended(0).err
+    assert said in run("st", "-p", share.st, "ramp", "1000", "100").ended(0).err
+    assert said in run("rmd", "-p", share.rmd, "--id", "3", "raw", "A2 00 00 00 30 75 00 00").ended(0).err
+    assert said not in run("rmd", "-p", share.rmd, "--id", "3", "status").ended(0).err
+    # Two shares would own the same motor.
+    for holder in ("share", "node"):
+        twice = run(holder, "-p", share.rmd).ended(2)
+        assert "a share or node already holds this line" in twice.err
     eventually(lambda: abs(direct.rpm()) < 30 and abs(direct.dps(3)) < 5, "motors that stop")
 
 
@@ -131,7 +137,7 @@ def test_a_command_latches_stops_and_releases(share, run, direct):
 
 def test_a_stop_that_a_drive_does_not_confirm_is_an_error(share, run, direct):
     direct.command("rmd0", 9, 0xA2, *7 * [0])
-    done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(3)
+    done = run("share", "stop", "--at", f"unix:{share.path}").ended(3)
     assert "rmd0, motor 9: it may still be turning" in done.out
     assert "not all confirmed" in done.err
 
@@ -141,12 +147,12 @@ def test_a_stop_of_all_says_where_no_motor_was_found_and_is_no_error_for_it(shar
     for motor in (20, 21):
         run("rmd", "-p", share.rmd, "--id", motor, "status").ended(3)
     run("st", "-p", share.st, "-m", 5, "status").ended(1)
-    done = run("share", "stop", "--at", f"unix:{share.path}", within=60).ended(0)
+    done = run("share", "stop", "--at", f"unix:{share.path}").ended(0)
     assert "rmd0, motor 1: it confirmed the stop" in done.out
     assert "rmd0: no motor was found at 20 to 21\n" in done.out
     assert "st0: no motor was found at 5\n" in done.out
     assert "may still be turning" not in done.out
-    said = run("share", "stop", "--at", f"unix:{share.path}", "--json", within=60).ended(0)
+    said = run("share", "stop", "--at", f"unix:{share.path}", "--json").ended(0)
     assert '"event":"no-motor","line":"rmd0"' in said.out.replace(" ", "")
 
 

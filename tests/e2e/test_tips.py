@@ -85,6 +85,6 @@ def test_an_unknown_frame_code_may_be_one_of_the_other_profile(run, cold):
 
 def test_the_conformance_kit_names_the_profile_that_fits(run, cold):
     kit = ("conformance", "st", "-p", cold, "--profile", "spec", "--only")
-    message = run(*kit, "a_shorter_value", within=60).ended(1).err
+    message = run(*kit, "a_shorter_value").ended(1).err
     assert "try --profile mcsdk-5.4" in message and "exist only in profile spec" in message
-    assert "try --profile" not in run(*kit, "a_shorter_value_keeps_the_other_bytes[FF_", within=60).ended(1).err
+    assert "try --profile" not in run(*kit, "a_shorter_value_keeps_the_other_bytes[FF_").ended(1).err

@@ -241,7 +241,7 @@ export const STILL = 5;
 /** Whether a motor runs, as its card says. A loaded machine and a motor that still stops refuse: a person tries again. */
 async function runs(motor: Locator) {
   const said = motor.locator('form.fields .said').first();
-  await expect(said).toHaveText(/^✓ Running|the command is too old|it is still stopping/);
+  await expect(said).toHaveText(/^✓ Running|the command is too old|it is still stopping|no sign of life/);
   return (await said.innerText()).startsWith('✓ Running');
 }
 

@@ -141,7 +141,6 @@ const liveOnes = async (page: Page, name: string) =>
   (await card(page, name).locator('.value:not(.old) .digits').allInnerTexts()).filter((text) => text !== '–');
 
 test('no old value looks live when the share is another one, and the page says that it outlives the monitor', async ({ bench, page }) => {
-  test.setTimeout(120_000);
   await bench.monitor.end();
   const at = `unix:${bench.folder}/share`;
   const begin = async () => {

@@ -4,7 +4,6 @@ import { Chromium } from './chromium';
 import { card, hold, spin, test } from './bench';
 
 test('the motor of a real tab stops when the tab is away, hangs, is frozen or killed', async ({ bench }) => {
-  test.setTimeout(120_000);
   const chromium = await Chromium.open();
   const opened = async () => {
     const page = await chromium.tab();

@@ -2,7 +2,6 @@
 import { card, expect, open, spin, STILL, test } from './bench';
 
 test('a fault is shown with what to do, in the header of every view, and acknowledged', async ({ bench, live }) => {
-  test.setTimeout(120_000);
   const inject = (motor: number, fault: string) =>
     bench.drives.tell({ command: 'fault', port: `pty:${bench.folder}/st0`, motor, fault });
   await spin(live, 1000);

@@ -106,7 +106,6 @@ async function oldest(page: Page, started: number) {
 }
 
 test('no bad network shows an old value as a live one', async () => {
-  test.setTimeout(180_000);
   const bench = new Bench();
   const network = await Network.open();
   let chromium: Chromium | undefined;

@@ -2,7 +2,6 @@
 import { expect, open, test } from './bench';
 
 test('a recording is made, its gap is named, it is drawn, finer after a zoom, and downloaded', async ({ bench, live }) => {
-  test.setTimeout(120_000);
   const header = live.locator('.top').getByRole('group', { name: 'Recording' });
   await header.getByRole('button', { name: '● Record' }).click();
   await expect(header).toContainText(/REC \d\d:0[2-9]/, { timeout: 60_000 });

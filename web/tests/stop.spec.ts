@@ -4,7 +4,6 @@ import { card, expect, open, spin, STILL, test, VIEWS } from './bench';
 const CONFIRMED = /Stopped: \d+ of \d+ motors confirmed/;
 
 test('a stop works from every view, by button and by key, and by HTTP while the WebSocket is down', async ({ bench, page }) => {
-  test.setTimeout(120_000);
   // In the page: Playwright's route of a WebSocket is too slow for the samples.
   await page.addInitScript(() => {
     window.WebSocket = class extends WebSocket {
@@ -45,7 +44,6 @@ test('a stop works from every view, by button and by key, and by HTTP while the 
 });
 
 test('a card says what is true of its motor: it runs, is stopped, is refused, is out of reach', async ({ bench, live }) => {
-  test.setTimeout(120_000);
   const motor = card(live, 'st0/1');
   const running = motor.getByText(/^✓ Running/);
   await spin(live, 1000);
@@ -111,7 +109,6 @@ test('what is said of a stop leaves room if many motors did not confirm', async 
 });
 
 test('a stop that was not confirmed is named on every page, also on one that is opened later', async ({ bench, live, viewer }) => {
-  test.setTimeout(120_000);
   try {
     await expect(viewer.getByRole('article')).toHaveCount(6);
     bench.drives.process.kill('SIGSTOP');

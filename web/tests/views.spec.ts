@@ -2,7 +2,6 @@
 import { expect, open, test, VIEWS, violations } from './bench';
 
 test('every view is accessible, as wide as the window, and asks nobody but its server @look', async ({ bench, page }) => {
-  test.setTimeout(120_000);
   const urls: string[] = [];
   const complaints: string[] = [];
   page.on('request', (request) => urls.push(request.url()));

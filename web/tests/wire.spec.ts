@@ -8,7 +8,6 @@ const region = (page: Page) => page.getByRole('region', { name: 'Frames' });
 const count = async (page: Page) => Number(await region(page).getByRole('table').getAttribute('aria-rowcount')) - 1;
 
 test('frames come live, can be paused, searched and saved, and are shown around an instant', async ({ bench, live }) => {
-  test.setTimeout(120_000);
   bench.read();
   await open(live, 'Wire');
   await expect.poll(() => count(live)).toBeGreaterThan(300);

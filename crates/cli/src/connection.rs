@@ -160,22 +160,12 @@ impl Wrap {
     }
 }
 
-/// Says, after a command that leaves motors turning, that the holder of the port stops them now.
+/// Says, after a command that changes the motion of motors, that the holder of the port stops them now.
 pub fn tell_of_stop(port: &PortName) {
     if port.is_held() {
         note(
             "the share stops the motor now, because this command ends: on a share a motor turns as long \
-             as the program that turned it. Use a move with --wait, or a program that stays",
-        );
-    }
-}
-
-/// Says, after a command that changes the motion of a motor, when the holder of the port stops it.
-pub fn tell_of_owner(port: &PortName) {
-    if port.is_held() {
-        note(
-            "this command ends: the share stops the motor now if the command started it, if it was taken \
-             with ?take, or if no other program turns it",
+             as the program that last changed its motion. Use a move with --wait, or a program that stays",
         );
     }
 }

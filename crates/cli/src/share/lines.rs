@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::message::{Line, Protocol};
@@ -53,7 +54,15 @@ impl Lines {
         }
         for text in &self.ports {
             let (profile, timeout) = (self.profile, self.timeout);
-            let wish = Wish { port: text.parse()?, profile, timeout, limits };
+            let port: PortName = text.parse()?;
+            if port.is_held() {
+                // Two shares would own the same motor, each for a program of its own.
+                return Err(Failure::usage(format!(
+                    "{port}: a share or node already holds this line"
+                ))
+                .trying("use that one: programs connect to it"));
+            }
+            let wish = Wish { port, profile, timeout, limits };
             for protocol in wish.protocols() {
                 let number = match protocol {
                     Protocol::St => &mut st,

@@ -114,6 +114,10 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
         match error.kind() {
             // It says why.
             io::ErrorKind::Other => failure,
+            io::ErrorKind::WouldBlock => {
+                Failure::link(format!("the share at {} is there, and does not answer", args.at))
+                    .trying("is it stopped (SIGSTOP), or in a debugger? The motors may still turn")
+            }
             _ => failure.trying("is --at that of a running `motorlink share`?"),
         }
     };

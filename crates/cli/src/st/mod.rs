@@ -22,7 +22,7 @@ pub use refusal::reason_of_read;
 use session::connect;
 pub use units::StUnits;
 
-use crate::connection::{Connection, tell_of_owner, tell_of_stop};
+use crate::connection::{Connection, tell_of_stop};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::keep_error;
@@ -58,12 +58,9 @@ fn run_at(
                 _ => failure,
             };
             let session = connect().map_err(of_stop)?;
-            let starts = matches!(act, Act::Start { .. } | Act::StartStop);
             act::run(&session, act)?;
-            match session.client.started().next() {
-                Some(_) if starts => tell_of_stop(port),
-                Some(_) => tell_of_owner(port),
-                None => {}
+            if session.client.started().next().is_some() {
+                tell_of_stop(port);
             }
             Ok(())
         }

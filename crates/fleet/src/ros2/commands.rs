@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use super::cdr;
+use motorlink_recording::schema::{JointState, Message as _};
+
 use super::joint::{Joint, Mode, Reference};
 use super::pace::{Late, Pace};
 use super::readings::Readings;
-use super::types::JointState;
 use super::wire::{Attachment, Gid};
 
 /// The most publishers that are remembered.
@@ -340,7 +340,7 @@ impl Commands {
     /// What a message asks of joints.
     fn wanted(&self, payload: &[u8]) -> Result<Vec<(usize, Mode, f64)>, Refused> {
         let unreadable = || ("unreadable", "a sample that cannot be read as JointState".to_owned());
-        let message: JointState = cdr::decode(payload).ok_or_else(unreadable)?;
+        let message: JointState = JointState::decode(payload).map_err(|_| unreadable())?;
         let JointState { name: names, position, velocity, effort, .. } = &message;
         let lengths = [position, velocity, effort].map(Vec::len);
         if lengths.into_iter().any(|length| length != 0 && length != names.len()) {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use motorlink_recording::schema::{Message, Time};
 use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::exchange::Target;
@@ -20,13 +21,11 @@ use zenoh::sample::Sample;
 use zenoh::{Session as Zenoh, Wait};
 
 use super::asking::Asking;
-use super::cdr::{self, Value};
 use super::commands::{Commands, Order, Output};
 use super::joint::Joint;
 use super::moving::{Failed, Mover};
 use super::readings::Readings;
 use super::report::{self, Known};
-use super::types::Time;
 use super::wire::{Attachment, Endpoint};
 use crate::clock::Clock;
 
@@ -205,8 +204,8 @@ impl Shared {
                 report::joint_state(&machine.joints, &machine.readings, now, machine.fresh)
             });
             // Programs complain about a state that comes twice.
-            if let Some(state) = state.filter(|it| it.header.stamp != last) {
-                last = state.header.stamp.clone();
+            if let Some(state) = state.filter(|it| it.stamp != last) {
+                last = state.stamp;
                 publisher.put(&state, self.clock.wall());
             }
         }
@@ -318,13 +317,13 @@ impl<'a> Publisher<'a> {
     }
 
     /// Publishes a message. If the network does not take it, nothing waits.
-    fn put(&mut self, message: &impl Value, wall: f64) {
+    fn put(&mut self, message: &impl Message, wall: f64) {
         self.sequence += 1;
         let sequence = self.sequence;
         let attachment = Attachment { sequence, sent_ns: (wall * 1e9) as i64, gid: self.topic.gid };
         let _ = self
             .zenoh
-            .put(&self.topic.key, cdr::encode(message))
+            .put(&self.topic.key, message.encode())
             .attachment(attachment.encode())
             .congestion_control(CongestionControl::Drop)
             .wait();

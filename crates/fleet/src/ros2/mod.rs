@@ -2,7 +2,6 @@
 //! and diagnostics, obeys joint commands, and has two services.
 
 mod asking;
-mod cdr;
 mod commands;
 mod describe;
 mod joint;
@@ -28,9 +27,10 @@ use zenoh::{Session as Zenoh, Wait};
 use crate::clock::Clock;
 use commands::{Commands, Rules};
 use machine::{Machine, NAME, Shared};
+use motorlink_recording::schema::{DiagnosticArray, JointState, Message};
 use readings::Readings;
 use service::Service;
-use types::{DiagnosticArray, JointState, TRIGGER};
+use types::{TRIGGER, trigger};
 use wire::{Endpoint, Graph, Kind};
 
 pub use joint::Settings;
@@ -113,14 +113,14 @@ impl Ros2 {
         let base = settings.namespace.clone().unwrap_or_else(|| legal.clone());
         let graph = Graph::new(settings.domain, zenoh.zid().to_string(), legal);
         let mut numbers = 1..;
-        let mut endpoint = |kind, name: String, message, depth| {
+        let mut endpoint = |kind, name: String, (of, definition): (&str, String), depth| {
             let number = numbers.next().unwrap_or_default();
-            graph.endpoint(number, kind, &name, message, depth)
+            graph.endpoint(number, kind, &name, (of, &definition), depth)
         };
         let (kind, name) = (Kind::Publisher, format!("/{base}/joint_states"));
-        let states = endpoint(kind, name, JointState::MESSAGE, DEPTH);
+        let states = endpoint(kind, name, message::<JointState>(), DEPTH);
         let diagnostics =
-            endpoint(kind, "/diagnostics".to_owned(), DiagnosticArray::MESSAGE, DEPTH);
+            endpoint(kind, "/diagnostics".to_owned(), message::<DiagnosticArray>(), DEPTH);
         let period = Duration::from_secs_f64(settings.rate_hz.recip());
         tokio::spawn(Arc::clone(&shared).tell_states(states.clone(), period));
         tokio::spawn(Arc::clone(&shared).tell_diagnostics(diagnostics.clone(), period));
@@ -129,7 +129,7 @@ impl Ros2 {
         let mut obeys = Vec::new();
         if has_commands {
             let (kind, name) = (Kind::Subscription, format!("/{base}/joint_commands"));
-            let commands = endpoint(kind, name, JointState::MESSAGE, COMMAND_DEPTH);
+            let commands = endpoint(kind, name, message::<JointState>(), COMMAND_DEPTH);
             let shared = Arc::clone(&shared);
             let taken = move |sample| shared.receive(&sample);
             let declared = zenoh.declare_subscriber(&commands.key).callback(taken).background();
@@ -139,7 +139,7 @@ impl Ros2 {
         let mut services = Vec::new();
         for service in Service::ALL {
             let name = format!("/{base}/{}", service.name());
-            let endpoint = endpoint(Kind::Service, name, &TRIGGER, DEPTH);
+            let endpoint = endpoint(Kind::Service, name, (TRIGGER, trigger()), DEPTH);
             service.open(&shared, zenoh, &endpoint).map_err(io::Error::other)?;
             services.push(endpoint);
         }
@@ -157,4 +157,9 @@ impl Ros2 {
             _tokens: tokens,
         })
     }
+}
+
+/// The name and the definition of a message type.
+fn message<M: Message>() -> (&'static str, String) {
+    (M::TYPE, M::definition())
 }

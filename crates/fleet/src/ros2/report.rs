@@ -1,21 +1,11 @@
 //! The messages in which a node says how its joints are.
 
+use motorlink_recording::schema::{DiagnosticArray, DiagnosticStatus, JointState, Level, Time};
 use motorlink_telemetry::share::message::Line;
 
-use super::cdr::Byte;
 use super::commands::Commands;
 use super::joint::Joint;
 use super::readings::{Reading, Readings};
-use super::types::{DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Time};
-
-/// The levels of `diagnostic_msgs/msg/DiagnosticStatus`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Level {
-    Ok = 0,
-    Warn = 1,
-    Error = 2,
-    Stale = 3,
-}
 
 /// The state of all joints whose values are not older than `age` seconds. NaN marks a missing value. Without a
 /// torque constant there are no efforts. The stamp is that of the oldest value. `None` without joints.
@@ -35,7 +25,7 @@ pub fn joint_state(
     };
     let has_effort = fresh.iter().any(|(joint, _)| joint.effort_nm(0.0).is_some());
     Some(JointState {
-        header: header(oldest),
+        stamp: time(oldest),
         name: fresh.iter().map(|(joint, _)| joint.name.clone()).collect(),
         position: array(Reading::position),
         velocity: array(Reading::velocity),
@@ -68,7 +58,7 @@ impl Known<'_> {
     pub fn diagnostics(&self, wall: f64) -> DiagnosticArray {
         let joints = self.joints.iter().map(|joint| self.of_joint(joint));
         let status = std::iter::once(self.of_commands()).chain(joints).collect();
-        DiagnosticArray { header: header(wall), status }
+        DiagnosticArray { stamp: time(wall), status }
     }
 
     fn of_commands(&self) -> DiagnosticStatus {
@@ -123,19 +113,20 @@ impl Known<'_> {
         part: &str,
         message: String,
         hardware_id: String,
-        values: Vec<KeyValue>,
+        values: Vec<(String, String)>,
     ) -> DiagnosticStatus {
-        let (level, name) = (Byte(level as u8), format!("{}: {part}", self.node));
+        let name = format!("{}: {part}", self.node);
         DiagnosticStatus { level, name, message, hardware_id, values }
     }
 }
 
-fn pair(key: &str, value: impl ToString) -> KeyValue {
-    KeyValue { key: key.to_owned(), value: value.to_string() }
+fn pair(key: &str, value: impl ToString) -> (String, String) {
+    (key.to_owned(), value.to_string())
 }
 
-fn header(wall: f64) -> Header {
-    Header { stamp: Time::of(wall), frame_id: String::new() }
+/// A moment in seconds since 1970.
+fn time(wall: f64) -> Time {
+    Time((wall * 1e9) as u64)
 }
 
 #[cfg(test)]
@@ -172,7 +163,7 @@ mod tests {
         assert!(state.position[1].is_nan());
         assert_eq!(state.velocity, [std::f64::consts::TAU; 2]);
         assert_eq!(state.effort[0], 1.0);
-        assert_eq!(state.header.stamp, Time { sec: 1_000_020, nanosec: 500_000_000 });
+        assert_eq!(state.stamp, Time(1_000_020_500_000_000));
         let wheel = joint_state(&joints()[1..2], &values(), 100.1, 0.5).unwrap();
         assert!(wheel.position[0].is_nan() && wheel.effort.is_empty());
         assert_eq!(joint_state(&joints(), &values(), 100.6, 0.5), None);
@@ -192,7 +183,7 @@ mod tests {
             age: 0.5,
         };
         let status = known.diagnostics(1.0).status.into_iter().skip(1);
-        status.map(|status| (status.level.0, status.message)).collect()
+        status.map(|status| (status.level as u8, status.message)).collect()
     }
 
     #[test]

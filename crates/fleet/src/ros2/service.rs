@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use motorlink_recording::schema::Message as _;
 use motorlink_telemetry::share::event_text::DriveProtocol;
 use motorlink_telemetry::share::exchange::Target;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
 use super::asking::{self, Asking};
-use super::cdr;
 use super::machine::Shared;
 use super::types::TriggerResponse;
 use super::wire::{Attachment, Endpoint};
@@ -56,7 +56,7 @@ impl Service {
                 let request = query.attachment().map(|it| it.to_bytes());
                 let request = request.and_then(|it| Attachment::decode(&it)).unwrap_or_default();
                 let attachment = Attachment { sent_ns, ..request }.encode();
-                let reply = query.reply(query.key_expr().clone(), cdr::encode(&response));
+                let reply = query.reply(query.key_expr().clone(), response.encode());
                 // Who has asked may be gone.
                 let _ = reply.attachment(attachment).wait();
             });

@@ -2,7 +2,7 @@
 
 use ring::digest::{SHA256, digest};
 
-use super::describe::Message;
+use super::describe::{dds_name, hash};
 
 /// Who sent a sample.
 pub type Gid = [u8; 16];
@@ -123,11 +123,11 @@ impl Graph {
         number: usize,
         kind: Kind,
         name: &str,
-        message: &'static Message,
+        (type_name, definition): (&str, &str),
         depth: u32,
     ) -> Endpoint {
         let Graph { domain, session, node } = self;
-        let (hash, dds) = (message.hash(), message.dds_name());
+        let (hash, dds) = (hash(type_name, definition), dds_name(type_name));
         let key = format!("{domain}{name}/{dds}/{hash}");
         let (word, mangled) = (kind.word(), name.replace('/', "%"));
         // Reliable, volatile, the last `depth`: what is not written is as usual.
@@ -143,8 +143,8 @@ impl Graph {
 
 #[cfg(test)]
 mod tests {
-    use super::super::types::JointState;
     use super::*;
+    use motorlink_recording::schema::{JointState, Message as _};
 
     #[test]
     fn names_of_nodes_become_legal() {
@@ -176,8 +176,9 @@ mod tests {
     fn keys_and_tokens_are_those_of_rmw_zenoh() {
         let graph = Graph::new(3, "ab12".to_owned(), "arm1".to_owned());
         assert_eq!(graph.token(), "@ros2_lv/3/ab12/0/0/NN/%/%/arm1");
-        let states =
-            graph.endpoint(1, Kind::Publisher, "/arm1/joint_states", JointState::MESSAGE, 10);
+        let definition = JointState::definition();
+        let message = (JointState::TYPE, definition.as_str());
+        let states = graph.endpoint(1, Kind::Publisher, "/arm1/joint_states", message, 10);
         let kind = "sensor_msgs::msg::dds_::JointState_/\
                     RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e";
         assert_eq!(states.key, format!("3/arm1/joint_states/{kind}"));

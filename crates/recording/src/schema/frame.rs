@@ -2,12 +2,12 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::IDENTIFIERS;
+use serde::{Deserialize, Serialize};
 
-use super::cdr::{Decoder, Encoder, Malformed};
 use super::message::{Message, Time, named, with_dependencies};
 
 /// `motorlink/msg/Frame`: one frame on the wire, or bytes that are none.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Frame {
     /// When it was sent, or its last byte came.
     pub stamp: Time,
@@ -23,7 +23,8 @@ pub struct Frame {
 }
 
 /// The direction of a [`Frame`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "u8", into = "u8")]
 #[repr(u8)]
 pub enum Direction {
     /// From the program to the motors.
@@ -34,8 +35,15 @@ pub enum Direction {
 
 named!(Direction as "uint8": Sent = "SENT", Received = "RECEIVED");
 
+impl From<u8> for Direction {
+    fn from(direction: u8) -> Self {
+        if direction == 0 { Direction::Sent } else { Direction::Received }
+    }
+}
+
 /// What a [`Frame`] is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "u8", into = "u8")]
 #[repr(u8)]
 pub enum FrameResult {
     /// A frame of the protocol.
@@ -50,6 +58,17 @@ pub enum FrameResult {
 
 named!(FrameResult as "uint8": Frame = "FRAME", Nack = "NACK", Damaged = "DAMAGED",
        Foreign = "FOREIGN");
+
+impl From<u8> for FrameResult {
+    fn from(result: u8) -> Self {
+        match result {
+            0 => FrameResult::Frame,
+            1 => FrameResult::Nack,
+            3 => FrameResult::Foreign,
+            _ => FrameResult::Damaged,
+        }
+    }
+}
 
 impl Frame {
     /// Of [`id`](Self::id): the identifier has 29 bits.
@@ -102,32 +121,6 @@ impl Message for Frame {
             FrameResult::constants(),
         );
         with_dependencies(&fields, &[Time::DEPENDENCY])
-    }
-
-    fn write(&self, out: &mut Encoder) {
-        self.stamp.write(out);
-        out.u8(self.direction as u8);
-        out.u32(self.id);
-        out.u8(self.result as u8);
-        out.bytes(&self.data);
-    }
-
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        Ok(Frame {
-            stamp: Time::read(from)?,
-            direction: match from.u8()? {
-                0 => Direction::Sent,
-                _ => Direction::Received,
-            },
-            id: from.u32()?,
-            result: match from.u8()? {
-                0 => FrameResult::Frame,
-                1 => FrameResult::Nack,
-                3 => FrameResult::Foreign,
-                _ => FrameResult::Damaged,
-            },
-            data: from.bytes()?,
-        })
     }
 }
 

@@ -1,26 +1,19 @@
 //! The messages whose types are the same in every recording.
 
-use super::cdr::{Decoder, Encoder, Malformed};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::cdr::{self, Malformed};
 
 /// A message with a type of its own.
-pub trait Message: Sized {
+pub trait Message: Serialize + DeserializeOwned {
     /// The name of the type: package, `msg`, name.
     const TYPE: &'static str;
     /// The fields in the language of `.msg` files, with the types that they use.
     fn definition() -> String;
-    /// Writes the fields.
-    fn write(&self, out: &mut Encoder);
-    /// Reads the fields.
-    ///
-    /// # Errors
-    /// The bytes are not such a message.
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed>;
-
     /// The message as CDR.
     fn encode(&self) -> Vec<u8> {
-        let mut out = Encoder::default();
-        self.write(&mut out);
-        out.into_bytes()
+        cdr::encode(self)
     }
 
     /// The message that this CDR is.
@@ -28,7 +21,7 @@ pub trait Message: Sized {
     /// # Errors
     /// It is a message of another type.
     fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
-        Self::read(&mut Decoder::new(bytes)?)
+        cdr::decode(bytes).map(|(message, _)| message)
     }
 }
 
@@ -54,17 +47,36 @@ macro_rules! named {
                 Self::ALL.iter().map(constant).collect()
             }
         }
+
+        impl From<$kind> for u8 {
+            fn from(kind: $kind) -> u8 {
+                kind as u8
+            }
+        }
     };
 }
 pub(super) use named;
 
 /// `builtin_interfaces/msg/Time`: ns since 1970.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(from = "(i32, u32)", into = "(i32, u32)")]
 pub struct Time(pub u64);
+
+impl From<Time> for (i32, u32) {
+    fn from(Time(nanos): Time) -> Self {
+        (i32::try_from(nanos / NANOS).unwrap_or(i32::MAX), (nanos % NANOS) as u32)
+    }
+}
+
+impl From<(i32, u32)> for Time {
+    fn from((seconds, nanos): (i32, u32)) -> Self {
+        Time(u64::try_from(seconds).unwrap_or(0) * NANOS + u64::from(nanos))
+    }
+}
 
 impl Time {
     /// The fields in the language of `.msg` files.
-    pub(super) const DEPENDENCY: (&'static str, &'static str) =
+    pub const DEPENDENCY: (&'static str, &'static str) =
         ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
 
     /// The time of the day in the form of RFC 3339, to the millisecond: `2026-11-23T14:05:09.250Z`.
@@ -83,44 +95,39 @@ impl Time {
         let (hour, minute, second) = (of_day / 3_600, of_day / 60 % 60, of_day % 60);
         format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{millis:03}Z")
     }
-
-    pub(super) fn write(self, out: &mut Encoder) {
-        out.i32(i32::try_from(self.0 / NANOS).unwrap_or(i32::MAX));
-        out.u32((self.0 % NANOS) as u32);
-    }
-
-    pub(super) fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        let seconds = u64::try_from(from.i32()?).unwrap_or(0);
-        Ok(Time(seconds * NANOS + u64::from(from.u32()?)))
-    }
 }
 
 /// `std_msgs/msg/Header`, without a frame of reference: motors have none.
 const HEADER: (&str, &str) =
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 
-fn write_header(stamp: Time, out: &mut Encoder) {
-    stamp.write(out);
-    out.text("");
-}
+/// A header, of which only the time is kept.
+mod header {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-fn read_header(from: &mut Decoder<'_>) -> Result<Time, Malformed> {
-    let stamp = Time::read(from)?;
-    from.text()?;
-    Ok(stamp)
+    use super::Time;
+
+    pub fn serialize<S: Serializer>(stamp: &Time, to: S) -> Result<S::Ok, S::Error> {
+        (stamp, "").serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Time, D::Error> {
+        <(Time, String)>::deserialize(from).map(|(stamp, _)| stamp)
+    }
 }
 
 /// A definition with those of the types that it uses, each behind a line of 80 `=`.
-pub(super) fn with_dependencies(fields: &str, dependencies: &[(&str, &str)]) -> String {
+pub fn with_dependencies(fields: &str, dependencies: &[(&str, &str)]) -> String {
     let rule = "=".repeat(80);
     let used = dependencies.iter().map(|(name, text)| format!("{rule}\nMSG: {name}\n{text}"));
     std::iter::once(fields.to_owned()).chain(used).collect()
 }
 
 /// `sensor_msgs/msg/JointState`: where motors are and how they move.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JointState {
     /// When the values were read.
+    #[serde(with = "header")]
     pub stamp: Time,
     /// The motors.
     pub name: Vec<String>,
@@ -140,37 +147,20 @@ impl Message for JointState {
                       float64[] velocity\nfloat64[] effort\n";
         with_dependencies(fields, &[HEADER, Time::DEPENDENCY])
     }
-
-    fn write(&self, out: &mut Encoder) {
-        write_header(self.stamp, out);
-        out.sequence(&self.name, |out, name| out.text(name));
-        for values in [&self.position, &self.velocity, &self.effort] {
-            out.sequence(values, |out, value| out.f64(*value));
-        }
-    }
-
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        Ok(JointState {
-            stamp: read_header(from)?,
-            name: from.sequence(Decoder::text)?,
-            position: from.sequence(Decoder::f64)?,
-            velocity: from.sequence(Decoder::f64)?,
-            effort: from.sequence(Decoder::f64)?,
-        })
-    }
 }
 
 /// `diagnostic_msgs/msg/DiagnosticArray`: the condition of motors.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DiagnosticArray {
     /// When this was so.
+    #[serde(with = "header")]
     pub stamp: Time,
     /// One for each motor.
     pub status: Vec<DiagnosticStatus>,
 }
 
 /// `diagnostic_msgs/msg/DiagnosticStatus`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiagnosticStatus {
     /// How good it is.
     pub level: Level,
@@ -185,7 +175,8 @@ pub struct DiagnosticStatus {
 }
 
 /// The level of a [`DiagnosticStatus`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(from = "u8", into = "u8")]
 #[repr(u8)]
 pub enum Level {
     /// Nothing is wrong.
@@ -225,38 +216,10 @@ impl Message for DiagnosticArray {
         let status = ("diagnostic_msgs/DiagnosticStatus", status.as_str());
         with_dependencies(fields, &[HEADER, Time::DEPENDENCY, status, value])
     }
-
-    fn write(&self, out: &mut Encoder) {
-        write_header(self.stamp, out);
-        out.sequence(&self.status, |out, status| {
-            out.u8(status.level as u8);
-            out.text(&status.name);
-            out.text(&status.message);
-            out.text(&status.hardware_id);
-            out.sequence(&status.values, |out, (key, value)| {
-                out.text(key);
-                out.text(value);
-            });
-        });
-    }
-
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        let stamp = read_header(from)?;
-        let status = from.sequence(|from| {
-            Ok(DiagnosticStatus {
-                level: from.u8()?.into(),
-                name: from.text()?,
-                message: from.text()?,
-                hardware_id: from.text()?,
-                values: from.sequence(|from| Ok((from.text()?, from.text()?)))?,
-            })
-        })?;
-        Ok(DiagnosticArray { stamp, status })
-    }
 }
 
 /// `rcl_interfaces/msg/Log`: something that happened.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
     /// When it happened.
     pub stamp: Time,
@@ -269,11 +232,26 @@ pub struct Log {
     /// Who commanded it; may be empty.
     pub by: String,
     /// The kind, one word for programs: `stopped`.
+    #[serde(with = "function")]
     pub kind: String,
 }
 
+/// The kind, and the line of a program that a log of ROS names: there is none.
+mod function {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(kind: &str, to: S) -> Result<S::Ok, S::Error> {
+        (kind, 0u32).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+        <(String, u32)>::deserialize(from).map(|(kind, _)| kind)
+    }
+}
+
 /// The severity of a [`Log`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(from = "u8", into = "u8")]
 #[repr(u8)]
 pub enum Severity {
     /// For looking for causes.
@@ -313,29 +291,6 @@ impl Message for Log {
             Severity::constants(),
         );
         with_dependencies(&fields, &[Time::DEPENDENCY])
-    }
-
-    fn write(&self, out: &mut Encoder) {
-        self.stamp.write(out);
-        out.u8(self.severity as u8);
-        out.text(&self.name);
-        out.text(&self.message);
-        out.text(&self.by);
-        out.text(&self.kind);
-        out.u32(0);
-    }
-
-    fn read(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        let log = Log {
-            stamp: Time::read(from)?,
-            severity: from.u8()?.into(),
-            name: from.text()?,
-            message: from.text()?,
-            by: from.text()?,
-            kind: from.text()?,
-        };
-        from.u32()?;
-        Ok(log)
     }
 }
 

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::Errors;
 use motorlink_proto::st::{ControlMode, Flags, RegisterId, Status};
 use motorlink_telemetry::signal::{Quantity, Signal, Source};
 
-use super::cdr::{Decoder, Encoder, Malformed};
+use super::cdr::{self, Malformed};
 use super::message::{Time, with_dependencies};
 use super::name::{camel_case, snake_case};
 
@@ -100,11 +100,9 @@ impl SignalsType {
     /// A row as CDR.
     pub fn encode(&self, row: &SignalsRow) -> Vec<u8> {
         debug_assert_eq!(row.values.len(), self.fields.len());
-        let mut out = Encoder::default();
-        row.stamp.write(&mut out);
-        out.f64(row.span_s);
-        row.values.iter().for_each(|value| out.f64(*value));
-        out.into_bytes()
+        let mut message = cdr::encode(&(row.stamp, row.span_s));
+        row.values.iter().for_each(|value| message.extend(value.to_le_bytes()));
+        message
     }
 
     /// The row that this CDR is.
@@ -112,12 +110,11 @@ impl SignalsType {
     /// # Errors
     /// It is a message of another type.
     pub fn decode(&self, bytes: &[u8]) -> Result<SignalsRow, Malformed> {
-        let mut from = Decoder::new(bytes)?;
-        Ok(SignalsRow {
-            stamp: Time::read(&mut from)?,
-            span_s: from.f64()?,
-            values: self.fields.iter().map(|_| from.f64()).collect::<Result<_, _>>()?,
-        })
+        let ((stamp, span_s), values) = cdr::decode(bytes)?;
+        let (values, _) = values.as_chunks();
+        let values = values.get(..self.fields.len()).ok_or(Malformed::Short)?;
+        let values = values.iter().copied().map(f64::from_le_bytes).collect();
+        Ok(SignalsRow { stamp, span_s, values })
     }
 }
 

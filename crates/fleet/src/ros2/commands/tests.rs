@@ -1,7 +1,7 @@
 use super::super::joint::tests::joint;
 use super::super::readings::tests::readings;
-use super::super::types::Header;
 use super::*;
+use motorlink_recording::schema::Time;
 
 const LIVE: f64 = 0.2;
 /// When the values of the motors came.
@@ -42,7 +42,7 @@ impl Publisher {
 
     fn send(&mut self, commands: &mut Commands, now: f64, message: &JointState) {
         let attachment = self.attachment(now);
-        commands.receive(now, Some(&attachment), &cdr::encode(message), &measured());
+        commands.receive(now, Some(&attachment), &message.encode(), &measured());
     }
 
     /// A publisher whose pace is known at `now`, without motion.
@@ -60,10 +60,9 @@ fn outputs(commands: &mut Commands) -> Vec<Output> {
 }
 
 fn wheel(velocity: f64) -> JointState {
-    let header = Header::default();
     let (position, effort) = (Vec::new(), Vec::new());
     JointState {
-        header,
+        stamp: Time::default(),
         name: vec!["wheel".to_owned()],
         position,
         velocity: vec![velocity],
@@ -72,9 +71,8 @@ fn wheel(velocity: f64) -> JointState {
 }
 
 fn arm(position: f64) -> JointState {
-    let header = Header::default();
-    let (velocity, effort) = (Vec::new(), Vec::new());
-    JointState { header, name: vec!["arm".to_owned()], position: vec![position], velocity, effort }
+    let (stamp, velocity, effort) = (Time::default(), Vec::new(), Vec::new());
+    JointState { stamp, name: vec!["arm".to_owned()], position: vec![position], velocity, effort }
 }
 
 fn sends(output: &Output) -> bool {
@@ -136,7 +134,7 @@ fn samples_that_waited_in_a_network_move_nothing() {
     // The network was cut for 10 s. All samples come at once.
     for step in 1..480 {
         let attachment = publisher.attachment(READ + 0.02 * f64::from(step));
-        let payload = cdr::encode(&wheel(1.0));
+        let payload = wheel(1.0).encode();
         commands.receive(READ + 10.0, Some(&attachment), &payload, &measured());
     }
     assert_eq!(outputs(&mut commands), []);
@@ -185,7 +183,7 @@ fn what_is_not_a_command_of_known_joints_moves_nothing() {
 #[test]
 fn bytes_that_are_no_sample_move_nothing() {
     let (mut commands, mut publisher) = ready();
-    let (payload, readings) = (cdr::encode(&wheel(1.0)), measured());
+    let (payload, readings) = (wheel(1.0).encode(), measured());
     commands.receive(READ, None, &payload, &readings);
     commands.receive(READ, Some(&[1; 32]), &payload, &readings);
     assert_eq!(count(&commands, "not_rmw_zenoh"), 2);
@@ -271,7 +269,7 @@ fn samples_that_come_late_keep_a_joint_blocked() {
     commands.failed(READ, 1, 1, "a fault".to_owned(), false);
     outputs(&mut commands);
     // The network holds all samples up for a second.
-    let payload = cdr::encode(&wheel(1.0));
+    let payload = wheel(1.0).encode();
     for step in 0..200 {
         let now = READ + 0.02 * f64::from(step);
         let attachment = publisher.attachment(now - 1.0);
