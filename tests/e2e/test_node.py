@@ -112,7 +112,7 @@ def test_a_motor_that_a_command_takes_stops_at_its_end(node, direct, run):
     run("st", "-p", "zenoh:arm1/st0?take", "set", "SPEED_KP", "200", **via(node)).ended(0)
     stands(direct)
     ramp = run("st", "-p", "zenoh:arm1/st0?take", "ramp", "1500", "200", **via(node)).ended(0)
-    assert "if no other program turns it" in ramp.err
+    assert "the share stops the motor now" in ramp.err
 
 
 def test_a_node_finds_drives_that_are_late_and_a_whole_bus_of_them(start, sim, run, tmp_path):

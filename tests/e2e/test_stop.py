@@ -94,7 +94,7 @@ def test_a_stop_that_the_drive_does_not_receive_in_time_says_so(run, tmp_path):
 
     stop = frame(1 << 5 | EXECUTE, [STOP_MOTOR])
     with device(tmp_path / "slow", answer) as port:
-        message = run("st", "-p", port, "stop").ended(3).err
+        message = run("st", "-p", port, "--timeout", "5s", "stop").ended(3).err
         eventually(lambda: b"".join(heard).endswith(stop), "a stop as the last bytes")
     assert message.startswith("error: motor 1 may still be turning: ") and STOP_AGAIN in message
     assert "the drive did not understand what it received (TIMEOUT: " in message

@@ -4,7 +4,7 @@ import { ServerClock } from './clock';
 import { LIVE, nameOf } from './format';
 import { type Rows, decode, groupOf } from './rows';
 import type {
-  Beat, Event as DriveEvent, Group, Line, Ran, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
+  Beat, Event as DriveEvent, Group, Line, RunResult, Recorded, Request, ShareRequest, ShareText, SignalName, Text, Welcome,
 } from './wire';
 
 export type { Rows } from './rows';
@@ -77,7 +77,7 @@ export const shareLost = signal<string | null>(null);
 /** The recording that is made, or the last one. */
 export const recorded = signal<Recorded | null>(null);
 /** The end of the references that the server sent last to each motor, by its name in texts. */
-export const rans = signal<ReadonlyMap<string, Ran>>(new Map());
+export const rans = signal<ReadonlyMap<string, RunResult>>(new Map());
 /** Whether this page turned motors, so that its end stops them. */
 export const holds = signal(false);
 /** Time to the server and back, in ms. It grows while nothing is received. */

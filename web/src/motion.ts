@@ -5,7 +5,7 @@ import { decimalsOf, nameOf, number, sentence } from './format';
 import { type Entry, entries, lapsed, rans, state, welcome } from './link';
 import { type Live, liveOf } from './overview';
 import type { Sentence } from './parts';
-import type { Description, Ran } from './wire';
+import type { Description, RunResult } from './wire';
 
 /** Events of a motor after which the page that turned it does not run it any more. */
 const ENDS: ReadonlySet<string> = new Set(['stopping', 'stopped', 'stop-failed', 'silent']);
@@ -31,7 +31,7 @@ export function endOf(all: readonly Entry[], since: number, line: string, motor:
 }
 
 /** What the end of the references that the server sent came to. */
-export function endOfReferences({ reference, failure }: Ran, unit: string): Sentence {
+export function endOfReferences({ reference, failure }: RunResult, unit: string): Sentence {
   const at = `${number(reference, decimalsOf(unit))} ${unit}`;
   return failure == null
     ? { tone: 'ok', text: `Running. The reference has reached ${at}.` }

@@ -437,24 +437,6 @@ export type Phase = "starting" | "recording" | "ending" | "ended" | "failed";
 
 export type Protocol = "st" | "rmd";
 
-export type Ran = { 
-/**
- * The last reference that the motor acknowledged, in the unit of the run.
- */
-reference: number, 
-/**
- * Why it is not the target, and how the motor took the stop that followed.
- */
-failure?: string | null, 
-/**
- * The line.
- */
-line: string, 
-/**
- * The motor's number or ID.
- */
-motor: number, };
-
 export type Reason = "usage" | "version" | "latched" | "held" | "expired" | "overtaken" | "displaced" | "busy" | "refused" | "silent" | "unheard" | "unconfirmed" | "line" | "forbidden" | "lapsed" | "later";
 
 export type Recorded = { 
@@ -843,6 +825,24 @@ rate: number | null, } | { "ask": "end-recording" } | { "ask": "recordings" } | 
 name: string, });
 
 export type Role = "operator" | "viewer";
+
+export type RunResult = { 
+/**
+ * The last reference that the motor acknowledged, in the unit of the run.
+ */
+reference: number, 
+/**
+ * Why it is not the target, and how the motor took the stop that followed.
+ */
+failure?: string | null, 
+/**
+ * The line.
+ */
+line: string, 
+/**
+ * The motor's number or ID.
+ */
+motor: number, };
 
 export type ShareRequest = { 
 /**
@@ -1309,7 +1309,7 @@ older: number, } | { "to": "recording" } & RecordingContent) | { "kind": "lapsed
 /**
  * Why, in words.
  */
-message: string, } | { "kind": "ran" } & Ran | { "kind": "share", 
+message: string, } | { "kind": "ran" } & RunResult | { "kind": "share", 
 /**
  * Why it is lost; `null`: it is there.
  */

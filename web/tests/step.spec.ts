@@ -3,14 +3,12 @@ import type { Page } from '@playwright/test';
 import { readFileSync } from 'node:fs';
 import { expect, open, test, violations } from './bench';
 
-test.describe.configure({ timeout: 180_000 });
-
 async function setUp(page: Page, motor: string, from: number, to: number) {
   await open(page, 'Step response');
   await page.getByRole('combobox', { name: 'Motor' }).selectOption(motor);
   await page.getByLabel(/^From/).fill(String(from));
   await page.getByLabel(/^To/).fill(String(to));
-  await page.getByLabel('Record for').fill('1');
+  await page.getByLabel('Record for').fill('3');
 }
 
 const apply = (page: Page) => page.getByRole('button', { name: 'Apply the step' }).click();

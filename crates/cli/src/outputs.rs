@@ -22,14 +22,14 @@ const MOST_LINKS: usize = 40;
 pub enum Output {
     Stdout,
     /// A regular file, which is replaced as a whole, or a name that is free.
-    File(Place),
+    File(OutputPath),
     /// A device, a FIFO: it is written as it is.
-    Stream(Place),
+    Stream(OutputPath),
 }
 
 /// A file by its name on the command line, and by the name behind all symbolic links.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct OutputPath {
     named: PathBuf,
     real: PathBuf,
 }
@@ -65,7 +65,7 @@ pub fn resolve(
             found.push(Some(Output::Stdout));
             continue;
         }
-        let place = Place::find(path).map_err(|error| Failure::file(path, &error))?;
+        let place = OutputPath::find(path).map_err(|error| Failure::file(path, &error))?;
         let identity = place.identity();
         let same = used.iter().find(|(_, other)| identity.as_ref() == Some(other));
         if let Some((words, _)) = same {
@@ -107,12 +107,12 @@ impl Identity {
     }
 }
 
-impl Place {
+impl OutputPath {
     fn find(path: &Path) -> io::Result<Self> {
         let mut real = path.to_owned();
         // A stream behind a link of /proc/self/fd has no other name.
         if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-            return Ok(Place { named: path.to_owned(), real });
+            return Ok(OutputPath { named: path.to_owned(), real });
         }
         for _ in 0..MOST_LINKS {
             let folder = match real.parent() {
@@ -123,7 +123,7 @@ impl Place {
             let place = folder.join(name);
             match fs::read_link(&place) {
                 Ok(target) => real = folder.join(target),
-                Err(_) => return Ok(Place { named: path.to_owned(), real: place }),
+                Err(_) => return Ok(OutputPath { named: path.to_owned(), real: place }),
             }
         }
         Err(Error::other("too many symbolic links"))

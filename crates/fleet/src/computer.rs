@@ -13,7 +13,7 @@ pub fn name() -> Name {
 
 /// A number that this computer keeps, and that a copy of its disk in another computer does not have: the
 /// addresses of network cards differ.
-pub(crate) fn mark() -> u32 {
+pub(crate) fn fingerprint() -> u32 {
     let read = |path: String| fs::read_to_string(path).ok();
     let cards = fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
     let cards = cards.map(|card| card.path()).filter(|card| card.join("device").exists());

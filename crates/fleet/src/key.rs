@@ -173,7 +173,7 @@ pub fn all_asks(node: &Name, boot: &Name) -> String {
 }
 
 /// That a program is there: a liveliness token.
-pub fn here(node: &Name, boot: &Name, who: &Name, session: &Name) -> String {
+pub fn session_token(node: &Name, boot: &Name, who: &Name, session: &Name) -> String {
     format!("{ROOT}/{node}/{WHOLE}/here/{boot}/{who}/{session}")
 }
 
@@ -214,7 +214,7 @@ pub(crate) fn all_columns(node: &Name) -> String {
 
 /// What programs ask of a motor without a session: queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum About {
+pub enum MotorQuery {
     /// What the drive is.
     Identity,
     /// The values of registers.
@@ -223,22 +223,22 @@ pub enum About {
     Settings,
 }
 
-impl About {
+impl MotorQuery {
     /// All of them.
-    pub const ALL: [Self; 3] = [About::Identity, About::Registers, About::Settings];
+    pub const ALL: [Self; 3] = [MotorQuery::Identity, MotorQuery::Registers, MotorQuery::Settings];
 
     /// The part of keys behind the motor.
     const fn words(self) -> &'static str {
         match self {
-            About::Identity => "identity",
-            About::Registers => "registers/*",
-            About::Settings => "settings",
+            MotorQuery::Identity => "identity",
+            MotorQuery::Registers => "registers/*",
+            MotorQuery::Settings => "settings",
         }
     }
 }
 
 /// What is asked of a motor: a query. That of registers is about all that can be read.
-pub fn about(node: &Name, line: &str, motor: u8, about: About) -> String {
+pub fn about(node: &Name, line: &str, motor: u8, about: MotorQuery) -> String {
     format!("{ROOT}/{node}/{line}/{motor}/{}", about.words())
 }
 
@@ -248,7 +248,7 @@ pub fn register(node: &Name, line: &str, motor: u8, name: &str) -> String {
 }
 
 /// What is asked of all motors of a node.
-pub(crate) fn all_about(node: &Name, about: About) -> String {
+pub(crate) fn all_about(node: &Name, about: MotorQuery) -> String {
     format!("{ROOT}/{node}/*/*/{}", about.words())
 }
 
@@ -309,7 +309,7 @@ pub fn run_of(key: &str) -> Option<(Name, Name)> {
 }
 
 /// Who is there, and in which session, in a key that [`here`] made.
-pub fn present_of(key: &str) -> Option<(Name, Name)> {
+pub fn parse_session_token(key: &str) -> Option<(Name, Name)> {
     let [_, _, who, session] = behind_node(key)?[..] else { return None };
     Some((who.parse().ok()?, session.parse().ok()?))
 }
@@ -336,9 +336,9 @@ mod tests {
             let asker = Asker { scope, who: who.clone(), session: name("7f") };
             assert_eq!(Asker::of(&key), Some(asker), "{key}");
         }
-        let (alive, here) = (alive(&node, &boot), here(&node, &boot, &who, &name("7f")));
+        let (alive, here) = (alive(&node, &boot), session_token(&node, &boot, &who, &name("7f")));
         assert_eq!(run_of(&alive), Some((node, boot)));
-        assert_eq!(present_of(&here), Some((who, name("7f"))));
+        assert_eq!(parse_session_token(&here), Some((who, name("7f"))));
     }
 
     #[test]
@@ -358,13 +358,13 @@ mod tests {
     #[test]
     fn a_query_names_one_motor_or_several() {
         let node = name("arm1");
-        for it in About::ALL {
+        for it in MotorQuery::ALL {
             assert_eq!(one_motor(&about(&node, "st0", 1, it)), Some(("st0", "1")), "{it:?}");
             assert_eq!(one_motor(&all_about(&node, it)), None, "{it:?}");
         }
         let key = register(&node, "st0", 1, "SPEED_MEAS");
         assert_eq!((one_motor(&key), one_register(&key)), (Some(("st0", "1")), Some("SPEED_MEAS")));
-        assert_eq!(one_register(&about(&node, "st0", 1, About::Registers)), None);
+        assert_eq!(one_register(&about(&node, "st0", 1, MotorQuery::Registers)), None);
         for key in [
             "motorlink/v1/*/st0/1/identity",
             "motorlink/v1/arm1/s$*/1/identity",

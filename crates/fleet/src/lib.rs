@@ -11,7 +11,6 @@
 //! sent, and a motor of a program that gives no sign of life is stopped.
 #![forbid(unsafe_code)]
 
-mod authorization;
 mod certificate;
 pub mod clock;
 pub mod computer;
@@ -24,6 +23,7 @@ pub mod network;
 pub mod node;
 pub mod port;
 pub mod remote;
+mod request_scope;
 pub mod ros2;
 pub mod site;
 pub mod view;

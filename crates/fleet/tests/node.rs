@@ -15,7 +15,7 @@ use asking::Asker;
 use motorlink::port::{NotDone, PortError, PortName};
 use motorlink::{rmd, st};
 use motorlink_fleet::directory::{self, Directory};
-use motorlink_fleet::key::{self, About};
+use motorlink_fleet::key::{self, MotorQuery};
 use motorlink_fleet::message::NoAnswer;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::node::NodeError;
@@ -336,7 +336,7 @@ fn a_node_without_a_reader_says_that_it_cannot_read_drives() {
     let world = World::new("unread");
     let network = Network::Connect(vec![format!("tcp/{}", world.address)]);
     let (zenoh, _) = network.open().unwrap();
-    for about in About::ALL {
+    for about in MotorQuery::ALL {
         let key = key::about(&"unread".parse().unwrap(), "st0", 1, about);
         let replies = zenoh.get(&key).wait().unwrap();
         let error = replies.recv().unwrap().into_result().unwrap_err();

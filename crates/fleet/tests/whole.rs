@@ -18,7 +18,7 @@ use motorlink_fleet::remote::Remote;
 use motorlink_fleet::whole::Whole;
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Answer, Ask, EventKind, Reason, StoppedMotor};
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
 use motorlink_telemetry::signal::{Motor, Signal};

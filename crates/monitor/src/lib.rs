@@ -8,11 +8,11 @@
 //! - [`server`] serves the page, and connects pages to the share.
 #![forbid(unsafe_code)]
 
-pub mod alive;
+pub mod dead_man;
 pub mod drive;
 pub mod foxglove;
 pub mod message;
-mod page;
+mod page_session;
 pub mod recordings;
 pub mod server;
-mod socket;
+mod websocket_limits;

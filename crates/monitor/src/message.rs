@@ -183,6 +183,39 @@ pub enum Ask {
     },
 }
 
+impl Ask {
+    /// The motor that it is about.
+    pub fn motor(&self) -> Option<&MotorName> {
+        match self {
+            Ask::StopAll
+            | Ask::LetGo
+            | Ask::Motors { .. }
+            | Ask::Describe { .. }
+            | Ask::Limits
+            | Ask::Record { .. }
+            | Ask::EndRecording
+            | Ask::Recordings
+            | Ask::Recording { .. } => None,
+            Ask::Read { motor, .. }
+            | Ask::Write { motor, .. }
+            | Ask::Act { motor, .. }
+            | Ask::Run { motor, .. }
+            | Ask::Limit { motor, .. }
+            | Ask::Dump { motor }
+            | Ask::Diff { motor, .. }
+            | Ask::Restore { motor, .. } => Some(motor),
+        }
+    }
+
+    /// The line that it is about.
+    pub fn line(&self) -> Option<&str> {
+        match self {
+            Ask::Motors { line } | Ask::Describe { line } => Some(line),
+            ask => ask.motor().map(|motor| &*motor.line),
+        }
+    }
+}
+
 fn is_false(value: &bool) -> bool {
     !value
 }
@@ -223,7 +256,7 @@ pub enum Text {
         message: String,
     },
     /// The references that the server sent have ended, unless a stop or another command ended them.
-    Ran(Ran),
+    Ran(RunResult),
     /// The share is lost, or there again. Nothing is known of the motors in between.
     Share {
         /// Why it is lost; `null`: it is there.
@@ -237,7 +270,7 @@ pub enum Text {
 /// The end of references that the server sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Ran {
+pub struct RunResult {
     /// The motor.
     #[serde(flatten)]
     pub motor: MotorName,

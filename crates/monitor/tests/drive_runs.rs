@@ -6,8 +6,8 @@ use crate::world::{Page, Sent, World, connect, rmd, st};
 use motorlink_monitor::message::{Answer, Ask, Mode};
 use motorlink_proto::rmd::{Code, Payload, SetPositionLimited, SetSpeed, SetTorque};
 use motorlink_proto::st::{CurrentReference, Profile, Ramp, Request, TorqueRamp};
+use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
-use motorlink_telemetry::share::program::Refusal;
 
 fn run(motor: MotorName, mode: Mode, target: f64, rate: f64) -> Ask {
     Ask::Run { motor, mode, target, rate, hold: false }

@@ -2,8 +2,8 @@
 
 use crate::world::{LIMIT, World, connect};
 use motorlink_proto::st::Profile;
+use motorlink_telemetry::share::client::{Listener, Program, Refusal};
 use motorlink_telemetry::share::message::{Answer, Ask, Event, EventKind, Reason, Text, decode};
-use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::time::timeout;
 
 /// A speed of 360 °/s.

@@ -8,8 +8,8 @@ use crate::world::{LIMIT, Page, World, st};
 use motorlink_monitor::message::Mode;
 use motorlink_monitor::server::link::Link;
 use motorlink_proto::st::Profile;
+use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::message::{Answer, Ask, EventKind, Reason, Text, decode};
-use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::time::timeout;
 
 const TURN: [u8; 8] = [0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0];

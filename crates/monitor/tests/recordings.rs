@@ -16,10 +16,10 @@ use motorlink_monitor::message::{
 use motorlink_monitor::recordings::{Recordings, Wanted};
 use motorlink_proto::st::Profile;
 use motorlink_recording::read::Recording;
+use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::frame::{Kind, Reader};
+use motorlink_telemetry::share::frame::{FrameKind, Reader};
 use motorlink_telemetry::share::message::{Reason, decode};
-use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::time::timeout;
 
 const PAGE: &str = "page 1";
@@ -94,7 +94,7 @@ impl Desk {
         let mut frames = Reader::default();
         frames.push(&bytes);
         let head = frames.take().unwrap().expect("a text");
-        assert_eq!(head.kind, Kind::Text);
+        assert_eq!(head.kind, FrameKind::Text);
         let mut all = Vec::new();
         while let Some(frame) = frames.take().unwrap() {
             all.push(Data::decode(&frame.payload).unwrap());

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::world::{LIMIT, Page, World, rmd};
 use motorlink::port::{CanLink, EventCan, Evented, Link, PortError};
-use motorlink_monitor::message::{Answer, Ask, Mode, Ran};
+use motorlink_monitor::message::{Answer, Ask, Mode, RunResult};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::Code;
 use motorlink_proto::st::Profile;
@@ -66,7 +66,7 @@ async fn run(page: &Page, target: f64, rate: f64) {
     assert!(matches!(page.ask(ask).await, Ok(Answer::Run { streams: true, .. })));
 }
 
-async fn ran(page: &Page) -> Ran {
+async fn ran(page: &Page) -> RunResult {
     let end = Instant::now() + LIMIT;
     loop {
         if let Some(ran) = page.drive.rans.lock().unwrap().pop() {
@@ -84,7 +84,7 @@ async fn a_lost_reply_does_not_end_a_run() {
     run(&page, 360.0, 400.0).await;
     world.reaches("rmd1.speed_dps", |dps| dps > 60.0).await;
     loses.store(1, Ordering::SeqCst);
-    assert_eq!(ran(&page).await, Ran { motor: rmd(1), reference: 360.0, failure: None });
+    assert_eq!(ran(&page).await, RunResult { motor: rmd(1), reference: 360.0, failure: None });
     assert_eq!(loses.load(Ordering::SeqCst), 0);
     world.reaches("rmd1.speed_dps", |dps| dps > 350.0).await;
 }
@@ -96,7 +96,7 @@ async fn a_motor_that_does_not_reply_is_stopped_and_the_page_is_told() {
     run(&page, 360.0, 100.0).await;
     world.reaches("rmd1.speed_dps", |dps| dps > 60.0).await;
     loses.store(usize::MAX, Ordering::SeqCst);
-    let Ran { reference, failure, .. } = ran(&page).await;
+    let RunResult { reference, failure, .. } = ran(&page).await;
     assert!((30.0..360.0).contains(&reference), "{reference}");
     let failure = failure.unwrap();
     assert!(

@@ -50,12 +50,12 @@ pub struct Runner {
 pub struct Remote {
     /// Commands may wait for the engine: it opens a port, or this process does not run.
     clock: Clock,
-    place: Place,
+    place: Execution,
 }
 
 /// Where an engine runs.
 #[derive(Debug, Clone)]
-enum Place {
+enum Execution {
     Thread {
         tasks: Sender<Task>,
         wake: Arc<UnixStream>,
@@ -82,7 +82,7 @@ impl Runner {
         let engine = Engine { acquisition, waiting: HashMap::new() };
         let thread = std::thread::Builder::new().name(name.to_owned());
         let thread = thread.spawn(move || engine.run(&inbox, woken))?;
-        let place = Place::Thread { tasks, wake: Arc::new(wake) };
+        let place = Execution::Thread { tasks, wake: Arc::new(wake) };
         Ok(Runner { remote: Remote { clock: Clock::running(), place }, thread: Some(thread) })
     }
 
@@ -91,7 +91,7 @@ impl Runner {
     pub fn here(acquisition: Acquisition) -> Self {
         let clock = acquisition.clock().clone();
         let engine = Engine { acquisition, waiting: HashMap::new() };
-        let place = Place::Here(Arc::new(Mutex::new(Some(engine))));
+        let place = Execution::Here(Arc::new(Mutex::new(Some(engine))));
         Runner { remote: Remote { clock, place }, thread: None }
     }
 
@@ -128,12 +128,12 @@ impl Remote {
     /// Gives the motors that an engine without a thread has stopped.
     fn close(&self) -> Vec<Stopped> {
         match &self.place {
-            Place::Thread { wake, .. } => {
+            Execution::Thread { wake, .. } => {
                 // It fails if the engine has ended.
                 let _ = wake.shutdown(std::net::Shutdown::Both);
                 Vec::new()
             }
-            Place::Here(engine) => {
+            Execution::Here(engine) => {
                 let engine = lock(engine).take();
                 engine.map_or_else(Vec::new, Engine::stop)
             }
@@ -144,14 +144,14 @@ impl Remote {
     /// before.
     pub fn advance(&self) -> Option<Duration> {
         match &self.place {
-            Place::Thread { .. } => None,
-            Place::Here(engine) => lock(engine).as_mut().and_then(Engine::advance),
+            Execution::Thread { .. } => None,
+            Execution::Here(engine) => lock(engine).as_mut().and_then(Engine::advance),
         }
     }
 
     /// Waits for the next of these; `None` if no more come.
     pub(crate) fn next<T>(&self, results: &Receiver<T>) -> Option<T> {
-        while let Place::Here(_) = &self.place {
+        while let Execution::Here(_) = &self.place {
             match results.try_recv() {
                 Ok(result) => return Some(result),
                 Err(TryRecvError::Disconnected) => return None,
@@ -348,8 +348,8 @@ impl Remote {
 
     fn send(&self, task: impl FnOnce(&mut Engine) + Send + 'static) -> Result<(), Ended> {
         let (tasks, wake) = match &self.place {
-            Place::Thread { tasks, wake } => (tasks, wake),
-            Place::Here(engine) => return lock(engine).as_mut().map(task).ok_or(Ended),
+            Execution::Thread { tasks, wake } => (tasks, wake),
+            Execution::Here(engine) => return lock(engine).as_mut().map(task).ok_or(Ended),
         };
         tasks.send(Box::new(task)).map_err(|_| Ended)?;
         match (&**wake).write(&[0]) {

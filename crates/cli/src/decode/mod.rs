@@ -20,7 +20,7 @@ use motorlink_capture::{
 };
 
 use motorlink_recording::read::{Line, MAGIC};
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 
 use crate::failure::Failure;
 use crate::output::note;

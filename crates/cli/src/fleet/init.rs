@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use motorlink_fleet::key::Name;
-use motorlink_fleet::site::{self, Member, Place, Plan, Role, Site, SiteError};
+use motorlink_fleet::site::{self, Member, Plan, Role, RouterAddress, Site, SiteError};
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -25,7 +25,7 @@ pub struct Args {
     folder: PathBuf,
     /// Where the router is reached; may be repeated. Needed the first time
     #[arg(long, value_name = "HOST[:PORT]")]
-    router: Vec<Place>,
+    router: Vec<RouterAddress>,
     /// A computer with drives; may be repeated
     #[arg(long = "node", value_name = "NAME")]
     nodes: Vec<Name>,

@@ -9,7 +9,7 @@ use motorlink_telemetry::share::message::Protocol;
 use super::args::{Nodes, Via};
 use super::found::found;
 use crate::failure::Failure;
-use crate::record::{Place, What, run_on};
+use crate::record::{RecordedPort, What, run_on};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -30,7 +30,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             if line.heard.is_empty() {
                 continue;
             }
-            let mut place = Place { port: remote.port(&line.line), ..Place::default() };
+            let mut place =
+                RecordedPort { port: remote.port(&line.line), ..RecordedPort::default() };
             let numbers = line.heard.iter();
             match line.protocol {
                 Protocol::St => {

@@ -9,7 +9,7 @@ use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
 use motorlink_fleet::remote::Remote;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, Protocol};
 use serde_json::json;
 

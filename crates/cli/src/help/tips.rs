@@ -37,18 +37,18 @@ fn tip(error: &Error, root: &Command, words: &[&str]) -> Option<String> {
     match error.kind() {
         ErrorKind::InvalidSubcommand => {
             let word = text(ContextKind::InvalidSubcommand)?;
-            let parent = Place::before(word, root, words);
+            let parent = CommandAt::before(word, root, words);
             let is_suggested = error.get(ContextKind::SuggestedSubcommand).is_some();
             parent.of_value(word).or_else(|| parent.of_command(word, root, is_suggested))
         }
         ErrorKind::UnknownArgument => {
             let word = text(ContextKind::InvalidArg)?;
-            let parent = Place::before(word, root, words);
+            let parent = CommandAt::before(word, root, words);
             if word.starts_with('-') { parent.of_option(word, root) } else { parent.of_value(word) }
         }
         ErrorKind::ValueValidation => {
             let (arg, value) = (text(ContextKind::InvalidArg)?, text(ContextKind::InvalidValue)?);
-            let place = Place::of_all(root, words);
+            let place = CommandAt::of_all(root, words);
             let arg = place.command.get_arguments().find(|other| is_shown_as(other, arg))?;
             let is_of_number = error.source().is_some_and(|source| {
                 source.is::<ParseFloatError>() || source.is::<ParseIntError>()
@@ -60,13 +60,13 @@ fn tip(error: &Error, root: &Command, words: &[&str]) -> Option<String> {
 }
 
 /// A place in a command line.
-struct Place<'a> {
+struct CommandAt<'a> {
     /// The words of its subcommands: `st get`.
     path: Vec<&'a str>,
     command: &'a Command,
 }
 
-impl<'a> Place<'a> {
+impl<'a> CommandAt<'a> {
     fn of_all(root: &'a Command, words: &[&'a str]) -> Self {
         let (mut path, mut command) = (Vec::new(), root);
         for word in words {
@@ -74,13 +74,13 @@ impl<'a> Place<'a> {
                 (path, command) = ([path, vec![next.get_name()]].concat(), next);
             }
         }
-        Place { path, command }
+        CommandAt { path, command }
     }
 
     /// The place where `word` is.
     fn before(word: &str, root: &'a Command, words: &[&'a str]) -> Self {
         let end = words.iter().position(|other| other.split('=').next() == word.split('=').next());
-        Place::of_all(root, &words[..end.unwrap_or(words.len())])
+        CommandAt::of_all(root, &words[..end.unwrap_or(words.len())])
     }
 
     fn protocol(&self) -> &str {

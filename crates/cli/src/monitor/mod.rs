@@ -13,7 +13,7 @@ use motorlink_monitor::message::Role;
 use motorlink_monitor::server::{self, Options, Settings, Tls};
 use motorlink_telemetry::share::address::{Address, Local};
 use motorlink_telemetry::share::message::{Answer, Ask, Line};
-use motorlink_telemetry::share::opening::Limits;
+use motorlink_telemetry::share::port_config::Limits;
 use motorlink_telemetry::share::server::Server;
 use serde_json::json;
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use motorlink::rmd;
 use motorlink::st;
 use motorlink_fleet::ros2;
-use motorlink_telemetry::share::opening::Limits;
+use motorlink_telemetry::share::port_config::Limits;
 use serde::Deserialize;
 
 use crate::failure::Failure;

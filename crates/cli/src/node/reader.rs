@@ -7,8 +7,8 @@ use motorlink_fleet::message::Value;
 use motorlink_fleet::node::{Drive, Reader, Reading};
 use motorlink_monitor::drive;
 use motorlink_monitor::message::{self, Register};
+use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::message::{Line, MotorName};
-use motorlink_telemetry::share::program::Refusal;
 
 /// All drives of a node.
 pub struct Drives;

@@ -35,21 +35,22 @@ const ENOUGH: f64 = 0.99;
 const OTHERS: [&str; 6] = ["csv", "log", "asc", "pcapng", "svg", "png"];
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let of = |port: &String| Place { port: port.clone(), ..Place::default() };
-    let ports: Vec<Place> = args.ports.iter().filter(|port| !port.is_empty()).map(of).collect();
+    let of = |port: &String| RecordedPort { port: port.clone(), ..RecordedPort::default() };
+    let ports: Vec<RecordedPort> =
+        args.ports.iter().filter(|port| !port.is_empty()).map(of).collect();
     run_on(&ports, &args.what)
 }
 
 /// A port, and the motors that it is known to have.
 #[derive(Default)]
-pub struct Place {
+pub struct RecordedPort {
     pub port: String,
     pub motors: Vec<MotorNumber>,
     pub ids: MotorSet,
 }
 
 /// Records these ports.
-pub fn run_on(ports: &[Place], args: &What) -> Result<(), Failure> {
+pub fn run_on(ports: &[RecordedPort], args: &What) -> Result<(), Failure> {
     // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     let config = config(ports, args)?;
@@ -90,7 +91,7 @@ fn start(config: &Config) -> Result<Recorder, Failure> {
     started
 }
 
-fn config(ports: &[Place], args: &What) -> Result<Config, Failure> {
+fn config(ports: &[RecordedPort], args: &What) -> Result<Config, Failure> {
     if ports.is_empty() {
         return Err(missing_port());
     }
@@ -107,7 +108,7 @@ fn config(ports: &[Place], args: &What) -> Result<Config, Failure> {
     let motors: Vec<MotorNumber> = numbers.collect();
     let ids = args.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
     let is_given = !motors.is_empty() || !ids.is_empty();
-    let port = |place: &Place| -> Result<Port, Failure> {
+    let port = |place: &RecordedPort| -> Result<Port, Failure> {
         let name = place.port.parse()?;
         let (motors, ids) = match is_given {
             true => (motors.clone(), ids),

@@ -6,7 +6,7 @@ use std::time::Duration;
 use motorlink_link::serve::{ServeName, Server};
 use motorlink_recording::replay::{RmdLine, RmdReplay, Speed, StLine, StReplay, Tally};
 use motorlink_recording::schema::drive;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use serde_json::{Value, json};
 
 use super::input::Input;

@@ -6,7 +6,7 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::message::{Line, Protocol};
-use motorlink_telemetry::share::opening::{Limits, OpenError, Wish};
+use motorlink_telemetry::share::port_config::{Limits, OpenError, PortConfig};
 
 use crate::connection::missing_port;
 use crate::failure::Failure;
@@ -62,7 +62,7 @@ impl Lines {
                 ))
                 .trying("use that one: programs connect to it"));
             }
-            let wish = Wish { port, profile, timeout, limits };
+            let wish = PortConfig { port, profile, timeout, limits };
             for protocol in wish.protocols() {
                 let number = match protocol {
                     Protocol::St => &mut st,

@@ -12,7 +12,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use motorlink_telemetry::line::Stopped;
 use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::message::{self, ANY_MOTOR, Ask, Event, StoppedMotor};
-use motorlink_telemetry::share::opening::Limits;
+use motorlink_telemetry::share::port_config::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};

@@ -34,7 +34,7 @@ pub fn run(
     let bar = crate::output::progress(rates.len());
     let (mut is_found, mut echoes) = (false, false);
     for &rate in rates {
-        let place = Place { port, rate: has_rate.then_some(rate) };
+        let place = ScannedPort { port, rate: has_rate.then_some(rate) };
         if has_rate {
             bar.set_message(format!("{rate} baud"));
         }
@@ -61,13 +61,13 @@ pub fn run(
 }
 
 /// Where a drive is looked for.
-struct Place<'a> {
+struct ScannedPort<'a> {
     port: &'a PortName,
     /// `None` on a port without a baud rate.
     rate: Option<u32>,
 }
 
-impl Place<'_> {
+impl ScannedPort<'_> {
     /// What was found, for people.
     fn shown(&self, text: &str) -> String {
         match self.rate {
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn a_finding_has_its_rate_if_the_port_has_rates() {
         let port = "serial:/dev/ttyACM0".parse().unwrap();
-        let at = |rate| Place { port: &port, rate };
+        let at = |rate| ScannedPort { port: &port, rate };
         assert_eq!(at(Some(9600)).shown("silence"), "    9600 baud  silence");
         assert_eq!(at(None).shown("silence"), "silence");
         let silence =

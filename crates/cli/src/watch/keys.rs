@@ -39,7 +39,7 @@ pub enum Ask {
 }
 
 /// The page, the selection and the typed text.
-pub struct Place {
+pub struct Selection {
     pub view: View,
     pub field: Field,
     pub shows_help: bool,
@@ -91,9 +91,9 @@ pub const HELP: &[Help] = &[
     key(None, "q Ctrl-C", "quit", "quit"),
 ];
 
-impl Place {
+impl Selection {
     pub fn new(rows: usize) -> Self {
-        Place {
+        Selection {
             view: View::Motors,
             field: Field::None,
             shows_help: false,

@@ -32,7 +32,7 @@ use crate::json::RmdUnits;
 use crate::output::note;
 use crate::st::StUnits;
 pub use args::Args;
-use keys::{Ask, Place, View};
+use keys::{Ask, Selection, View};
 use model::{Model, Port};
 use row::Row;
 use screen::{Screen, Wait};
@@ -83,7 +83,7 @@ struct Watch {
     shares: Vec<Share>,
     work: Work,
     model: Model,
-    place: Place,
+    place: Selection,
     /// Values of registers, or why there is none.
     read: BTreeMap<(usize, Item), Result<String, String>>,
     /// When registers were last read, and whether a read is in progress.
@@ -123,7 +123,7 @@ impl Watch {
             st: StUnits { profile: args.profile, raw: false, full_scale: args.full_scale },
             rmd: RmdUnits { raw: false, gear: args.gear_ratio, encoder_bits: None },
         };
-        let place = Place::new(rows.len());
+        let place = Selection::new(rows.len());
         let model = Model::new(by, units, ports, rows, args.rate);
         Ok(Watch {
             runners,

@@ -20,7 +20,7 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::style::{Color, Modifier};
 
-use super::keys::{Ask, Field, Place, View};
+use super::keys::{Ask, Field, Selection, View};
 use super::model::{Model, Port};
 use super::row::{Row, Stop};
 use super::settings::Item;
@@ -100,23 +100,23 @@ fn happens(model: &mut Model, port: usize, what: What) {
     model.take(port, &Record::Event(Arc::new(Event { time: Instant(0), what })));
 }
 
-fn press(place: &mut Place, code: KeyCode) -> Option<Ask> {
+fn press(place: &mut Selection, code: KeyCode) -> Option<Ask> {
     press_with(place, code, KeyModifiers::NONE)
 }
 
-fn press_with(place: &mut Place, code: KeyCode, modifiers: KeyModifiers) -> Option<Ask> {
+fn press_with(place: &mut Selection, code: KeyCode, modifiers: KeyModifiers) -> Option<Ask> {
     let list = |row| Item::of(if row < 2 { st(1) } else { rmd(1) }, &units());
     place.press(KeyEvent::new(code, modifiers), list, |item| item.unwritable(&units()))
 }
 
-fn type_in(place: &mut Place, text: &str) {
+fn type_in(place: &mut Selection, text: &str) {
     for letter in text.chars() {
         assert_eq!(press(place, KeyCode::Char(letter)), None, "{letter}");
     }
 }
 
 /// What is drawn.
-fn drawn(model: &Model, place: &Place, width: u16, height: u16) -> Terminal<TestBackend> {
+fn drawn(model: &Model, place: &Selection, width: u16, height: u16) -> Terminal<TestBackend> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     let read = BTreeMap::new();
     let shown = Shown { model, place, read: &read };
@@ -133,7 +133,7 @@ fn lines(terminal: &Terminal<TestBackend>) -> Vec<String> {
 
 #[test]
 fn each_motor_has_a_row_with_its_values() {
-    let lines = lines(&drawn(&model(), &Place::new(5), 80, 24));
+    let lines = lines(&drawn(&model(), &Selection::new(5), 80, 24));
     assert_eq!(
         lines[..9],
         [
@@ -161,15 +161,19 @@ fn each_motor_has_a_row_with_its_values() {
 fn a_port_that_is_gone_and_back_is_said() {
     let mut model = model();
     happens(&mut model, 1, What::Lost(LineError::Closed.into()));
-    let gone = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let gone = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(gone[4].starts_with(" can0:1     PORT GONE 0s             -"), "{gone:?}");
     let text = "port gone, opened again when it is back: can0 for 0s";
     assert!(gone.contains(&text.to_owned()), "{gone:?}");
-    let details =
-        lines(&drawn(&model, &Place { view: View::Details, row: 2, ..Place::new(5) }, 80, 24));
+    let details = lines(&drawn(
+        &model,
+        &Selection { view: View::Details, row: 2, ..Selection::new(5) },
+        80,
+        24,
+    ));
     assert_eq!(details[2], "port gone for 0s: the port was closed");
     happens(&mut model, 1, What::Back);
-    let back = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let back = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(back[4].starts_with(" can0:1     turning"), "{back:?}");
     assert!(back.iter().any(|line| line.ends_with("can0: the port is back after 0s")), "{back:?}");
 }
@@ -178,10 +182,10 @@ fn a_port_that_is_gone_and_back_is_said() {
 fn a_silent_motor_has_no_present_value() {
     let mut model = model();
     happens(&mut model, 0, What::Silent(st(1), LineError::Closed.into()));
-    let silent = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let silent = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(silent[2].starts_with(">st0:1      NO ANSWER 0s             -"), "{silent:?}");
     happens(&mut model, 0, What::Answers(st(1)));
-    let answers = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let answers = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(answers[2].starts_with(">st0:1      RUN"), "{answers:?}");
 }
 
@@ -201,7 +205,7 @@ fn a_stop_that_is_not_confirmed_is_said_in_bold_words_in_every_view() {
     for view in [View::Motors, View::Details, View::Settings] {
         for shows_help in [false, true] {
             for (width, height) in [(80, 24), (200, 60), (50, 5)] {
-                let place = Place { view, shows_help, ..Place::new(5) };
+                let place = Selection { view, shows_help, ..Selection::new(5) };
                 let terminal = drawn(&model, &place, width, height);
                 let lines = lines(&terminal);
                 let at = lines.iter().position(|line| line == bad);
@@ -212,7 +216,7 @@ fn a_stop_that_is_not_confirmed_is_said_in_bold_words_in_every_view() {
             }
         }
     }
-    let lines = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let lines = lines(&drawn(&model, &Selection::new(5), 80, 24));
     let why = "stop NOT CONFIRMED by can0:32, repeated after the next reply: no reply";
     assert!(lines.contains(&why.to_owned()), "{lines:?}");
     let good = "stop confirmed by 4 of 5: st0:1 st0:2 can0:1 can0:2";
@@ -227,7 +231,7 @@ fn a_stop_of_a_motor_that_the_drive_does_not_have_is_no_alarm() {
     model.has_no_motor(0, number);
     assert_eq!(model.rows[0].stop, Stop::None);
     assert!(model.due_stops(std::time::Instant::now()).is_empty());
-    let lines = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let lines = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(!lines.iter().any(|line| line.contains("NOT CONFIRMED")), "{lines:?}");
     assert!(
         lines.iter().any(|line| line.contains("st0:1: the drive has no such motor")),
@@ -274,7 +278,7 @@ fn what_does_not_fit_is_counted() {
     for number in [1, 2, 32] {
         give(&mut model, 1, rmd(number), &[("errors", 0b1000)]);
     }
-    let lines = lines(&drawn(&model, &Place::new(5), 80, 12));
+    let lines = lines(&drawn(&model, &Selection::new(5), 80, 12));
     assert!(lines.contains(&"... 2 more lines: Enter shows one motor".to_owned()), "{lines:?}");
 }
 
@@ -282,14 +286,14 @@ fn what_does_not_fit_is_counted() {
 fn the_latch_is_always_in_view() {
     let mut model = model();
     happens(&mut model, 0, What::Latched("ann".into()));
-    let some = lines(&drawn(&model, &Place::new(5), 80, 24));
+    let some = lines(&drawn(&model, &Selection::new(5), 80, 24));
     assert!(
         some[1].starts_with("LATCHED (u releases it): motion of st0 is refused since ann"),
         "{some:?}"
     );
     happens(&mut model, 1, What::Latched("ann".into()));
     for view in [View::Motors, View::Details, View::Settings] {
-        let place = Place { view, ..Place::new(5) };
+        let place = Selection { view, ..Selection::new(5) };
         for (width, height) in [(80, 24), (200, 60), (40, 10)] {
             let lines = lines(&drawn(&model, &place, width, height));
             assert!(lines[1].starts_with("LATCHED (u releases it): every motion"), "{lines:?}");
@@ -297,7 +301,7 @@ fn the_latch_is_always_in_view() {
     }
     (0..2).for_each(|port| happens(&mut model, port, What::Released("ann".into())));
     assert!(model.latched().is_none());
-    let place = Place { field: Field::Release, ..Place::new(5) };
+    let place = Selection { field: Field::Release, ..Selection::new(5) };
     let lines = lines(&drawn(&model, &place, 80, 24));
     assert!(lines.contains(&"no latch is set: any key goes back _".to_owned()), "{lines:?}");
 }
@@ -314,12 +318,12 @@ fn nothing_panics_on_small_terminals_and_the_selected_motor_is_in_view() {
         for shows_help in [false, true] {
             for (width, height) in [(1, 1), (2, 3), (20, 5), (40, 10), (80, 24), (200, 60)] {
                 let items = Item::of(st(1), &units());
-                let place = Place { view, shows_help, items, row: 4, ..Place::new(5) };
+                let place = Selection { view, shows_help, items, row: 4, ..Selection::new(5) };
                 drawn(&model, &place, width, height);
             }
         }
     }
-    let place = Place { row: 4, ..Place::new(5) };
+    let place = Selection { row: 4, ..Selection::new(5) };
     for (width, height) in [(20, 5), (40, 10)] {
         let lines = lines(&drawn(&model, &place, width, height));
         assert!(lines.iter().any(|line| line.starts_with(">can0:32")), "{lines:?}");
@@ -332,7 +336,7 @@ fn details_have_all_signals_and_the_reason_of_a_refusal() {
     let mut model = model();
     let signal = Signal { motor: st(1), source: Source::Register(RegisterId::MOTOR_POWER) };
     happens(&mut model, 0, What::Refused(vec![signal], LineError::Reply.into()));
-    let place = Place { view: View::Details, ..Place::new(5) };
+    let place = Selection { view: View::Details, ..Selection::new(5) };
     let lines = lines(&drawn(&model, &place, 80, 24));
     assert_eq!(lines[1], "st0:1  RUN  on ./st0");
     assert_eq!(lines[2], "no fault is reported");
@@ -361,7 +365,7 @@ fn stop_all_works_from_every_view_and_while_typing() {
         for field in &fields {
             for (code, modifiers) in keys {
                 for shows_help in [false, true] {
-                    let mut place = Place { view, shows_help, ..Place::new(5) };
+                    let mut place = Selection { view, shows_help, ..Selection::new(5) };
                     place.field = field.clone();
                     let asked = press_with(&mut place, code, modifiers);
                     assert_eq!(asked, Some(Ask::StopAll), "{view:?} {field:?} {code:?}");
@@ -381,7 +385,7 @@ fn the_latch_is_released_after_a_y_only() {
         (KeyCode::Esc, None),
         (KeyCode::Char('u'), None),
     ] {
-        let mut place = Place::new(5);
+        let mut place = Selection::new(5);
         assert_eq!(press(&mut place, KeyCode::Char('u')), None);
         assert_eq!(press(&mut place, code), asked, "{code:?}");
         assert_eq!(place.field, Field::None);
@@ -390,7 +394,7 @@ fn the_latch_is_released_after_a_y_only() {
 
 #[test]
 fn a_register_is_found_and_edited() {
-    let mut place = Place::new(5);
+    let mut place = Selection::new(5);
     press(&mut place, KeyCode::Char('r'));
     assert_eq!(place.view, View::Settings);
     type_in(&mut place, "/speed_k");
@@ -435,7 +439,7 @@ fn registers_that_move_the_motor_are_not_edited() {
         units.st.profile = profile;
         assert!(Item::Register(RegisterId::IQ_SPEEDMODE).unwritable(&units).is_some());
     }
-    let mut place = Place::new(5);
+    let mut place = Selection::new(5);
     type_in(&mut place, "r/CONTROL_MODE");
     press(&mut place, KeyCode::Enter);
     type_in(&mut place, "e");
@@ -465,7 +469,7 @@ fn no_limit_applies_to_what_is_edited() {
 #[test]
 fn keys_that_work_in_every_view_do_so() {
     for view in [View::Motors, View::Details, View::Settings] {
-        let at = || Place { view, ..Place::new(5) };
+        let at = || Selection { view, ..Selection::new(5) };
         assert_eq!(press(&mut at(), KeyCode::Char('s')), Some(Ask::Stop));
         assert_eq!(press(&mut at(), KeyCode::Char('n')), Some(Ask::Find));
         assert_eq!(press(&mut at(), KeyCode::Char('q')), Some(Ask::Quit));
@@ -484,7 +488,7 @@ fn keys_that_work_in_every_view_do_so() {
 
 #[test]
 fn the_selection_stays_in_the_list() {
-    let mut place = Place::new(2);
+    let mut place = Selection::new(2);
     for (code, row) in [
         (KeyCode::Up, 0),
         (KeyCode::Char('j'), 1),

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 
 use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::client::Program;
 use motorlink_telemetry::share::message::{Group, Line};
-use motorlink_telemetry::share::program::Program;
 use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::key_expr::keyexpr;
@@ -13,11 +13,11 @@ use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
 use super::sessions::Sessions;
-use crate::authorization::Lines;
 use crate::clock::Clock;
 use crate::key::Name;
 use crate::membership::Membership;
 use crate::message::{Answer, NoAnswer};
+use crate::request_scope::Lines;
 
 /// What all tasks of a node have.
 pub(super) struct Common {

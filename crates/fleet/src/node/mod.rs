@@ -1,14 +1,14 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
-mod admission;
 mod common;
-mod others;
+mod drive_reader;
 mod outbox;
+mod peers;
 mod publish;
 mod queries;
-mod query_router;
-mod reader;
+mod request_order;
 mod session;
+mod session_router;
 mod sessions;
 
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
 use common::Common;
 
-pub use reader::{Drive, Reader, Reading};
+pub use drive_reader::{Drive, Reader, Reading};
 
 /// The longest time until others see a node.
 const SEEN: Duration = Duration::from_secs(2);
@@ -102,7 +102,7 @@ impl Node {
         if zenoh.liveliness().get(key::alive_of(&name)).wait().map_err(failed)?.recv().is_ok() {
             return Err(NodeError::NameTaken(name));
         }
-        let boot = Name::run(computer::mark())?;
+        let boot = Name::run(computer::fingerprint())?;
         let (state, sessions, members) = (RwLock::default(), Mutex::default(), Mutex::default());
         let own = OnceLock::new();
         let common = Arc::new(Common {
@@ -117,10 +117,10 @@ impl Node {
             sessions,
             members,
         });
-        others::follow(&common).map_err(failed)?;
+        peers::follow(&common).map_err(failed)?;
         runtime.block_on(publish::start(&common, period))?;
         runtime.block_on(queries::open(&common, reader))?;
-        let alive = query_router::open(&common, &runtime).map_err(failed)?;
+        let alive = session_router::open(&common, &runtime).map_err(failed)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {
             return Err(NodeError::Unknown(common.name.clone()));
@@ -148,7 +148,7 @@ impl Node {
 
     /// Leaves the network, and says that its motors have been stopped.
     pub fn end(self) {
-        others::say_end(&self.common);
+        peers::say_end(&self.common);
     }
 
     /// What ROS 2 machines see of it.

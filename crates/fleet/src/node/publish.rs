@@ -8,13 +8,13 @@ use std::time::Duration;
 use motorlink_proto::rmd::{Command, ReadStatus};
 use motorlink_proto::st::{FrameCode, RegisterId};
 use motorlink_telemetry::overview::Overview;
+use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::frame::{Frame, Kind};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{
     Answer, Ask, DropRule, Event, EventKind, Group, Line, SignalName, Text, decode,
 };
-use motorlink_telemetry::share::program::{Listener, Program};
 use motorlink_telemetry::signal::Motor;
 use serde::Serialize;
 use tokio::runtime::Handle;
@@ -26,9 +26,9 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
 use super::common::{Common, State, covers, reply};
-use crate::authorization::Lines;
 use crate::key;
 use crate::message::Info;
+use crate::request_scope::Lines;
 
 /// How often the state is published.
 const STATE: Duration = Duration::from_secs(1);
@@ -74,7 +74,7 @@ impl Common {
         let mut groups = BTreeMap::new();
         while let Ok(Frame { kind, payload }) = listener.next().await {
             match kind {
-                Kind::Text => match decode(&payload) {
+                FrameKind::Text => match decode(&payload) {
                     Ok(Text::Event(event)) => {
                         self.follow_port(&event);
                         self.publish_event(&event);
@@ -89,7 +89,7 @@ impl Common {
                     Ok(Text::Missed { .. }) => self.state_mut().lost.clear(),
                     _ => {}
                 },
-                Kind::Data => {
+                FrameKind::Data => {
                     let of = Data::decode(&payload).ok().and_then(|data| groups.get(&data.group));
                     let Some((line, motor)) = of else { continue };
                     let key = key::samples(&self.name, line, *motor);

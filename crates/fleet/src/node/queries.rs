@@ -4,9 +4,9 @@ use std::io;
 use std::sync::Arc;
 
 use motorlink_proto::st::ErrorCode;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, Reason};
-use motorlink_telemetry::share::program::{Program, Refusal};
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
@@ -17,8 +17,8 @@ use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
 use super::common::{Common, covers, refuse, reply_with};
-use super::reader::{Drive, Reader};
-use crate::key::{self, About};
+use super::drive_reader::{Drive, Reader};
+use crate::key::{self, MotorQuery};
 use crate::message::{Identity, NoAnswer};
 
 /// Queries that are carried out at one time.
@@ -48,7 +48,7 @@ pub(super) async fn open(common: &Arc<Common>, reader: Option<Arc<dyn Reader>>) 
     tokio::spawn(async move { while listener.next().await.is_ok() {} });
     let places = Arc::new(Semaphore::new(MOST));
     let queries = Arc::new(Queries { common: Arc::clone(common), reader, program, places });
-    for about in About::ALL {
+    for about in MotorQuery::ALL {
         let (queries, handle) = (Arc::clone(&queries), Handle::current());
         let take = move |query: Query| queries.take(about, query, &handle);
         let key = key::all_about(&common.name, about);
@@ -59,7 +59,7 @@ pub(super) async fn open(common: &Arc<Common>, reader: Option<Arc<dyn Reader>>) 
 }
 
 impl Queries {
-    fn take(self: &Arc<Self>, about: About, query: Query, handle: &Handle) {
+    fn take(self: &Arc<Self>, about: MotorQuery, query: Query, handle: &Handle) {
         let Ok(place) = Arc::clone(&self.places).try_acquire_owned() else {
             let message = format!("{MOST} such queries are carried out already; ask again");
             let busy = Refusal::new(Reason::Busy, message);
@@ -72,7 +72,7 @@ impl Queries {
         });
     }
 
-    async fn answer(&self, about: About, query: &Query) {
+    async fn answer(&self, about: MotorQuery, query: &Query) {
         self.common.refresh().await;
         let asked = query.key_expr();
         match self.drives(about, asked) {
@@ -88,7 +88,7 @@ impl Queries {
     }
 
     /// The motors that a query is about: the one that it names, or those that have answered.
-    fn drives(&self, about: About, asked: &keyexpr) -> Result<Vec<Drive>, Refusal> {
+    fn drives(&self, about: MotorQuery, asked: &keyexpr) -> Result<Vec<Drive>, Refusal> {
         let lines = self.common.known_lines();
         let drive = |line: &Line, motor| {
             let (program, line) = (self.program.clone(), line.clone());
@@ -111,7 +111,7 @@ impl Queries {
     }
 
     /// The answers about a motor.
-    async fn read(&self, about: About, drive: Drive, asked: &keyexpr) -> Vec<Reply> {
+    async fn read(&self, about: MotorQuery, drive: Drive, asked: &keyexpr) -> Vec<Reply> {
         let (line, motor) = (drive.line.line.clone(), drive.motor);
         let answers = self.try_read(about, drive, asked).await;
         answers.unwrap_or_else(|why| {
@@ -128,7 +128,7 @@ impl Queries {
 
     async fn try_read(
         &self,
-        about: About,
+        about: MotorQuery,
         drive: Drive,
         asked: &keyexpr,
     ) -> Result<Vec<Reply>, Refusal> {
@@ -139,11 +139,11 @@ impl Queries {
         let key = key::about(&self.common.name, &line.line, motor, about);
         let of = |name: &String| key::register(&self.common.name, &line.line, motor, name);
         let mut names = match about {
-            About::Registers => reader.registers(&line),
-            About::Identity | About::Settings => Vec::new(),
+            MotorQuery::Registers => reader.registers(&line),
+            MotorQuery::Identity | MotorQuery::Settings => Vec::new(),
         };
         names.retain(|name| covers(asked, &of(name)));
-        if about == About::Registers && names.is_empty() {
+        if about == MotorQuery::Registers && names.is_empty() {
             // A number, or a name that the reader refuses with those that are alike.
             let Some(name) = key::one_register(asked) else { return Ok(vec![]) };
             if name.len() > LONGEST {
@@ -157,16 +157,16 @@ impl Queries {
             return Err(why);
         }
         Ok(match about {
-            About::Identity => {
+            MotorQuery::Identity => {
                 let drive = reader.identity(drive).await?;
                 let Line { line, protocol, profile, .. } = line;
                 vec![(key, Ok(json(&Identity { line, motor, protocol, profile, drive })))]
             }
-            About::Settings => {
+            MotorQuery::Settings => {
                 let text = reader.settings(drive).await?;
                 vec![(key, Ok((text.into_bytes(), Encoding::from(TOML))))]
             }
-            About::Registers => {
+            MotorQuery::Registers => {
                 let keys: Vec<_> = names.iter().map(of).collect();
                 let values = reader.read(drive, names).await?.into_iter();
                 keys.into_iter().zip(values.map(|value| value.map(|it| json(&it)))).collect()

@@ -5,22 +5,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_link::is_printable;
-use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
+use motorlink_telemetry::share::client::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
+use motorlink_telemetry::share::command_kind::CommandKind;
+use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{Ask as ShareAsk, Reason, Request, Text, decode, encode};
-use motorlink_telemetry::share::program::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
-use motorlink_telemetry::share::request::Kind;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
-use super::admission::{Admission, Verdict, age};
 use super::common::{Common, answer, answer_with};
 use super::outbox::Outbox;
+use super::request_order::{RequestOrder, Verdict, age};
 use super::sessions::{Asked, Asking};
-use crate::authorization;
 use crate::clock::span;
 use crate::key::Scope;
 use crate::message::{Answer, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
+use crate::request_scope;
 
 /// Requests without an answer. A share that has 256 answers for a program takes no more of its requests.
 const REQUESTS: usize = 128;
@@ -34,7 +34,7 @@ const PATIENCE: f64 = 60.0;
 /// What a session task has.
 pub(super) struct Session {
     pub(super) common: Arc<Common>,
-    pub(super) admission: Admission,
+    pub(super) order: RequestOrder,
     /// When the last message of any kind came.
     pub(super) heard: f64,
     /// Whether it has changed something.
@@ -156,20 +156,20 @@ impl Session {
                 if let Some(why) = forbidden(&post, kind, scope) {
                     answer(&query, &Answer::Refused { t: now, why });
                 } else {
-                    let verdict = self.admission.post(now, post, kind);
+                    let verdict = self.order.post(now, post, kind);
                     self.taken(&query, now);
                     return self.carry_out(verdict).await;
                 }
             }
             Ask::Urgent { after, post } => {
                 let kind = self.common.lines().kind(&post.request.ask);
-                if kind != Kind::Stops || scope < Scope::Stop {
+                if kind != CommandKind::Stops || scope < Scope::Stop {
                     let why =
                         "an urgent request is a stop or a latch, with a key of `stop` or `act`"
                             .to_owned();
                     answer(&query, &Answer::Refused { t: now, why });
                 } else {
-                    let verdict = self.admission.urgent(now, after, post);
+                    let verdict = self.order.urgent(now, after, post);
                     self.taken(&query, now);
                     return self.carry_out(verdict).await;
                 }
@@ -179,7 +179,7 @@ impl Session {
     }
 
     fn taken(&self, query: &Query, now: f64) {
-        answer(query, &Answer::Taken { t: now, next: self.admission.next() });
+        answer(query, &Answer::Taken { t: now, next: self.order.next() });
     }
 
     /// Gives the end of the session, if this is it.
@@ -193,7 +193,7 @@ impl Session {
             Verdict::Pass(request) => {
                 // The share takes requests only as long as few of its answers wait.
                 let kind = self.common.lines().kind(&request.ask);
-                let most = if kind == Kind::Stops { WITH_STOPS } else { REQUESTS };
+                let most = if kind == CommandKind::Stops { WITH_STOPS } else { REQUESTS };
                 self.has_commanded |= kind.changes();
                 if self.waiting.len() >= most {
                     let why = "too many requests wait for their answers".to_owned();
@@ -245,7 +245,7 @@ impl Session {
 }
 
 /// Why a request may not be sent with this key.
-fn forbidden(post: &Post, kind: Kind, scope: Scope) -> Option<String> {
+fn forbidden(post: &Post, kind: CommandKind, scope: Scope) -> Option<String> {
     let is_own = post.request.id >= OWN_IDS;
     let is_of_session = matches!(
         post.request.ask,
@@ -256,8 +256,8 @@ fn forbidden(post: &Post, kind: Kind, scope: Scope) -> Option<String> {
         () if is_of_session => Some(
             "a session begins with join, which says its deadlines, and ends with leave".to_owned(),
         ),
-        () if scope < authorization::scope(kind) => {
-            Some(format!("this request needs the key of `{}`", authorization::scope(kind).word()))
+        () if scope < request_scope::scope(kind) => {
+            Some(format!("this request needs the key of `{}`", request_scope::scope(kind).word()))
         }
         () => None,
     }

@@ -3,6 +3,7 @@
 //! A tunnel stands between the program's socket and the network. It takes the requests of the program,
 //! says how old they may become, sends them until the node has them, and brings what the share says.
 
+mod node_link;
 mod outgoing;
 mod tunnel;
 
@@ -19,7 +20,7 @@ use zenoh::Session as Zenoh;
 use crate::computer;
 use crate::key::Name;
 use crate::network::{Network, NetworkError};
-use tunnel::{Tunnel, Whom};
+use tunnel::{SessionParams, Tunnel};
 
 /// Without another one: how long the motors of a program may turn without a sign of life.
 pub const DEADLINE: Duration = Duration::from_secs(1);
@@ -82,7 +83,7 @@ impl Remote {
     ) -> Result<UnixStream, Unreachable> {
         let (own, other) = pair()?;
         let Remote { node, boot, who, deadline, motion, network, stops, .. } = self.clone();
-        let whom = Whom { node, boot, who, deadline, motion, stops, patience };
+        let whom = SessionParams { node, boot, who, deadline, motion, stops, patience };
         match Tunnel::open(whom, zenoh, own).await {
             Ok(()) => Ok(other),
             Err(Unreachable::Missing(why)) => {

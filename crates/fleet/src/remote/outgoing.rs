@@ -76,7 +76,7 @@ impl Outgoing {
     }
 
     /// A sign of life.
-    pub fn sign(&self, now: f64) -> Ask {
+    pub fn heartbeat(&self, now: f64) -> Ask {
         Ask::Alive { sent: self.clock.at_least(now) }
     }
 

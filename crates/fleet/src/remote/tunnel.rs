@@ -1,6 +1,5 @@
 //! Between the socket of a program and a node.
 
-use std::collections::BTreeSet;
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
 use std::sync::Arc;
@@ -8,43 +7,37 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Unreachable;
-use motorlink_telemetry::share::frame::{self, Kind as FrameKind, Reader};
+use motorlink_telemetry::share::command_kind::CommandKind;
+use motorlink_telemetry::share::frame::{self, FrameKind, Reader};
 use motorlink_telemetry::share::message::{
     Answer as ShareAnswer, Ask as ShareAsk, Request, Text, decode, encode,
 };
-use motorlink_telemetry::share::request::Kind;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{sleep, timeout};
+use zenoh::Session as Zenoh;
 use zenoh::liveliness::LivelinessToken;
-use zenoh::qos::{CongestionControl, Priority};
-use zenoh::query::{ConsolidationMode, Reply};
+use zenoh::qos::Priority;
 use zenoh::sample::{Sample, SampleKind};
-use zenoh::{Session as Zenoh, Wait};
 
+use super::node_link::{ASKED, NodeLink, PAUSE, first_of, run_of};
+use super::outgoing::Outgoing;
 use crate::VERSION;
-use crate::authorization::{self, Lines};
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
 use crate::message::{Answer, Ask};
-use crate::remote::outgoing::Outgoing;
+use crate::request_scope::{self, Lines};
 
 /// How long a node keeps a pull, in seconds.
 const WAIT: f64 = 0.25;
 /// How long an answer to it may take besides.
 const ANSWER: Duration = Duration::from_millis(1000);
-/// How long a node is looked for, in seconds.
-const FOUND: f64 = 1.0;
 /// How long a node that is there may take to begin a session, in seconds.
 const JOINED: f64 = 2.0;
-/// A question before the session is asked again after this time: it may be lost on a busy network.
-const ASKED: Duration = Duration::from_millis(400);
 /// How long a node may be silent whose next run has begun, in seconds: more than a pull takes.
 const RESTARTED: f64 = 1.5;
-/// The pause after an answer that did not come.
-const PAUSE: Duration = Duration::from_millis(50);
 /// A program that has ended waits so long for the node to know it.
 const LEAVING: Duration = Duration::from_millis(300);
 /// The longest request of a program.
@@ -74,7 +67,7 @@ impl Drop for Counted {
 }
 
 /// The node, and the values of `join`.
-pub(super) struct Whom {
+pub(super) struct SessionParams {
     pub(super) node: Name,
     /// Its run; `None`: the only one that is there.
     pub(super) boot: Option<Name>,
@@ -86,25 +79,15 @@ pub(super) struct Whom {
     pub(super) patience: Duration,
 }
 
-/// Asks a node.
-#[derive(Clone)]
-struct Line {
-    zenoh: Arc<Zenoh>,
-    node: Name,
-    who: Name,
-    session: Name,
-    boot: Name,
-}
-
 /// An answer, and when it was asked for.
 struct Answered {
-    of: Of,
+    of: QueryKind,
     asked: f64,
     answer: Option<(Answer, Vec<u8>)>,
 }
 
 /// What was asked.
-enum Of {
+enum QueryKind {
     Pull,
     Post(u32),
     Urgent(u32),
@@ -121,7 +104,7 @@ enum Next {
 }
 
 pub(super) struct Tunnel {
-    line: Line,
+    link: NodeLink,
     outgoing: Outgoing,
     lines: Lines,
     deadline: f64,
@@ -157,34 +140,34 @@ pub(super) struct Tunnel {
 impl Tunnel {
     /// Begins a session at the node, and serves the socket from then on.
     pub(super) async fn open(
-        whom: Whom,
+        whom: SessionParams,
         zenoh: Arc<Zenoh>,
         socket: StdStream,
     ) -> Result<(), Unreachable> {
         let failed = |error: String| Unreachable::Failed(error);
-        let Whom { node, boot, who, deadline, motion, stops, patience } = whom;
+        let SessionParams { node, boot, who, deadline, motion, stops, patience } = whom;
         let scope = if stops { Scope::Stop } else { Scope::See };
         let boot = match boot {
             Some(boot) => boot,
             None => run_of(&zenoh, &node).await?,
         };
         let session = Name::random().map_err(|error| failed(error.to_string()))?;
-        let line = Line { zenoh, node, who, session, boot };
-        let here = key::here(&line.node, &line.boot, &line.who, &line.session);
-        let here = line.zenoh.liveliness().declare_token(here).await;
+        let link = NodeLink { zenoh, node, who, session, boot };
+        let here = key::session_token(&link.node, &link.boot, &link.who, &link.session);
+        let here = link.zenoh.liveliness().declare_token(here).await;
         let here = here.map_err(|error| failed(error.to_string()))?;
         let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
-        let runs = line.zenoh.liveliness().declare_subscriber(key::alive_of(&line.node)).await;
+        let runs = link.zenoh.liveliness().declare_subscriber(key::alive_of(&link.node)).await;
         let runs = runs.map_err(|error| failed(error.to_string()))?;
         let join = Ask::Join { protocol: VERSION, program: own_program(), deadline, motion };
         let begun = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
-            match line.ask(scope, &join, Priority::RealTime, ASKED).await {
+            match link.ask(scope, &join, Priority::RealTime, ASKED).await {
                 Some((answer, _)) => break (asked, answer),
                 // The nodes of a network that was just joined may not be known yet.
                 None if Boot.now() > begun + JOINED => {
-                    return Err(failed(line.unanswered(scope)));
+                    return Err(failed(link.unanswered(scope)));
                 }
                 None => sleep(PAUSE).await,
             }
@@ -200,7 +183,7 @@ impl Tunnel {
         let (answers, answered) = unbounded_channel();
         let (written, done) = unbounded_channel();
         let tunnel = Tunnel {
-            line,
+            link,
             outgoing: Outgoing::new(NodeClock::new(asked, now, t)),
             lines: Lines::of(&lines),
             deadline,
@@ -276,7 +259,7 @@ impl Tunnel {
     /// A run of a node with this name has begun or is away.
     fn saw(&mut self, sample: &Sample) {
         let run = key::run_of(sample.key_expr().as_str());
-        let is_other = run.is_some_and(|(_, boot)| boot != self.line.boot);
+        let is_other = run.is_some_and(|(_, boot)| boot != self.link.boot);
         self.has_successor |= is_other && sample.kind() == SampleKind::Put;
     }
 
@@ -296,7 +279,7 @@ impl Tunnel {
             match request.ask {
                 // The node has said hello to its share.
                 ShareAsk::Hello { .. } => self.hello(request.id),
-                _ if self.lines.kind(&request.ask) == Kind::Stops => {
+                _ if self.lines.kind(&request.ask) == CommandKind::Stops => {
                     self.outgoing.urgent(now, request);
                 }
                 _ => self.outgoing.post(now, request),
@@ -310,15 +293,15 @@ impl Tunnel {
         for ask in self.outgoing.due(now) {
             let (of, scope, priority) = match &ask {
                 Ask::Urgent { post, .. } => {
-                    (Of::Urgent(post.number), Scope::Stop, Priority::RealTime)
+                    (QueryKind::Urgent(post.number), Scope::Stop, Priority::RealTime)
                 }
                 Ask::Post(post) => {
-                    let scope = authorization::scope(self.lines.kind(&post.request.ask));
+                    let scope = request_scope::scope(self.lines.kind(&post.request.ask));
                     let priority = match scope {
                         Scope::Act => Priority::InteractiveHigh,
                         Scope::See | Scope::Stop => Priority::DataHigh,
                     };
-                    (Of::Post(post.number), scope, priority)
+                    (QueryKind::Post(post.number), scope, priority)
                 }
                 _ => continue,
             };
@@ -329,15 +312,15 @@ impl Tunnel {
         }
         if self.sign.is_some_and(|sign| sign <= now) {
             self.sign = Some(now + self.deadline / 5.0);
-            let ask = self.outgoing.sign(now);
-            self.ask(Of::Sign, Scope::Act, &ask, Priority::RealTime, ANSWER, now);
+            let ask = self.outgoing.heartbeat(now);
+            self.ask(QueryKind::Sign, Scope::Act, &ask, Priority::RealTime, ANSWER, now);
         }
         if self.may_pull() && self.pull_from <= now {
             self.is_pulling = true;
             self.pulls += 1;
             let (number, after) = (self.pulls, self.after);
             let pull = Ask::Pull { number, after, wait: WAIT };
-            self.ask(Of::Pull, Scope::See, &pull, Priority::Data, span(WAIT) + ANSWER, now);
+            self.ask(QueryKind::Pull, Scope::See, &pull, Priority::Data, span(WAIT) + ANSWER, now);
         }
     }
 
@@ -345,8 +328,8 @@ impl Tunnel {
     fn hello(&mut self, id: u32) {
         let answer = ShareAnswer::Hello {
             protocol: motorlink_telemetry::share::VERSION,
-            share: format!("node {}", self.line.node),
-            name: self.line.who.to_string(),
+            share: format!("node {}", self.link.node),
+            name: self.link.who.to_string(),
         };
         let text = encode(&Text::Answer { id, answer });
         // It is short.
@@ -360,7 +343,7 @@ impl Tunnel {
 
     fn ask(
         &self,
-        of: Of,
+        of: QueryKind,
         scope: Scope,
         ask: &Ask,
         priority: Priority,
@@ -368,7 +351,7 @@ impl Tunnel {
         asked: f64,
     ) {
         // In this order on the network. The answers come in any order.
-        let replies = self.line.send(scope, ask, priority, timeout);
+        let replies = self.link.send(scope, ask, priority, timeout);
         let answers = self.answers.clone();
         tokio::spawn(async move {
             let answer = match replies {
@@ -383,7 +366,7 @@ impl Tunnel {
     /// Gives the reason if the session is over.
     fn answered(&mut self, Answered { of, asked, answer }: Answered) -> Option<String> {
         let now = Boot.now();
-        let is_pull = matches!(of, Of::Pull);
+        let is_pull = matches!(of, QueryKind::Pull);
         if is_pull {
             self.is_pulling = false;
             self.pull_from = now;
@@ -396,14 +379,14 @@ impl Tunnel {
         self.outgoing.heard(asked, now, answer.t());
         match (answer, of) {
             (Answer::Over { why, .. } | Answer::Refused { why, .. }, _) => return Some(why),
-            (Answer::Taken { .. }, Of::Urgent(number)) => self.outgoing.taken_urgent(number),
+            (Answer::Taken { .. }, QueryKind::Urgent(number)) => self.outgoing.taken_urgent(number),
             (Answer::Taken { next, .. }, of) => {
                 self.outgoing.taken(next);
-                if matches!(of, Of::Post(number) if number > next) {
+                if matches!(of, QueryKind::Post(number) if number > next) {
                     self.outgoing.missed(now);
                 }
             }
-            (Answer::Pulled { first, count, .. }, Of::Pull) if first == self.after + 1 => {
+            (Answer::Pulled { first, count, .. }, QueryKind::Pull) if first == self.after + 1 => {
                 self.after += count;
                 self.coming.extend(stream);
             }
@@ -434,7 +417,7 @@ impl Tunnel {
         }
         let waits = now - self.outgoing.oldest()?;
         (waits > self.patience).then(|| {
-            let who = &self.line.who;
+            let who = &self.link.who;
             format!("it answers, but not to this request: {who} may be allowed to see only")
         })
     }
@@ -454,104 +437,10 @@ impl Tunnel {
         // The stops that the program has asked for just before.
         self.send(Boot.now());
         let leave = Ask::Leave { why: "the program has ended".to_owned() };
-        let left = self.line.ask(Scope::See, &leave, Priority::RealTime, LEAVING);
+        let left = self.link.ask(Scope::See, &leave, Priority::RealTime, LEAVING);
         // The node notices it otherwise, later.
         let _ = timeout(LEAVING, left).await;
     }
-}
-
-/// The run of a node. Two nodes with one name would answer for each other, so that is refused.
-async fn run_of(zenoh: &Zenoh, node: &Name) -> Result<Name, Unreachable> {
-    let end = Boot.now() + FOUND;
-    loop {
-        let tokens = zenoh.liveliness().get(key::alive_of(node)).timeout(ASKED).await;
-        let tokens = tokens.map_err(|error| Unreachable::Failed(error.to_string()))?;
-        let mut runs = BTreeSet::new();
-        while let Ok(reply) = tokens.recv_async().await {
-            let Ok(sample) = reply.into_result() else { continue };
-            runs.extend(key::run_of(sample.key_expr().as_str()).map(|(_, boot)| boot));
-        }
-        let count = runs.len();
-        match runs.pop_first() {
-            Some(boot) if count == 1 => return Ok(boot),
-            Some(_) => {
-                let why = format!(
-                    "{count} nodes have the name {node}: give each a --name of its own; \
-                         `motorlink fleet stop-all --node {node}` stops the motors of all of them"
-                );
-                return Err(Unreachable::Failed(why));
-            }
-            // The nodes of a network that was just joined may not be known yet.
-            None if Boot.now() < end => sleep(PAUSE).await,
-            None => return Err(Unreachable::Missing(format!("no node {node} answers"))),
-        }
-    }
-}
-
-impl Line {
-    /// What is said if the node is there, and does not answer `join`.
-    fn unanswered(&self, scope: Scope) -> String {
-        let Line { node, who, .. } = self;
-        let right = scope.word();
-        format!(
-            "node {node} is there, but does not answer: it is busy or hangs, or {who} may not be allowed to {right}"
-        )
-    }
-
-    /// Sends a request. `None`: it cannot be sent now.
-    fn send(
-        &self,
-        scope: Scope,
-        ask: &Ask,
-        priority: Priority,
-        timeout: Duration,
-    ) -> Option<Replies> {
-        let key = key::ask(&self.node, &self.boot, scope, &self.who, &self.session);
-        let payload = serde_json::to_vec(ask).ok()?;
-        let replies = self
-            .zenoh
-            .get(key)
-            .payload(payload)
-            .consolidation(ConsolidationMode::None)
-            .congestion_control(CongestionControl::Drop)
-            .priority(priority)
-            .express(true)
-            .timeout(timeout)
-            .wait();
-        replies.ok()
-    }
-
-    /// Sends a request, and waits for its answer. `None`: there is none.
-    async fn ask(
-        &self,
-        scope: Scope,
-        ask: &Ask,
-        priority: Priority,
-        timeout: Duration,
-    ) -> Option<(Answer, Vec<u8>)> {
-        first_of(self.send(scope, ask, priority, timeout)?).await
-    }
-}
-
-type Runs = zenoh::pubsub::Subscriber<zenoh::handlers::FifoChannelHandler<Sample>>;
-
-type Replies = zenoh::handlers::FifoChannelHandler<Reply>;
-
-/// The first answer that can be read: the attachment if there is one.
-async fn first_of(replies: Replies) -> Option<(Answer, Vec<u8>)> {
-    while let Ok(reply) = replies.recv_async().await {
-        let Ok(sample) = reply.into_result() else { continue };
-        let payload = sample.payload().to_bytes().into_owned();
-        let head = sample.attachment().map(|it| it.to_bytes().into_owned());
-        let (head, stream) = match head {
-            Some(head) => (head, payload),
-            None => (payload, Vec::new()),
-        };
-        if let Ok(answer) = serde_json::from_slice(&head) {
-            return Some((answer, stream));
-        }
-    }
-    None
 }
 
 /// The name of this program in the log of the node.
@@ -561,3 +450,5 @@ fn own_program() -> String {
     let short: String = name.chars().filter(char::is_ascii_alphanumeric).take(12).collect();
     format!("{short} {}", std::process::id() % 1_000_000)
 }
+
+type Runs = zenoh::pubsub::Subscriber<zenoh::handlers::FifoChannelHandler<Sample>>;

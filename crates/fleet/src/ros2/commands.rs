@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use motorlink_recording::schema::{JointState, Message as _};
 
 use super::joint::{Joint, Mode, Reference};
-use super::pace::{Late, Pace};
+use super::latency::{Late, Pace};
 use super::readings::Readings;
-use super::wire::{Attachment, Gid};
+use super::rmw_zenoh::{Attachment, Gid};
 
 /// The most publishers that are remembered.
 const PUBLISHERS: usize = 16;
@@ -107,7 +107,7 @@ pub struct Order {
 
 /// How a joint takes commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shown<'a> {
+pub struct CommandStatus<'a> {
     /// The text for people.
     pub words: &'a str,
     /// Whether it takes none for now.
@@ -233,7 +233,7 @@ impl Commands {
     }
 
     /// How a joint takes commands. `None`: it is read only.
-    pub fn phase(&self, name: &str) -> Option<Shown<'_>> {
+    pub fn phase(&self, name: &str) -> Option<CommandStatus<'_>> {
         let Commanded { joint, phase, stops } =
             self.joints.iter().find(|it| it.joint.name == name)?;
         joint.command?;
@@ -243,7 +243,7 @@ impl Commands {
             Phase::Moving { .. } => ("moving", false),
             Phase::Blocked { why, .. } => (why.as_str(), true),
         };
-        Some(Shown { words, is_blocked })
+        Some(CommandStatus { words, is_blocked })
     }
 
     /// Why the last sample was refused, for a while.

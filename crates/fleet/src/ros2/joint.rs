@@ -6,12 +6,12 @@ use std::f64::consts::TAU;
 use motorlink_proto::rmd::{Command as _, SetPositionLimited, SetSpeed, SetTorque};
 use motorlink_proto::st::Ramp;
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::Line;
 use motorlink_telemetry::signal::Motor;
 use serde::Deserialize;
 
-use super::wire;
+use super::rmw_zenoh;
 
 /// What a file says of ROS 2. Times are in seconds.
 #[derive(Debug, Clone, Deserialize)]
@@ -125,7 +125,7 @@ impl Settings {
         within("ros2.time_to_live_seconds", self.time_to_live_seconds, 0.02, 10.0)?;
         within("ros2.start_within_rad", self.start_within_rad, 0.0, TAU)?;
         if let Some(namespace) = &self.namespace
-            && !wire::is_name(namespace)
+            && !rmw_zenoh::is_name(namespace)
         {
             return Err(format!(
                 "ros2.namespace: `{namespace}` is not a ROS name; a valid one is arm1"
@@ -205,7 +205,7 @@ impl JointSettings {
 impl Joint {
     /// The joint of a motor that is in no file.
     pub fn of_motor(line: &Line, motor: u8) -> Option<Self> {
-        Self::of(wire::legal(&format!("{}_{motor}", line.line)), line, motor)
+        Self::of(rmw_zenoh::legal(&format!("{}_{motor}", line.line)), line, motor)
     }
 
     fn of(name: String, line: &Line, motor: u8) -> Option<Self> {

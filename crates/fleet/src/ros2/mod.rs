@@ -1,37 +1,37 @@
 //! A node for ROS 2 machines whose middleware is `rmw_zenoh`, without any ROS here: it publishes joint states
 //! and diagnostics, obeys joint commands, and has two services.
 
-mod asking;
+mod bridge;
 mod commands;
-mod describe;
 mod joint;
-mod machine;
+mod latency;
+mod motor_client;
 mod moving;
-mod pace;
 mod readings;
-mod report;
+mod rmw_zenoh;
 mod service;
-mod types;
-mod wire;
+mod status_messages;
+mod trigger;
+mod type_hash;
 
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::program::Program;
+use motorlink_telemetry::share::client::Program;
 use tokio::time::timeout;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
+use bridge::{Machine, NAME, Shared};
 use commands::{Commands, Rules};
-use machine::{Machine, NAME, Shared};
 use motorlink_recording::schema::{DiagnosticArray, JointState, Message};
 use readings::Readings;
+use rmw_zenoh::{Endpoint, EndpointKind, Graph};
 use service::Service;
-use types::{TRIGGER, trigger};
-use wire::{Endpoint, Graph, Kind};
+use trigger::{TRIGGER, trigger};
 
 pub use joint::Settings;
 
@@ -109,7 +109,7 @@ impl Ros2 {
         tokio::spawn(Arc::clone(&shared).listen(listener));
         tokio::spawn(Arc::clone(&shared).stop_in_time());
 
-        let legal = wire::legal(node);
+        let legal = rmw_zenoh::legal(node);
         let base = settings.namespace.clone().unwrap_or_else(|| legal.clone());
         let graph = Graph::new(settings.domain, zenoh.zid().to_string(), legal);
         let mut numbers = 1..;
@@ -117,7 +117,7 @@ impl Ros2 {
             let number = numbers.next().unwrap_or_default();
             graph.endpoint(number, kind, &name, (of, &definition), depth)
         };
-        let (kind, name) = (Kind::Publisher, format!("/{base}/joint_states"));
+        let (kind, name) = (EndpointKind::Publisher, format!("/{base}/joint_states"));
         let states = endpoint(kind, name, message::<JointState>(), DEPTH);
         let diagnostics =
             endpoint(kind, "/diagnostics".to_owned(), message::<DiagnosticArray>(), DEPTH);
@@ -128,7 +128,7 @@ impl Ros2 {
 
         let mut obeys = Vec::new();
         if has_commands {
-            let (kind, name) = (Kind::Subscription, format!("/{base}/joint_commands"));
+            let (kind, name) = (EndpointKind::Subscription, format!("/{base}/joint_commands"));
             let commands = endpoint(kind, name, message::<JointState>(), COMMAND_DEPTH);
             let shared = Arc::clone(&shared);
             let taken = move |sample| shared.receive(&sample);
@@ -139,7 +139,7 @@ impl Ros2 {
         let mut services = Vec::new();
         for service in Service::ALL {
             let name = format!("/{base}/{}", service.name());
-            let endpoint = endpoint(Kind::Service, name, (TRIGGER, trigger()), DEPTH);
+            let endpoint = endpoint(EndpointKind::Service, name, (TRIGGER, trigger()), DEPTH);
             service.open(&shared, zenoh, &endpoint).map_err(io::Error::other)?;
             services.push(endpoint);
         }

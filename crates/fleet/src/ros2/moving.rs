@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use motorlink_proto::st::{Command, NotStarted, Ramp, Request, Status};
+use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::message::Reason;
-use motorlink_telemetry::share::program::Refusal;
 use tokio::sync::watch;
 
-use super::asking::{Asking, Sent, refused};
 use super::commands::Order;
 use super::joint::Reference;
+use super::motor_client::{MotorClient, SendOptions, refused};
 use crate::clock::Clock;
 
 /// How long a ramp of an ST drive to the next speed takes, in ms.
@@ -21,7 +21,7 @@ const PATIENCE: f64 = 0.5;
 
 /// Moves the motor of a joint.
 pub struct Mover {
-    asking: Asking,
+    motor: MotorClient,
     clock: Arc<dyn Clock>,
     /// The last motion.
     motion: Option<Motion>,
@@ -56,8 +56,8 @@ pub struct Failed {
 
 impl Mover {
     /// One that has moved nothing.
-    pub fn new(asking: Asking, clock: Arc<dyn Clock>) -> Self {
-        Mover { asking, clock, motion: None }
+    pub fn new(motor: MotorClient, clock: Arc<dyn Clock>) -> Self {
+        Mover { motor, clock, motion: None }
     }
 
     /// Carries out the newest order, again and again, if its motion goes on. Reports motions that fail.
@@ -103,7 +103,7 @@ impl Mover {
         }
         let Some(sent) = self.sent(order) else { return Ok(false) };
         if !motion.is_begun {
-            motion.is_begun = self.begin(order, Sent { continues: false, ..sent }).await?;
+            motion.is_begun = self.begin(order, SendOptions { continues: false, ..sent }).await?;
             // A stop before the read of `begin` has ended the motion. One after it is seen by the share.
             if !motion.is_begun || !goes_on(order) {
                 return Ok(false);
@@ -112,7 +112,7 @@ impl Mover {
         match order.reference {
             Reference::Rmd(bytes) => match self.sent(order) {
                 Some(sent) => {
-                    let result = self.asking.rmd(bytes, sent).await;
+                    let result = self.motor.rmd(bytes, sent).await;
                     motion.may_move |= result.as_ref().map_or_else(may_be_sent, |_| true);
                     result.map(|_| true)
                 }
@@ -124,21 +124,21 @@ impl Mover {
     }
 
     /// How a command of an order is sent. `None`: it is too late.
-    fn sent(&self, order: Order) -> Option<Sent> {
+    fn sent(&self, order: Order) -> Option<SendOptions> {
         let time_to_live = order.until - self.clock.now();
-        (time_to_live > 0.0).then_some(Sent { time_to_live, continues: true })
+        (time_to_live > 0.0).then_some(SendOptions { time_to_live, continues: true })
     }
 
     /// Whether the motor can be moved now. All commands of the motion follow this read: none is sent after
     /// a stop.
-    async fn begin(&self, order: Order, sent: Sent) -> Result<bool, Refusal> {
+    async fn begin(&self, order: Order, sent: SendOptions) -> Result<bool, Refusal> {
         if let Reference::Rmd(_) = order.reference {
-            return match self.asking.errors(sent).await? {
+            return match self.motor.errors(sent).await? {
                 Some(errors) => Err(refused(errors)),
                 None => Ok(true),
             };
         }
-        let (status, flags) = self.asking.state(sent).await?;
+        let (status, flags) = self.motor.state(sent).await?;
         match status {
             Status::FaultNow | Status::FaultOver => {
                 Err(refused(NotStarted::Faults { status, flags }.to_string()))
@@ -153,7 +153,7 @@ impl Mover {
     async fn rest(&self, motion: &mut Motion) -> Result<bool, Refusal> {
         (motion.is_begun, motion.is_started) = (false, false);
         match std::mem::take(&mut motion.may_move) {
-            true => self.asking.stop().await.map_or(Ok(true), |why| Err(refused(why))),
+            true => self.motor.stop().await.map_or(Ok(true), |why| Err(refused(why))),
             false => Ok(true),
         }
     }
@@ -162,14 +162,14 @@ impl Mover {
     async fn turn(&self, order: Order, rpm: i32, motion: &mut Motion) -> Result<bool, Refusal> {
         let ramp = Request::SetRamp(Ramp { speed_rpm: rpm, duration_ms: RAMP_MS });
         let Some(sent) = self.sent(order) else { return Ok(false) };
-        self.asking.st(&ramp, sent).await?;
+        self.motor.st(&ramp, sent).await?;
         if motion.is_started {
             return Ok(true);
         }
         let Some(sent) = self.sent(order) else { return Ok(false) };
         motion.may_move = true;
-        self.asking.st(&Request::ExecuteCommand(Command::StartMotor), sent).await?;
-        self.asking.started().await?;
+        self.motor.st(&Request::ExecuteCommand(Command::StartMotor), sent).await?;
+        self.motor.started().await?;
         motion.is_started = true;
         Ok(true)
     }

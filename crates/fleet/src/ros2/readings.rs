@@ -11,15 +11,15 @@ use motorlink_telemetry::signal::{Motor, Source};
 use super::joint::Joint;
 
 /// A motor of a share.
-pub type Place = (String, u8);
+pub type MotorKey = (String, u8);
 
 /// The last values of all motors.
 #[derive(Debug, Default)]
 pub struct Readings {
     /// Wall clock minus the clock of the line, in seconds.
     walls: BTreeMap<String, f64>,
-    groups: BTreeMap<u32, (Place, Vec<String>)>,
-    motors: BTreeMap<Place, Reading>,
+    groups: BTreeMap<u32, (MotorKey, Vec<String>)>,
+    motors: BTreeMap<MotorKey, Reading>,
 }
 
 /// The last values of a motor.
@@ -59,7 +59,7 @@ impl Readings {
     }
 
     /// Takes samples. Gives their motor.
-    pub fn take(&mut self, now: f64, data: &Data) -> Option<&Place> {
+    pub fn take(&mut self, now: f64, data: &Data) -> Option<&MotorKey> {
         let (place, names) = self.groups.get(&data.group)?;
         let (last, offset) = (data.rows().checked_sub(1)?, self.walls.get(&place.0)?);
         let reading = self.motors.entry(place.clone()).or_default();

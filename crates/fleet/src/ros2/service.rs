@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use motorlink_recording::schema::Message as _;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::Target;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::motor_exchange::Target;
 use zenoh::query::Query;
 use zenoh::{Session as Zenoh, Wait};
 
-use super::asking::{self, Asking};
-use super::machine::Shared;
-use super::types::TriggerResponse;
-use super::wire::{Attachment, Endpoint};
+use super::bridge::Shared;
+use super::motor_client::{self, MotorClient};
+use super::rmw_zenoh::{Attachment, Endpoint};
+use super::trigger::TriggerResponse;
 
 /// What a service does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +78,7 @@ impl Service {
 async fn stop_all(shared: &Arc<Shared>) -> Vec<String> {
     // Commands that come now must not turn them again.
     shared.with(|machine, now| machine.commands.block_all(now, "stop_all was called"));
-    match asking::stop_all(&shared.program).await {
+    match motor_client::stop_all(&shared.program).await {
         Ok(motors) => motors
             .into_iter()
             .filter(|motor| !motor.absent)
@@ -109,8 +109,8 @@ async fn clear_faults(shared: &Arc<Shared>) -> Vec<String> {
         }
         let place = format!("{line}, motor {}", motor.number());
         let target = Target::of(&line, motor, speaks);
-        let asking = Asking { program: shared.program.clone(), target };
-        match asking.clear_faults().await {
+        let motor = MotorClient { program: shared.program.clone(), target };
+        match motor.clear_faults().await {
             Ok(None) => {}
             Ok(Some(left)) => failures.push(format!("{place}: {left}")),
             Err(refusal) => failures.push(format!("{place}: {}", refusal.message)),

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::role::Role;
-use crate::key::{self, About, Name, Scope};
+use crate::key::{self, MotorQuery, Name, Scope};
 
 /// The rules for these members. All else is denied.
 pub(super) fn control(members: &BTreeMap<Name, Role>) -> Value {
@@ -57,7 +57,7 @@ fn seeing() -> Vec<Value> {
 /// What all programs may ask of all nodes.
 fn asked_of_all() -> Vec<String> {
     let any = Name::any();
-    let about = About::ALL.map(|about| key::all_about(&any, about));
+    let about = MotorQuery::ALL.map(|about| key::all_about(&any, about));
     [&[key::all_info(), key::all_columns(&any)][..], &about].concat()
 }
 
@@ -100,7 +100,7 @@ fn of_program(name: &Name, scopes: &[Scope]) -> Vec<Value> {
     let any = Name::any();
     let ask = |scope: &Scope| key::ask(&any, &any, *scope, name, &any);
     let asks: Vec<_> = scopes.iter().map(ask).collect();
-    let here = [key::here(&any, &any, name, &any)];
+    let here = [key::session_token(&any, &any, name, &any)];
     vec![
         coming(&format!("asks {name}"), &["query"], &asks),
         coming(&format!("here {name}"), &["liveliness_token"], &here),

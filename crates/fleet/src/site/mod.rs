@@ -15,8 +15,8 @@ mod access;
 mod authority;
 mod error;
 mod folder;
-mod place;
 mod role;
+mod router_address;
 #[cfg(test)]
 mod tests;
 
@@ -32,8 +32,8 @@ use crate::config::ConfigFile;
 use crate::key::Name;
 use authority::{Authority, Pair};
 pub use error::SiteError;
-pub use place::{BadPlace, Place};
 pub use role::Role;
+pub use router_address::{BadAddress, RouterAddress};
 
 /// The name of the router in its certificate.
 const ROUTER: &str = "router";
@@ -48,7 +48,7 @@ pub struct Plan {
     /// Its folder.
     pub folder: PathBuf,
     /// Where the router is reached. Empty: as before.
-    pub router: Vec<Place>,
+    pub router: Vec<RouterAddress>,
     /// Members, besides those that it has.
     pub members: Vec<(Role, Name)>,
     /// How long new certificates hold.
@@ -103,7 +103,7 @@ pub fn init(plan: &Plan) -> Result<Site, SiteError> {
         admit(&mut known, name.clone(), *role, None)?;
     }
     let file = site.join("router.json5");
-    let wanted: Vec<_> = plan.router.iter().map(Place::connected).collect();
+    let wanted: Vec<_> = plan.router.iter().map(RouterAddress::connected).collect();
     let router = folder::read(&file)?;
     let addresses = match &router {
         Some(router) => router.texts(REACHED_AT),
@@ -184,15 +184,15 @@ impl Signer<'_> {
         Ok(self.authority.insert(authority))
     }
 
-    fn router(&mut self, places: &[Place]) -> Result<ConfigFile, SiteError> {
+    fn router(&mut self, places: &[RouterAddress]) -> Result<ConfigFile, SiteError> {
         let days = self.days;
         let authority = self.authority()?;
         let hosts = places.iter().map(|it| it.host.clone()).collect();
         let pair = authority.for_router(ROUTER, hosts, days)?;
-        let listen = Place::listened(places);
+        let listen = RouterAddress::listened(places);
         let mut config = ConfigFile::new("router", "listen", &listen);
         set_tls(&mut config, "listen", authority, &pair);
-        let reached_at: Vec<_> = places.iter().map(Place::connected).collect();
+        let reached_at: Vec<_> = places.iter().map(RouterAddress::connected).collect();
         config.set(REACHED_AT, json!(reached_at));
         Ok(config)
     }

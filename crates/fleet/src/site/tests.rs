@@ -217,8 +217,8 @@ fn what_cannot_be_is_refused_before_anything_is_written() {
 #[test]
 fn a_router_listens_at_ip_addresses_and_for_names_at_all() {
     let listened = |texts: &[&str]| {
-        let places: Vec<Place> = texts.iter().map(|it| it.parse().unwrap()).collect();
-        Place::listened(&places)
+        let places: Vec<RouterAddress> = texts.iter().map(|it| it.parse().unwrap()).collect();
+        RouterAddress::listened(&places)
     };
     assert_eq!(listened(&["10.0.0.5", "localhost:1"]), ["tls/10.0.0.5:7447", "tls/127.0.0.1:1"]);
     assert_eq!(listened(&["10.0.0.5", "plant.local"]), ["tls/0.0.0.0:7447"]);
@@ -235,6 +235,6 @@ fn a_router_listens_at_ip_addresses_and_for_names_at_all() {
         "a..b",
         "*",
     ] {
-        assert_eq!(bad.parse::<Place>(), Err(BadPlace), "{bad}");
+        assert_eq!(bad.parse::<RouterAddress>(), Err(BadAddress), "{bad}");
     }
 }

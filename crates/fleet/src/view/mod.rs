@@ -1,6 +1,6 @@
 //! What nodes publish: the last values of all motors, without a session at any node.
 
-mod picture;
+mod snapshot;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,8 +17,8 @@ use crate::directory::{self, Run};
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::remote;
-use picture::Picture;
-pub use picture::{Drive, Node};
+use snapshot::Picture;
+pub use snapshot::{Drive, Node};
 
 /// How long nodes may take to say their columns.
 const ANSWER: Duration = Duration::from_secs(2);

@@ -2,21 +2,25 @@
 //!
 //! It has no socket and reads no clock. Times come from the caller, in seconds.
 
+mod answers;
+mod rounds;
+mod subscriptions;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::client_codec::Refusal;
 use motorlink_telemetry::share::data;
-use motorlink_telemetry::share::frame::{Frame, Kind as FrameKind};
+use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{
     Answer, Ask, Event, EventKind, Line, Reason, Request, SignalName, Text, decode, encode,
 };
 
-use super::latches::Latches;
 use super::member::{Member, State};
+use super::motion_latch::Latches;
 use super::names;
-use super::round::{Kind, Round};
+use super::round::{Round, RoundKind};
 use crate::key::Name;
 
 /// How long a stop waits for a node that is away, in seconds.
@@ -33,14 +37,14 @@ pub(super) enum Out {
 #[derive(Debug)]
 struct Asked {
     node: Name,
-    of: Of,
+    of: RequestPurpose,
     /// When, by the wall clock.
     wall: f64,
 }
 
 /// Why a node was asked.
 #[derive(Debug)]
-enum Of {
+enum RequestPurpose {
     /// For the request of the program with this id, about this line of the node.
     One(u32, Option<String>),
     Round(u64),
@@ -156,22 +160,23 @@ impl Aggregate {
         member.latch = 0;
         self.latch_first(node);
         if self.now < self.stops_until && !self.stopped.contains(node) {
-            self.ask(node, Ask::Stop { motor: None }, Of::Nothing);
+            self.ask(node, Ask::Stop { motor: None }, RequestPurpose::Nothing);
         }
-        self.ask(node, Ask::Lines, Of::Lines);
+        self.ask(node, Ask::Lines, RequestPurpose::Lines);
         let waiting = self.rounds.iter().filter(|(_, round)| round.waits.contains(node));
         let waiting: Vec<_> = waiting.map(|(number, round)| (*number, round.kind)).collect();
         for (number, kind) in waiting {
             if let Some(ask) = self.ask_of(kind, node) {
-                self.ask(node, ask, Of::Round(number));
+                self.ask(node, ask, RequestPurpose::Round(number));
             }
         }
-        let pending =
-            |number: &u32| self.rounds.values().any(|round| round.kind == Kind::Subscribe(*number));
+        let pending = |number: &u32| {
+            self.rounds.values().any(|round| round.kind == RoundKind::Subscribe(*number))
+        };
         let again = self.subscriptions.iter().filter(|(number, _)| !pending(number));
         let again = again.filter_map(|(number, it)| Some((*number, it.parts.get(node)?.clone())));
         for (number, ask) in again.collect::<Vec<_>>() {
-            self.ask(node, ask, Of::Again(number));
+            self.ask(node, ask, RequestPurpose::Again(number));
         }
         self.end_waiting(node);
     }
@@ -247,20 +252,20 @@ impl Aggregate {
                 self.answer(id, Answer::Hello { protocol: VERSION, share, name });
                 self.tell_away();
             }
-            Ask::Lines => self.all(id, Kind::Lines),
-            Ask::Rates { line: None } => self.all(id, Kind::Rates),
+            Ask::Lines => self.all(id, RoundKind::Lines),
+            Ask::Rates { line: None } => self.all(id, RoundKind::Rates),
             Ask::Stop { motor: None } => {
                 self.stops_until = self.now + PENDING;
                 self.stopped.clear();
-                self.all(id, Kind::Stop);
+                self.all(id, RoundKind::Stop);
             }
             Ask::Latch => {
                 self.latches.add(&self.program);
-                self.all(id, Kind::Latch);
+                self.all(id, RoundKind::Latch);
             }
             Ask::Release => {
                 self.latches.clear();
-                self.all(id, Kind::Release);
+                self.all(id, RoundKind::Release);
             }
             Ask::Subscribe { .. } => self.subscribe(id, ask),
             Ask::Unsubscribe { subscription } => {
@@ -303,7 +308,7 @@ impl Aggregate {
                 if event.event == EventKind::Released
                     && let Some(number) = self.latches.watched_by(&self.program)
                 {
-                    self.ask(node, Ask::Lines, Of::Released(number));
+                    self.ask(node, Ask::Lines, RequestPurpose::Released(number));
                 }
                 let ahead = self.members.get(node).map_or(0.0, Member::ahead);
                 self.say(&Text::Event(names::event(node, event, ahead)));
@@ -342,7 +347,7 @@ impl Aggregate {
     fn latch_first(&mut self, node: &Name) {
         let before = self.members.get(node).map_or(0, |member| member.latch);
         if self.latches.number().is_some_and(|number| number > before) {
-            self.ask(node, Ask::Latch, Of::Nothing);
+            self.ask(node, Ask::Latch, RequestPurpose::Nothing);
         }
     }
 
@@ -354,196 +359,6 @@ impl Aggregate {
             data::regroup(&mut payload, group);
             self.out.push(Out::Program(Frame::data(payload)));
         }
-    }
-
-    fn answered(&mut self, node: &Name, id: u32, result: Result<Answer, Refusal>) {
-        let Some(Asked { of, wall, .. }) = self.asked.remove(&id) else { return };
-        if let Ok(Answer::Lines { lines, latched_by }) = &result {
-            let before = self.learn(node, lines, latched_by.clone(), wall);
-            if let Of::Released(number) = of
-                && latched_by.is_none()
-                && self.latches.number() == Some(number)
-            {
-                self.latches.clear();
-            }
-            if matches!(of, Of::Lines) {
-                self.tell_lines(node, &before, lines);
-            }
-        }
-        if let (Of::Round(_) | Of::Nothing, Ok(Answer::Stop { .. })) = (&of, &result) {
-            self.stopped.insert(node.clone());
-        }
-        let new = match (&of, &result) {
-            (Of::Again(number), Ok(Answer::Subscribe { subscription })) => {
-                Some((*number, *subscription))
-            }
-            (Of::Round(round), Ok(Answer::Subscribe { subscription })) => {
-                match self.rounds.get(round).map(|it| it.kind) {
-                    Some(Kind::Subscribe(number)) => Some((number, *subscription)),
-                    _ => None,
-                }
-            }
-            _ => None,
-        };
-        if let Some((ours, theirs)) = new {
-            match self.members.get_mut(node) {
-                Some(member) if self.subscriptions.contains_key(&ours) => {
-                    member.subscriptions.insert(theirs, ours);
-                }
-                // It was ended meanwhile.
-                _ => self.ask(node, Ask::Unsubscribe { subscription: theirs }, Of::Nothing),
-            }
-        }
-        self.ended(node, of, result);
-    }
-
-    /// Ends what a node was asked for.
-    fn ended(&mut self, node: &Name, of: Of, result: Result<Answer, Refusal>) {
-        match of {
-            Of::One(id, line) => {
-                let result = result.map(|answer| names::answer(node, answer));
-                let named = |why| names::refusal(node, line.as_deref(), why);
-                self.end(id, result.map_err(named));
-            }
-            Of::Round(number) => {
-                let Some(round) = self.rounds.get_mut(&number) else { return };
-                round.waits.remove(node);
-                round.done.insert(node.clone(), result);
-                self.finish(number);
-            }
-            Of::Lines | Of::Released(_) | Of::Again(_) | Of::Nothing => {}
-        }
-    }
-
-    /// Remembers the lines of a node, which was asked for them at this time of the wall clock. Gives those
-    /// before.
-    fn learn(
-        &mut self,
-        node: &Name,
-        lines: &[Line],
-        latched_by: Option<String>,
-        asked: f64,
-    ) -> Vec<Line> {
-        let Some(member) = self.members.get_mut(node) else { return Vec::new() };
-        member.latched_by = latched_by;
-        member.learn(lines, asked, self.wall)
-    }
-
-    /// Tells the program what is new at a node that was just connected.
-    fn tell_lines(&mut self, node: &Name, before: &[Line], lines: &[Line]) {
-        let is_in = |lines: &[Line], line: &Line| {
-            lines.iter().any(|it| it.line == line.line && it.protocol == line.protocol)
-        };
-        for line in before.iter().filter(|line| !is_in(lines, line)) {
-            let message = format!("node {node} has no such line any more");
-            self.tell(node, EventKind::Closed, &line.line, message);
-        }
-        for line in lines {
-            let (event, words) = match is_in(before, line) {
-                true => (EventKind::Back, "is there again"),
-                false => (EventKind::Opened, "is there"),
-            };
-            self.tell(node, event, &line.line, format!("node {node} {words}"));
-        }
-    }
-
-    /// Asks all nodes.
-    fn all(&mut self, id: u32, kind: Kind) {
-        let nodes: BTreeSet<_> = self.members.keys().cloned().collect();
-        self.round(id, kind, nodes);
-    }
-
-    fn round(&mut self, id: u32, kind: Kind, nodes: BTreeSet<Name>) {
-        self.last_round += 1;
-        let number = self.last_round;
-        let round = Round { id, kind, waits: nodes.clone(), done: BTreeMap::new() };
-        self.rounds.insert(number, round);
-        for node in &nodes {
-            match self.members.get(node).map(|it| &it.state) {
-                Some(State::Here) => {
-                    if let Some(ask) = self.ask_of(kind, node) {
-                        self.ask(node, ask, Of::Round(number));
-                    }
-                }
-                Some(State::Away(why)) => {
-                    let why = away(node, why);
-                    self.ended(node, Of::Round(number), Err(why));
-                }
-                Some(State::Coming) | None => {}
-            }
-        }
-        self.finish(number);
-    }
-
-    /// What a node is asked in a round.
-    fn ask_of(&self, kind: Kind, node: &Name) -> Option<Ask> {
-        Some(match kind {
-            Kind::Lines => Ask::Lines,
-            Kind::Rates => Ask::Rates { line: None },
-            Kind::Stop => Ask::Stop { motor: None },
-            Kind::Latch => Ask::Latch,
-            Kind::Release => Ask::Release,
-            Kind::Subscribe(number) => self.subscriptions.get(&number)?.parts.get(node)?.clone(),
-        })
-    }
-
-    /// Answers the program if all nodes have answered.
-    fn finish(&mut self, number: u64) {
-        if self.rounds.get(&number).is_none_or(|round| !round.waits.is_empty()) {
-            return;
-        }
-        let Some(round) = self.rounds.remove(&number) else { return };
-        let answer = round.answer(&self.members);
-        if let (Kind::Subscribe(subscription), Err(_)) = (round.kind, &answer) {
-            self.unsubscribe(subscription);
-        }
-        self.end(round.id, answer);
-    }
-
-    /// No round waits for a node that did not come.
-    fn fail_rounds(&mut self, node: &Name, why: &str) {
-        let waiting = self.rounds.iter().filter(|(_, round)| round.waits.contains(node));
-        for number in waiting.map(|(number, _)| *number).collect::<Vec<_>>() {
-            self.ended(node, Of::Round(number), Err(away(node, why)));
-        }
-    }
-
-    fn subscribe(&mut self, id: u32, ask: Ask) {
-        let Ask::Subscribe { signals, period, queue, drop, rows } = ask else { return };
-        let mut of_nodes: BTreeMap<Name, Vec<SignalName>> = BTreeMap::new();
-        for mut signal in signals {
-            match self.known(&signal.line) {
-                Ok((node, line)) => {
-                    signal.line = line;
-                    of_nodes.entry(node).or_default().push(signal);
-                }
-                Err(why) => return self.refuse(id, why),
-            }
-        }
-        self.last_subscription += 1;
-        let number = self.last_subscription;
-        let nodes = of_nodes.keys().cloned().collect();
-        let part = |signals| Ask::Subscribe { signals, period, queue, drop, rows };
-        let parts = of_nodes.into_iter().map(|(node, signals)| (node, part(signals)));
-        self.subscriptions.insert(number, Subscription { parts: parts.collect() });
-        self.round(id, Kind::Subscribe(number), nodes);
-    }
-
-    /// Whether there was such a subscription.
-    fn unsubscribe(&mut self, number: u32) -> bool {
-        if self.subscriptions.remove(&number).is_none() {
-            return false;
-        }
-        let mut theirs = Vec::new();
-        for (node, member) in &mut self.members {
-            let ended = member.subscriptions.iter().filter(|(_, ours)| **ours == number);
-            theirs.extend(ended.map(|(subscription, _)| (node.clone(), *subscription)));
-            member.subscriptions.retain(|_, ours| *ours != number);
-        }
-        for (node, subscription) in theirs {
-            self.ask(&node, Ask::Unsubscribe { subscription }, Of::Nothing);
-        }
-        true
     }
 
     /// Asks the node of a line.
@@ -564,7 +379,7 @@ impl Aggregate {
                 if matches!(ask, Ask::Command { .. }) {
                     self.latch_first(&node);
                 }
-                self.ask(&node, ask, Of::One(id, Some(there)));
+                self.ask(&node, ask, RequestPurpose::One(id, Some(there)));
             }
             // It does not take long until it is known whether the node is there.
             Some(State::Coming) | None => {
@@ -582,7 +397,7 @@ impl Aggregate {
         }
     }
 
-    fn ask(&mut self, node: &Name, ask: Ask, of: Of) {
+    fn ask(&mut self, node: &Name, ask: Ask, of: RequestPurpose) {
         if let (Ask::Latch, Some(member)) = (&ask, self.members.get_mut(node)) {
             member.latch = self.latches.number().unwrap_or(member.latch);
         }

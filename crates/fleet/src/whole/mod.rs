@@ -4,8 +4,8 @@
 //! back. `aggregate` decides, without sockets and clocks.
 
 mod aggregate;
-mod latches;
 mod member;
+mod motion_latch;
 mod names;
 mod round;
 mod serve;
@@ -19,8 +19,8 @@ use crate::key::Name;
 use crate::network::Network;
 use crate::remote::{self, Remote};
 use aggregate::Aggregate;
-use latches::Latches;
-use serve::{Known, Serving};
+use motion_latch::Latches;
+use serve::{AbsentNodes, FleetSession};
 
 /// The nodes of a network.
 #[derive(Debug, Clone)]
@@ -30,7 +30,7 @@ pub struct Whole {
     /// Only these; all of them if it is empty.
     pub nodes: BTreeSet<Name>,
     /// Nodes that went away. They stay in the list, also for programs that come later.
-    known: Known,
+    known: AbsentNodes,
     latches: Latches,
 }
 
@@ -39,7 +39,7 @@ impl Whole {
     pub fn new(network: Network, nodes: BTreeSet<Name>) -> Self {
         // No node has this name: each takes its place.
         let pattern = Remote::new(Name::near("node"), network);
-        Whole { pattern, nodes, known: Known::default(), latches: Latches::default() }
+        Whole { pattern, nodes, known: AbsentNodes::default(), latches: Latches::default() }
     }
 }
 
@@ -59,7 +59,7 @@ impl Address for Whole {
             .map_err(|error| Unreachable::Missing(format!("no node can be reached: {error}")))?;
         let (own, other) = remote::pair()?;
         let aggregate = Aggregate::new(pattern.who.to_string(), latches);
-        let serving = Serving::open(aggregate, pattern, is_meant, known, zenoh, own);
+        let serving = FleetSession::open(aggregate, pattern, is_meant, known, zenoh, own);
         let opened = remote::runtime()?.block_on(serving);
         opened.map_err(|error| Unreachable::Failed(error.to_string()))?;
         Ok(other)

@@ -11,7 +11,7 @@ use crate::key::Name;
 
 /// What all nodes are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum RoundKind {
     Lines,
     Rates,
     Stop,
@@ -25,7 +25,7 @@ pub(super) enum Kind {
 pub(super) struct Round {
     /// That of the program's request.
     pub(super) id: u32,
-    pub(super) kind: Kind,
+    pub(super) kind: RoundKind,
     /// The nodes that have not answered.
     pub(super) waits: BTreeSet<Name>,
     pub(super) done: BTreeMap<Name, Result<Answer, Refusal>>,
@@ -38,15 +38,15 @@ impl Round {
             self.done.iter().filter_map(|(node, result)| Some((node, result.as_ref().ok()?)));
         let all = good.map(|(node, answer)| names::answer(node, answer.clone()));
         Ok(match self.kind {
-            Kind::Lines => lines(members),
-            Kind::Rates => {
+            RoundKind::Lines => lines(members),
+            RoundKind::Rates => {
                 let rates = all.filter_map(|answer| match answer {
                     Answer::Rates { rates } => Some(rates),
                     _ => None,
                 });
                 Answer::Rates { rates: rates.flatten().collect() }
             }
-            Kind::Stop => {
+            RoundKind::Stop => {
                 let stopped = all.filter_map(|answer| match answer {
                     Answer::Stop { motors } => Some(motors),
                     _ => None,
@@ -59,9 +59,9 @@ impl Round {
                 }
                 Answer::Stop { motors }
             }
-            Kind::Latch => self.by_all(Answer::Latch)?,
-            Kind::Release => self.by_all(Answer::Release)?,
-            Kind::Subscribe(subscription) => {
+            RoundKind::Latch => self.by_all(Answer::Latch)?,
+            RoundKind::Release => self.by_all(Answer::Release)?,
+            RoundKind::Subscribe(subscription) => {
                 // A node that is away has its part when it is back.
                 let refused = self.refused().find(|(_, refusal)| refusal.reason != Reason::Line);
                 match refused {

@@ -40,14 +40,14 @@ const QUEUE: usize = 64;
 const STATES: usize = 64;
 
 /// What a node has said.
-struct News {
+struct NodeEvent {
     node: Name,
     /// Which connection of it.
     run: u64,
-    what: What,
+    what: NodeEventKind,
 }
 
-enum What {
+enum NodeEventKind {
     Connected(Result<StdStream, Unreachable>),
     Said(Frame),
     Ended,
@@ -67,7 +67,7 @@ struct Link {
 }
 
 /// A program that sees all nodes.
-pub(super) struct Serving {
+pub(super) struct FleetSession {
     aggregate: Aggregate,
     /// What a node is, besides its name.
     pattern: Remote,
@@ -80,18 +80,18 @@ pub(super) struct Serving {
     frames: Reader,
     writer: OwnedWriteHalf,
     out: Vec<u8>,
-    news: Receiver<News>,
-    told: Sender<News>,
+    news: Receiver<NodeEvent>,
+    told: Sender<NodeEvent>,
     /// Nodes that come and go.
     seen: Subscriber<FifoChannelHandler<Sample>>,
     /// What nodes say of themselves.
     states: Subscriber<RingChannelHandler<Sample>>,
-    known: Known,
+    known: AbsentNodes,
     zenoh: Arc<Zenoh>,
 }
 
 /// Nodes that went away, by their names in the fleet, for programs that come later.
-pub(super) type Known = Arc<Mutex<BTreeMap<Name, Absent>>>;
+pub(super) type AbsentNodes = Arc<Mutex<BTreeMap<Name, Absent>>>;
 
 /// A node that went away.
 #[derive(Debug, Clone)]
@@ -100,13 +100,13 @@ pub(super) struct Absent {
     lines: Vec<Line>,
 }
 
-impl Serving {
+impl FleetSession {
     /// Looks for nodes, and serves the socket from then on. `known` has nodes that were there before.
     pub(super) async fn open(
         aggregate: Aggregate,
         pattern: Remote,
         is_meant: impl Fn(&Name) -> bool + Send + Sync + 'static,
-        known: Known,
+        known: AbsentNodes,
         zenoh: Arc<Zenoh>,
         socket: StdStream,
     ) -> io::Result<()> {
@@ -119,7 +119,7 @@ impl Serving {
         let states = states.map_err(io::Error::other)?;
         let (reader, writer) = UnixStream::from_std(socket)?.into_split();
         let (told, news) = channel(QUEUE);
-        let mut serving = Serving {
+        let mut serving = FleetSession {
             aggregate,
             pattern,
             is_meant: Box::new(is_meant),
@@ -211,7 +211,7 @@ impl Serving {
                 Out::Node(node, request) => {
                     let requests = self.links.get(&node).and_then(|link| link.requests.as_ref());
                     let mut bytes = Vec::new();
-                    let _ = frame::append(frame::Kind::Text, &encode(&request), &mut bytes);
+                    let _ = frame::append(frame::FrameKind::Text, &encode(&request), &mut bytes);
                     // If it has ended, that is heard soon.
                     let _ = requests.map(|it| it.send(bytes));
                 }
@@ -318,24 +318,26 @@ impl Serving {
             tokio::spawn(async move {
                 let connected = remote.open(zenoh, PATIENCE).await;
                 // The program may have ended.
-                let _ = told.send(News { node, run, what: What::Connected(connected) }).await;
+                let _ = told
+                    .send(NodeEvent { node, run, what: NodeEventKind::Connected(connected) })
+                    .await;
             });
         }
     }
 
-    fn heard(&mut self, News { node, run, what }: News) {
+    fn heard(&mut self, NodeEvent { node, run, what }: NodeEvent) {
         self.aggregate.at(Boot.now(), Boot.wall());
         if self.links.get(&node).is_none_or(|link| link.run != run) {
             return;
         }
         let lost = match what {
-            What::Said(frame) => return self.aggregate.heard(&node, frame),
-            What::Connected(Ok(socket)) => match self.begin(&node, run, socket) {
+            NodeEventKind::Said(frame) => return self.aggregate.heard(&node, frame),
+            NodeEventKind::Connected(Ok(socket)) => match self.begin(&node, run, socket) {
                 Ok(()) => return self.aggregate.came(&node),
                 Err(error) => error.to_string(),
             },
-            What::Connected(Err(error)) => error.to_string(),
-            What::Ended => "the connection has ended".to_owned(),
+            NodeEventKind::Connected(Err(error)) => error.to_string(),
+            NodeEventKind::Ended => "the connection has ended".to_owned(),
         };
         if let Some(link) = self.links.get_mut(&node) {
             link.requests = None;
@@ -365,16 +367,16 @@ impl Serving {
         let (told, name) = (self.told.clone(), node.clone());
         tokio::spawn(async move {
             let (mut frames, mut bytes) = (Reader::default(), vec![0; 1 << 14]);
-            let said = |what| told.send(News { node: name.clone(), run, what });
+            let said = |what| told.send(NodeEvent { node: name.clone(), run, what });
             while let Ok(size @ 1..) = reader.read(&mut bytes).await {
                 frames.push(&bytes[..size]);
                 while let Ok(Some(frame)) = frames.take() {
-                    if said(What::Said(frame)).await.is_err() {
+                    if said(NodeEventKind::Said(frame)).await.is_err() {
                         return;
                     }
                 }
             }
-            let _ = said(What::Ended).await;
+            let _ = said(NodeEventKind::Ended).await;
         });
         if let Some(link) = self.links.get_mut(node) {
             link.requests = Some(requests);

@@ -11,9 +11,9 @@ use motorlink_proto::st::{
 use motorlink_proto::units::{Rounding, Scale};
 use motorlink_spec::st_messages::{self, Content, Value as StField};
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::Target;
-use motorlink_telemetry::share::program::Refusal;
+use motorlink_telemetry::share::client::Refusal;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::motor_exchange::Target;
 use motorlink_telemetry::signal::Motor;
 
 use super::value;

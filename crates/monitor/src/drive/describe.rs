@@ -4,7 +4,7 @@ use motorlink_proto::rmd::Errors;
 use motorlink_proto::st::{Flags, Ramp, Status};
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity as _};
 use motorlink_telemetry::overview;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::signal::{Motor, Source};
 
 use super::commands::Command;

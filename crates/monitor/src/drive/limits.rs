@@ -5,7 +5,7 @@ use motorlink_proto::st::register::Unit;
 use motorlink_proto::st::{self, Account, Counters, Effect, LimitError, Ramp};
 use motorlink_proto::units::{CentiDegrees, IqCommand, Quantity, Rounding, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::program::Refusal;
+use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::signal::Motor;
 
 use crate::message::Mode;

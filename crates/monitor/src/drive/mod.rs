@@ -1,15 +1,14 @@
 //! What pages ask of drives: registers, commands, motion, limits and settings.
 //!
-//! - `exchange` sends a request to a motor and gives its reply.
 //! - `describe` says what the drives of a line have. `commands` and `registers` are its parts that are also
 //!   used to carry out requests.
 //! - `limits` has what all pages may ask of a motor at most.
 
-mod act;
+mod command_execution;
 mod commands;
-mod control;
 mod describe;
 mod limits;
+mod motion_guard;
 mod registers;
 mod run;
 mod search;
@@ -21,15 +20,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use motorlink::settings::Dump;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::{Exchanges, Target};
+use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, MotorName};
-use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
 use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
-use control::Control;
+use motion_guard::Control;
 
-pub use control::Motion;
+pub use motion_guard::MotionPermit;
 
 /// Carries out the requests of pages about drives. Copies are the same drives.
 #[derive(Clone)]
@@ -70,7 +69,7 @@ impl Drives {
         &self,
         ask: Ask,
         view: &Program,
-        drive: &impl Motion,
+        drive: &impl MotionPermit,
     ) -> Result<Answer, Refusal> {
         match ask {
             Ask::StopAll
@@ -94,7 +93,7 @@ impl Drives {
             Ask::Act { motor, command, values, hold, to_rom } => {
                 let target = self.target(motor)?;
                 let command = commands::Command::named(&target, &command)?;
-                let request = act::Act { target, command, values, hold, to_rom };
+                let request = command_execution::Act { target, command, values, hold, to_rom };
                 Ok(Answer::Act { values: request.carry_out(&self.control, view, drive).await? })
             }
             Ask::Limit { motor, mode, most } => {

@@ -7,12 +7,12 @@ use motorlink_proto::st::{
     self, Features, Profile, Reading, RegisterId, Request as StRequest, find_register,
 };
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::{
+use motorlink_telemetry::share::client::Refusal;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::message::Reason;
+use motorlink_telemetry::share::motor_exchange::{
     ATTEMPTS, Exchanges, Target, is_refused_by_motor, is_worth_repeating,
 };
-use motorlink_telemetry::share::message::Reason;
-use motorlink_telemetry::share::program::Refusal;
 use motorlink_telemetry::signal::{Motor, Quantity};
 
 use super::value;
@@ -22,7 +22,7 @@ use crate::message::{Register, Value};
 const MEASURED: &str = "Measured values";
 
 /// What has a name and a value.
-pub(super) enum Place {
+pub(super) enum ValueSource {
     /// A register of an ST drive.
     Register(RegisterId),
     /// A phase of the rev-up, and the index of its value.
@@ -33,7 +33,7 @@ pub(super) enum Place {
     Measured(Code, &'static Field),
 }
 
-impl Place {
+impl ValueSource {
     /// The place with this name.
     pub(super) fn named(target: &Target, name: &str) -> Result<Self, Refusal> {
         let (found, why) = match (target.motor, target.speaks) {
@@ -42,10 +42,11 @@ impl Place {
                 let phase =
                     |block: &Block<st::Setting>| matches!(block.id, st::Setting::RevupPhase(_));
                 match find_register(name) {
-                    Ok(register) => (Some(Place::Register(register)), String::new()),
+                    Ok(register) => (Some(ValueSource::Register(register)), String::new()),
                     Err(why) => {
                         let setting = setting(&tuning, name).filter(|(block, _)| phase(block));
-                        let place = setting.map(|(block, at)| Place::StSetting(tuning, block, at));
+                        let place =
+                            setting.map(|(block, at)| ValueSource::StSetting(tuning, block, at));
                         (place, why.to_string())
                     }
                 }
@@ -54,12 +55,12 @@ impl Place {
                 let tuning = RmdTuning { motor };
                 match setting(&tuning, name) {
                     Some((block, at)) => {
-                        (Some(Place::RmdSetting(tuning, block, at)), String::new())
+                        (Some(ValueSource::RmdSetting(tuning, block, at)), String::new())
                     }
                     None => match Quantity::named(name) {
                         Ok(quantity) => {
                             let (code, field) = quantity.read();
-                            (Some(Place::Measured(code, field)), String::new())
+                            (Some(ValueSource::Measured(code, field)), String::new())
                         }
                         Err(_) => (None, format!("the motor has no setting or value `{name}`")),
                     },
@@ -74,7 +75,7 @@ impl Place {
     fn request(&self, exchanges: &Exchanges<'_>) -> Result<Request, String> {
         let motor = exchanges.target.name.motor;
         match self {
-            Place::Register(register) => {
+            ValueSource::Register(register) => {
                 let is_readable = exchanges
                     .of_st()
                     .zip(register.shape())
@@ -84,14 +85,14 @@ impl Place {
                     false => Err(format!("{register} cannot be read")),
                 }
             }
-            Place::StSetting(tuning, block, _) => {
+            ValueSource::StSetting(tuning, block, _) => {
                 let (motor, request) = tuning.request(&Ask::Read(block.id));
                 Ok(Request::St(motor, request))
             }
-            Place::RmdSetting(tuning, block, _) => {
+            ValueSource::RmdSetting(tuning, block, _) => {
                 Ok(Request::Rmd(tuning.motor, tuning.request(&Ask::Read(block.id))))
             }
-            Place::Measured(code, _) => match exchanges.of_rmd() {
+            ValueSource::Measured(code, _) => match exchanges.of_rmd() {
                 Some(id) => Ok(Request::Rmd(id, [u8::from(*code), 0, 0, 0, 0, 0, 0, 0])),
                 None => Err("an ST drive has no such value".to_owned()),
             },
@@ -101,15 +102,15 @@ impl Place {
     /// Its value in the reply.
     fn value(&self, name: &str, exchanges: &Exchanges<'_>, reply: &[u8]) -> Option<Value> {
         match self {
-            Place::Register(register) => {
+            ValueSource::Register(register) => {
                 let (_, profile) = exchanges.of_st()?;
                 let bits = register.decode(profile, reply)?;
                 let reading = Reading { register: *register, bits, profile };
                 Some(value::of_register(&register.to_string(), reading))
             }
-            Place::StSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
-            Place::RmdSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
-            Place::Measured(_, field) => {
+            ValueSource::StSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
+            ValueSource::RmdSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
+            ValueSource::Measured(_, field) => {
                 Some(value::of_field(name.to_owned(), field, reply.try_into().ok()?))
             }
         }
@@ -159,7 +160,7 @@ pub(super) async fn read_each(
     exchanges: &Exchanges<'_>,
     names: &[String],
 ) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
-    let places = names.iter().map(|name| Ok((name, Place::named(exchanges.target, name)?)));
+    let places = names.iter().map(|name| Ok((name, ValueSource::named(exchanges.target, name)?)));
     let places = places.collect::<Result<Vec<_>, Refusal>>()?;
     let _lane = exchanges.lane().await;
     let mut attempt = 1;
@@ -173,7 +174,7 @@ pub(super) async fn read_each(
 
 async fn read_once(
     exchanges: &Exchanges<'_>,
-    places: &[(&String, Place)],
+    places: &[(&String, ValueSource)],
 ) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
     let mut replies: Vec<(Request, Result<Vec<u8>, Refusal>)> = Vec::new();
     let mut values = Vec::new();

@@ -16,17 +16,17 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity, Scale, SpeedLimit};
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
+use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::Reason;
-use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::motor_exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 use motorlink_telemetry::signal::Motor;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
-use super::act::started;
-use super::control::{Control, MOTION, Motion, Permitted, Running, send};
-use crate::message::{Answer, Mode, Ran};
+use super::command_execution::started;
+use super::motion_guard::{Control, MOTION, MotionPermit, MotionSession, Running, send};
+use crate::message::{Answer, Mode, RunResult};
 
 /// The time between two references.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -76,7 +76,7 @@ impl Run {
     pub(super) async fn carry_out(
         self,
         control: &Arc<Control>,
-        drive: &impl Motion,
+        drive: &impl MotionPermit,
     ) -> Result<Answer, Refusal> {
         if !(self.rate.is_finite() && self.rate > 0.0) {
             let message =
@@ -87,7 +87,7 @@ impl Run {
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.end_run(&self.target).await;
-        let permitted = Permitted::new(drive, self.hold, stops).await?;
+        let permitted = MotionSession::new(drive, self.hold, stops).await?;
         let begun = Begun { run: &self, control, permitted };
         let (from, streams) = match (self.target.motor, self.target.speaks, self.mode) {
             (Motor::Rmd(id), _, Mode::Speed) => {
@@ -163,10 +163,10 @@ impl Run {
 struct Begun<'a, M> {
     run: &'a Run,
     control: &'a Arc<Control>,
-    permitted: Permitted<'a, M>,
+    permitted: MotionSession<'a, M>,
 }
 
-impl<M: Motion> Begun<'_, M> {
+impl<M: MotionPermit> Begun<'_, M> {
     fn target(&self) -> &Target {
         &self.run.target
     }
@@ -359,7 +359,7 @@ impl References {
         self,
         from: f64,
         mut ended: watch::Receiver<bool>,
-        report: impl FnOnce(Ran) + Send,
+        report: impl FnOnce(RunResult) + Send,
     ) {
         let mut ticks = interval_at(Instant::now() + PERIOD, PERIOD);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -387,7 +387,7 @@ impl References {
                 Err(why) => failure = Some(self.stop(&why).await),
             }
         }
-        report(Ran { motor: self.target.name.clone(), reference, failure });
+        report(RunResult { motor: self.target.name.clone(), reference, failure });
     }
 
     /// Sends one. The replies so far are confirmed with the last one.

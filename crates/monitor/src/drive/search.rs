@@ -2,9 +2,9 @@
 
 use motorlink_proto::rmd::{Command, MotorSet, ReadStatus};
 use motorlink_proto::st::{ErrorCode, RegisterId, Request};
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
-use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::motor_exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 use tokio::task::JoinSet;
 
 /// The motors that reply.

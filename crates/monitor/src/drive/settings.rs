@@ -9,13 +9,13 @@ use motorlink::settings::{
     identify,
 };
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::exchange::{Exchanges, Target, is_refused_by_motor};
+use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{MotorName, Reason};
-use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target, is_refused_by_motor};
 use motorlink_telemetry::signal::Motor;
 
-use super::control::Control;
+use super::motion_guard::Control;
 use crate::message::{self, Answer};
 
 /// The settings of a motor of either protocol.

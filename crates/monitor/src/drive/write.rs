@@ -5,12 +5,12 @@ use motorlink_proto::st::{
     parse_value,
 };
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::exchange::{Exchanges, Target};
+use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::Reason;
-use motorlink_telemetry::share::program::{Program, Refusal};
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
-use super::control::{Control, Motion, Permitted, send};
-use super::registers::{self, Place};
+use super::motion_guard::{Control, MotionPermit, MotionSession, send};
+use super::registers::{self, ValueSource};
 use super::settings;
 use super::value;
 use crate::message::Value;
@@ -29,15 +29,15 @@ impl Write {
         self,
         control: &Control,
         view: &Program,
-        drive: &impl Motion,
+        drive: &impl MotionPermit,
     ) -> Result<Vec<Value>, Refusal> {
         let exchanges = Exchanges::new(view, &self.target);
-        let place = Place::named(&self.target, &self.name)?;
+        let place = ValueSource::named(&self.target, &self.name)?;
         let register = match (place, exchanges.of_st()) {
-            (Place::Register(register), Some((_, profile))) => {
+            (ValueSource::Register(register), Some((_, profile))) => {
                 register.not_a_setting(profile).map(|why| (register, profile, why))
             }
-            (Place::Measured(..), _) => {
+            (ValueSource::Measured(..), _) => {
                 return Err(Refusal::usage(format!(
                     "{} is measured and cannot be written",
                     self.name
@@ -65,7 +65,7 @@ impl Write {
         let stops = control.stops(&self.target);
         let _turn = control.turn(&self.target).await;
         control.end_run(&self.target).await;
-        let permitted = Permitted::new(drive, false, stops).await?;
+        let permitted = MotionSession::new(drive, false, stops).await?;
         permitted.send(control, &request).await?;
         let exchanges = Exchanges::new(&permitted.program, &self.target);
         written(&exchanges, (register, profile, bits)).await

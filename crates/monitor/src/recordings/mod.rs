@@ -5,8 +5,8 @@
 
 mod downsample;
 mod folder;
-mod make;
 mod part;
+mod recorder;
 
 use std::fs::File;
 use std::io;
@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::address::Address;
+use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::{self as share, Reason};
-use motorlink_telemetry::share::program::{Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio::task::spawn_blocking;
 
@@ -28,7 +28,7 @@ pub use part::{MOST_SIGNALS, Wanted};
 
 use crate::message::{Answer, Ask, Recorded};
 use folder::Folder;
-use make::{Making, Order};
+use recorder::{Making, Order};
 
 /// The rates of signals, in Hz, as `motorlink record` takes them.
 const RATES: RangeInclusive<f64> = 0.1..=1000.0;

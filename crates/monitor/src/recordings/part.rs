@@ -7,7 +7,7 @@ use std::io;
 use motorlink_recording::read::{Content, Recording, Types, lost};
 use motorlink_recording::schema::Log;
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::frame::{self, Kind};
+use motorlink_telemetry::share::frame::{self, FrameKind};
 use motorlink_telemetry::share::message::encode;
 
 use super::downsample::{Downsample, FEWEST, Point};
@@ -134,12 +134,12 @@ pub fn read(
     let damage = lost(recording.losses());
     let mut bytes = Vec::new();
     let head = encode(&RecordingPart { from, to, events, more_events, damage });
-    frame::append(Kind::Text, &head, &mut bytes).map_err(|error| error.to_string())?;
+    frame::append(FrameKind::Text, &head, &mut bytes).map_err(|error| error.to_string())?;
     for (number, column) in columns {
         let data = samples(number, first as f64 / 1e9, &column.finish());
         // There is none of a signal without samples.
         if let Some(data) = data.encode() {
-            frame::append(Kind::Data, &data, &mut bytes).map_err(|error| error.to_string())?;
+            frame::append(FrameKind::Data, &data, &mut bytes).map_err(|error| error.to_string())?;
         }
     }
     Ok(Some(bytes))

@@ -31,7 +31,7 @@ pub struct Auth {
 }
 
 impl Auth {
-    /// A auth with new tokens, for a server at this port. `names` are names of this machine that
+    /// With new tokens, for a server at this port. `names` are names of this machine that
     /// browsers may use.
     ///
     /// # Errors

@@ -6,15 +6,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::frame::Kind;
+use motorlink_telemetry::share::client::{Listener, Program, Refusal};
+use motorlink_telemetry::share::frame::FrameKind;
 use motorlink_telemetry::share::message::{
     Answer, Ask, EventKind, Line, Reason, Request, StoppedMotor, Text, decode,
 };
-use motorlink_telemetry::share::program::{Listener, Program, Refusal};
 use tokio::sync::{Mutex as AsyncMutex, watch};
 use tokio::time::{Instant, sleep, timeout};
 
-use crate::alive::Stops;
+use crate::dead_man::Stops;
 use crate::drive::Drives;
 
 /// The name of the server at the share.
@@ -184,7 +184,7 @@ impl Link {
     ) -> io::Result<Vec<Line>> {
         loop {
             let frame = listener.next().await?;
-            if frame.kind != Kind::Text {
+            if frame.kind != FrameKind::Text {
                 continue;
             }
             let Ok(Text::Event(event)) = decode(&frame.payload) else { continue };

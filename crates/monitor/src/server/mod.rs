@@ -2,15 +2,15 @@
 //!
 //! [`Server::start`] serves in threads of its own, until it is dropped.
 
+mod assets;
 mod auth;
+mod connections;
 pub mod link;
 mod recordings;
 mod routes;
-mod site;
 mod socket;
 mod state;
 mod tls;
-mod transport;
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
@@ -86,10 +86,10 @@ impl Server {
         let tls = tls.as_ref().map(Tls::acceptor);
         let link = Arc::clone(&state.link);
         runtime.spawn(async move { link.keep().await });
-        runtime.spawn(transport::serve(listener, tls, routes::router(Arc::clone(&state))));
+        runtime.spawn(connections::serve(listener, tls, routes::router(Arc::clone(&state))));
         if let Some(bare) = bare {
             let router = routes::bare_router(Arc::clone(&state));
-            runtime.spawn(transport::serve(bare, None, router));
+            runtime.spawn(connections::serve(bare, None, router));
         }
         Ok(Server { runtime: Some(runtime), state, address, bare: bare_address })
     }

@@ -11,12 +11,12 @@ use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::{Stream, unfold};
-use motorlink_telemetry::share::program::Refusal;
+use motorlink_telemetry::share::client::Refusal;
 use serde::Deserialize;
 use tokio::io::{AsyncReadExt, Take};
 
+use super::connections::Deadline;
 use super::state::State;
-use super::transport::Deadline;
 use crate::recordings::{MOST_SIGNALS, Wanted};
 
 /// Bytes of a file that are read at once.

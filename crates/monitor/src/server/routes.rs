@@ -17,11 +17,11 @@ use motorlink_telemetry::share::message::StoppedMotor;
 use serde::{Deserialize, Serialize};
 
 use super::auth::is_local_origin;
+use super::connections::Arrival;
 use super::socket::{self, LONGEST_TEXT};
 use super::state::State;
-use super::transport::Arrival;
-use super::{recordings, site};
-use crate::alive::Lapse;
+use super::{assets, recordings};
+use crate::dead_man::Lapse;
 use crate::foxglove::{self, SUBPROTOCOLS};
 use crate::message::Role;
 
@@ -64,7 +64,7 @@ pub fn router(state: Arc<State>) -> Router {
 }
 
 #[derive(Deserialize)]
-struct Given {
+struct TokenQuery {
     token: Option<String>,
 }
 
@@ -143,16 +143,16 @@ fn admitted(state: &State, request: &Request) -> Result<Role, Box<Response>> {
 
 /// The role of the token in the address.
 fn given_role(state: &State, request: &Request) -> Option<Role> {
-    let Query(Given { token }) = Query::try_from_uri(request.uri()).ok()?;
+    let Query(TokenQuery { token }) = Query::try_from_uri(request.uri()).ok()?;
     state.auth.role_of(&token?)
 }
 
 async fn page(headers: HeaderMap) -> Response {
-    site::page(&headers)
+    assets::page(&headers)
 }
 
 async fn file(uri: Uri, headers: HeaderMap) -> Response {
-    site::file(uri.path().trim_start_matches('/'), &headers)
+    assets::file(uri.path().trim_start_matches('/'), &headers)
 }
 
 async fn open(

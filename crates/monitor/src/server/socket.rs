@@ -7,19 +7,19 @@ use axum::extract::ws::{Message, WebSocket};
 use futures_util::SinkExt;
 use futures_util::stream::{SplitStream, StreamExt};
 use motorlink_proto::time::Micros;
-use motorlink_telemetry::share::frame::{Frame, Kind};
+use motorlink_telemetry::share::client::{Listener, Program};
+use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message as share;
-use motorlink_telemetry::share::program::{Listener, Program};
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 use super::link::{AGAIN, Link};
 use super::state::{Settings, State};
-use crate::alive::Lapse;
+use crate::dead_man::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
-use crate::page::{Broken, May, Page, encode};
-use crate::socket::{Budget, PATIENCE, Sink, close};
+use crate::page_session::{Broken, Page, Permissions, encode};
+use crate::websocket_limits::{Budget, PATIENCE, Sink, close};
 
 /// The longest text of a page.
 pub const LONGEST_TEXT: usize = 1 << 16;
@@ -58,7 +58,7 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     };
     let (out, outgoing) = mpsc::channel(WAITING);
     let Settings { separate_share, opens_addresses, deadline, program } = &state.settings;
-    let may = May { role, opens_addresses: *opens_addresses };
+    let may = Permissions { role, opens_addresses: *opens_addresses };
     let (link, recordings) = (Arc::clone(&state.link), Arc::clone(&state.recordings));
     let page =
         Arc::new(Page::new(name.clone(), may, Micros::from(*deadline), link, recordings, out));
@@ -171,26 +171,26 @@ async fn write(
 struct View {
     link: Arc<Link>,
     name: String,
-    state: Seen,
+    state: LinkState,
 }
 
-enum Seen {
+enum LinkState {
     Up(Listener),
-    Down(Coming),
+    Down(ReconnectTask),
 }
 
 /// Connects again and again, until it is dropped.
-struct Coming(JoinHandle<(Program, Listener)>);
+struct ReconnectTask(JoinHandle<(Program, Listener)>);
 
-impl Drop for Coming {
+impl Drop for ReconnectTask {
     fn drop(&mut self) {
         self.0.abort();
     }
 }
 
-impl Coming {
+impl ReconnectTask {
     fn new(link: Arc<Link>, name: String) -> Self {
-        Coming(tokio::spawn(async move {
+        ReconnectTask(tokio::spawn(async move {
             loop {
                 if let Ok((program, listener, _)) = link.connect(&name).await {
                     return (program, listener);
@@ -205,8 +205,8 @@ impl View {
     /// `listener` is `None` if the share is lost.
     fn new(link: Arc<Link>, name: String, listener: Option<Listener>) -> Self {
         let state = match listener {
-            Some(listener) => Seen::Up(listener),
-            None => Seen::Down(Coming::new(Arc::clone(&link), name.clone())),
+            Some(listener) => LinkState::Up(listener),
+            None => LinkState::Down(ReconnectTask::new(Arc::clone(&link), name.clone())),
         };
         View { link, name, state }
     }
@@ -215,22 +215,22 @@ impl View {
     fn received(&mut self, page: &Page) -> Option<Message> {
         match &mut self.state {
             // What is wrong is found again by the next read.
-            Seen::Up(listener) => Some(message(page, listener.received().ok()??)),
-            Seen::Down(_) => None,
+            LinkState::Up(listener) => Some(message(page, listener.received().ok()??)),
+            LinkState::Down(_) => None,
         }
     }
 
     /// The next message for the page. It can be dropped while it waits.
     async fn next(&mut self, page: &Page) -> Message {
         let lost = match &mut self.state {
-            Seen::Up(listener) => match listener.next().await {
+            LinkState::Up(listener) => match listener.next().await {
                 Ok(frame) => return message(page, frame),
                 Err(error) => Some(error.to_string()),
             },
-            Seen::Down(coming) => match (&mut coming.0).await {
+            LinkState::Down(coming) => match (&mut coming.0).await {
                 Ok((program, listener)) => {
                     page.set_view(Some(program));
-                    self.state = Seen::Up(listener);
+                    self.state = LinkState::Up(listener);
                     None
                 }
                 Err(error) => Some(error.to_string()),
@@ -238,7 +238,8 @@ impl View {
         };
         if lost.is_some() {
             page.set_view(None);
-            self.state = Seen::Down(Coming::new(Arc::clone(&self.link), self.name.clone()));
+            self.state =
+                LinkState::Down(ReconnectTask::new(Arc::clone(&self.link), self.name.clone()));
         }
         Message::Text(encode(&Text::Share { lost }).into())
     }
@@ -249,7 +250,7 @@ fn message(page: &Page, frame: Frame) -> Message {
     page.notice_stop_in_view(&frame);
     let Frame { kind, payload } = frame;
     match kind {
-        Kind::Data => Message::Binary(payload.into()),
-        Kind::Text => Message::Text(String::from_utf8_lossy(&payload).into_owned().into()),
+        FrameKind::Data => Message::Binary(payload.into()),
+        FrameKind::Text => Message::Text(String::from_utf8_lossy(&payload).into_owned().into()),
     }
 }

@@ -11,7 +11,7 @@ use tokio::sync::Semaphore;
 use super::auth::{Auth, random_word};
 use super::link::Link;
 use crate::foxglove::Viewers;
-use crate::page::Page;
+use crate::page_session::Page;
 use crate::recordings::Recordings;
 
 /// Pages at the same time.

@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use crate::shared::Share;
 use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
-use motorlink_monitor::drive::{Drives, Motion};
-use motorlink_monitor::message::{Answer, Ask, Ran};
+use motorlink_monitor::drive::{Drives, MotionPermit};
+use motorlink_monitor::message::{Answer, Ask, RunResult};
 use motorlink_proto::st::{Frame, Parse, Profile};
 use motorlink_telemetry::share::address::{Address, Local};
+use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::{self as share, MotorName, Reason};
-use motorlink_telemetry::share::program::{Program, Refusal};
 
 pub use crate::drives::path;
 pub use crate::shared::LIMIT;
@@ -43,7 +43,7 @@ pub struct Drive {
     pub lapsed: AtomicBool,
     pub opened: AtomicBool,
     /// The ends of references.
-    pub rans: Arc<Mutex<Vec<Ran>>>,
+    pub rans: Arc<Mutex<Vec<RunResult>>>,
     session: tokio::sync::Mutex<Option<Program>>,
     listening: Mutex<Option<tokio::task::JoinHandle<()>>>,
 }
@@ -229,7 +229,7 @@ impl Drive {
     }
 }
 
-impl Motion for Drive {
+impl MotionPermit for Drive {
     async fn program(&self, _: bool) -> Result<Program, Refusal> {
         if self.lapsed.load(Ordering::SeqCst) {
             return Err(Refusal::new(Reason::Lapsed, "the page gives no sign of life"));
@@ -244,7 +244,7 @@ impl Motion for Drive {
         Ok(session.clone().expect("it was set"))
     }
 
-    fn report(&self) -> impl FnOnce(Ran) + Send + 'static {
+    fn report(&self) -> impl FnOnce(RunResult) + Send + 'static {
         let rans = Arc::clone(&self.rans);
         move |ran| rans.lock().unwrap().push(ran)
     }

@@ -9,7 +9,7 @@ use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
 
-use super::client::{Driven, not_done};
+use super::driven::{Driven, not_done};
 use super::session::SessionOutput;
 use super::{Asked, Client, Error, Options};
 

@@ -14,6 +14,7 @@
 
 mod arrival;
 mod client;
+mod driven;
 mod error;
 mod event;
 pub(crate) mod follow;

@@ -1,5 +1,8 @@
 //! The host's end of a CAN bus without the bus: what the blocking client and event loops share.
 
+mod errors;
+mod held;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -70,16 +73,6 @@ struct PendingRequest {
     until: Instant,
 }
 
-/// Torques for motors 1 to 4 that wait until the motors can be trusted.
-#[derive(Debug, Clone, Copy)]
-struct Held {
-    torques: SetTorque4,
-    expect: MotorSet,
-    /// Those of them that have answered.
-    answered: MotorSet,
-    until: Instant,
-}
-
 /// What the caller has to do next.
 #[derive(Debug)]
 pub(super) enum SessionOutput {
@@ -89,6 +82,16 @@ pub(super) enum SessionOutput {
     Done(MotorId, Result<[u8; 8], Error>),
     /// Hand in what comes until then; `None` while no exchange is under way.
     Wait(Option<Instant>),
+}
+
+/// Torques for motors 1 to 4 that wait until the motors can be trusted.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    torques: SetTorque4,
+    expect: MotorSet,
+    /// Those of them that have answered.
+    answered: MotorSet,
+    until: Instant,
 }
 
 impl Session {
@@ -434,61 +437,6 @@ impl Session {
         self.moving = self.moving.union(moved.without(unexpected));
     }
 
-    fn is_held(&self, id: MotorId) -> bool {
-        self.held.is_some_and(|held| held.expect.contains(id))
-    }
-
-    /// A motor that torques are held for answered the questions, or failed to: then they are sent for the
-    /// others.
-    fn held_answered(
-        &mut self,
-        id: MotorId,
-        result: Result<[u8; 8], proto::Failure>,
-    ) -> Option<SessionOutput> {
-        let held = self.held.as_mut()?;
-        match result {
-            Ok(_) | Err(proto::Failure::Quarantined) => {
-                held.answered.insert(id);
-                None
-            }
-            Err(error) => {
-                held.expect.remove(id);
-                // To a motor of another protocol the frame may mean anything.
-                if held.expect.is_empty() || matches!(error, proto::Failure::Foreign(_)) {
-                    self.drop_held(None);
-                }
-                Some(SessionOutput::Done(id, Err(self.failed(id, error))))
-            }
-        }
-    }
-
-    /// Sends the torques that are held, if their motors can be trusted; when to try again.
-    fn send_held(&mut self, now: Instant) -> Option<Instant> {
-        let Held { torques, expect, until, .. } =
-            self.held.filter(|held| held.answered == held.expect)?;
-        match self.host.set_torque4(now, torques, expect) {
-            Err(RequestError::Quarantined { until: free, .. }) if now < until => return Some(free),
-            Ok(()) => self.held = None,
-            Err(why) => self.drop_held(Some(why)),
-        }
-        None
-    }
-
-    /// Gives the torques that are held up. Motors whose questions are under way end in quarantine.
-    fn drop_held(&mut self, why: Option<RequestError>) {
-        if let Some(held) = self.held.take() {
-            (self.unsent, self.unsent_for) = (held.answered, why);
-        }
-    }
-
-    fn why_unsent(&self, id: MotorId) -> Error {
-        match self.unsent_for {
-            Some(RequestError::Quarantined { .. }) => self.shared(id),
-            Some(why) => self.refused(why),
-            None => self.quarantined(id),
-        }
-    }
-
     /// Gives up the exchange with a motor, if there is one. Its reply may still come.
     pub(super) fn cancel(&mut self, now: Instant, id: MotorId) {
         if self.busy().contains(id) {
@@ -526,56 +474,6 @@ impl Session {
         match self.waiting.contains(id) || is_held {
             true => Err(Error::Twice(id)),
             false => Ok(()),
-        }
-    }
-
-    fn quarantined(&self, id: MotorId) -> Error {
-        Error::Quarantined { port: Arc::clone(&self.port), motor: id }
-    }
-
-    /// Of a motor that was waited for: it would have been trusted if it had been silent.
-    fn shared(&self, id: MotorId) -> Error {
-        Error::Shared { port: Arc::clone(&self.port), motor: id }
-    }
-
-    fn refused(&self, refused: RequestError) -> Error {
-        match refused {
-            RequestError::Quarantined { id, .. } => self.quarantined(id),
-            RequestError::Limit { id, exceeded } => Error::Limit { motor: id, exceeded },
-            RequestError::OutOfReach(id) => Error::OutOfReach(id),
-            RequestError::Busy(id) => Error::Twice(id),
-        }
-    }
-
-    /// If the motor does not answer the other program, or a reply of it cannot be trusted, the error is
-    /// that of a port of one's own.
-    fn undone(&self, id: MotorId, why: PortError) -> Error {
-        match why {
-            PortError::NotDone { kind: NotDone::Unconfirmed, .. } => {
-                Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }
-            }
-            PortError::NotDone { kind: NotDone::Silent | NotDone::Unheard, .. } => {
-                let [code, ..] = self.pending[id.index()].request;
-                let port = Arc::clone(&self.port);
-                Error::Timeout { port, motor: id, request: Code::from(code) }
-            }
-            why => why.into(),
-        }
-    }
-
-    fn failed(&self, id: MotorId, error: proto::Failure) -> Error {
-        if self.is_held && error == proto::Failure::Timeout {
-            return PortError::HolderSilent { port: self.port.to_string() }.into();
-        }
-        let port = Arc::clone(&self.port);
-        let [code, ..] = self.pending[id.index()].request;
-        let code = Code::from(code);
-        match error {
-            proto::Failure::Altered => Error::Altered { port, motor: id, request: code },
-            proto::Failure::Echo => Error::Echo { port, motor: id },
-            proto::Failure::Foreign(dialect) => Error::Foreign { port, motor: id, dialect },
-            proto::Failure::Quarantined => Error::Quarantined { port, motor: id },
-            _ => Error::Timeout { port, motor: id, request: code },
         }
     }
 }

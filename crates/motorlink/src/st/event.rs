@@ -11,7 +11,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Instant;
 
-use super::client::{Driven, of_profile};
+use super::driven::{Driven, of_profile};
 use super::{Client, Error, Exchanged, Options};
 
 /// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when

@@ -15,6 +15,7 @@
 
 mod arrival;
 mod client;
+mod driven;
 mod error;
 mod event;
 pub(crate) mod follow;

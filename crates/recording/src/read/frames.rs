@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use motorlink_capture::{Captured, Direction, Stamp, Wire};
 use motorlink_link::printable;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 
 use super::message::Messages;
 use super::recording::Recording;

@@ -8,7 +8,7 @@ use mcap::records::op;
 
 use super::damage::{Damage, Loss};
 use super::record::{Channel, Fields, HEAD, Metadata, Schema, Statistics, split};
-use super::recording::{AttachmentPlace, Kind, Recording};
+use super::recording::{AttachmentPlace, RangeKind, Recording};
 
 /// Body of the last record.
 const FOOTER: usize = 8 + 8 + 4;
@@ -73,7 +73,7 @@ impl<R: Read + Seek> Recording<R> {
         found.chunks.sort_by_key(|at| at.start);
         self.attachments = found.attachments;
         self.catalogue.add(found.schemas, found.channels);
-        found.chunks.into_iter().for_each(|at| self.add_place(Kind::Chunk, at));
+        found.chunks.into_iter().for_each(|at| self.add_place(RangeKind::Chunk, at));
         self.statistics = statistics;
         Ok(Some(()))
     }

@@ -11,7 +11,7 @@ use super::chunk;
 use super::damage::{Damage, Loss};
 use super::record::Channel;
 use super::record::{ChunkHead, Fields, HEAD, MessageHead, split};
-use super::recording::{Kind, Place, Recording};
+use super::recording::{MessageRange, RangeKind, Recording};
 
 /// All times.
 const ALL: RangeInclusive<u64> = 0..=u64::MAX;
@@ -56,8 +56,8 @@ impl<'a, R: Read + Seek> Messages<'a, R> {
     }
 
     /// Whether the head of a chunk says that all its messages are at other times.
-    fn is_elsewhere(&mut self, place: &Place) -> io::Result<bool> {
-        if place.kind != Kind::Chunk || self.between == ALL {
+    fn is_elsewhere(&mut self, place: &MessageRange) -> io::Result<bool> {
+        if place.kind != RangeKind::Chunk || self.between == ALL {
             return Ok(false);
         }
         let bytes = self.recording.source.bytes(place.at.start, CHUNK_HEAD)?;
@@ -110,13 +110,17 @@ impl<R: Read + Seek> Recording<R> {
     }
 
     /// The messages of a place. `after` is the time of the message before it.
-    fn read_place(&mut self, place: &Place, after: Option<u64>) -> io::Result<VecDeque<Message>> {
-        let Place { kind, at, part } = place;
+    fn read_place(
+        &mut self,
+        place: &MessageRange,
+        after: Option<u64>,
+    ) -> io::Result<VecDeque<Message>> {
+        let MessageRange { kind, at, part } = place;
         let bytes = self.source.bytes(at.start, at.end - at.start)?;
         let records = match kind {
-            Kind::Chunk => whole(bytes),
-            Kind::Cut => Ok(beginning(bytes).1),
-            Kind::Loose => Ok(bytes.to_vec()),
+            RangeKind::Chunk => whole(bytes),
+            RangeKind::Cut => Ok(beginning(bytes).1),
+            RangeKind::Loose => Ok(bytes.to_vec()),
         };
         let records = Arc::new(records.unwrap_or_else(|damage| {
             self.add_loss(Loss { bytes: at.clone(), after, damage });

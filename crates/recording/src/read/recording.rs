@@ -19,7 +19,7 @@ pub struct Recording<R> {
     pub(super) profile: String,
     pub(super) library: String,
     pub(super) catalogue: Catalogue,
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<MessageRange>,
     pub(super) metadata: Vec<Metadata>,
     pub(super) attachments: Vec<AttachmentPlace>,
     pub(super) losses: Vec<Loss>,
@@ -30,16 +30,16 @@ pub struct Recording<R> {
 
 /// Bytes of the file that have messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
-    pub kind: Kind,
+pub struct MessageRange {
+    pub kind: RangeKind,
     pub at: Range<u64>,
     /// The part of the file: numbers of channels have one meaning in it.
     pub part: usize,
 }
 
-/// What is at a [`Place`].
+/// What is at a [`MessageRange`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum RangeKind {
     /// The record of a whole chunk.
     Chunk,
     /// The record of a chunk whose end is missing.
@@ -221,7 +221,7 @@ impl<R: Read + Seek> Recording<R> {
         (self.statistics.messages > 0).then_some(self.statistics.times)
     }
 
-    pub(super) fn add_place(&mut self, kind: Kind, at: Range<u64>) {
-        self.places.push(Place { kind, at, part: self.catalogue.part() });
+    pub(super) fn add_place(&mut self, kind: RangeKind, at: Range<u64>) {
+        self.places.push(MessageRange { kind, at, part: self.catalogue.part() });
     }
 }

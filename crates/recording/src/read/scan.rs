@@ -13,7 +13,7 @@ use super::record::{
     Attachment, Channel, ChunkHead, Fields, HEAD, MessageHead, Metadata, Schema, Statistics,
     is_known, message_index, split,
 };
-use super::recording::{AttachmentPlace, Kind, Place, Recording};
+use super::recording::{AttachmentPlace, MessageRange, RangeKind, Recording};
 
 /// Loose records are read in groups of about this size.
 const GROUP: u64 = 1 << 20;
@@ -203,12 +203,12 @@ impl<R: Read + Seek> Recording<R> {
         }
         seen.statistics.count(&head, self.catalogue.number(head.channel));
         match self.places.last_mut() {
-            Some(Place { kind: Kind::Loose, at: group, part: same })
+            Some(MessageRange { kind: RangeKind::Loose, at: group, part: same })
                 if *same == part && group.end == at.start && at.end - group.start <= GROUP =>
             {
                 group.end = at.end;
             }
-            _ => self.add_place(Kind::Loose, at),
+            _ => self.add_place(RangeKind::Loose, at),
         }
         Ok(true)
     }
@@ -228,7 +228,7 @@ impl<R: Read + Seek> Recording<R> {
                     (head.channel, head.log_time, start as u64)
                 });
                 seen.in_chunk = Some(messages.collect());
-                self.add_place(Kind::Chunk, at.clone());
+                self.add_place(RangeKind::Chunk, at.clone());
                 Ok(Next::Record(at.end))
             }
             Err(damage) => self.damaged(damage, at.end),
@@ -288,7 +288,7 @@ impl<R: Read + Seek> Recording<R> {
             let (head, records) = beginning(record);
             if let Some(head) = head {
                 self.take_records(&records, seen);
-                self.add_place(Kind::Cut, at);
+                self.add_place(RangeKind::Cut, at);
                 if head.compression.is_empty() {
                     lost.start += HEAD as u64 + head.length + records.len() as u64;
                 }

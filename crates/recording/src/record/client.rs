@@ -15,7 +15,7 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::owner::{RETRY, RmdOwner};
 use motorlink_telemetry::line::{RmdLine, StLine, StOver, StRelay};
 use motorlink_telemetry::runner::Remote;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::signal::Motor;
 
 use super::frames::{Outlet, Plug};

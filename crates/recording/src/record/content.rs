@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use motorlink_proto::st::FullScale;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::sample::Sample;
-use motorlink_telemetry::share::event_text::{DriveProtocol, Told};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::event_text::DescribedEvent;
 use motorlink_telemetry::share::message::EventKind;
 use motorlink_telemetry::signal::{Motor, Signal};
 
@@ -202,7 +203,7 @@ impl Content {
     }
 
     /// An event.
-    pub(super) fn told(&mut self, stamp: Time, told: Told, put: &mut dyn FnMut(Entry)) {
+    pub(super) fn told(&mut self, stamp: Time, told: DescribedEvent, put: &mut dyn FnMut(Entry)) {
         let silent = match told.event {
             EventKind::Silent | EventKind::Lost | EventKind::Closed => Some(true),
             EventKind::Answers | EventKind::Back => Some(false),
@@ -314,7 +315,7 @@ impl Line {
             .collect()
     }
 
-    fn log(&self, stamp: Time, told: Told) -> Log {
+    fn log(&self, stamp: Time, told: DescribedEvent) -> Log {
         let severity = match told.event {
             EventKind::StopFailed => Severity::Error,
             EventKind::Lost

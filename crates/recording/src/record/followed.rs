@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use motorlink_telemetry::sample::Sample;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::event_text::Told;
+use motorlink_telemetry::share::event_text::DescribedEvent;
 use motorlink_telemetry::share::message::{Event, EventKind, SignalRate};
 use motorlink_telemetry::share::stream::{Followed as Target, Item, Stream, Wanted};
 use motorlink_telemetry::signal::Signal;
@@ -18,7 +18,7 @@ use crate::schema::Time;
 use crate::write::Entry;
 
 /// A share, and the name of a line there.
-pub(super) type Place = (Arc<dyn Address>, String);
+pub(super) type LineOfShare = (Arc<dyn Address>, String);
 
 /// The recording of a line of a share.
 #[derive(Debug)]
@@ -36,7 +36,12 @@ pub(super) struct Followed {
 const RATES_FROM: u64 = 2_100_000_000;
 
 /// These signals of a line of a share, which has its own name for the line.
-pub(super) fn target((share, name): Place, line: &Line, groups: &[Group], by: &str) -> Target {
+pub(super) fn target(
+    (share, name): LineOfShare,
+    line: &Line,
+    groups: &[Group],
+    by: &str,
+) -> Target {
     let wanted = groups.iter().map(|group| Wanted {
         signals: group.motors.iter().flat_map(|(_, signals)| signals).copied().collect(),
         period: group.period.0 as f64 / 1e6,
@@ -88,7 +93,8 @@ impl Followed {
     }
 
     fn item(&mut self, item: Item, now: Time, put: &mut dyn FnMut(Entry)) {
-        let of_line = |event, message| Told { event, motor: None, by: None, since: None, message };
+        let of_line =
+            |event, message| DescribedEvent { event, motor: None, by: None, since: None, message };
         match item {
             Item::Row { wanted, motor, time, span, values } => {
                 let sample = |value: f64| (!value.is_nan()).then(|| Sample::told(value));
@@ -147,6 +153,6 @@ impl Followed {
         let message = message.strip_prefix(&place).unwrap_or(&message).to_owned();
         let motor = number.and_then(|number| self.content.line().speaks.motor(number));
         let by = by.map(Into::into);
-        self.content.told(stamp, Told { event, motor, by, since: None, message }, put);
+        self.content.told(stamp, DescribedEvent { event, motor, by, since: None, message }, put);
     }
 }

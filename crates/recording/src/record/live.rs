@@ -11,7 +11,7 @@ use motorlink::rmd::MotorSet;
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::search;
 use motorlink_telemetry::share::address::Address;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::stream::Stream;
 
 use super::choice::{self, Group};

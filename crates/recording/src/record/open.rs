@@ -11,14 +11,14 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{LineError, RmdLine, StLine};
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::search;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::share::port::place_of;
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
 use super::client::{Client, Lent};
-use super::followed::Place;
+use super::followed::LineOfShare;
 use super::frames::Taps;
 use super::track::Line;
 use super::wall::Anchor;
@@ -51,7 +51,7 @@ pub(super) struct Opened {
     /// The client, if it is not the recording's own.
     pub(super) lent: Option<Lent>,
     /// The path of the share that holds the port, and its name of the line.
-    pub(super) share: Option<Place>,
+    pub(super) share: Option<LineOfShare>,
 }
 
 /// Opens all ports, and takes the clients. A port of both kinds gives a serial line and a CAN bus.

@@ -18,7 +18,7 @@ use motorlink_recording::schema::{
 };
 use motorlink_recording::write::Entry;
 use motorlink_telemetry::line::Request;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::signal::Motor;
 use motorlink_testbench::Bench;
 

@@ -133,42 +133,48 @@ impl DirectRmd {
     }
 }
 
-impl Driver for DirectSt {
-    fn clock(&self) -> Clock {
-        self.client.clock()
-    }
+/// What clients of both protocols do alike.
+macro_rules! driver {
+    ($driver:ty, $motor:expr) => {
+        impl Driver for $driver {
+            fn clock(&self) -> Clock {
+                self.client.clock()
+            }
 
-    fn timeout(&self) -> Duration {
-        self.client.timeout()
-    }
+            fn timeout(&self) -> Duration {
+                self.client.timeout()
+            }
 
-    fn link_state(&self) -> LinkState {
-        self.client.link_state()
-    }
+            fn link_state(&self) -> LinkState {
+                self.client.link_state()
+            }
 
-    fn reopen(&mut self) -> Result<(), LineError> {
-        Ok(self.client.reopen()?)
-    }
+            fn reopen(&mut self) -> Result<(), LineError> {
+                Ok(self.client.reopen()?)
+            }
 
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.client.descriptor()
-    }
+            fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+                self.client.descriptor()
+            }
 
-    fn expire_next(&self, time_to_live: Duration) {
-        self.client.expire_next(time_to_live);
-    }
+            fn expire_next(&self, time_to_live: Duration) {
+                self.client.expire_next(time_to_live);
+            }
 
-    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        let client = self.client.into_client();
-        let stopped = client.stop_on_drop().stop_now().into_iter();
-        stopped
-            .map(|one| Stopped {
-                motor: Motor::St(one.motor),
-                result: one.result.map_err(LineError::from),
-            })
-            .collect()
-    }
+            fn stop_started(self: Box<Self>) -> Vec<Stopped> {
+                let stopped = self.client.into_client().stop_on_drop().stop_now().into_iter();
+                let told = stopped.map(|one| Stopped {
+                    motor: $motor(&one),
+                    result: one.result.map_err(LineError::from),
+                });
+                told.collect()
+            }
+        }
+    };
 }
+
+driver!(DirectSt, |one: &st::Stopped| Motor::St(one.motor));
+driver!(DirectRmd, |one: &rmd::Stopped| Motor::Rmd(one.id));
 
 impl StDriver for DirectSt {
     fn profile(&self) -> Profile {
@@ -209,43 +215,6 @@ impl StDriver for DirectSt {
 
     fn exchanged(&self) -> Exchanged {
         self.client.exchanged()
-    }
-}
-
-impl Driver for DirectRmd {
-    fn clock(&self) -> Clock {
-        self.client.clock()
-    }
-
-    fn timeout(&self) -> Duration {
-        self.client.timeout()
-    }
-
-    fn link_state(&self) -> LinkState {
-        self.client.link_state()
-    }
-
-    fn reopen(&mut self) -> Result<(), LineError> {
-        Ok(self.client.reopen()?)
-    }
-
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.client.descriptor()
-    }
-
-    fn expire_next(&self, time_to_live: Duration) {
-        self.client.expire_next(time_to_live);
-    }
-
-    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        let client = self.client.into_client();
-        let stopped = client.stop_on_drop().stop_now().into_iter();
-        stopped
-            .map(|one| Stopped {
-                motor: Motor::Rmd(one.id),
-                result: one.result.map_err(LineError::from),
-            })
-            .collect()
     }
 }
 

@@ -62,7 +62,7 @@ pub enum Verdict {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ExchangeKind {
     Stop,
     Command(CommandId),
     Poll(PollId),
@@ -73,7 +73,7 @@ pub(super) enum Kind {
 /// The exchange of a lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct UnderWay {
-    pub(super) kind: Kind,
+    pub(super) kind: ExchangeKind,
     pub(super) since: Instant,
     /// Whether the line was in sync when it began. Else its duration is not that of the exchange alone.
     pub(super) in_sync: bool,
@@ -85,11 +85,11 @@ pub(super) struct UnderWay {
 impl UnderWay {
     pub(super) fn displaced(self) -> Displaced {
         match self.kind {
-            Kind::Poll(poll) => Displaced::Poll(poll),
-            Kind::Command(id) if self.is_unsent => Displaced::Unsent(id),
-            Kind::Command(id) => Displaced::Command(id),
-            Kind::Recovery(_) => Displaced::Recovery,
-            Kind::Stop => Displaced::Stop,
+            ExchangeKind::Poll(poll) => Displaced::Poll(poll),
+            ExchangeKind::Command(id) if self.is_unsent => Displaced::Unsent(id),
+            ExchangeKind::Command(id) => Displaced::Command(id),
+            ExchangeKind::Recovery(_) => Displaced::Recovery,
+            ExchangeKind::Stop => Displaced::Stop,
         }
     }
 }

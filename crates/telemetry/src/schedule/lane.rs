@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::exchange::{CommandId, Kind, Outcome, PollId, UnderWay, Verdict};
+use super::exchange::{CommandId, ExchangeKind, Outcome, PollId, UnderWay, Verdict};
 use super::stops::Stops;
 
 /// A lane that has not answered for this time is asked less often. Failures in a row alone do not show
@@ -85,7 +85,7 @@ impl<C: Clone> LaneState<C> {
     /// The stop to begin now, if the lane is free for it or what is under way gives way to it.
     fn due_stop(&self, now: Instant, preempts: bool) -> Option<usize> {
         let Some(exchange) = self.under_way else { return self.stops.in_turn(now) };
-        if !matches!(exchange.kind, Kind::Stop) {
+        if !matches!(exchange.kind, ExchangeKind::Stop) {
             return self.stops.in_turn(now).filter(|_| preempts || exchange.is_unsent);
         }
         let ahead = || self.stops.unsent_behind_first().filter(|_| !preempts && exchange.is_unsent);
@@ -99,7 +99,7 @@ impl<C: Clone> LaneState<C> {
 
     /// Begins the stop that is due.
     pub(super) fn begin_stop(&mut self, now: Instant, preempts: bool) -> Option<C> {
-        let is_under_way = self.under_way.is_some_and(|it| matches!(it.kind, Kind::Stop));
+        let is_under_way = self.under_way.is_some_and(|it| matches!(it.kind, ExchangeKind::Stop));
         self.stops.begin(self.due_stop(now, preempts)?, is_under_way)
     }
 
@@ -110,7 +110,8 @@ impl<C: Clone> LaneState<C> {
 
     /// When the stop that is under way gives way to another one.
     pub(super) fn gives_way_at(&self) -> Option<Instant> {
-        let exchange = self.under_way.filter(|exchange| matches!(exchange.kind, Kind::Stop))?;
+        let exchange =
+            self.under_way.filter(|exchange| matches!(exchange.kind, ExchangeKind::Stop))?;
         self.stops.gives_way_at(exchange.since)
     }
 
@@ -144,7 +145,7 @@ impl<C: Clone> LaneState<C> {
     }
 
     /// Begins an exchange.
-    pub(super) fn begin(&mut self, now: Instant, kind: Kind) {
+    pub(super) fn begin(&mut self, now: Instant, kind: ExchangeKind) {
         let in_sync = self.in_sync;
         self.under_way = Some(UnderWay { kind, since: now, in_sync, is_unsent: false });
     }
@@ -153,15 +154,15 @@ impl<C: Clone> LaneState<C> {
     pub(super) fn begin_command(&mut self, now: Instant) -> Option<(CommandId, C)> {
         let (id, command, deadline) = self.commands.pop_front()?;
         self.begun = Some((id, command.clone(), deadline));
-        self.begin(now, Kind::Command(id));
+        self.begin(now, ExchangeKind::Command(id));
         Some((id, command))
     }
 
     /// The command that has begun waits again, behind the exchange that brings the lane in sync.
     pub(super) fn recover(&mut self) {
         let Some(exchange) = &mut self.under_way else { return };
-        if let (Kind::Command(id), Some(begun)) = (exchange.kind, self.begun.take()) {
-            exchange.kind = Kind::Recovery(id);
+        if let (ExchangeKind::Command(id), Some(begun)) = (exchange.kind, self.begun.take()) {
+            exchange.kind = ExchangeKind::Recovery(id);
             self.commands.push_front(begun);
         }
     }
@@ -180,7 +181,7 @@ impl<C: Clone> LaneState<C> {
 
     /// Gives up the poll that is under way, if there is one: what it is, and when it began.
     pub(super) fn give_up_poll(&mut self) -> Option<(PollId, Instant)> {
-        let Some(UnderWay { kind: Kind::Poll(poll), since, .. }) = self.under_way else {
+        let Some(UnderWay { kind: ExchangeKind::Poll(poll), since, .. }) = self.under_way else {
             return None;
         };
         self.under_way = None;
@@ -199,10 +200,10 @@ impl<C: Clone> LaneState<C> {
             Outcome::Closed => {}
         }
         match exchange.kind {
-            Kind::Poll(poll) => Verdict::Poll(poll),
-            Kind::Command(id) => Verdict::Command(id),
-            Kind::Recovery(id) => self.judge_recovery(id, outcome),
-            Kind::Stop => self.stops.judge(now, outcome),
+            ExchangeKind::Poll(poll) => Verdict::Poll(poll),
+            ExchangeKind::Command(id) => Verdict::Command(id),
+            ExchangeKind::Recovery(id) => self.judge_recovery(id, outcome),
+            ExchangeKind::Stop => self.stops.judge(now, outcome),
         }
     }
 

@@ -3,7 +3,7 @@
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 
-use super::exchange::{Kind, Outcome, PollId, UnderWay};
+use super::exchange::{ExchangeKind, Outcome, PollId, UnderWay};
 use super::pace::Pace;
 
 /// The part of the time that polls and commands may fill. The rest is for stops and for noise.
@@ -176,7 +176,7 @@ impl Load {
         }
         self.durations.push(span);
         match exchange.kind {
-            Kind::Poll(poll) => {
+            ExchangeKind::Poll(poll) => {
                 let cost = self.costs.entry(poll).or_default();
                 // What its first answer changes is not left to the end of the window.
                 self.is_decided &= cost.mean > 0.0;
@@ -185,7 +185,9 @@ impl Load {
                     cost.pace.came(now);
                 }
             }
-            Kind::Command(_) | Kind::Stop | Kind::Recovery(_) => self.of_commands += span.0,
+            ExchangeKind::Command(_) | ExchangeKind::Stop | ExchangeKind::Recovery(_) => {
+                self.of_commands += span.0
+            }
         }
     }
 
@@ -300,4 +302,10 @@ impl Recent {
         let last = sorted.len().checked_sub(1)?;
         sorted.get((last as f64 * part).round() as usize).copied()
     }
+}
+
+/// The last multiple of a period behind the anchor that is not after `now`.
+pub fn last_on_grid(anchor: Instant, period: Micros, now: Instant) -> Instant {
+    let since = now.since(anchor).0;
+    anchor + Micros(since - since % period.0)
 }

@@ -28,6 +28,7 @@
 //! little of the line.
 
 mod exchange;
+mod group;
 mod lane;
 mod load;
 mod pace;
@@ -39,10 +40,12 @@ use std::time::Duration;
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 
+use group::Group;
+
 pub use exchange::{CommandId, Displaced, Lane, Outcome, PollId, Verdict};
-use exchange::{Kind, UnderWay};
+use exchange::{ExchangeKind, UnderWay};
 use lane::LaneState;
-pub use load::Load;
+pub use load::{Load, last_on_grid};
 use load::{Rhythm, stretched};
 pub use stops::Quiet;
 
@@ -95,21 +98,6 @@ pub struct LineRules {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{QUEUE} commands wait already")]
 pub struct QueueFull;
-
-/// Polls of a lane with the same period.
-#[derive(Debug)]
-struct Group {
-    lane: Lane,
-    rhythm: Rhythm,
-    is_opener: bool,
-    polls: Vec<PollId>,
-    /// The poll of this instant that is next.
-    position: usize,
-    /// This instant.
-    due: Instant,
-    /// Instants that were skipped.
-    skipped: u64,
-}
 
 /// The schedule of one line.
 #[derive(Debug)]
@@ -316,7 +304,7 @@ impl<C: Clone> Schedule<C> {
             Some(displaced) => self.load.over(now, displaced.since),
             None => self.under_way += 1,
         }
-        state.begin(now, Kind::Stop);
+        state.begin(now, ExchangeKind::Stop);
         self.load.began(now);
         let displaced = displaced.map(UnderWay::displaced);
         Some((lane, Job::Stop { command, displaced }))
@@ -387,7 +375,7 @@ impl<C: Clone> Schedule<C> {
         });
         self.is_started |= opener.is_none();
         state.commands_in_a_row = 0;
-        state.begin(now, Kind::Poll(poll));
+        state.begin(now, ExchangeKind::Poll(poll));
         self.under_way += 1;
         self.load.began(now);
         self.load.waited(now.since(instant));
@@ -495,30 +483,4 @@ impl<C: Clone> Schedule<C> {
         self.last_id += 1;
         CommandId(self.last_id)
     }
-}
-
-impl Group {
-    /// A group has polls, and the position is that of one of them.
-    fn next_poll(&self) -> PollId {
-        self.polls[self.position]
-    }
-
-    /// Goes on with the next instant. Instants that are over are skipped.
-    fn finish_instant(&mut self, now: Instant, stretch: f64, anchor: Instant) {
-        let period = self.rhythm.at(stretch);
-        let periods = (now.since(self.due).0 / period.0).max(1);
-        self.skipped += periods - 1;
-        self.due += Micros(periods.saturating_mul(period.0));
-        if period == self.rhythm.period {
-            // An instant of a slowed line is between two of the grid.
-            self.due = last_on_grid(anchor, period, self.due + Micros(period.0 - 1));
-        }
-        self.position = 0;
-    }
-}
-
-/// The last multiple of a period behind the anchor that is not after `now`.
-pub fn last_on_grid(anchor: Instant, period: Micros, now: Instant) -> Instant {
-    let since = now.since(anchor).0;
-    anchor + Micros(since - since % period.0)
 }

@@ -1,7 +1,7 @@
 //! A program at a share, without a socket: requests as bytes, and the meaning of the bytes of the share.
 
 use super::data::{Data, DataError};
-use super::frame::{self, FrameError, Kind, Reader};
+use super::frame::{self, FrameError, FrameKind, Reader};
 use super::message::{self, Answer, Ask, MessageError, Reason, Request, Text};
 
 /// The requests of a program, and what it receives.
@@ -78,7 +78,7 @@ impl ClientCodec {
         self.last_id = self.last_id.wrapping_add(1);
         let id = self.last_id;
         let mut stream = Vec::new();
-        frame::append(Kind::Text, &message::encode(&Request::new(id, ask)), &mut stream)?;
+        frame::append(FrameKind::Text, &message::encode(&Request::new(id, ask)), &mut stream)?;
         Ok((id, stream))
     }
 
@@ -94,8 +94,8 @@ impl ClientCodec {
     pub fn hear(&mut self) -> Result<Option<Heard>, CodecError> {
         let Some(frame) = self.reader.take()? else { return Ok(None) };
         Ok(Some(match frame.kind {
-            Kind::Data => Heard::Data(Data::decode(&frame.payload)?),
-            Kind::Text => match message::decode(&frame.payload)? {
+            FrameKind::Data => Heard::Data(Data::decode(&frame.payload)?),
+            FrameKind::Text => match message::decode(&frame.payload)? {
                 Text::Answer { id, answer } => Heard::Ended(Ended { id, result: Ok(answer) }),
                 Text::Refusal { id, reason, message, code } => {
                     Heard::Ended(Ended { id, result: Err(Refusal { reason, message, code }) })

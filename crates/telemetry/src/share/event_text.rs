@@ -5,62 +5,20 @@ use std::sync::Arc;
 
 use motorlink_capture::st::Transcript;
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Direction, MotorId, describe};
-use motorlink_proto::st::{Frame, MAX_FRAME, MotorNumber, Profile};
+use motorlink_proto::rmd::{Direction, describe};
+use motorlink_proto::st::{Frame, MAX_FRAME};
 use motorlink_proto::time::{Instant, Micros};
 
-use super::message::{EventKind, Line, Protocol};
+use super::drive_protocol::DriveProtocol;
+use super::message::EventKind;
 use crate::event::What;
 use crate::line::Request;
 use crate::schedule::CommandId;
 use crate::signal::Motor;
 
-/// What the drives of a line speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DriveProtocol {
-    /// ST's protocol, in this profile.
-    St(Profile),
-    /// The RMD protocol.
-    Rmd,
-}
-
-impl DriveProtocol {
-    /// What the drives of a line speak. `None`: in a profile that is not known here.
-    pub fn of(line: &Line) -> Option<Self> {
-        match line.protocol {
-            Protocol::Rmd => Some(DriveProtocol::Rmd),
-            Protocol::St => Some(DriveProtocol::St(line.profile.as_ref()?.parse().ok()?)),
-        }
-    }
-
-    /// The protocol, without a profile.
-    pub fn protocol(self) -> Protocol {
-        match self {
-            DriveProtocol::St(_) => Protocol::St,
-            DriveProtocol::Rmd => Protocol::Rmd,
-        }
-    }
-
-    /// The profile of ST drives.
-    pub fn profile(self) -> Option<Profile> {
-        match self {
-            DriveProtocol::St(profile) => Some(profile),
-            DriveProtocol::Rmd => None,
-        }
-    }
-
-    /// The motor with this number or ID. `None`: no motor can have it.
-    pub fn motor(self, number: u8) -> Option<Motor> {
-        match self {
-            DriveProtocol::St(_) => MotorNumber::new(number).map(Motor::St),
-            DriveProtocol::Rmd => MotorId::new(number).map(Motor::Rmd),
-        }
-    }
-}
-
 /// An event with its sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Told {
+pub struct DescribedEvent {
     /// What happened.
     pub event: EventKind,
     /// The motor; `None` for the line.
@@ -102,9 +60,9 @@ impl EventText {
     }
 
     /// The event with its sentence. Reads and confirmations are none.
-    pub fn of(&mut self, speaks: DriveProtocol, what: &What) -> Option<Told> {
+    pub fn of(&mut self, speaks: DriveProtocol, what: &What) -> Option<DescribedEvent> {
         let event = |event, motor: Option<Motor>, by: Option<&Arc<str>>, message: String| {
-            Some(Told { event, motor, by: by.cloned(), since: None, message })
+            Some(DescribedEvent { event, motor, by: by.cloned(), since: None, message })
         };
         match what {
             What::Lost(why) => {
@@ -126,7 +84,7 @@ impl EventText {
             What::Doubtful(motor, since) => {
                 let message = "values may be those of other signals".to_owned();
                 let told = event(EventKind::Doubtful, Some(*motor), None, message)?;
-                Some(Told { since: Some(*since), ..told })
+                Some(DescribedEvent { since: Some(*since), ..told })
             }
             What::Commanded(_, by, request) if !request.is_read() => {
                 let message = format!("{by} sends {}", described(speaks, request));

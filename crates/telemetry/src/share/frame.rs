@@ -10,7 +10,7 @@ pub const LONGEST_REQUEST: usize = 1 << 16;
 
 /// What a payload is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum FrameKind {
     /// A JSON text.
     Text,
     /// Samples.
@@ -21,7 +21,7 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
     /// What it is.
-    pub kind: Kind,
+    pub kind: FrameKind,
     /// The payload.
     pub payload: Vec<u8>,
 }
@@ -29,12 +29,12 @@ pub struct Frame {
 impl Frame {
     /// A JSON text.
     pub fn text(payload: Vec<u8>) -> Self {
-        Frame { kind: Kind::Text, payload }
+        Frame { kind: FrameKind::Text, payload }
     }
 
     /// Samples.
     pub fn data(payload: Vec<u8>) -> Self {
-        Frame { kind: Kind::Data, payload }
+        Frame { kind: FrameKind::Data, payload }
     }
 }
 
@@ -61,18 +61,18 @@ pub struct Reader {
     most: usize,
 }
 
-impl Kind {
+impl FrameKind {
     const fn number(self) -> u8 {
         match self {
-            Kind::Text => 1,
-            Kind::Data => 2,
+            FrameKind::Text => 1,
+            FrameKind::Data => 2,
         }
     }
 
     const fn of_number(number: u8) -> Option<Self> {
         match number {
-            1 => Some(Kind::Text),
-            2 => Some(Kind::Data),
+            1 => Some(FrameKind::Text),
+            2 => Some(FrameKind::Data),
             _ => None,
         }
     }
@@ -82,7 +82,7 @@ impl Kind {
 ///
 /// # Errors
 /// The payload is longer than [`LONGEST`]. Nothing is appended.
-pub fn append(kind: Kind, payload: &[u8], stream: &mut Vec<u8>) -> Result<(), FrameError> {
+pub fn append(kind: FrameKind, payload: &[u8], stream: &mut Vec<u8>) -> Result<(), FrameError> {
     let size = payload.len();
     let too_long = FrameError::TooLong { size, most: LONGEST };
     let length = u32::try_from(size).map_err(|_| too_long)?;
@@ -121,7 +121,7 @@ impl Reader {
             return Ok(None);
         };
         let [a, b, c, d, kind, 0, 0, 0] = *header else { return Err(FrameError::Header) };
-        let kind = Kind::of_number(kind).ok_or(FrameError::Header)?;
+        let kind = FrameKind::of_number(kind).ok_or(FrameError::Header)?;
         let size = u32::from_le_bytes([a, b, c, d]) as usize;
         if size > self.most {
             return Err(FrameError::TooLong { size, most: self.most });

@@ -4,25 +4,27 @@
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`client_codec`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port, [`address`] the
-//! way to a share. With the feature `tokio` `program` is a program that does not block, and `exchange`
-//! its requests to a motor. [`request`] reads the bytes of a command. [`opening`] opens the ports of lines,
-//! [`scan`] asks what answers on others. [`event_text`] makes sentences of the events of an engine. [`wire`] keeps the frames of a line.
+//! way to a share. With the feature `tokio` `client` is a program that does not block, and `motor_exchange`
+//! its requests to a motor. [`command_kind`] reads the bytes of a command. [`port_config`] opens the ports
+//! of lines, [`scan`] asks what answers on others. [`event_text`] makes sentences of the events of an
+//! engine. [`wire`] keeps the frames of a line.
 
 pub mod address;
+#[cfg(feature = "tokio")]
+pub mod client;
 pub mod client_codec;
 pub mod clock;
+pub mod command_kind;
 pub mod data;
+pub mod drive_protocol;
 pub mod event_text;
-#[cfg(feature = "tokio")]
-pub mod exchange;
 pub mod frame;
 pub mod hub;
 pub mod message;
-pub mod opening;
-pub mod port;
 #[cfg(feature = "tokio")]
-pub mod program;
-pub mod request;
+pub mod motor_exchange;
+pub mod port;
+pub mod port_config;
 pub mod scan;
 pub mod server;
 pub mod stream;

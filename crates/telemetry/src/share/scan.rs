@@ -7,7 +7,7 @@ use motorlink::rmd::{self, MotorSet};
 use motorlink::st::{self, BAUD_RATES, SCAN_TIMEOUT};
 
 use super::message::{Finding, Protocol};
-use super::opening::OpenError;
+use super::port_config::OpenError;
 
 /// The rates that a port can choose, the most frequent of such drives first.
 pub fn rates(port: &PortName, protocol: Protocol) -> Vec<u32> {

@@ -16,7 +16,7 @@ use rustix::io::Errno;
 use super::frame::{self, LONGEST_REQUEST, Reader};
 use super::hub::{Hub, LineEnded, SessionId, SharedLine};
 use super::message::{self, Event, Line, Text};
-use super::opening::Limits;
+use super::port_config::Limits;
 use crate::line::Stopped;
 
 /// How often samples and events are sent.
@@ -266,7 +266,7 @@ impl Client {
     fn say_last(&mut self, why: &str) {
         let closing = message::encode(&Text::Closing { message: why.to_owned() });
         // No message of a hub is too long.
-        let _ = frame::append(frame::Kind::Text, &closing, &mut self.out);
+        let _ = frame::append(frame::FrameKind::Text, &closing, &mut self.out);
     }
 
     /// Sends what waits for the program.

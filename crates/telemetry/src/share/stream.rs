@@ -2,7 +2,7 @@
 //! again. Nothing in it waits, and it reads no clock.
 
 mod connection;
-mod target;
+mod subscription;
 
 use std::collections::VecDeque;
 use std::os::unix::net::UnixStream;
@@ -14,7 +14,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::address::Unreachable;
 use connection::Connection;
-pub use target::{Followed, Item, Wanted};
+pub use subscription::{Followed, Item, Wanted};
 
 /// Time between two attempts to reach a share, in ns.
 const AGAIN: u64 = 500_000_000;

@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::client_codec::{ClientCodec, Ended, Heard, Refusal};
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::frame::{Kind, append};
+use motorlink_telemetry::share::frame::{FrameKind, append};
 use motorlink_telemetry::share::message::*;
 
 use crate::shared::LIMIT;
@@ -101,7 +101,7 @@ impl Asker {
     /// Sends a text or what should be one.
     pub fn send_text(&mut self, payload: &[u8]) {
         let mut bytes = Vec::new();
-        append(Kind::Text, payload, &mut bytes).unwrap();
+        append(FrameKind::Text, payload, &mut bytes).unwrap();
         self.send_bytes(&bytes);
     }
 

@@ -2,14 +2,14 @@
 
 use motorlink_telemetry::share::data::{Data, DataError};
 use motorlink_telemetry::share::frame::{
-    Frame, FrameError, HEADER, Kind, LONGEST, LONGEST_REQUEST, Reader, append,
+    Frame, FrameError, FrameKind, HEADER, LONGEST, LONGEST_REQUEST, Reader, append,
 };
 use motorlink_telemetry::share::message::{EventKind, Request, Text, decode, encode};
 use proptest::prelude::*;
 
 const PAGE: &str = include_str!("../../../../docs/SHARE-PROTOCOL.md");
 
-fn stream(payloads: &[(Kind, Vec<u8>)]) -> Vec<u8> {
+fn stream(payloads: &[(FrameKind, Vec<u8>)]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (kind, payload) in payloads {
         append(*kind, payload, &mut bytes).unwrap();
@@ -87,9 +87,9 @@ fn samples_of_another_version_are_named() {
 #[test]
 fn sizes_have_limits() {
     let mut stream = Vec::new();
-    append(Kind::Data, &vec![0; LONGEST], &mut stream).unwrap();
+    append(FrameKind::Data, &vec![0; LONGEST], &mut stream).unwrap();
     let size = LONGEST + 1;
-    let refused = append(Kind::Data, &vec![0; size], &mut stream);
+    let refused = append(FrameKind::Data, &vec![0; size], &mut stream);
     assert_eq!(refused, Err(FrameError::TooLong { size, most: LONGEST }));
     assert_eq!(stream.len(), HEADER + LONGEST);
     let mut reader = Reader::new(LONGEST_REQUEST);
@@ -99,8 +99,8 @@ fn sizes_have_limits() {
     assert_eq!(reader.take(), Err(FrameError::TooLong { size: LONGEST, most }));
 }
 
-fn payloads() -> impl Strategy<Value = Vec<(Kind, Vec<u8>)>> {
-    let kind = prop_oneof![Just(Kind::Text), Just(Kind::Data)];
+fn payloads() -> impl Strategy<Value = Vec<(FrameKind, Vec<u8>)>> {
+    let kind = prop_oneof![Just(FrameKind::Text), Just(FrameKind::Data)];
     prop::collection::vec((kind, prop::collection::vec(any::<u8>(), 0..40)), 0..5)
 }
 
@@ -130,7 +130,7 @@ proptest! {
 
     #[test]
     fn a_part_of_a_message_means_more(payload in prop::collection::vec(any::<u8>(), 0..40)) {
-        let bytes = stream(&[(Kind::Text, payload)]);
+        let bytes = stream(&[(FrameKind::Text, payload)]);
         for end in 0..bytes.len() {
             let mut reader = Reader::default();
             reader.push(&bytes[..end]);

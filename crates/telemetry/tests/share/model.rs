@@ -21,11 +21,11 @@ use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::runner::Remote;
 use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::frame::{Frame as Message, Kind};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::frame::{Frame as Message, FrameKind};
 use motorlink_telemetry::share::hub::{Hub, SessionId, SharedLine};
 use motorlink_telemetry::share::message::*;
-use motorlink_telemetry::share::opening::Opened;
+use motorlink_telemetry::share::port_config::Opened;
 use motorlink_telemetry::share::wire::Tap;
 
 use crate::engine::Polled;
@@ -291,7 +291,7 @@ impl World {
 
 fn send(hub: &mut Hub, session: SessionId, id: u32, ask: Ask) {
     let payload = encode(&Request::new(id, ask));
-    hub.received(session, &Message { kind: Kind::Text, payload }, Micros(0));
+    hub.received(session, &Message { kind: FrameKind::Text, payload }, Micros(0));
 }
 
 fn command((line, motor): (&str, u8), bytes: &[u8], own: bool) -> Ask {

@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 
 use motorlink_telemetry::share::VERSION;
-use motorlink_telemetry::share::frame::{Kind, Reader, append};
+use motorlink_telemetry::share::frame::{FrameKind, Reader, append};
 use motorlink_telemetry::share::message::*;
 
 pub struct Scripted {
@@ -46,7 +46,7 @@ impl Scripted {
 
     pub fn answer(&mut self, id: u32, answer: Answer) {
         let mut out = Vec::new();
-        append(Kind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
+        append(FrameKind::Text, &encode(&Text::Answer { id, answer }), &mut out).unwrap();
         // A program that is gone asks nothing more.
         let _ = self.stream.write_all(&out);
     }

@@ -8,7 +8,7 @@ use crate::asking::{Asker, command, hello, turn};
 use crate::shared::{LIMIT, Share};
 use motorlink_telemetry::share::VERSION;
 use motorlink_telemetry::share::client_codec::Refusal;
-use motorlink_telemetry::share::frame::{Kind, append};
+use motorlink_telemetry::share::frame::{FrameKind, append};
 use motorlink_telemetry::share::message::*;
 
 impl Share {
@@ -29,7 +29,7 @@ fn damage_ends_the_connection_with_words_and_nothing_else() {
     let mut other = share.join("other");
     let text = |payload: &[u8]| {
         let mut bytes = Vec::new();
-        append(Kind::Text, payload, &mut bytes).unwrap();
+        append(FrameKind::Text, payload, &mut bytes).unwrap();
         bytes
     };
     let damaged = [

@@ -11,8 +11,8 @@ use crate::shared::{LIMIT, Share};
 use motorlink_proto::rmd::MotorId;
 use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::data::Data;
-use motorlink_telemetry::share::event_text::DriveProtocol;
-use motorlink_telemetry::share::frame::{Kind, append};
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::frame::{FrameKind, append};
 use motorlink_telemetry::share::message::*;
 use motorlink_telemetry::share::stream::{Followed, Item, Stream, Wanted};
 use motorlink_telemetry::signal::{Motor, Signal};
@@ -120,14 +120,14 @@ fn losses_and_missing_values_are_told() {
     let columns = vec![vec![0.0], vec![0.001], vec![1.0], vec![90.0]];
     let data = Data { group: 7, sequence: 0, lost: 3, t0: 101.0, columns };
     let told = [
-        (Kind::Text, encode(&Text::Group(group))),
-        (Kind::Data, data.encode().unwrap()),
-        (Kind::Text, encode(&Text::Missed { events: 2 })),
+        (FrameKind::Text, encode(&Text::Group(group))),
+        (FrameKind::Data, data.encode().unwrap()),
+        (FrameKind::Text, encode(&Text::Missed { events: 2 })),
         (
-            Kind::Text,
+            FrameKind::Text,
             encode(&Text::Unconfirmed { subscription: 1, line: line(), motor: 2, rows: 4 }),
         ),
-        (Kind::Text, encode(&Text::Closing { message: "enough".to_owned() })),
+        (FrameKind::Text, encode(&Text::Closing { message: "enough".to_owned() })),
     ];
     let path = crate::drives::path("follow-scripted", "socket");
     let socket = UnixListener::bind(&path).unwrap();

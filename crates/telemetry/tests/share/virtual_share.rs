@@ -11,10 +11,10 @@ use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::line::{RmdLine, StLine};
 use motorlink_telemetry::runner::Remote;
-use motorlink_telemetry::share::event_text::DriveProtocol;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::frame::{Reader, append};
 use motorlink_telemetry::share::hub::{Hub, SessionId, SharedLine};
-use motorlink_telemetry::share::opening::Opened;
+use motorlink_telemetry::share::port_config::Opened;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_testbench::{Bench, BenchConfig};
 

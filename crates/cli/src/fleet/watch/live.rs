@@ -22,7 +22,7 @@ const PICTURE: Duration = Duration::from_millis(250);
 const KEYS: &str = "s sort  f filter  n by node  ↑↓ scroll  / name  q quit";
 
 /// What was chosen with keys.
-pub struct Place {
+pub struct Choice {
     sort: Sort,
     only: Only,
     by_node: bool,
@@ -41,7 +41,7 @@ pub fn require_terminal() -> Result<(), Failure> {
     )
 }
 
-pub fn show(view: &View, mut place: Place) -> Result<(), Failure> {
+pub fn show(view: &View, mut place: Choice) -> Result<(), Failure> {
     interrupt::take_over();
     let mut screen = Screen::enter()?;
     let theme = Theme::of_terminal();
@@ -78,9 +78,9 @@ pub fn show(view: &View, mut place: Place) -> Result<(), Failure> {
     Ok(())
 }
 
-impl Place {
+impl Choice {
     pub fn new(sort: Sort, only: Only, by_node: bool, name: String) -> Self {
-        Place { sort, only, by_node, name, types: false, first: 0 }
+        Choice { sort, only, by_node, name, types: false, first: 0 }
     }
 
     /// Handles a key. `false`: the end.
@@ -116,7 +116,7 @@ impl Place {
     }
 }
 
-fn draw(frame: &mut Frame<'_>, shown: &Shown, place: &mut Place, theme: &Theme) {
+fn draw(frame: &mut Frame<'_>, shown: &Shown, place: &mut Choice, theme: &Theme) {
     let area = frame.area();
     let (columns, height) = (usize::from(area.width), usize::from(area.height));
     let width = shown.name_width(place.by_node);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_name_is_typed_and_its_letters_are_no_keys() {
-        let mut place = Place::new(Sort::Name, Only::All, false, "old".to_owned());
+        let mut place = Choice::new(Sort::Name, Only::All, false, "old".to_owned());
         let mut press = |code| place.press(KeyEvent::from(code));
         assert!(press(KeyCode::Char('/')));
         for letter in "arms/q1".chars() {

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Printer, print_line};
 use crate::span::span_up_to;
-use live::Place;
+use live::Choice;
 use table::{Only, Row, Shown, Sort, Sum};
 
 /// How long the first values may take.
@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let view = View::open(&args.via.network())?;
     if !prints {
         let Args { sort, only, by_node, .. } = *args;
-        return live::show(&view, Place::new(sort, only, by_node, args.name.clone()));
+        return live::show(&view, Choice::new(sort, only, by_node, args.name.clone()));
     }
     wait_for_values(&view);
     loop {

@@ -11,7 +11,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
-use super::keys::{Field, HELP, Place, View};
+use super::keys::{Field, HELP, Selection, View};
 use crate::text::{self, wrapped};
 use parts::MARK;
 pub use parts::{Shown, Theme};
@@ -124,7 +124,7 @@ fn field(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
 }
 
 /// The last lines: the keys of the view.
-fn keys(place: &Place, width: usize) -> Vec<String> {
+fn keys(place: &Selection, width: usize) -> Vec<String> {
     let is_shown = |view: Option<View>| view.is_none_or(|view| view == place.view);
     let words: Vec<String> = match &place.field {
         Field::None => HELP

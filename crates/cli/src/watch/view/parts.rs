@@ -6,7 +6,7 @@ use motorlink_telemetry::sample::Sample;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
-use super::super::keys::Place;
+use super::super::keys::Selection;
 use super::super::model::{Model, Said, age};
 use super::super::row::HISTORY;
 use super::super::settings::Item;
@@ -18,7 +18,7 @@ pub const MARK: &str = ">";
 /// The data of the screen.
 pub struct Shown<'a> {
     pub model: &'a Model,
-    pub place: &'a Place,
+    pub place: &'a Selection,
     /// Values of registers, or why there is none.
     pub read: &'a BTreeMap<(usize, Item), Result<String, String>>,
 }

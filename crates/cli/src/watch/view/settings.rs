@@ -2,7 +2,7 @@
 
 use ratatui::text::{Line, Span};
 
-use super::super::keys::Place;
+use super::super::keys::Selection;
 use super::super::settings::Item;
 use super::parts::{Shown, Theme, first, listed};
 use crate::text::{fit, wrapped};
@@ -15,7 +15,7 @@ const VALUE: usize = 24;
 const FIXED: usize = 1 + NAME + 1 + VALUE + 1 + 1 + 1;
 
 /// The registers that are read repeatedly.
-pub fn in_view(place: &Place) -> Vec<Item> {
+pub fn in_view(place: &Selection) -> Vec<Item> {
     let found = place.found();
     let begin = place.item.saturating_sub(AROUND / 2);
     found.into_iter().skip(begin).take(AROUND).collect()

@@ -5,19 +5,20 @@ use std::sync::Arc;
 use motorlink::ownership::Carried;
 use motorlink_proto::Motion;
 
-use super::ids::SessionId;
+use super::Hub;
 use super::line::SharedLine;
+use super::pending_stops::Why;
 use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
-use super::stopping::Address;
-use super::work::{Done, Sent, Work};
-use super::{Hub, Why};
+use super::session_id::SessionId;
+use super::stop_procedure::Address;
+use super::work_results::{EngineCompletion, Sent, WorkResult};
 use crate::acquisition::Rate;
 use crate::event::CommandError;
 use crate::line::Reply;
 use crate::runner::CommandResult;
+use crate::share::command_kind::Configures;
 use crate::share::message::{self, MotorName, Reason, SignalName, SignalRate};
-use crate::share::request::Configures;
 use crate::signal::Motor;
 
 /// Why answers are not confirmed.
@@ -25,11 +26,14 @@ const UNCONFIRMED: &str = "the line failed, or a reply came twice or late, after
     confirmation: the answers so far may be those to other commands; ask again";
 
 impl Hub {
-    pub(super) fn finish(&mut self, Done { session, id, line, name, what }: Done) {
+    pub(super) fn finish(
+        &mut self,
+        EngineCompletion { session, id, line, name, what }: EngineCompletion,
+    ) {
         match what {
-            Work::Command(sent, result) => self.command_over(session, id, line, sent, result),
-            Work::Confirm { motor, result } => {
-                self.told_of(line, motor, &result);
+            WorkResult::Command(sent, result) => self.command_over(session, id, line, sent, result),
+            WorkResult::Confirm { motor, result } => {
+                self.doubt_after_failure(line, motor, &result);
                 // What the engine found before it answered.
                 let _ = self.collect_events();
                 let lane = self.lines.get(&line).and_then(|held| held.lane(motor));
@@ -49,7 +53,7 @@ impl Hub {
                     }
                 }
             }
-            Work::Stop { part, motor, by, motion, is_precaution, result } => {
+            WorkResult::Stop { part, motor, by, motion, is_precaution, result } => {
                 self.stop_ended(line, motor, (&by, motion), &result);
                 // A line that was closed meanwhile is one that fails.
                 let address = self
@@ -71,18 +75,18 @@ impl Hub {
                     }
                 }
             }
-            Work::Search(motor, result) => {
+            WorkResult::Search(motor, result) => {
                 let Some(held) = self.lines.get_mut(&line) else { return };
                 if held.search_ended(motor, &result) {
                     self.stop_again(line, motor, Why::Asked);
                 }
             }
-            Work::Unheard(part, motor) => {
+            WorkResult::Unheard(part, motor) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
                 let motor = MotorName { line: name.to_string(), motor: motor.number() };
                 session.unheard(part, motor, UNHEARD);
             }
-            Work::Rates(part, rates) => {
+            WorkResult::Rates(part, rates) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
                 let named = |rate: Rate| SignalRate {
                     signal: SignalName {
@@ -161,7 +165,7 @@ impl Hub {
             if result.is_ok() && self.lines.get(&line).is_some_and(is_pending) {
                 self.stop_again(line, motor, Why::Asked);
             }
-            self.told_of(line, motor, &result);
+            self.doubt_after_failure(line, motor, &result);
         }
         let Some((id, session)) = id.zip(self.sessions.get_mut(&session)) else { return };
         session.pending -= 1;
@@ -193,18 +197,18 @@ impl Hub {
     }
 
     /// Answers from before a failure of the line are not confirmed any more.
-    fn told_of(&mut self, line: usize, motor: Motor, result: &CommandResult) {
+    fn doubt_after_failure(&mut self, line: usize, motor: Motor, result: &CommandResult) {
         let is_failure = result.as_ref().is_err_and(|error| match error {
             CommandError::Line(error) => error.is_line_failure(),
             _ => false,
         });
         if is_failure && let Some(held) = self.lines.get(&line) {
-            self.doubt(line, held.lane(motor));
+            self.mark_unconfirmed(line, held.lane(motor));
         }
     }
 
-    pub(super) fn doubt(&mut self, line: usize, motor: Option<Motor>) {
-        self.sessions.iter_mut().for_each(|(_, session)| session.doubt(line, motor));
+    pub(super) fn mark_unconfirmed(&mut self, line: usize, motor: Option<Motor>) {
+        self.sessions.iter_mut().for_each(|(_, session)| session.mark_unconfirmed(line, motor));
     }
 
     /// Whose the motor is after a command.

@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 
 use motorlink_proto::time::{Instant, Micros};
 
-use super::ids::seconds;
 use super::line::Lines;
+use super::session_id::seconds;
 use crate::acquisition::ConsumerId;
 use crate::plan::Wants;
 use crate::rows::{Item, MotorRows, Row};

@@ -9,10 +9,10 @@ use litemap::LiteMap as Map;
 use motorlink::port::{Carries, Place, PortName};
 use motorlink_link::list;
 
-use super::ids::SessionId;
+use super::session_id::SessionId;
 use crate::line::Stopped;
 use crate::share::message::{FoundPort, Protocol};
-use crate::share::opening::{OpenError, Opened};
+use crate::share::port_config::{OpenError, Opened};
 use crate::share::scan::Found;
 
 /// Jobs at the same time, besides ports that are closed: that stops motors, and is always possible.
@@ -42,20 +42,20 @@ pub(super) struct Asker {
 pub(super) struct Job {
     pub(super) asker: Asker,
     /// What the job occupies, and what it does there.
-    place: Option<(Place, Does)>,
-    thread: JoinHandle<End>,
+    place: Option<(Place, PortOperation)>,
+    thread: JoinHandle<JobResult>,
 }
 
 /// What a job does with a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Does {
+pub(super) enum PortOperation {
     Scans,
     Opens,
     Closes,
 }
 
 /// What a job came to.
-pub(super) enum End {
+pub(super) enum JobResult {
     Listed(Vec<(FoundPort, Option<Place>)>),
     Scanned(Scanned),
     Opened(Box<Result<Opened, OpenError>>),
@@ -80,9 +80,9 @@ pub(super) struct Scanned {
 }
 
 /// Says that the thread of a job ends, also if it panics.
-struct AtEnd<F: FnMut()>(F);
+struct DropGuard<F: FnMut()>(F);
 
-impl<F: FnMut()> Drop for AtEnd<F> {
+impl<F: FnMut()> Drop for DropGuard<F> {
     fn drop(&mut self) {
         (self.0)();
     }
@@ -91,24 +91,27 @@ impl<F: FnMut()> Drop for AtEnd<F> {
 impl Jobs {
     /// Waits for the lines that are being closed, and gives their motors.
     pub(super) fn end(self) -> Vec<(String, Vec<Stopped>)> {
-        let closing =
-            self.under_way.into_iter().map(|(_, value)| value).filter(|job| job.does(Does::Closes));
+        let closing = self
+            .under_way
+            .into_iter()
+            .map(|(_, value)| value)
+            .filter(|job| job.does(PortOperation::Closes));
         closing
             .filter_map(|job| match job.thread.join() {
-                Ok(End::Closed(Closed { name, stopped, .. })) => Some((name, stopped)),
+                Ok(JobResult::Closed(Closed { name, stopped, .. })) => Some((name, stopped)),
                 _ => None,
             })
             .collect()
     }
 
     /// Whether there is room for one that does this; `None`: it lists ports.
-    pub(super) fn has_room(&self, does: Option<Does>) -> bool {
-        let closing = self.count(Does::Closes);
+    pub(super) fn has_room(&self, does: Option<PortOperation>) -> bool {
+        let closing = self.count(PortOperation::Closes);
         let has_room = self.under_way.len() - closing < MOST_JOBS;
         match does {
-            Some(Does::Closes) => true,
-            Some(Does::Scans) => has_room && self.count(Does::Scans) < MOST_SCANS,
-            Some(Does::Opens) | None => has_room,
+            Some(PortOperation::Closes) => true,
+            Some(PortOperation::Scans) => has_room && self.count(PortOperation::Scans) < MOST_SCANS,
+            Some(PortOperation::Opens) | None => has_room,
         }
     }
 
@@ -116,15 +119,15 @@ impl Jobs {
     pub(super) fn begin(
         &mut self,
         asker: Asker,
-        place: Option<(Place, Does)>,
-        work: impl FnOnce() -> End + Send + 'static,
+        place: Option<(Place, PortOperation)>,
+        work: impl FnOnce() -> JobResult + Send + 'static,
         ended: impl Fn(JobId) + Send + 'static,
     ) -> io::Result<()> {
         self.last += 1;
         let job = JobId(self.last);
         let thread = std::thread::Builder::new().name("port".to_owned());
         let thread = thread.spawn(move || {
-            let _at_end = AtEnd(|| ended(job));
+            let _at_end = DropGuard(|| ended(job));
             work()
         })?;
         self.under_way.insert(job, Job { asker, place, thread });
@@ -144,33 +147,33 @@ impl Jobs {
 
     /// The ports that are opened or closed.
     pub(super) fn changing(&self) -> impl Iterator<Item = (&Place, &Job)> {
-        let jobs = self.under_way.values().filter(|job| !job.does(Does::Scans));
+        let jobs = self.under_way.values().filter(|job| !job.does(PortOperation::Scans));
         jobs.filter_map(|job| Some((&job.place.as_ref()?.0, job)))
     }
 
     /// How many do this.
-    pub(super) fn count(&self, what: Does) -> usize {
+    pub(super) fn count(&self, what: PortOperation) -> usize {
         self.under_way.values().filter(|job| job.does(what)).count()
     }
 }
 
 impl Job {
     /// What it came to; `None` if it panicked.
-    pub(super) fn end(self) -> (Asker, Option<End>) {
+    pub(super) fn end(self) -> (Asker, Option<JobResult>) {
         (self.asker, self.thread.join().ok())
     }
 
     /// What it does with its port, in a word.
     pub(super) fn verb(&self) -> &'static str {
         match self.place {
-            Some((_, Does::Scans)) => "scans",
-            Some((_, Does::Opens)) => "opens",
-            Some((_, Does::Closes)) => "closes",
+            Some((_, PortOperation::Scans)) => "scans",
+            Some((_, PortOperation::Opens)) => "opens",
+            Some((_, PortOperation::Closes)) => "closes",
             None => "uses",
         }
     }
 
-    pub(super) fn does(&self, what: Does) -> bool {
+    pub(super) fn does(&self, what: PortOperation) -> bool {
         self.place.as_ref().is_some_and(|(_, does)| *does == what)
     }
 }

@@ -13,19 +13,20 @@ use motorlink_proto::Motion;
 use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
-use super::ids::{SessionId, seconds, wall_now};
 use super::motors::{MotorState, Presence};
 use super::pending_stops::{LineStop, PendingStop};
 use super::reasons::may_be_executed;
+use super::session_id::{SessionId, seconds, wall_now};
 use crate::acquisition::{Acquisition, Tally};
 use crate::event::{CommandError, What};
 use crate::line::{LineError, Request, Stopped};
 use crate::plan::Wants;
 use crate::runner::{CommandResult, Remote, Runner};
-use crate::share::event_text::{DriveProtocol, EventText, Told};
+use crate::share::command_kind::{self, Configures};
+use crate::share::drive_protocol::DriveProtocol;
+use crate::share::event_text::{DescribedEvent, EventText};
 use crate::share::message::{ANY_MOTOR, Answer, Event, EventKind, Line};
-use crate::share::opening::Opened;
-use crate::share::request::{self, Configures};
+use crate::share::port_config::Opened;
 use crate::share::wire::{self, Part, Tap};
 use crate::signal::Motor;
 use crate::subscription::{Full, Record, Subscription};
@@ -279,7 +280,7 @@ impl SharedLine {
         (!has_ended).then_some(events)
     }
 
-    fn message(&self, time: Instant, told: Told) -> Event {
+    fn message(&self, time: Instant, told: DescribedEvent) -> Event {
         let motor = told.motor.map(Motor::number);
         let place = match motor {
             Some(motor) => format!("{}, motor {motor}", self.name),
@@ -299,7 +300,7 @@ impl SharedLine {
 
     /// Whether it is the stop of a number that the drive does not have, or of an ID that never answered and
     /// that no program turned. Only the program that asked for the stop gets the failure.
-    fn is_of_no_motor(&self, told: &Told) -> bool {
+    fn is_of_no_motor(&self, told: &DescribedEvent) -> bool {
         let is_of_stop = matches!(told.event, EventKind::Stopping | EventKind::StopFailed);
         let Some(motor) = told.motor.filter(|_| is_of_stop) else { return false };
         let is_unheard = self.speaks == DriveProtocol::Rmd && !self.has_heard(motor);
@@ -316,7 +317,7 @@ impl SharedLine {
 
     /// The motor of this number.
     pub(super) fn motor(&self, number: u8) -> Result<Motor, String> {
-        request::motor(self.speaks, number).map_err(|why| format!("{}: {why}", self.name))
+        command_kind::motor(self.speaks, number).map_err(|why| format!("{}: {why}", self.name))
     }
 
     /// The request of these bytes, and what it does besides. `segments` are the registers of the
@@ -327,7 +328,7 @@ impl SharedLine {
         bytes: &[u8],
         segments: impl Fn(u8) -> Option<Vec<RegisterId>>,
     ) -> Result<(Request, Option<Configures>), String> {
-        request::of(self.speaks, motor, bytes, segments)
+        command_kind::of(self.speaks, motor, bytes, segments)
             .map_err(|why| format!("{}: {why}", self.name))
     }
 

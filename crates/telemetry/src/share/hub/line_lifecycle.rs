@@ -9,17 +9,17 @@ use motorlink::st::Profile;
 use motorlink_proto::time::Micros;
 
 use super::Hub;
-use super::ids::SessionId;
-use super::jobs::{Asker, Closed, Does, End, Job, JobId, Scanned, found_ports};
+use super::jobs::{Asker, Closed, Job, JobId, JobResult, PortOperation, Scanned, found_ports};
 use super::line::SharedLine;
 use super::requests::{Refused, usage};
-use super::work::News;
+use super::session_id::SessionId;
+use super::work_results::Completion;
 use crate::line::Stopped;
 use crate::share::message::{
     ANY_MOTOR, Answer, EventKind, FoundPort, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
     Protocol, Reason, StoppedMotor,
 };
-use crate::share::opening::{OpenError, Opened, Wish};
+use crate::share::port_config::{OpenError, Opened, PortConfig};
 use crate::share::scan::{self, Found};
 
 /// The shortest time for a reply, in seconds.
@@ -27,7 +27,7 @@ const SHORTEST_TIMEOUT: f64 = 1e-3;
 
 /// A port to open, and the protocol of its drives.
 pub(super) struct Order {
-    wish: Wish,
+    wish: PortConfig,
     protocol: Protocol,
 }
 
@@ -39,7 +39,7 @@ impl Hub {
         by: &Arc<str>,
         id: u32,
     ) -> Result<Option<Answer>, Refused> {
-        self.begin(session, by, id, None, || End::Listed(found_ports()))
+        self.begin(session, by, id, None, || JobResult::Listed(found_ports()))
     }
 
     /// A port that a program wants to open.
@@ -64,7 +64,7 @@ impl Hub {
         }
         let port = self.free_port(port)?;
         let (timeout, limits) = (timeout.map(Duration::from_secs_f64), self.limits);
-        let wish = Wish { port, profile, timeout, limits };
+        let wish = PortConfig { port, profile, timeout, limits };
         if !wish.protocols().contains(&protocol) {
             let port = &wish.port;
             return Err(usage(match protocol {
@@ -123,11 +123,11 @@ impl Hub {
                 })
             })?,
         };
-        let place = Some((port.place(), Does::Scans));
+        let place = Some((port.place(), PortOperation::Scans));
         self.begin(session, by, id, place, move || {
             let found = scan::scan(&port, protocol, wish.timeout);
             let rate = scan::rate_of(&port, protocol);
-            End::Scanned(Scanned { port, rate, rates, found })
+            JobResult::Scanned(Scanned { port, rate, rates, found })
         })
     }
 
@@ -139,12 +139,14 @@ impl Hub {
         id: u32,
         Order { wish, protocol }: Order,
     ) -> Result<Option<Answer>, Refused> {
-        if self.lines.len() + self.jobs.count(Does::Opens) >= self.first_lines + MOST_OPENED {
+        if self.lines.len() + self.jobs.count(PortOperation::Opens)
+            >= self.first_lines + MOST_OPENED
+        {
             let message = format!("programs open up to {MOST_OPENED} lines; close one first");
             return Err((Reason::Busy, message));
         }
-        let place = Some((wish.port.place(), Does::Opens));
-        self.begin(session, by, id, place, move || End::Opened(Box::new(wish.open(protocol))))
+        let place = Some((wish.port.place(), PortOperation::Opens));
+        self.begin(session, by, id, place, move || JobResult::Opened(Box::new(wish.open(protocol))))
     }
 
     /// Closes a line: from now on no program can use it. Its motors are stopped.
@@ -163,9 +165,9 @@ impl Hub {
         }
         self.sessions.iter_mut().for_each(|(_, session)| session.forget(line));
         let place = held.places();
-        self.begin(session, by, id, Some((place.clone(), Does::Closes)), move || {
+        self.begin(session, by, id, Some((place.clone(), PortOperation::Closes)), move || {
             let (name, port) = (held.name.clone(), held.port.clone());
-            End::Closed(Closed { name, port, place, stopped: held.end() })
+            JobResult::Closed(Closed { name, port, place, stopped: held.end() })
         })
     }
 
@@ -174,8 +176,8 @@ impl Hub {
         session: SessionId,
         by: &Arc<str>,
         id: u32,
-        place: Option<(Place, Does)>,
-        work: impl FnOnce() -> End + Send + 'static,
+        place: Option<(Place, PortOperation)>,
+        work: impl FnOnce() -> JobResult + Send + 'static,
     ) -> Result<Option<Answer>, Refused> {
         if !self.jobs.has_room(place.as_ref().map(|(_, does)| *does)) {
             let message = "the share scans or opens too many ports at this moment".to_owned();
@@ -184,7 +186,7 @@ impl Hub {
         let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
         let ended = move |job| {
             // The hub may have gone.
-            let _ = done.send(News::Job(job));
+            let _ = done.send(Completion::Job(job));
             wake();
         };
         let asker = Asker { session, id, by: Arc::clone(by) };
@@ -199,10 +201,10 @@ impl Hub {
             return;
         };
         let answer = match end {
-            Some(End::Listed(ports)) => Ok(self.listed(ports)),
-            Some(End::Scanned(scanned)) => self.scanned(&by, scanned),
-            Some(End::Opened(opened)) => self.opened(&by, *opened),
-            Some(End::Closed(closed)) => Ok(self.closed(&by, closed)),
+            Some(JobResult::Listed(ports)) => Ok(self.listed(ports)),
+            Some(JobResult::Scanned(scanned)) => self.scanned(&by, scanned),
+            Some(JobResult::Opened(opened)) => self.opened(&by, *opened),
+            Some(JobResult::Closed(closed)) => Ok(self.closed(&by, closed)),
             None => Err((Reason::Line, "the share has a fault".to_owned())),
         };
         let Some(session) = self.sessions.get_mut(&session) else { return };
@@ -290,7 +292,7 @@ impl Hub {
         let mut motors = Vec::new();
         for (place, job) in self.jobs.changing() {
             let by_whom = &job.asker.by;
-            let failure = match job.does(Does::Opens) {
+            let failure = match job.does(PortOperation::Opens) {
                 true => format!("{by_whom} opens it at this moment; its motors are stopped then"),
                 false => format!(
                     "{by_whom} closes it at this moment, which stops the motors that programs turned"

@@ -2,22 +2,24 @@
 //!
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 
-mod claims;
 mod completions;
 mod feed;
-mod ids;
 mod jobs;
-mod lapses;
-mod life;
+mod leases;
 mod line;
 mod line_lifecycle;
+mod liveness;
 mod motors;
 mod pending_stops;
 mod reasons;
 mod requests;
 mod session;
-mod stopping;
-mod work;
+mod session_id;
+mod stop_procedure;
+mod stops;
+mod subscriptions;
+mod watchdog;
+mod work_results;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -29,22 +31,21 @@ use motorlink_proto::time::{Instant, Micros};
 use super::event_text;
 use super::frame::Frame;
 use super::message::{self, Ending, Event, EventKind};
-use super::opening::Limits;
+use super::port_config::Limits;
 use crate::event::CommandError;
-use crate::line::{Request, Stopped};
+use crate::line::Stopped;
 use crate::runner::Ended;
-use crate::schedule::Quiet;
 use crate::signal::Motor;
-use ids::wall_now;
 use jobs::Jobs;
 use line::Lines;
-use pending_stops::{LONGEST_PAUSE, PendingPortStops};
-use session::{Part, Session};
-use work::{Done, News, Work};
+use pending_stops::{PendingPortStops, Why};
+use session::Session;
+use session_id::wall_now;
+use work_results::{Completion, EngineCompletion, WorkResult};
 
-pub use ids::SessionId;
-pub(super) use ids::seconds;
 pub use line::SharedLine;
+pub use session_id::SessionId;
+pub(super) use session_id::seconds;
 
 /// The engine of a line has ended: its thread is gone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -76,19 +77,9 @@ pub struct Hub {
     lapsed: Vec<(SessionId, String)>,
     /// Programs that have left and own motors, which are switched off.
     switch_off: BTreeSet<SessionId>,
-    done: Sender<News>,
-    ended: Receiver<News>,
+    done: Sender<Completion>,
+    ended: Receiver<Completion>,
     wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-/// Why a motor is stopped.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Why {
-    Asked,
-    /// It is one of all that the lines can have.
-    OfAll,
-    /// It did not confirm an earlier stop. Stops that are asked for now go first.
-    Repeated,
 }
 
 impl Hub {
@@ -263,34 +254,6 @@ impl Hub {
         self.collect_events()
     }
 
-    /// Repeats stops that no drive has confirmed.
-    fn repeat_stops(&mut self) {
-        for line in self.numbers() {
-            let Some(held) = self.lines.get(&line) else { continue };
-            let now = held.now();
-            for motor in held.due_again(now) {
-                self.stop_again(line, motor, Why::Repeated);
-            }
-            if let Some(motor) = self.lines.get_mut(&line).and_then(|held| held.due_search(now)) {
-                self.search(line, motor);
-            }
-            if let Some(by) = self.lines.get_mut(&line).and_then(|held| held.due_line_stop(now)) {
-                self.stop_line(line, None, &by);
-            }
-        }
-    }
-
-    /// Stops all motors that a line can have, but one and those whose stop is under way.
-    fn stop_line(&mut self, line: usize, but: Option<Motor>, by: &Arc<str>) {
-        let Some(held) = self.lines.get(&line) else { return };
-        // Those that are under way have more tries.
-        let is_meant = |motor: &Motor| Some(*motor) != but && !held.is_stopping(*motor);
-        let motors: Vec<Motor> = held.stoppable().filter(is_meant).collect();
-        for motor in motors {
-            self.stop(Why::OfAll, line, motor, SessionId::default(), None, by);
-        }
-    }
-
     fn collect_events(&mut self) -> Result<(), LineEnded> {
         for line in self.numbers() {
             let (mut retry, mut doubts) = (Vec::new(), Vec::new());
@@ -304,7 +267,7 @@ impl Hub {
                 held.begin_line_stop(by, Micros(0));
             }
             for motor in doubts {
-                self.doubt(line, motor);
+                self.mark_unconfirmed(line, motor);
             }
             events.into_iter().for_each(|event| self.publish(event));
             for motor in retry {
@@ -318,8 +281,8 @@ impl Hub {
     pub fn advance(&mut self) {
         while let Ok(news) = self.ended.try_recv() {
             match news {
-                News::Engine(done) => self.finish(done),
-                News::Job(job) => self.job_ended(job),
+                Completion::Engine(done) => self.finish(done),
+                Completion::Job(job) => self.job_ended(job),
             }
         }
     }
@@ -364,99 +327,19 @@ impl Hub {
         self.publish(Event { wall, line, t, since, motor, by, event, message });
     }
 
-    /// Repeats a stop that was not confirmed. A motor of a program that left is stopped, too.
-    fn stop_again(&mut self, line: usize, motor: Motor, why: Why) {
-        let Some(held) = self.lines.get_mut(&line) else { return };
-        // One that is under way has another try if it fails.
-        if held.is_stopping(motor) {
-            return;
-        }
-        match held.pending_stop(motor).map(|stop| Arc::clone(&stop.by)) {
-            Some(by) => self.stop(why, line, motor, SessionId::default(), None, &by),
-            None => self.stop_if_orphaned(line, motor, why, false),
-        }
-    }
-
-    /// Stops a motor whose owner has left. A request of a program that is there may be under way: its end
-    /// decides, unless one `was_refused`.
-    fn stop_if_orphaned(&mut self, line: usize, motor: Motor, why: Why, was_refused: bool) {
-        let Some(held) = self.lines.get(&line) else { return };
-        let Some(owner) = held.owners.owner(motor) else { return };
-        let is_here = |program| !was_refused && self.sessions.contains_key(&program);
-        if !self.sessions.contains_key(&owner)
-            && held.owners.left_by(owner, is_here).contains(&motor)
-        {
-            let by = "share".into();
-            if self.switch_off.contains(&owner)
-                && let Some(held) = self.lines.get_mut(&line)
-            {
-                held.begin_switch_off(motor, &by);
-            }
-            self.stop(why, line, motor, owner, None, &by);
-        }
-    }
-
-    fn stop(
-        &mut self,
-        why: Why,
-        line: usize,
-        motor: Motor,
-        session: SessionId,
-        part: Option<Part>,
-        by: &Arc<str>,
-    ) {
-        let tell = self.teller(session, None, line);
-        let Some(held) = self.lines.get_mut(&line) else { return };
-        held.owners.interrupt(motor);
-        held.begin_stop(motor, by);
-        held.motor_state(motor).stops += 1;
-        let quiet = match why {
-            Why::OfAll if held.is_doubtful(motor) => Some(Quiet::Precaution),
-            Why::Repeated => Some(Quiet::Again),
-            Why::Asked | Why::OfAll => None,
-        };
-        let is_precaution = quiet == Some(Quiet::Precaution);
-        let request = held.stop_of(motor);
-        let motion = request.motion();
-        let asker = Arc::clone(by);
-        let ended = move |result| {
-            tell(Work::Stop { part, motor, by: asker, motion, is_precaution, result });
-        };
-        let begun = match quiet {
-            None => held.remote().stop_then(by, request, ended),
-            Some(quiet) => held.remote().stop_quietly_then(by, request, quiet, ended),
-        };
-        if begun.is_err() {
-            let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
-            let name = held.name.as_str().into();
-            let what = Work::Stop { part, motor, by, motion, is_precaution, result };
-            self.finish(Done { session, id: None, line, name, what });
-        }
-    }
-
-    /// Stops a motor that may not exist, behind the commands of programs.
-    fn search(&mut self, line: usize, motor: Motor) {
-        let tell = self.teller(SessionId::default(), None, line);
-        let Some(held) = self.lines.get(&line) else { return };
-        let stop = held.pending_stop(motor);
-        let by = stop.map_or_else(|| "share".into(), |stop| Arc::clone(&stop.by));
-        let ended = move |result| tell(Work::Search(motor, result));
-        // If the engine has ended, the share ends.
-        let _ = held.remote().command_then(&by, Request::stop(motor), LONGEST_PAUSE, ended);
-    }
-
     /// Receives the end of something in an engine's thread.
     fn teller(
         &self,
         session: SessionId,
         id: Option<u32>,
         line: usize,
-    ) -> impl FnOnce(Work) + Send + use<> {
+    ) -> impl FnOnce(WorkResult) + Send + use<> {
         let (done, wake) = (self.done.clone(), Arc::clone(&self.wake));
         let name: Arc<str> = self.lines.get(&line).map_or("", |held| &held.name).into();
         move |what| {
             // The hub may have gone.
-            let _ = done.send(News::Engine(Done { session, id, line, name, what }));
+            let _ =
+                done.send(Completion::Engine(EngineCompletion { session, id, line, name, what }));
             wake();
         }
     }

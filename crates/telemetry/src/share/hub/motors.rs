@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use motorlink_proto::time::Instant;
 
-use super::ids::SessionId;
 use super::pending_stops::PendingStop;
+use super::session_id::SessionId;
 
 /// What a share knows of a motor.
 #[derive(Default)]

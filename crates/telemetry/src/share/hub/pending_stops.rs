@@ -91,3 +91,13 @@ pub(super) struct LineStop {
     /// When it is repeated.
     pub(super) next: Instant,
 }
+
+/// Why a motor is stopped.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Why {
+    Asked,
+    /// It is one of all that the lines can have.
+    OfAll,
+    /// It did not confirm an earlier stop. Stops that are asked for now go first.
+    Repeated,
+}

@@ -1,38 +1,27 @@
 //! What programs ask for.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
-use super::feed::Feed;
-use super::ids::SessionId;
-use super::line::SharedLine;
-use super::pending_stops::AGAIN;
+use super::Hub;
 use super::reasons::reason;
-use super::session::{NO_MOTOR, Session, UNANSWERED};
-use super::work::{Sent, Work};
-use super::{Hub, Why};
-use crate::acquisition::Acquisition;
+use super::session::Session;
+use super::session_id::SessionId;
+use super::work_results::{Sent, WorkResult};
 use crate::event::CommandError;
 use crate::line::Request;
 
 use crate::share::VERSION;
-use crate::share::frame::{Frame, Kind};
+use crate::share::command_kind::CommandKind;
+use crate::share::frame::{Frame, FrameKind};
 use crate::share::message::{
-    self, ANY_MOTOR, Answer, Ask, Column, DropRule, EventKind, LONGEST_DEADLINE, LONGEST_NAME,
-    LONGEST_QUEUE, LONGEST_SCAN, LONGEST_TIME, LONGEST_WHY, MOST_SIGNALS, MOST_SUBSCRIPTIONS,
-    MotorName, Reason, SHORTEST_DEADLINE, SignalName, StoppedMotor,
+    self, Answer, Ask, EventKind, LONGEST_DEADLINE, LONGEST_NAME, LONGEST_SCAN, LONGEST_TIME,
+    LONGEST_WHY, MotorName, Reason, SHORTEST_DEADLINE,
 };
-use crate::share::request::Kind as CommandKind;
 use crate::share::wire::{MOST_FRAMES, Part};
-use crate::signal::{Motor, Signal, Source};
-use crate::subscription::Full;
-
-/// The shortest period of a subscription, in seconds.
-const SHORTEST_PERIOD: f64 = 1e-4;
+use crate::signal::Motor;
 
 /// The time to live of a confirmation.
 const CONFIRMATION: Micros = Micros::from_millis(1_000);
@@ -51,7 +40,7 @@ impl Hub {
     /// A program has sent a message. `waited` is how long it may have waited before it was read: it is
     /// a part of its time to live.
     pub fn received(&mut self, session: SessionId, frame: &Frame, waited: Micros) {
-        if frame.kind != Kind::Text {
+        if frame.kind != FrameKind::Text {
             return self.close(session, "a program sends requests only");
         }
         match message::decode::<message::Request>(&frame.payload) {
@@ -266,7 +255,7 @@ impl Hub {
         why.map_or(Ok(()), |why| Err((Reason::Busy, why)))
     }
 
-    fn line(&self, name: &str) -> Result<usize, Refused> {
+    pub(super) fn line(&self, name: &str) -> Result<usize, Refused> {
         let found = self.lines.iter().find(|(_, held)| held.name == name);
         found.map(|(line, _)| *line).ok_or_else(|| {
             let names: Vec<_> = self.lines.values().map(|held| held.name.as_str()).collect();
@@ -283,50 +272,6 @@ impl Hub {
     ) -> Result<(usize, Motor), Refused> {
         let line = self.line(line)?;
         Ok((line, self.lines[&line].motor(*motor).map_err(usage)?))
-    }
-
-    fn subscribe(
-        &mut self,
-        id: SessionId,
-        signals: &[SignalName],
-        period: f64,
-        (queue, drop): (u32, DropRule),
-        rows: bool,
-    ) -> Result<u32, Refused> {
-        let mut wanted: Map<usize, BTreeSet<Signal>> = Map::new();
-        if signals.is_empty() || signals.len() > MOST_SIGNALS {
-            return Err(usage(format!("a subscription has 1 to {MOST_SIGNALS} signals")));
-        }
-        if !(1..=LONGEST_QUEUE).contains(&queue) {
-            return Err(usage(format!("a queue has 1 to {LONGEST_QUEUE} records")));
-        }
-        let period = span("the period", period, SHORTEST_PERIOD)?;
-        for SignalName { line, motor, name } in signals {
-            let (line, motor) = self.motor(&MotorName { line: line.clone(), motor: *motor })?;
-            let signal = Signal::named(motor, name).map_err(|error| usage(error.to_string()))?;
-            wanted.entry(line).or_default().insert(signal);
-        }
-        let full = match drop {
-            DropRule::Oldest => Full::DropOldest,
-            DropRule::Newest => Full::DropNewest,
-        };
-        let Some(session) = self.sessions.get_mut(&id) else { return Ok(0) };
-        if session.feeds.len() >= MOST_SUBSCRIPTIONS {
-            let message = format!("a program has up to {MOST_SUBSCRIPTIONS} subscriptions");
-            return Err((Reason::Busy, message));
-        }
-        session.last_feed += 1;
-        let mut feed = Feed::new(session.last_feed, rows);
-        for (line, signals) in wanted {
-            if let Some(held) = self.lines.get_mut(&line) {
-                for signal in &signals {
-                    held.motor_state(signal.motor).is_known = true;
-                }
-            }
-            feed.add(&self.lines, line, signals, period, (queue as usize, full)).map_err(ended)?;
-        }
-        session.feeds.insert(session.last_feed, feed);
-        Ok(session.last_feed)
     }
 
     fn command(
@@ -378,7 +323,7 @@ impl Hub {
         let leases = self.lease_by((session, name), line, changed);
         let Some(held) = self.lines.get_mut(&line) else { return Ok(()) };
         let sent = Sent { motor, motion, configures, made: made(self.now, age), leases };
-        let ended_with = move |result| tell(Work::Command(sent, result));
+        let ended_with = move |result| tell(WorkResult::Command(sent, result));
         let begun = match motion.stops() {
             true => held.remote().stop_then(name, request, ended_with),
             false => held.remote().command_then(name, request, time_to_live, ended_with),
@@ -395,107 +340,9 @@ impl Hub {
     ) -> Result<(), Refused> {
         let (line, motor) = self.motor(motor)?;
         let tell = self.teller(session, Some(id), line);
-        let ended_with = move |result| tell(Work::Confirm { motor, result });
+        let ended_with = move |result| tell(WorkResult::Confirm { motor, result });
         let remote = self.lines[&line].remote();
         remote.command_then(name, Request::Confirm(motor), CONFIRMATION, ended_with).map_err(ended)
-    }
-
-    fn stop_asked(
-        &mut self,
-        session: SessionId,
-        name: &Arc<str>,
-        id: u32,
-        motor: Option<&MotorName>,
-    ) -> Result<(), Refused> {
-        let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
-            Some(motor) => (vec![self.motor(motor)?], Vec::new()),
-            None => {
-                for held in self
-                    .lines
-                    .iter_mut()
-                    .map(|(_, value)| value)
-                    .filter(|held| !held.has_answered())
-                {
-                    held.begin_line_stop(name, AGAIN);
-                }
-                let lines = self.lines.iter();
-                let all =
-                    lines.flat_map(|(line, held)| held.stoppable().map(move |it| (*line, it)));
-                all.partition(|(line, motor)| self.lines[line].is_awaited(*motor))
-            }
-        };
-        let of_all = motor.is_none();
-        let why = if of_all { Why::OfAll } else { Why::Asked };
-        let mut unreached = if of_all { self.stop_ports(name) } else { Vec::new() };
-        // The drive says of each number that it has no such motor.
-        let is_left = |(line, held): &(&usize, &SharedLine)| {
-            of_all && !held.has_answered() && !awaited.iter().any(|(of, _)| of == *line)
-        };
-        unreached.extend(self.lines.iter().filter(is_left).map(|(_, held)| StoppedMotor {
-            motor: MotorName { line: held.name.clone(), motor: ANY_MOTOR },
-            failure: Some(UNANSWERED.to_owned()),
-            absent: false,
-        }));
-        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(()) };
-        let part = asker.gather(id, awaited.len(), unreached);
-        for (line, motor) in awaited {
-            let held = &self.lines[&line];
-            if of_all && held.is_absent(motor) {
-                let name = MotorName { line: held.name.clone(), motor: motor.number() };
-                if let Some(asker) = self.sessions.get_mut(&session) {
-                    asker.unheard(part, name, NO_MOTOR);
-                }
-            } else if of_all && held.has_answered() && !held.may_turn(motor) {
-                let tell = self.teller(session, None, line);
-                let task = move |engine: &mut Acquisition| {
-                    if !engine.has_answered(&Request::stop(motor)) {
-                        tell(Work::Unheard(part, motor));
-                    }
-                };
-                // If the engine has ended, the stop fails, too.
-                let _ = held.remote().post(task);
-            }
-            self.stop(why, line, motor, session, Some(part), name);
-        }
-        for (line, motor) in others {
-            self.stop(why, line, motor, session, None, name);
-        }
-        Ok(())
-    }
-
-    fn rates(
-        &mut self,
-        session: SessionId,
-        id: u32,
-        line: Option<&str>,
-    ) -> Result<Option<Answer>, Refused> {
-        let lines = match line {
-            Some(line) => vec![self.line(line)?],
-            None => self.lines.keys().copied().collect(),
-        };
-        let Some(asker) = self.sessions.get_mut(&session) else { return Ok(None) };
-        if lines.is_empty() {
-            return Ok(Some(Answer::Rates { rates: Vec::new() }));
-        }
-        let part = asker.gather(id, lines.len(), Vec::new());
-        for line in lines {
-            let held = &self.lines[&line];
-            let tell = self.teller(session, None, line);
-            let task = move |engine: &mut Acquisition| {
-                tell(Work::Rates(part, engine.rates().collect()));
-            };
-            held.remote().post(task).map_err(ended)?;
-        }
-        Ok(None)
-    }
-}
-
-impl SharedLine {
-    /// The signals of a motor.
-    fn columns(&self) -> Vec<Column> {
-        let motor = self.speaks.motor(1);
-        let column = |motor| move |source| Column::of(&Signal { motor, source });
-        motor.into_iter().flat_map(|it| Source::all(it).into_iter().map(column(it))).collect()
     }
 }
 
@@ -528,14 +375,14 @@ fn deadline(seconds: f64) -> Result<Micros, Refused> {
     }
 }
 
-fn span(what: &str, seconds: f64, least: f64) -> Result<Micros, Refused> {
+pub(super) fn span(what: &str, seconds: f64, least: f64) -> Result<Micros, Refused> {
     if !(least..=LONGEST_TIME).contains(&seconds) {
         return Err(usage(format!("{what} is {least} to {LONGEST_TIME} s")));
     }
     Ok(Micros((seconds * 1e6).round() as u64))
 }
 
-fn ended(error: crate::runner::Ended) -> Refused {
+pub(super) fn ended(error: crate::runner::Ended) -> Refused {
     refused(&error.into())
 }
 

@@ -7,8 +7,8 @@ use litemap::LiteMap as Map;
 use motorlink_proto::st::RegisterId;
 
 use super::feed::Feed;
-use super::life::Life;
 use super::line::Lines;
+use super::liveness::Life;
 use crate::share::frame::Frame;
 use crate::share::message::{
     self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
@@ -115,7 +115,7 @@ impl Session {
     }
 
     /// The answers of a line so far, or of one of its motors, may be those to other commands.
-    pub(super) fn doubt(&mut self, line: usize, motor: Option<Motor>) {
+    pub(super) fn mark_unconfirmed(&mut self, line: usize, motor: Option<Motor>) {
         let is_meant = |other: Motor| motor.is_none_or(|motor| motor == other);
         for ((_, _), is_doubtful) in
             self.unconfirmed.iter_mut().filter(|((of, other), _)| *of == line && is_meant(*other))

@@ -5,20 +5,20 @@ use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
 use litemap::LiteMap as Map;
-use motorlink::port::{CanLink, Ending, Evented, Holder, Link, PortError};
+use motorlink::port::{CanLink, Evented, Link, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Command, MotorId, MotorSet, Payload, SetTorque, SetTorque4, TORQUE4_ID,
 };
 
 use super::connection::Connection;
-use super::place::Place;
+use super::line_address::LineAddress;
 use crate::share::client_codec::{Ended, Refusal};
 use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a host into commands, and their answers into replies.
 pub(super) struct ShareBus {
-    port: Place,
+    port: LineAddress,
     connection: Connection,
     /// The last request to each motor.
     pending: Map<MotorId, Pending>,
@@ -34,7 +34,7 @@ struct Pending {
 }
 
 impl ShareBus {
-    pub(super) fn open(place: &Place) -> Result<Self, PortError> {
+    pub(super) fn open(place: &LineAddress) -> Result<Self, PortError> {
         Ok(ShareBus {
             port: place.clone(),
             connection: Connection::open(place)?,
@@ -80,29 +80,13 @@ impl ShareBus {
 }
 
 impl Link for ShareBus {
-    fn holder(&self) -> Option<Holder> {
-        Some(self.connection.holder())
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.connection)
     }
 
     fn confirm_next(&self, motor: u8) {
         let motor = MotorId::new(motor).map_or(MotorSet::EMPTY, MotorSet::from);
         self.confirms.set(self.confirms.get().union(motor));
-    }
-
-    fn expire_next(&self, time_to_live: Duration) {
-        self.connection.expire_next(time_to_live);
-    }
-
-    fn only_own(&self, is_set: bool) {
-        self.connection.only_own(is_set);
-    }
-
-    fn claim(&self, motors: &[u8]) {
-        self.connection.claim(motors);
-    }
-
-    fn end_with(&self, ending: Ending) {
-        self.connection.end_with(ending);
     }
 }
 

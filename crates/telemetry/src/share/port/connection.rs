@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{self, FdLink, Holder, PortError};
+use motorlink::port::{self, FdLink, Holder, Link, PortError};
 use motorlink::st::Profile;
 
-use super::place::{Deadlines, Place};
+use super::line_address::{Deadlines, LineAddress};
 use super::pulse::Socket;
 use crate::share::VERSION;
 use crate::share::client_codec::{ClientCodec, CodecError, Ended, Heard};
-use crate::share::event_text::DriveProtocol;
+use crate::share::command_kind::CommandKind;
+use crate::share::drive_protocol::DriveProtocol;
 use crate::share::message::{Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Text};
-use crate::share::request::Kind;
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
@@ -24,7 +24,7 @@ const TIME_TO_LIVE: Duration = Duration::from_secs(1);
 
 /// The connection to a share.
 pub(super) struct Connection {
-    port: Place,
+    port: LineAddress,
     socket: Socket,
     codec: ClientCodec,
     holder: Holder,
@@ -47,7 +47,7 @@ pub(super) struct Connection {
 
 impl Connection {
     /// Connects to a share, and looks for the line there.
-    pub(super) fn open(port: &Place) -> Result<Self, PortError> {
+    pub(super) fn open(port: &LineAddress) -> Result<Self, PortError> {
         let stream = port.at.connect().map_err(|error| port.unreachable(error))?;
         let mut opened = Connection {
             socket: Socket::new(FdLink::new(stream, port.name())?),
@@ -100,36 +100,8 @@ impl Connection {
         }
     }
 
-    pub(super) fn holder(&self) -> Holder {
-        self.holder
-    }
-
     pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
         self.socket.descriptor()
-    }
-
-    /// The next command must not be sent later than this.
-    pub(super) fn expire_next(&self, time_to_live: Duration) {
-        self.expires.set(time_to_live.min(TIME_TO_LIVE));
-    }
-
-    /// The program has moved these motors through an earlier connection.
-    pub(super) fn claim(&self, motors: &[u8]) {
-        self.claims.set(motors.to_vec());
-    }
-
-    /// Whether the share refuses commands to motors that the program does not own.
-    pub(super) fn only_own(&self, is_set: bool) {
-        self.is_own.set(is_set);
-    }
-
-    /// What the share does with the motors of this program when it leaves.
-    pub(super) fn end_with(&self, ending: port::Ending) {
-        self.ending.set(match ending {
-            port::Ending::Stop => Ending::Stop,
-            port::Ending::Off => Ending::Off,
-            port::Ending::Nothing => Ending::Nothing,
-        });
     }
 
     /// Sends a command to a motor; gives its id.
@@ -177,7 +149,7 @@ impl Connection {
             Protocol::St => DriveProtocol::St(self.holder.profile.unwrap_or_default()),
             Protocol::Rmd => DriveProtocol::Rmd,
         };
-        Kind::of_bytes(speaks, motor, bytes).changes()
+        CommandKind::of_bytes(speaks, motor, bytes).changes()
     }
 
     /// Sends a request; gives its id.
@@ -223,6 +195,32 @@ impl Connection {
 
     fn gone(&self) -> PortError {
         self.port.missing(self.port.at.ended(self.closing.as_deref()))
+    }
+}
+
+impl Link for Connection {
+    fn holder(&self) -> Option<Holder> {
+        Some(self.holder)
+    }
+
+    fn expire_next(&self, time_to_live: Duration) {
+        self.expires.set(time_to_live.min(TIME_TO_LIVE));
+    }
+
+    fn claim(&self, motors: &[u8]) {
+        self.claims.set(motors.to_vec());
+    }
+
+    fn only_own(&self, is_set: bool) {
+        self.is_own.set(is_set);
+    }
+
+    fn end_with(&self, ending: port::Ending) {
+        self.ending.set(match ending {
+            port::Ending::Stop => Ending::Stop,
+            port::Ending::Off => Ending::Off,
+            port::Ending::Nothing => Ending::Nothing,
+        });
     }
 }
 

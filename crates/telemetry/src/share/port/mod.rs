@@ -2,7 +2,7 @@
 
 mod bus;
 mod connection;
-mod place;
+mod line_address;
 mod pulse;
 mod serial;
 
@@ -18,7 +18,7 @@ use motorlink::port::{
 use super::address::{Address, Local};
 use super::message::{LONGEST_DEADLINE, Protocol, SHORTEST_DEADLINE};
 use bus::ShareBus;
-use place::{Deadlines, Place};
+use line_address::{Deadlines, LineAddress};
 use serial::ShareLine;
 
 /// Registers the port `share:` in this process.
@@ -28,7 +28,7 @@ pub fn register() {
 
 /// Where the share is and the name of the line there, if the port is a line of a share.
 pub fn place_of(port: &PortName) -> Option<(Arc<dyn Address>, String)> {
-    let place: &Place = port.holder()?.downcast_ref()?;
+    let place: &LineAddress = port.holder()?.downcast_ref()?;
     Some((Arc::clone(&place.at), place.line.clone()))
 }
 
@@ -49,7 +49,7 @@ fn named_port(
         .into_iter()
         .find(|protocol| line.starts_with(protocol.word()))?;
     let line = line.to_owned();
-    Some(PortName::new(SharePort(Place { at, deadlines, line, protocol, options })))
+    Some(PortName::new(SharePort(LineAddress { at, deadlines, line, protocol, options })))
 }
 
 /// `share:PATH/LINE`.
@@ -133,7 +133,7 @@ fn deadline(given: &Given<'_>, option: &'static str, text: &str) -> Result<Durat
 
 /// A line of a share.
 #[derive(Debug)]
-struct SharePort(Place);
+struct SharePort(LineAddress);
 
 impl Port for SharePort {
     fn body(&self) -> String {

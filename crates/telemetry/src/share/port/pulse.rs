@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use motorlink::port::{ByteLink, FdLink, PortError};
 
-use crate::share::frame::{Kind, append};
+use crate::share::frame::{FrameKind, append};
 use crate::share::message::{Ask, Request, encode};
 
 /// Signs of life within a deadline.
@@ -61,7 +61,7 @@ impl Socket {
 fn give_signs(shared: &Weak<Shared>, period: Duration) {
     let mut sign = Vec::new();
     // It is not too long.
-    let _ = append(Kind::Text, &encode(&Request::new(0, Ask::Alive)), &mut sign);
+    let _ = append(FrameKind::Text, &encode(&Request::new(0, Ask::Alive)), &mut sign);
     loop {
         thread::sleep(period);
         let Some(shared) = shared.upgrade() else { return };

@@ -4,17 +4,17 @@ use std::cell::Cell;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, Ending, Evented, Holder, Link, PortError};
+use motorlink::port::{ByteLink, Evented, Link, PortError};
 use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Parse};
 
 use super::connection::Connection;
-use super::place::Place;
+use super::line_address::LineAddress;
 use crate::share::client_codec::Ended;
 use crate::share::message::{Answer, Ask};
 
 /// Turns the frames of a master into commands, and their answers into replies.
 pub(super) struct ShareLine {
-    port: Place,
+    port: LineAddress,
     connection: Connection,
     /// The beginning of a frame.
     sent: Vec<u8>,
@@ -35,7 +35,7 @@ struct Pending {
 }
 
 impl ShareLine {
-    pub(super) fn open(place: &Place) -> Result<Self, PortError> {
+    pub(super) fn open(place: &LineAddress) -> Result<Self, PortError> {
         Ok(ShareLine {
             port: place.clone(),
             connection: Connection::open(place)?,
@@ -101,29 +101,13 @@ impl ShareLine {
 }
 
 impl Link for ShareLine {
-    fn holder(&self) -> Option<Holder> {
-        Some(self.connection.holder())
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.connection)
     }
 
     /// The requests to all motors of a line share its replies.
     fn confirm_next(&self, _: u8) {
         self.confirms.set(true);
-    }
-
-    fn expire_next(&self, time_to_live: Duration) {
-        self.connection.expire_next(time_to_live);
-    }
-
-    fn only_own(&self, is_set: bool) {
-        self.connection.only_own(is_set);
-    }
-
-    fn claim(&self, motors: &[u8]) {
-        self.connection.claim(motors);
-    }
-
-    fn end_with(&self, ending: Ending) {
-        self.connection.end_with(ending);
     }
 }
 

@@ -7,7 +7,7 @@ use std::os::unix::net::UnixStream;
 use litemap::LiteMap as Map;
 use motorlink_proto::st::Profile;
 
-use super::target::{Followed, Item, Wanted};
+use super::subscription::{Followed, Item, Wanted};
 use crate::share::VERSION;
 use crate::share::client_codec::{ClientCodec, Ended, Heard};
 use crate::share::clock::Clock;

@@ -2,7 +2,7 @@
 //!
 //! Nothing is decoded until a program asks.
 
-mod memory;
+mod frame_ring;
 mod reading;
 mod record;
 #[cfg(test)]
@@ -17,10 +17,10 @@ use motorlink::port::{Direction as Way, EventBytes, EventCan, TapBytes, TapCan};
 use motorlink_capture::Direction;
 use motorlink_proto::time::{Instant, Micros};
 
-use memory::Memory;
+use frame_ring::Memory;
 use record::What;
 
-pub use memory::{KEPT, MEMORY};
+pub use frame_ring::{KEPT, MEMORY};
 pub(super) use reading::{Part, read};
 
 /// The most frames of an answer.

@@ -11,10 +11,10 @@ use motorlink_proto::rmd::{self, Code, MotorId, Subject, describe};
 use motorlink_proto::st::{Frame, HEADER_NACK};
 use motorlink_proto::time::{Instant, Micros};
 
-use super::memory::{Block, Configured};
+use super::frame_ring::{Block, Configured};
 use super::record::{Seen, What, records};
 use super::{MOST_FRAMES, Tap};
-use crate::share::event_text::DriveProtocol;
+use crate::share::drive_protocol::DriveProtocol;
 use crate::share::hub::seconds;
 use crate::share::message::{Answer, WireFrame, WireLoad, WireResult, WireWay};
 
@@ -50,7 +50,7 @@ impl Part {
         self.most.clamp(1, MOST_FRAMES) as usize
     }
 
-    fn has(&self, frame: &Told) -> bool {
+    fn has(&self, frame: &DecodedFrame) -> bool {
         self.from.is_none_or(|from| frame.at >= from)
             && self.to.is_none_or(|to| frame.at <= to)
             && self.after.is_none_or(|after| frame.number > after)
@@ -83,7 +83,7 @@ impl Part {
 }
 
 /// A frame, and what is known of its exchange.
-struct Told {
+struct DecodedFrame {
     number: u64,
     at: Instant,
     direction: Direction,
@@ -112,7 +112,7 @@ struct Reading {
     meaning: Meaning,
     /// The number of the next frame.
     number: u64,
-    frames: Vec<Told>,
+    frames: Vec<DecodedFrame>,
     open: Vec<Open>,
 }
 
@@ -155,7 +155,7 @@ pub(in crate::share) fn read(
     }
     let (frames, more) = reading.finish(&part, until);
     let load = WireLoad::of(&frames);
-    let frames = frames.into_iter().map(Told::message).collect();
+    let frames = frames.into_iter().map(DecodedFrame::message).collect();
     let kept_since = kept_since.map(seconds);
     Answer::Frames { frames, more, missed, kept_since, load }
 }
@@ -211,7 +211,7 @@ impl Reading {
     }
 
     /// Gives the frames that are asked for, and whether there are more. `now`: everything was read.
-    fn finish(self, part: &Part, now: Option<Instant>) -> (Vec<Told>, bool) {
+    fn finish(self, part: &Part, now: Option<Instant>) -> (Vec<DecodedFrame>, bool) {
         let Reading { timeout, mut frames, open, .. } = self;
         let mut end = frames.len();
         for Open { frame, .. } in open {
@@ -227,9 +227,9 @@ impl Reading {
         }
         frames.truncate(end);
         frames.retain(|frame| part.has(frame));
-        let size = |frame: &Told| FRAME_TEXT + frame.words.len() + 3 * frame.bytes.len();
+        let size = |frame: &DecodedFrame| FRAME_TEXT + frame.words.len() + 3 * frame.bytes.len();
         let (mut count, mut text) = (0, 0);
-        let mut fits = |frame: &Told| {
+        let mut fits = |frame: &DecodedFrame| {
             count += 1;
             text += size(frame);
             count <= part.most() && text <= MOST_TEXT
@@ -249,7 +249,7 @@ impl Reading {
 /// Where the frames of a record go.
 struct Out<'a> {
     number: &'a mut u64,
-    frames: &'a mut Vec<Told>,
+    frames: &'a mut Vec<DecodedFrame>,
     open: &'a mut Vec<Open>,
     timeout: Micros,
 }
@@ -369,7 +369,7 @@ impl Out<'_> {
         let (number, bytes) = (*self.number, bytes.to_vec());
         *self.number += 1;
         let (is_unanswered, ended) = (false, None);
-        self.frames.push(Told {
+        self.frames.push(DecodedFrame {
             number,
             at,
             direction,
@@ -396,7 +396,7 @@ fn is_reply(message: &Message<'_>) -> bool {
     matches!(message, Message::Acknowledged(..) | Message::Refused(_))
 }
 
-impl Told {
+impl DecodedFrame {
     fn message(self) -> WireFrame {
         WireFrame {
             number: self.number,
@@ -424,8 +424,9 @@ impl Told {
 }
 
 impl WireLoad {
-    fn of(frames: &[Told]) -> Self {
-        let count = |is: fn(&Told) -> bool| frames.iter().filter(|frame| is(frame)).count() as u32;
+    fn of(frames: &[DecodedFrame]) -> Self {
+        let count =
+            |is: fn(&DecodedFrame) -> bool| frames.iter().filter(|frame| is(frame)).count() as u32;
         let ends = frames.iter().map(|frame| frame.at);
         let (from, to) = (ends.clone().min(), ends.max());
         let span = from.zip(to).map_or(0, |(from, to)| to.since(from).0);
@@ -440,7 +441,7 @@ impl WireLoad {
         WireLoad {
             from: from.map(seconds),
             to: to.map(seconds),
-            bits: frames.iter().map(Told::bits).sum(),
+            bits: frames.iter().map(DecodedFrame::bits).sum(),
             busy: if span == 0 { 0.0 } else { busy as f64 / span as f64 },
             nacks: count(|frame| frame.result == WireResult::Nack),
             damaged: count(|frame| frame.result == WireResult::Damaged),

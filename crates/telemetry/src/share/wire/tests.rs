@@ -5,7 +5,7 @@ use motorlink_proto::st::{HEADER_ACK, MAX_FRAME, Profile, RegisterId};
 use motorlink_proto::time::Instant;
 
 use super::*;
-use crate::share::event_text::DriveProtocol;
+use crate::share::drive_protocol::DriveProtocol;
 use crate::share::message::{Answer, WireFrame, WireLoad, WireResult, WireWay};
 
 const TIMEOUT: Micros = Micros::from_millis(50);

@@ -1,0 +1,220 @@
+//! Queries of programs, and the sessions that they belong to.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, MutexGuard, PoisonError};
+
+use motorlink_telemetry::share::client::{Program, UNAWAITED};
+use motorlink_telemetry::share::message::{Ask as ShareAsk, Request};
+use tokio::runtime::{Handle, Runtime};
+use tokio::sync::mpsc::error::TrySendError;
+use tokio::sync::mpsc::{Receiver, channel};
+use zenoh::Wait;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::Query;
+use zenoh::sample::SampleKind;
+
+use super::common::{Common, answer};
+use super::outbox::Outbox;
+use super::request_order::RequestOrder;
+use super::session::Session;
+use super::sessions::{Asked, Asking, Open, Sessions};
+use crate::VERSION;
+use crate::key::{self, Asker, Name, Scope};
+use crate::message::{Answer, Ask, LONGEST_ASK, LONGEST_DEADLINE, SHORTEST_DEADLINE};
+
+/// Sessions at one time: a share has 64 programs.
+const MOST_SESSIONS: usize = 48;
+/// The same with those that come to stop motors.
+const WITH_STOPS: usize = 60;
+/// Queries of a session that wait.
+const QUERIES: usize = 256;
+/// Sessions that are over and whose reason is remembered.
+const REASONS: usize = 256;
+/// The longest name of a program in the log, in bytes.
+const LONGEST_PROGRAM: usize = 20;
+
+/// Takes queries from now on.
+pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {
+    let zenoh = &common.zenoh;
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
+    let asked = move |query: Query| router.asked(query, &handle);
+    zenoh
+        .declare_queryable(key::all_asks(&common.name, &common.boot))
+        .callback(asked)
+        .background()
+        .wait()?;
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
+    let said = move |query: Query| {
+        let router = Arc::clone(&router);
+        handle.spawn(async move { router.say_info(&query).await });
+    };
+    let info = key::info(&common.name, &common.boot);
+    zenoh.declare_queryable(info).callback(said).background().wait()?;
+    let (router, handle) = (Arc::clone(common), runtime.handle().clone());
+    let here = move |sample: zenoh::sample::Sample| {
+        if sample.kind() == SampleKind::Delete
+            && let Some((who, session)) = key::parse_session_token(sample.key_expr().as_str())
+        {
+            router.gone(&who, &session, &handle);
+        }
+    };
+    let all = key::all_here(&common.name, &common.boot);
+    zenoh.liveliness().declare_subscriber(all).callback(here).background().wait()?;
+    zenoh.liveliness().declare_token(key::alive(&common.name, &common.boot)).wait()
+}
+
+impl Common {
+    fn sessions(&self) -> MutexGuard<'_, Sessions> {
+        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn asked(self: &Arc<Self>, query: Query, handle: &Handle) {
+        let t = self.clock.now();
+        let refuse = |why: String| answer(&query, &Answer::Refused { t, why });
+        let Some(asker) = Asker::of(query.key_expr().as_str()) else {
+            return refuse("the key does not say who asks for what".to_owned());
+        };
+        let bytes = query.payload().map(|payload| payload.to_bytes());
+        if bytes.as_ref().is_some_and(|bytes| bytes.len() > LONGEST_ASK) {
+            return refuse(format!("a request has up to {LONGEST_ASK} bytes"));
+        }
+        let ask: Ask = match serde_json::from_slice(&bytes.unwrap_or_default()) {
+            Ok(ask) => ask,
+            Err(error) => return refuse(format!("the request cannot be read: {error}")),
+        };
+        let Asker { scope, who, session } = asker;
+        let mut sessions = self.sessions();
+        sessions.heard(&session, t);
+        if matches!(ask, Ask::Join { .. }) && sessions.open.len() >= session_limit(scope) {
+            sessions.forget_silent(t);
+        }
+        let known = sessions.open.get(&session);
+        if let Some(Open { who: owner, .. }) = known
+            && *owner != who
+        {
+            return refuse("this is the session of somebody else".to_owned());
+        }
+        let sender = match (known, &ask) {
+            (Some(Open { asked, .. }), _) => asked.clone(),
+            (None, Ask::Join { .. }) if sessions.open.len() >= session_limit(scope) => {
+                return refuse(format!("the node has {MOST_SESSIONS} programs, its most"));
+            }
+            (None, Ask::Join { protocol, program, deadline, motion }) => {
+                let new = match JoinRequest::of(*protocol, program, *deadline, *motion) {
+                    Ok(new) => new,
+                    Err(why) => return refuse(why),
+                };
+                let (sender, asked) = channel(QUERIES);
+                let open = Open { who: who.clone(), asked: sender.clone(), heard: t };
+                sessions.open.insert(session.clone(), open);
+                handle.spawn(Arc::clone(self).serve(session, who, new, asked));
+                sender
+            }
+            (None, _) => {
+                let over = sessions.over.iter().find(|(it, _)| *it == session);
+                let why = over.map_or("no such session at this node", |(_, why)| why);
+                return answer(&query, &Answer::Over { t, why: why.to_owned() });
+            }
+        };
+        drop(sessions);
+        let asking = Box::new(Asking { query, ask, scope });
+        if let Err(TrySendError::Full(Asked::Query(asking))) = sender.try_send(Asked::Query(asking))
+        {
+            let query = asking.query;
+            let why = "too many requests of this session wait".to_owned();
+            answer(&query, &Answer::Refused { t, why });
+        }
+    }
+
+    /// A program or its network has gone. What it sees is kept for a moment; its motors stop now.
+    fn gone(self: &Arc<Self>, who: &Name, session: &Name, handle: &Handle) {
+        let sessions = self.sessions();
+        let open = sessions.open.get(session).filter(|open| open.who == *who);
+        let asked = open.map(|open| open.asked.clone());
+        drop(sessions);
+        if let Some(asked) = asked {
+            handle.spawn(async move { asked.send(Asked::Gone).await });
+        }
+    }
+
+    /// Serves one session.
+    async fn serve(
+        self: Arc<Self>,
+        session: Name,
+        who: Name,
+        new: JoinRequest,
+        asked: Receiver<Asked>,
+    ) {
+        let JoinRequest { program, deadline, motion } = new;
+        let name = format!("{who} ({program})");
+        let why = match Program::connect(&self.share, &name).await {
+            Err(error) => format!("the share of the node: {error}"),
+            Ok((program, listener, _)) => {
+                let ask = ShareAsk::Deadline { silence: Some(deadline), motion };
+                // A share that is lost is noticed when it is read.
+                let _ = program.pass(&Request::new(UNAWAITED, ask)).await;
+                let served = Session {
+                    common: Arc::clone(&self),
+                    order: RequestOrder::new(),
+                    heard: self.clock.now(),
+                    has_commanded: false,
+                    deadline,
+                    motion,
+                    program,
+                    listener,
+                    outbox: Outbox::default(),
+                    waiting: BTreeSet::new(),
+                    pull: None,
+                    last_pull: 0,
+                    closing: None,
+                };
+                served.serve(asked).await
+            }
+        };
+        let mut sessions = self.sessions();
+        sessions.open.remove(&session);
+        if sessions.over.len() >= REASONS {
+            sessions.over.pop_front();
+        }
+        sessions.over.push_back((session, why));
+    }
+}
+
+/// How many sessions there are before one with this key.
+fn session_limit(scope: Scope) -> usize {
+    match scope {
+        Scope::Stop => WITH_STOPS,
+        Scope::See | Scope::Act => MOST_SESSIONS,
+    }
+}
+
+/// A session that may begin.
+struct JoinRequest {
+    program: String,
+    deadline: f64,
+    motion: Option<f64>,
+}
+
+impl JoinRequest {
+    fn of(
+        protocol: u32,
+        program: &str,
+        deadline: f64,
+        motion: Option<f64>,
+    ) -> Result<Self, String> {
+        if protocol != VERSION {
+            return Err(format!("this node speaks version {VERSION}, the program {protocol}"));
+        }
+        let is_name = (1..=LONGEST_PROGRAM).contains(&program.len());
+        if !is_name || !program.chars().all(motorlink_link::is_printable) {
+            return Err(format!(
+                "the name of a program has 1 to {LONGEST_PROGRAM} bytes that can be printed"
+            ));
+        }
+        let possible = SHORTEST_DEADLINE..=LONGEST_DEADLINE;
+        if !possible.contains(&deadline) || motion.is_some_and(|it| !possible.contains(&it)) {
+            return Err(format!("a deadline is {SHORTEST_DEADLINE} to {LONGEST_DEADLINE} s"));
+        }
+        Ok(JoinRequest { program: program.to_owned(), deadline, motion })
+    }
+}

@@ -1,0 +1,96 @@
+//! Opens the ports of a share's lines.
+
+use std::time::Duration;
+
+use motorlink::port::PortName;
+use motorlink::st::Profile;
+use motorlink::{rmd, st};
+
+use super::drive_protocol::DriveProtocol;
+use super::message::Protocol;
+use super::wire::Tap;
+use crate::acquisition::Acquisition;
+use crate::line::{RmdLine, StLine};
+
+/// A port that a share opens, and how its drives are spoken to.
+#[derive(Debug, Clone)]
+pub struct PortConfig {
+    /// The port.
+    pub port: PortName,
+    /// The profile of ST drives.
+    pub profile: Profile,
+    /// How long to wait for a reply; that of the protocol without it.
+    pub timeout: Option<Duration>,
+    /// What no request may exceed, of whatever program.
+    pub limits: Limits,
+}
+
+/// What the requests of all programs of a share may not exceed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Limits {
+    /// Those of ST drives.
+    pub st: st::Limits,
+    /// Those of RMD motors.
+    pub rmd: rmd::Limits,
+}
+
+/// A port that is open, and its engine.
+pub struct Opened {
+    /// The port.
+    pub port: PortName,
+    /// What its drives speak.
+    pub speaks: DriveProtocol,
+    /// The engine.
+    pub engine: Acquisition,
+    /// What is around the port.
+    pub tap: Tap,
+}
+
+/// Why a port is not open.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// That of an ST drive.
+    #[error(transparent)]
+    St(#[from] st::Error),
+    /// That of RMD motors.
+    #[error(transparent)]
+    Rmd(#[from] rmd::Error),
+}
+
+impl PortConfig {
+    /// The protocols that the port can have.
+    pub fn protocols(&self) -> Vec<Protocol> {
+        let st = self.port.as_line().map(|_| Protocol::St);
+        st.into_iter().chain(self.port.as_can().map(|_| Protocol::Rmd)).collect()
+    }
+
+    /// Opens the port, which may wait.
+    ///
+    /// # Errors
+    /// What keeps it from being opened.
+    pub fn open(&self, protocol: Protocol) -> Result<Opened, OpenError> {
+        let tap = Tap::default();
+        let around = tap.clone();
+        let (speaks, engine) = match protocol {
+            Protocol::St => {
+                let defaults = st::Options::default();
+                let timeout = self.timeout.unwrap_or(defaults.timeout);
+                let (profile, limits) = (self.profile, self.limits.st);
+                let options = st::Options { profile, timeout, limits, ..defaults };
+                let wrap = move |link| around.around_line(link);
+                let client = st::EventClient::open_wrapped(&self.port, wrap, options)?;
+                (DriveProtocol::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
+            }
+            Protocol::Rmd => {
+                let defaults = rmd::Options::default();
+                let timeout = self.timeout.unwrap_or(defaults.timeout);
+                let limits = self.limits.rmd;
+                let options = rmd::Options { timeout, limits, ..defaults };
+                let wrap = move |link| around.around_bus(link);
+                let client = rmd::EventClient::open_wrapped(&self.port, wrap, options)?;
+                (DriveProtocol::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))
+            }
+        };
+        Ok(Opened { port: self.port.clone(), speaks, engine, tap })
+    }
+}
