@@ -54,7 +54,7 @@ def test_every_example_of_every_help_runs(run, motorlink, tmp_path, command):
     path = f"{Path(motorlink).resolve().parent}:{os.environ['PATH']}"
     # Commands of a fleet go to one node.
     for together in [lines] if command == "fleet" else [[line] for line in lines]:
-        with Shell(tmp_path, PATH=path, MOTORLINK_RMD_TIMEOUT="500ms") as shell:
+        with Shell(tmp_path, PATH=path, MOTORLINK_RMD_TIMEOUT="2s") as shell:
             for line in together:
                 words = next(commands(line))[1]
                 config = "servo.toml" if "mcsdk-5.4" in line else ""

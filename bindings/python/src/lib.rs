@@ -62,7 +62,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         motorlink_testbench::register();
         motorlink_telemetry::share::port::register();
-        motorlink_fleet::port::register();
+        motorlink_fleet::port_scheme::register();
         let finish = wrap_pyfunction!(leave_nodes, module)?;
         module.py().import("atexit")?.call_method1("register", (finish,))?;
         module.add("ST_SEGMENTS", motorlink_proto::st::SEGMENTS)?;

@@ -158,7 +158,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
     motorlink_testbench::register();
     motorlink_telemetry::share::port::register();
     #[cfg(feature = "fleet")]
-    motorlink_fleet::port::register();
+    motorlink_fleet::port_scheme::register();
     let words = own_words(words);
     let is_shown = |word: &OsString| word.to_string_lossy().chars().all(is_printable);
     let has_control_characters = !words.iter().all(is_shown);

@@ -8,7 +8,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
 
-use crate::certificate::Certificate;
+use crate::certificate_info::Certificate;
 
 /// What all configurations of Motorlink say: paths, and values in JSON.
 const USUAL: [(&str, &str); 7] = [

@@ -11,7 +11,7 @@
 //! sent, and a motor of a program that gives no sign of life is stopped.
 #![forbid(unsafe_code)]
 
-mod certificate;
+mod certificate_info;
 pub mod clock;
 pub mod computer;
 mod config;
@@ -21,9 +21,9 @@ mod membership;
 pub mod message;
 pub mod network;
 pub mod node;
-pub mod port;
+pub mod port_scheme;
 pub mod remote;
-mod request_scope;
+mod request_permission;
 pub mod ros2;
 pub mod site;
 pub mod view;

@@ -9,7 +9,7 @@ use serde_json::json;
 use zenoh::config::EndPoint;
 use zenoh::{Config, Session, Wait};
 
-use crate::certificate::Certificate;
+use crate::certificate_info::Certificate;
 use crate::config::ConfigFile;
 use crate::key::Name;
 use crate::site::{self, Role};

@@ -17,7 +17,7 @@ use crate::clock::Clock;
 use crate::key::Name;
 use crate::membership::Membership;
 use crate::message::{Answer, NoAnswer};
-use crate::request_scope::Lines;
+use crate::request_permission::Lines;
 
 /// What all tasks of a node have.
 pub(super) struct Common {

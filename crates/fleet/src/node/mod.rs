@@ -1,12 +1,12 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
 mod common;
-mod drive_reader;
-mod outbox;
-mod peers;
-mod publish;
-mod queries;
-mod request_order;
+mod drive_backend;
+mod motor_queries;
+mod peer_discovery;
+mod publisher;
+mod request_admission;
+mod send_buffer;
 mod session;
 mod session_router;
 mod sessions;
@@ -28,7 +28,7 @@ use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
 use common::Common;
 
-pub use drive_reader::{Drive, Reader, Reading};
+pub use drive_backend::{Drive, Reader, Reading};
 
 /// The longest time until others see a node.
 const SEEN: Duration = Duration::from_secs(2);
@@ -117,9 +117,9 @@ impl Node {
             sessions,
             members,
         });
-        peers::follow(&common).map_err(failed)?;
-        runtime.block_on(publish::start(&common, period))?;
-        runtime.block_on(queries::open(&common, reader))?;
+        peer_discovery::follow(&common).map_err(failed)?;
+        runtime.block_on(publisher::start(&common, period))?;
+        runtime.block_on(motor_queries::open(&common, reader))?;
         let alive = session_router::open(&common, &runtime).map_err(failed)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {
@@ -148,7 +148,7 @@ impl Node {
 
     /// Leaves the network, and says that its motors have been stopped.
     pub fn end(self) {
-        peers::say_end(&self.common);
+        peer_discovery::say_end(&self.common);
     }
 
     /// What ROS 2 machines see of it.

@@ -14,13 +14,13 @@ use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
 use super::common::{Common, answer, answer_with};
-use super::outbox::Outbox;
-use super::request_order::{RequestOrder, Verdict, age};
+use super::request_admission::{RequestOrder, Verdict, age};
+use super::send_buffer::Outbox;
 use super::sessions::{Asked, Asking};
 use crate::clock::span;
 use crate::key::Scope;
 use crate::message::{Answer, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
-use crate::request_scope;
+use crate::request_permission;
 
 /// Requests without an answer. A share that has 256 answers for a program takes no more of its requests.
 const REQUESTS: usize = 128;
@@ -256,9 +256,10 @@ fn forbidden(post: &Post, kind: CommandKind, scope: Scope) -> Option<String> {
         () if is_of_session => Some(
             "a session begins with join, which says its deadlines, and ends with leave".to_owned(),
         ),
-        () if scope < request_scope::scope(kind) => {
-            Some(format!("this request needs the key of `{}`", request_scope::scope(kind).word()))
-        }
+        () if scope < request_permission::scope(kind) => Some(format!(
+            "this request needs the key of `{}`",
+            request_permission::scope(kind).word()
+        )),
         () => None,
     }
 }

@@ -14,8 +14,8 @@ use zenoh::query::Query;
 use zenoh::sample::SampleKind;
 
 use super::common::{Common, answer};
-use super::outbox::Outbox;
-use super::request_order::RequestOrder;
+use super::request_admission::RequestOrder;
+use super::send_buffer::Outbox;
 use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;

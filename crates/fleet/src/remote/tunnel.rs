@@ -28,7 +28,7 @@ use crate::VERSION;
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
 use crate::message::{Answer, Ask};
-use crate::request_scope::{self, Lines};
+use crate::request_permission::{self, Lines};
 
 /// How long a node keeps a pull, in seconds.
 const WAIT: f64 = 0.25;
@@ -296,7 +296,7 @@ impl Tunnel {
                     (QueryKind::Urgent(post.number), Scope::Stop, Priority::RealTime)
                 }
                 Ask::Post(post) => {
-                    let scope = request_scope::scope(self.lines.kind(&post.request.ask));
+                    let scope = request_permission::scope(self.lines.kind(&post.request.ask));
                     let priority = match scope {
                         Scope::Act => Priority::InteractiveHigh,
                         Scope::See | Scope::Stop => Priority::DataHigh,

@@ -20,13 +20,13 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::Sample;
 use zenoh::{Session as Zenoh, Wait};
 
-use super::commands::{Commands, Order, Output};
+use super::command_arbiter::{Commands, Order, Output};
 use super::joint::Joint;
+use super::motion_executor::{Failed, Mover};
 use super::motor_client::MotorClient;
-use super::moving::{Failed, Mover};
-use super::readings::Readings;
 use super::rmw_zenoh::{Attachment, Endpoint};
 use super::status_messages::{self, Known};
+use super::value_cache::Readings;
 use crate::clock::Clock;
 
 /// How often diagnostics are published.

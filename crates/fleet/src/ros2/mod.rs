@@ -2,17 +2,17 @@
 //! and diagnostics, obeys joint commands, and has two services.
 
 mod bridge;
-mod commands;
+mod command_arbiter;
 mod joint;
-mod latency;
+mod motion_executor;
 mod motor_client;
-mod moving;
-mod readings;
 mod rmw_zenoh;
 mod service;
+mod staleness;
 mod status_messages;
-mod trigger;
+mod trigger_type;
 mod type_hash;
+mod value_cache;
 
 use std::io;
 use std::sync::Arc;
@@ -26,12 +26,12 @@ use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
 use bridge::{Machine, NAME, Shared};
-use commands::{Commands, Rules};
+use command_arbiter::{Commands, Rules};
 use motorlink_recording::schema::{DiagnosticArray, JointState, Message};
-use readings::Readings;
 use rmw_zenoh::{Endpoint, EndpointKind, Graph};
 use service::Service;
-use trigger::{TRIGGER, trigger};
+use trigger_type::{TRIGGER, trigger};
+use value_cache::Readings;
 
 pub use joint::Settings;
 

@@ -12,7 +12,7 @@ use zenoh::{Session as Zenoh, Wait};
 use super::bridge::Shared;
 use super::motor_client::{self, MotorClient};
 use super::rmw_zenoh::{Attachment, Endpoint};
-use super::trigger::TriggerResponse;
+use super::trigger_type::TriggerResponse;
 
 /// What a service does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use motorlink_recording::schema::{DiagnosticArray, DiagnosticStatus, JointState, Level, Time};
 use motorlink_telemetry::share::message::Line;
 
-use super::commands::Commands;
+use super::command_arbiter::Commands;
 use super::joint::Joint;
-use super::readings::{Reading, Readings};
+use super::value_cache::{Reading, Readings};
 
 /// The state of all joints whose values are not older than `age` seconds. NaN marks a missing value. Without a
 /// torque constant there are no efforts. The stamp is that of the oldest value. `None` without joints.
@@ -131,9 +131,9 @@ fn time(wall: f64) -> Time {
 
 #[cfg(test)]
 mod tests {
-    use super::super::commands::Rules;
+    use super::super::command_arbiter::Rules;
     use super::super::joint::tests::{joint, lines};
-    use super::super::readings::tests::readings;
+    use super::super::value_cache::tests::readings;
     use super::*;
 
     fn joints() -> Vec<Joint> {

@@ -81,7 +81,7 @@ fn field((kind, name): (&str, &str)) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::trigger::{TRIGGER, trigger};
+    use super::super::trigger_type::{TRIGGER, trigger};
     use super::*;
     use motorlink_recording::schema::{DiagnosticArray, JointState, Message as _};
 

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::authority::{Authority, Pair};
 use super::error::SiteError;
-use crate::certificate::Certificate;
+use crate::certificate_info::Certificate;
 use crate::config::ConfigFile;
 use crate::key::Name;
 

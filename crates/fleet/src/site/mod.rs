@@ -27,7 +27,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::json;
 
-use crate::certificate::Certificate;
+use crate::certificate_info::Certificate;
 use crate::config::ConfigFile;
 use crate::key::Name;
 use authority::{Authority, Pair};

@@ -17,8 +17,8 @@ use motorlink_telemetry::share::message::{
     Answer, Ask, Event, EventKind, Line, Reason, Request, SignalName, Text, decode, encode,
 };
 
+use super::latch_state::Latches;
 use super::member::{Member, State};
-use super::motion_latch::Latches;
 use super::names;
 use super::round::{Round, RoundKind};
 use crate::key::Name;

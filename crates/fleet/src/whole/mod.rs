@@ -4,11 +4,11 @@
 //! back. `aggregate` decides, without sockets and clocks.
 
 mod aggregate;
+mod fleet_session;
+mod latch_state;
 mod member;
-mod motion_latch;
 mod names;
 mod round;
-mod serve;
 
 use std::collections::BTreeSet;
 use std::os::unix::net::UnixStream;
@@ -19,8 +19,8 @@ use crate::key::Name;
 use crate::network::Network;
 use crate::remote::{self, Remote};
 use aggregate::Aggregate;
-use motion_latch::Latches;
-use serve::{AbsentNodes, FleetSession};
+use fleet_session::{AbsentNodes, FleetSession};
+use latch_state::Latches;
 
 /// The nodes of a network.
 #[derive(Debug, Clone)]

@@ -64,7 +64,7 @@ impl World {
 
     /// The name of a line's port, over this address.
     pub fn port(&self, line: &str, address: &str, options: &str) -> String {
-        motorlink_fleet::port::register();
+        motorlink_fleet::port_scheme::register();
         format!("zenoh:{}/{line}?via=tcp/{address}{options}", self.name)
     }
 

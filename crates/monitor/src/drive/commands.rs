@@ -16,7 +16,7 @@ use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::motor_exchange::Target;
 use motorlink_telemetry::signal::Motor;
 
-use super::value;
+use super::value_format;
 use crate::message::{self, Field, Value};
 
 /// A command of a protocol.
@@ -171,7 +171,7 @@ impl Command {
                 // The reply to these repeats the request.
                 let fields = row.reply.iter().filter(|_| !row.echo);
                 let value = |field: &RmdField| {
-                    value::of_field(field.name_with_unit().to_string(), field, data)
+                    value_format::of_field(field.name_with_unit().to_string(), field, data)
                 };
                 Some(fields.map(value).collect())
             }
@@ -182,13 +182,14 @@ impl Command {
                         let board = BoardInfo::decode(reply)?;
                         let [major, minor, patch] = board.version;
                         Some(vec![
-                            value::text("name", motorlink_link::printable(board.name)),
-                            value::text("version", format!("{major}.{minor}.{patch}")),
+                            value_format::text("name", motorlink_link::printable(board.name)),
+                            value_format::text("version", format!("{major}.{minor}.{patch}")),
                         ])
                     }
                     Content::FirmwareVersion => {
                         let firmware = FirmwareVersion::decode(reply);
-                        let text = |name, text| value::text(name, motorlink_link::printable(text));
+                        let text =
+                            |name, text| value_format::text(name, motorlink_link::printable(text));
                         Some(vec![text("name", firmware.name), text("version", firmware.version)])
                     }
                     _ => content
@@ -246,7 +247,7 @@ fn st_fields(code: FrameCode, profile: Profile) -> Vec<StNumber> {
 fn described(field: &StNumber) -> Field {
     let range = match field.value.ty {
         Type::F32 => [f32::MIN.into(), f32::MAX.into(), 0.0],
-        _ => value::range(&field.scale),
+        _ => value_format::range(&field.scale),
     };
     let (name, doc) = (field.value.name.to_owned(), field.value.label.to_owned());
     Field { name, doc, unit: field.scale.symbol.to_owned(), range, words: Vec::new() }
@@ -285,7 +286,7 @@ fn rmd_described(field: &RmdField) -> Field {
         Meaning::Words(words) => words.iter().map(|(_, word)| (*word).to_owned()).collect(),
         Meaning::Number | Meaning::Bits(_) => Vec::new(),
     };
-    let mut range = value::range(&field.scale);
+    let mut range = value_format::range(&field.scale);
     if let Some(most) = words.len().checked_sub(1) {
         range[1] = most as f64;
     }

@@ -1,20 +1,20 @@
 //! What pages ask of drives: registers, commands, motion, limits and settings.
 //!
-//! - `describe` says what the drives of a line have. `commands` and `registers` are its parts that are also
+//! - `description` says what the drives of a line have. `commands` and `registers` are its parts that are also
 //!   used to carry out requests.
 //! - `limits` has what all pages may ask of a motor at most.
 
 mod command_execution;
 mod commands;
-mod describe;
+mod description;
 mod limits;
-mod motion_guard;
+mod motion_interlock;
+mod motor_scan;
+mod register_write;
 mod registers;
-mod run;
-mod search;
+mod setpoint_ramp;
 mod settings;
-mod value;
-mod write;
+mod value_format;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,9 +26,9 @@ use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
 use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
-use motion_guard::Control;
+use motion_interlock::Control;
 
-pub use motion_guard::MotionPermit;
+pub use motion_interlock::MotionPermit;
 
 /// Carries out the requests of pages about drives. Copies are the same drives.
 #[derive(Clone)]
@@ -82,7 +82,7 @@ impl Drives {
             }
             Ask::Motors { line } => {
                 let speaks = self.speaks(&line)?;
-                Ok(Answer::Motors { motors: search::motors(view, &line, speaks).await? })
+                Ok(Answer::Motors { motors: motor_scan::motors(view, &line, speaks).await? })
             }
             Ask::Describe { line } => Ok(Answer::Describe(Box::new(self.describe(&line)?))),
             Ask::Read { motor, names } => {
@@ -104,7 +104,7 @@ impl Drives {
             Ask::Limits => Ok(Answer::Limits { limits: self.limits()? }),
             Ask::Write { motor, name, value, to_rom } => {
                 let target = self.target(motor)?;
-                let write = write::Write { target, name, value, to_rom };
+                let write = register_write::Write { target, name, value, to_rom };
                 Ok(Answer::Write { values: write.carry_out(&self.control, view, drive).await? })
             }
             Ask::Dump { motor } => Ok(settings::as_file(&motor, &self.dump(&motor, view).await?)),
@@ -116,7 +116,7 @@ impl Drives {
                 settings::restore(&self.control, view, self.target(motor)?, text, to_rom).await
             }
             Ask::Run { motor, mode, target: to, rate, hold } => {
-                let run = run::Run { target: self.target(motor)?, mode, to, rate, hold };
+                let run = setpoint_ramp::Run { target: self.target(motor)?, mode, to, rate, hold };
                 run.carry_out(&self.control, drive).await
             }
         }
@@ -127,7 +127,7 @@ impl Drives {
     /// # Errors
     /// The line is unknown.
     pub fn describe(&self, line: &str) -> Result<Description, Refusal> {
-        Ok(describe::describe(line, self.speaks(line)?))
+        Ok(description::describe(line, self.speaks(line)?))
     }
 
     /// Reads registers, in the order of their names. One that the drive refuses does not hide the others.

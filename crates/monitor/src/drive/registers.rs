@@ -15,7 +15,7 @@ use motorlink_telemetry::share::motor_exchange::{
 };
 use motorlink_telemetry::signal::{Motor, Quantity};
 
-use super::value;
+use super::value_format;
 use crate::message::{Register, Value};
 
 /// The heading of values that RMD motors measure.
@@ -106,12 +106,12 @@ impl ValueSource {
                 let (_, profile) = exchanges.of_st()?;
                 let bits = register.decode(profile, reply)?;
                 let reading = Reading { register: *register, bits, profile };
-                Some(value::of_register(&register.to_string(), reading))
+                Some(value_format::of_register(&register.to_string(), reading))
             }
             ValueSource::StSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
             ValueSource::RmdSetting(tuning, block, at) => setting_value(tuning, block, *at, reply),
             ValueSource::Measured(_, field) => {
-                Some(value::of_field(name.to_owned(), field, reply.try_into().ok()?))
+                Some(value_format::of_field(name.to_owned(), field, reply.try_into().ok()?))
             }
         }
     }
@@ -132,7 +132,7 @@ fn setting_value<T: Tuning>(
     reply: &[u8],
 ) -> Option<Value> {
     let digits = tuning.answer(&Ask::Read(block.id), reply)?.digits;
-    Some(value::of_setting(block.settings.get(at)?, *digits.get(at)?))
+    Some(value_format::of_setting(block.settings.get(at)?, *digits.get(at)?))
 }
 
 /// Reads values, as [`read_each`]. Those that the drive refuses have the reason as their text.
@@ -146,7 +146,7 @@ pub(super) async fn read(
         values => values?,
     };
     let or_why = |(name, value): (&String, Result<_, Refusal>)| {
-        value.unwrap_or_else(|why| value::text(name, why.message))
+        value.unwrap_or_else(|why| value_format::text(name, why.message))
     };
     Ok(names.iter().zip(values).map(or_why).collect())
 }
@@ -264,7 +264,7 @@ fn of_st(register: RegisterId, profile: Profile) -> Option<Register> {
         writable,
         wears_rom: false,
         can_keep: false,
-        range: scale.map(|scale| value::range(&scale)),
+        range: scale.map(|scale| value_format::range(&scale)),
     })
 }
 
@@ -279,7 +279,7 @@ fn of_block<Id>(block: &Block<Id>, doc: impl Fn(usize) -> &'static str) -> Vec<R
         writable: block.writing != Writing::Fixed,
         wears_rom: block.writing == Writing::Permanent,
         can_keep: block.writing == Writing::Kept,
-        range: Some(value::range(&setting.scale)),
+        range: Some(value_format::range(&setting.scale)),
     });
     register.collect()
 }

@@ -6,9 +6,9 @@
 mod protocol;
 mod session;
 mod socket;
-mod viewers;
+mod viewer_feed;
 
 pub use protocol::SUBPROTOCOLS;
 pub use session::LONGEST_TEXT;
 pub use socket::{PACKED, serve};
-pub use viewers::Viewers;
+pub use viewer_feed::Viewers;

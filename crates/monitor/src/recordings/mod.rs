@@ -4,8 +4,8 @@
 //! it has gone. Nothing else waits for it.
 
 mod downsample;
+mod excerpt;
 mod folder;
-mod part;
 mod recorder;
 
 use std::fs::File;
@@ -23,8 +23,8 @@ use motorlink_telemetry::share::message::{self as share, Reason};
 use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio::task::spawn_blocking;
 
+pub use excerpt::{MOST_SIGNALS, Wanted};
 pub use folder::Name;
-pub use part::{MOST_SIGNALS, Wanted};
 
 use crate::message::{Answer, Ask, Recorded};
 use folder::Folder;
@@ -93,7 +93,7 @@ impl Recordings {
             Ask::Recordings => self.list().await,
             Ask::Recording { name } => {
                 let file = self.open(&name)?;
-                let read = self.reading(move |_| part::content(name, file)).await?;
+                let read = self.reading(move |_| excerpt::content(name, file)).await?;
                 read.map(Answer::Recording).map_err(Refusal::usage)
             }
             _ => Err(Refusal::usage("this is not a request about recordings")),
@@ -190,7 +190,7 @@ impl Recordings {
         let wants = Wants(Arc::new(AtomicBool::new(true)));
         let is_wanted = Arc::clone(&wants.0);
         let read = self.reading(move |_| {
-            part::read(file, &wanted, &|| {
+            excerpt::read(file, &wanted, &|| {
                 moves();
                 is_wanted.load(Ordering::Relaxed)
             })

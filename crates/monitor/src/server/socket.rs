@@ -19,7 +19,7 @@ use super::state::{Settings, State};
 use crate::dead_man::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page_session::{Broken, Page, Permissions, encode};
-use crate::websocket_limits::{Budget, PATIENCE, Sink, close};
+use crate::rate_limit::{Budget, PATIENCE, Sink, close};
 
 /// The longest text of a page.
 pub const LONGEST_TEXT: usize = 1 << 16;

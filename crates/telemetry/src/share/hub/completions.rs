@@ -6,12 +6,12 @@ use motorlink::ownership::Carried;
 use motorlink_proto::Motion;
 
 use super::Hub;
+use super::error_mapping::{may_be_executed, reason};
 use super::line::SharedLine;
 use super::pending_stops::Why;
-use super::reasons::{may_be_executed, reason};
 use super::session::UNHEARD;
 use super::session_id::SessionId;
-use super::stop_procedure::Address;
+use super::stop_state::Address;
 use super::work_results::{EngineCompletion, Sent, WorkResult};
 use crate::acquisition::Rate;
 use crate::event::CommandError;

@@ -8,7 +8,7 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::Hub;
 use super::line::SharedLine;
-use super::motors::Lease;
+use super::motor_state::Lease;
 use super::requests::{Refused, usage};
 use super::session_id::SessionId;
 use crate::share::message::{Answer, EventKind, MotorName, Reason};

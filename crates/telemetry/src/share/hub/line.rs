@@ -13,9 +13,9 @@ use motorlink_proto::Motion;
 use motorlink_proto::st::RegisterId;
 use motorlink_proto::time::Instant;
 
-use super::motors::{MotorState, Presence};
+use super::error_mapping::may_be_executed;
+use super::motor_state::{MotorState, Presence};
 use super::pending_stops::{LineStop, PendingStop};
-use super::reasons::may_be_executed;
 use super::session_id::{SessionId, seconds, wall_now};
 use crate::acquisition::{Acquisition, Tally};
 use crate::event::{CommandError, What};

@@ -9,8 +9,8 @@ use motorlink::st::Profile;
 use motorlink_proto::time::Micros;
 
 use super::Hub;
-use super::jobs::{Asker, Closed, Job, JobId, JobResult, PortOperation, Scanned, found_ports};
 use super::line::SharedLine;
+use super::port_jobs::{Asker, Closed, Job, JobId, JobResult, PortOperation, Scanned, found_ports};
 use super::requests::{Refused, usage};
 use super::session_id::SessionId;
 use super::work_results::Completion;

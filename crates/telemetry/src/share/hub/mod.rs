@@ -3,20 +3,20 @@
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 
 mod completions;
-mod feed;
-mod jobs;
+mod error_mapping;
 mod leases;
 mod line;
 mod line_lifecycle;
-mod liveness;
-mod motors;
+mod motor_state;
 mod pending_stops;
-mod reasons;
+mod port_jobs;
 mod requests;
 mod session;
 mod session_id;
-mod stop_procedure;
-mod stops;
+mod session_liveness;
+mod stop_dispatch;
+mod stop_state;
+mod subscription_feed;
 mod subscriptions;
 mod watchdog;
 mod work_results;
@@ -36,9 +36,9 @@ use crate::event::CommandError;
 use crate::line::Stopped;
 use crate::runner::Ended;
 use crate::signal::Motor;
-use jobs::Jobs;
 use line::Lines;
 use pending_stops::{PendingPortStops, Why};
+use port_jobs::Jobs;
 use session::Session;
 use session_id::wall_now;
 use work_results::{Completion, EngineCompletion, WorkResult};

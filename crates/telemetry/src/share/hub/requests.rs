@@ -6,7 +6,7 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::Hub;
-use super::reasons::reason;
+use super::error_mapping::reason;
 use super::session::Session;
 use super::session_id::SessionId;
 use super::work_results::{Sent, WorkResult};

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use litemap::LiteMap as Map;
 use motorlink_proto::st::RegisterId;
 
-use super::feed::Feed;
 use super::line::Lines;
-use super::liveness::Life;
+use super::session_liveness::Life;
+use super::subscription_feed::Feed;
 use crate::share::frame::Frame;
 use crate::share::message::{
     self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,

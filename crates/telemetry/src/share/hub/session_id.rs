@@ -1,4 +1,4 @@
-//! Who and what the parts of a hub speak of: programs, protocols, motors, times.
+//! The number of a program, and times as numbers.
 
 use std::time::SystemTime;
 

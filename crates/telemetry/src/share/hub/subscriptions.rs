@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use litemap::LiteMap as Map;
 
 use super::Hub;
-use super::feed::Feed;
 use super::line::SharedLine;
 use super::requests::{Refused, ended, span, usage};
 use super::session_id::SessionId;
+use super::subscription_feed::Feed;
 use super::work_results::WorkResult;
 use crate::acquisition::Acquisition;
 use crate::share::message::{

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::jobs::JobId;
+use super::port_jobs::JobId;
 use super::session::Part;
 use super::session_id::SessionId;
 use motorlink_proto::Motion;

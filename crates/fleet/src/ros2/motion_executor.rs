@@ -8,7 +8,7 @@ use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::message::Reason;
 use tokio::sync::watch;
 
-use super::commands::Order;
+use super::command_arbiter::Order;
 use super::joint::Reference;
 use super::motor_client::{MotorClient, SendOptions, refused};
 use crate::clock::Clock;

@@ -17,7 +17,7 @@ use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
 use super::common::{Common, covers, refuse, reply_with};
-use super::drive_reader::{Drive, Reader};
+use super::drive_backend::{Drive, Reader};
 use crate::key::{self, MotorQuery};
 use crate::message::{Identity, NoAnswer};
 

@@ -1,5 +1,5 @@
 use super::super::joint::tests::joint;
-use super::super::readings::tests::readings;
+use super::super::value_cache::tests::readings;
 use super::*;
 use motorlink_recording::schema::Time;
 

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use motorlink_proto::Motion;
 use motorlink_proto::time::{Instant, Micros};
 
+use super::error_mapping::reason;
 use super::line::SharedLine;
-use super::motors::Presence;
+use super::motor_state::Presence;
 use super::pending_stops::{AGAIN, LineStop, PendingStop};
-use super::reasons::reason;
 use crate::event::CommandError;
 use crate::line::Request;
 use crate::runner::CommandResult;

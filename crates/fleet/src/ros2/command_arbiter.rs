@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use motorlink_recording::schema::{JointState, Message as _};
 
 use super::joint::{Joint, Mode, Reference};
-use super::latency::{Late, Pace};
-use super::readings::Readings;
 use super::rmw_zenoh::{Attachment, Gid};
+use super::staleness::{Late, Pace};
+use super::value_cache::Readings;
 
 /// The most publishers that are remembered.
 const PUBLISHERS: usize = 16;

@@ -9,10 +9,10 @@ use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
-use super::motion_guard::{Control, MotionPermit, MotionSession, send};
+use super::motion_interlock::{Control, MotionPermit, MotionSession, send};
 use super::registers::{self, ValueSource};
 use super::settings;
-use super::value;
+use super::value_format;
 use crate::message::Value;
 
 /// A write of a page.
@@ -80,7 +80,7 @@ async fn written(
 ) -> Result<Vec<Value>, Refusal> {
     let values = match VerifiedWrite::new::<()>(profile, register, bits) {
         Err(Unverified::NotReadable) => {
-            vec![value::text(&register.to_string(), "written; it cannot be read back")]
+            vec![value_format::text(&register.to_string(), "written; it cannot be read back")]
         }
         write => {
             let read = exchanges.register(register).await?;
@@ -93,7 +93,7 @@ async fn written(
                 return Err(Refusal::new(Reason::Refused, message));
             }
             let reading = motorlink_proto::st::Reading { register, bits: read, profile };
-            vec![value::of_register(&register.to_string(), reading)]
+            vec![value_format::of_register(&register.to_string(), reading)]
         }
     };
     exchanges.carried_out().await.map(|()| values)

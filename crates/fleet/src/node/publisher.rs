@@ -28,7 +28,7 @@ use zenoh::query::Query;
 use super::common::{Common, State, covers, reply};
 use crate::key;
 use crate::message::Info;
-use crate::request_scope::Lines;
+use crate::request_permission::Lines;
 
 /// How often the state is published.
 const STATE: Duration = Duration::from_secs(1);
