@@ -2,8 +2,8 @@
 
 use byteorder::LittleEndian;
 use cdr_encoding::Error;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Plain CDR, little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
@@ -45,6 +45,28 @@ pub(super) fn decode<T: DeserializeOwned>(message: &[u8]) -> Result<(T, &[u8]), 
     Ok((fields, &body[taken..]))
 }
 
+/// A text. The library takes the last byte for its end, whatever it is: `arm10` without an end would be
+/// `arm1`.
+#[derive(Debug, PartialEq)]
+pub(super) struct Text(pub(super) String);
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        // It has the form of a sequence of bytes.
+        let mut bytes = Vec::<u8>::deserialize(from)?;
+        // Some encoders write an empty text without its end.
+        if bytes.pop().is_some_and(|end| end != 0) {
+            return Err(D::Error::custom("a text without its end"));
+        }
+        String::from_utf8(bytes).map(Text).map_err(D::Error::custom)
+    }
+}
+
+/// A field that is a text.
+pub(super) fn text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    Text::deserialize(from).map(|text| text.0)
+}
+
 fn malformed(error: Error) -> Malformed {
     match error {
         Error::Eof => Malformed::Short,
@@ -66,15 +88,15 @@ mod tests {
             &[8, 0, 0, 0, 4, 0, 0, 0, 0xC3, 0xA4, b'b', 0, 1, 0, 0, 0, 0],
         ];
         assert_eq!(bytes, expected.concat());
-        let read = decode::<(u8, f64, u8, String, String)>(&bytes).unwrap().0;
-        assert_eq!(read, (7, 1.0, 8, "äb".to_owned(), String::new()));
+        let read = decode::<(u8, f64, u8, Text, Text)>(&bytes).unwrap().0;
+        assert_eq!(read, (7, 1.0, 8, Text("äb".to_owned()), Text(String::new())));
     }
 
     #[test]
     fn a_long_sequence_in_a_short_message_is_refused_without_memory_for_it() {
         let message = [0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF];
         assert_eq!(decode::<Vec<u8>>(&message), Err(Malformed::Short));
-        assert_eq!(decode::<String>(&message), Err(Malformed::Short));
+        assert_eq!(decode::<Text>(&message), Err(Malformed::Short));
         assert_eq!(decode::<Vec<f64>>(&message), Err(Malformed::Short));
     }
 
@@ -83,6 +105,8 @@ mod tests {
         assert_eq!(decode::<u8>(&[0, 0, 0, 0, 1]), Err(Malformed::Encoding));
         assert_eq!(decode::<u8>(&[0, 1]), Err(Malformed::Short));
         assert_eq!(decode::<bool>(&[0, 1, 0, 0, 2]), Err(Malformed::Value));
-        assert_eq!(decode::<String>(&[0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0]), Err(Malformed::Value));
+        assert_eq!(decode::<Text>(&[0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0]), Err(Malformed::Value));
+        assert_eq!(decode::<Text>(&[0, 1, 0, 0, 2, 0, 0, 0, b'a', b'b']), Err(Malformed::Value));
+        assert_eq!(decode::<Text>(&[0, 1, 0, 0, 0, 0, 0, 0]).unwrap().0, Text(String::new()));
     }
 }

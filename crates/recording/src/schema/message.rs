@@ -1,9 +1,9 @@
 //! The messages whose types are the same in every recording.
 
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::cdr::{self, Malformed};
+use super::cdr::{self, Malformed, Text, text};
 
 /// A message with a type of its own.
 pub trait Message: Serialize + DeserializeOwned {
@@ -105,15 +105,24 @@ const HEADER: (&str, &str) =
 mod header {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    use super::Time;
+    use super::{Text, Time};
 
     pub fn serialize<S: Serializer>(stamp: &Time, to: S) -> Result<S::Ok, S::Error> {
         (stamp, "").serialize(to)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Time, D::Error> {
-        <(Time, String)>::deserialize(from).map(|(stamp, _)| stamp)
+        <(Time, Text)>::deserialize(from).map(|(stamp, _)| stamp)
     }
+}
+
+fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    Ok(Vec::<Text>::deserialize(from)?.into_iter().map(|text| text.0).collect())
+}
+
+fn pairs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(String, String)>, D::Error> {
+    let pairs = Vec::<(Text, Text)>::deserialize(from)?;
+    Ok(pairs.into_iter().map(|(key, value)| (key.0, value.0)).collect())
 }
 
 /// A definition with those of the types that it uses, each behind a line of 80 `=`.
@@ -130,6 +139,7 @@ pub struct JointState {
     #[serde(with = "header")]
     pub stamp: Time,
     /// The motors.
+    #[serde(deserialize_with = "texts")]
     pub name: Vec<String>,
     /// rad. Empty if it is not recorded.
     pub position: Vec<f64>,
@@ -165,12 +175,16 @@ pub struct DiagnosticStatus {
     /// How good it is.
     pub level: Level,
     /// Label and motor: `st0/motor1`.
+    #[serde(deserialize_with = "text")]
     pub name: String,
     /// State and faults.
+    #[serde(deserialize_with = "text")]
     pub message: String,
     /// The port.
+    #[serde(deserialize_with = "text")]
     pub hardware_id: String,
     /// More, by name.
+    #[serde(deserialize_with = "pairs")]
     pub values: Vec<(String, String)>,
 }
 
@@ -226,10 +240,13 @@ pub struct Log {
     /// How bad it is.
     pub severity: Severity,
     /// Whom it concerns: `st0/motor1`, or the label of a port.
+    #[serde(deserialize_with = "text")]
     pub name: String,
     /// The sentence.
+    #[serde(deserialize_with = "text")]
     pub message: String,
     /// Who commanded it; may be empty.
+    #[serde(deserialize_with = "text")]
     pub by: String,
     /// The kind, one word for programs: `stopped`.
     #[serde(with = "function")]
@@ -240,12 +257,14 @@ pub struct Log {
 mod function {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+    use super::Text;
+
     pub fn serialize<S: Serializer>(kind: &str, to: S) -> Result<S::Ok, S::Error> {
         (kind, 0u32).serialize(to)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
-        <(String, u32)>::deserialize(from).map(|(kind, _)| kind)
+        <(Text, u32)>::deserialize(from).map(|(kind, _)| kind.0)
     }
 }
 
@@ -303,6 +322,14 @@ pub(super) mod tests {
         assert_eq!(M::decode(&bytes).as_ref(), Ok(&message));
         for end in 0..bytes.len() {
             assert!(M::decode(&bytes[..end]).is_err(), "{end} of {} bytes", bytes.len());
+        }
+        // What others send.
+        for at in 0..bytes.len() {
+            for value in [0, 1, 0x7F, 0xFF] {
+                let mut damaged = bytes.clone();
+                damaged[at] = value;
+                let _ = M::decode(&damaged);
+            }
         }
     }
 
