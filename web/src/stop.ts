@@ -1,4 +1,5 @@
 // Stop all: by WebSocket, by HTTP if that does not answer in time, and what is known of it.
+// No component of Preact is needed for it: the keys work before the page is drawn, and if drawing fails.
 import { signal } from '@preact/signals';
 import { nameOf } from './format';
 import { Refused, ask, entries, held, lastWelcome, latchedBy, lines, motors, sayAlive, shareLost, state, welcome } from './link';

@@ -3,6 +3,9 @@
 //! Requests are objects that check their arguments and read their replies ([`st::StRequest`],
 //! [`rmd::RmdRequest`]). Clients, blocking or not, send them. The typed and documented classes for
 //! users are in the Python files.
+//!
+//! No code of Python runs while a line is locked, because it may run signal handlers, which may use the
+//! line. No constant of a protocol is defined in Python: `make python-table` writes `_rmd_table.py`.
 
 mod arrival;
 mod can;

@@ -9,6 +9,9 @@
 //! | put the traffic of an open port into words | [`st::Transcript`] |
 //!
 //! docs/DECODE.md says how the direction of a frame is found.
+//!
+//! A new format has a file that makes an entry of a line (or of a packet, as `pcapng`), an entry in
+//! [`Format`], and an arm in [`Reader`] and [`Writer`].
 #![deny(missing_docs)]
 
 pub mod asc;

@@ -143,7 +143,23 @@ impl Wrap {
         connection: &Connection,
         check: impl FnOnce(Faults) -> Result<Faults, FaultError>,
     ) -> Result<Self, Failure> {
-        Ok(Wrap { trace: connection.trace, faults: connection.fault.map(check).transpose()? })
+        let faults = connection.fault.map(check).transpose()?;
+        if connection.port()?.is_held() {
+            if faults.is_some() {
+                let refused =
+                    "--fault damages frames, and a port of a share or node carries requests";
+                return Err(
+                    Failure::usage(refused).trying("use it on the port of the drive itself")
+                );
+            }
+            if connection.trace {
+                note(
+                    "--trace shows no frames here: a share or node has the line. `motorlink monitor` shows \
+                     the frames on its wire",
+                );
+            }
+        }
+        Ok(Wrap { trace: connection.trace, faults })
     }
 
     fn around<L>(

@@ -9,6 +9,10 @@
 //!
 //! Whatever must happen in time is decided at the node by its own clock: a command that is too old is not
 //! sent, and a motor of a program that gives no sign of life is stopped.
+//!
+//! Each request of a program is a numbered query, sent until the node has it. What the share says is pulled,
+//! and numbered, too. So a lost message costs time and no data. No stop depends on the liveliness tokens of
+//! Zenoh: they notice a cut network after seconds, and only end a session earlier.
 #![forbid(unsafe_code)]
 
 mod certificate_info;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use motorlink_proto::time::Instant as Moment;
 
 use crate::clock::Clock;
-use crate::port::{Ending, Link, PortError};
+use crate::port::PortError;
 
 /// Opens the port. May be called repeatedly.
 pub type Opener<L> = Box<dyn FnMut() -> Result<L, PortError> + Send>;
@@ -85,9 +85,6 @@ pub struct Reopening<L> {
     trouble: String,
     clock: Clock,
     sign: LinkSign,
-    /// What a program that holds the port knows of this client: see [`Link::only_own`] and
-    /// [`Link::end_with`].
-    told: (bool, Ending),
 }
 
 impl<L> Reopening<L> {
@@ -112,7 +109,6 @@ impl<L> Reopening<L> {
             trouble: String::new(),
             clock: Clock::default(),
             sign: LinkSign(Arc::new(Mutex::new(Shown::Open))),
-            told: (false, Ending::default()),
         }
     }
 
@@ -178,9 +174,7 @@ impl<L> Reopening<L> {
         self.not_before = retry;
         self.sign.show(Shown::ClosedUntil(retry));
     }
-}
 
-impl<L: Link> Reopening<L> {
     /// The open link, and whether this call opened it.
     pub fn link(&mut self) -> Result<(&mut L, bool), PortError> {
         let mut reopened = false;
@@ -193,9 +187,6 @@ impl<L: Link> Reopening<L> {
             }
             match open() {
                 Ok(link) => {
-                    let (is_own, ending) = self.told;
-                    link.only_own(is_own);
-                    link.end_with(ending);
                     self.link = Some(link);
                     self.reopened = Some(Instant::now());
                     self.sign.show(Shown::Open);
@@ -211,22 +202,6 @@ impl<L: Link> Reopening<L> {
         let name = &self.name;
         let link = self.link.as_mut();
         Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
-    }
-
-    /// [`Link::only_own`], also after the port was opened again.
-    pub fn only_own(&mut self, is_own: bool) {
-        self.told.0 = is_own;
-        if let Some(link) = &self.link {
-            link.only_own(is_own);
-        }
-    }
-
-    /// [`Link::end_with`], also after the port was opened again.
-    pub fn end_with(&mut self, ending: Ending) {
-        self.told.1 = ending;
-        if let Some(link) = &self.link {
-            link.end_with(ending);
-        }
     }
 }
 
@@ -244,23 +219,10 @@ impl<L: 'static> Reopening<L> {
             trouble,
             clock,
             sign,
-            told,
         } = self;
         let link = link.map(form);
         let open = open.map(|mut open| -> Opener<M> { Box::new(move || open().map(form)) });
-        Reopening {
-            name,
-            link,
-            open,
-            back_off,
-            wait,
-            not_before,
-            reopened,
-            trouble,
-            clock,
-            sign,
-            told,
-        }
+        Reopening { name, link, open, back_off, wait, not_before, reopened, trouble, clock, sign }
     }
 }
 
@@ -270,8 +232,6 @@ mod tests {
 
     #[derive(Debug)]
     struct Wire;
-
-    impl Link for Wire {}
 
     #[test]
     fn until_the_next_attempt_the_last_error_is_returned() {

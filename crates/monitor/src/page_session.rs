@@ -1,4 +1,8 @@
 //! A page: what it may ask for, and the motors that depend on it.
+//!
+//! A page has up to two sessions at the share. The first one sees. The second one is opened by the first
+//! command that may move a motor. The share stops what a session turned when it ends, so the dead-man
+//! closes the second session, and the server has no list of motors of its own.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

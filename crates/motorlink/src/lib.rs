@@ -24,6 +24,7 @@ pub mod settings;
 pub mod st;
 mod stopping;
 mod turn;
+mod way;
 
 pub use motorlink_link::reopening::{BackOff, LinkState, Opener};
 pub use motorlink_link::{Clock, can, list, port, slcan, time};

@@ -21,6 +21,9 @@
 //! [`time::Instant`] of their arrival. The caller then polls: the answer is what to send, a result,
 //! or how long to wait. The crate is `no_std`, allocates nothing, contains no `unsafe` and does not
 //! panic.
+//!
+//! Registers, codes, commands and units are defined only in the tables `st/register/table.rs`,
+//! `st/code.rs`, `rmd/command.rs` and `units.rs`. All crates take names, sizes and texts from them.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]

@@ -17,7 +17,8 @@
 //!
 //! # Conventions
 //!
-//! * SI units in `f32`; other units are in the name.
+//! * SI units in `f32`, which a Cortex-M4F computes in hardware; other units are in the name. A value that
+//!   changes little is stored as a difference, to keep its precision: the bus voltage as its sag.
 //! * Positive torque and current turn towards growing angles, which RMD calls clockwise. Positive
 //!   power goes from the supply into the motor and from the motor into the load.
 //! * Phase quantities are amplitudes: the Clarke transform keeps them (alpha is phase A). So torque is

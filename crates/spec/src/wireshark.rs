@@ -1,4 +1,6 @@
 //! The dissector of Wireshark for both protocols, in Lua: tables, and the code that reads them.
+//!
+//! The Lua files know how a frame is laid out. Numbers and names come from the tables.
 
 use std::fmt::Write as _;
 

@@ -70,7 +70,7 @@ impl Line for Changed {
         self.line.sends_at_once(lane)
     }
 
-    fn expire_next(&self, time_to_live: Duration) {
+    fn expire_next(&mut self, time_to_live: Duration) {
         self.line.expire_next(time_to_live);
     }
 

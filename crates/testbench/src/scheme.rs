@@ -1,4 +1,6 @@
 //! The port `sim:`: simulated drives inside the process.
+//!
+//! The drives advance at each access, in real time. They have no thread.
 
 use std::path::{Path, PathBuf};
 

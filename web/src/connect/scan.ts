@@ -1,4 +1,5 @@
 // Asks what answers on a port that no line has, at its rate and then at the others that it can choose.
+// The share tries one rate per request, so a scan needs no state there, and ends when the page does.
 import type { AnswerTo } from '../link';
 import type { Sentence } from '../parts';
 import type { Finding, Protocol } from '../wire';

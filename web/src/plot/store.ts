@@ -3,6 +3,7 @@
 // Memory: 10 min at the asked rate, 18.2 bytes a sample. 40 signals at 100 Hz take 44 MB. All signals
 // together get at most `MOST_BYTES`; beyond that each keeps a shorter time: 40 at 1 kHz keep 3 min.
 // There is no worker: what is done here takes less than 1 % of a core at 4000 values a second.
+// No sample goes through Preact: scheduler.ts draws.
 import type { Rows } from '../link';
 import type { SignalName } from '../wire';
 import type { Trace } from './chart';

@@ -51,6 +51,8 @@ type Over = Vec<(u8, Py<PyAny>)>;
 #[derive(Clone)]
 enum ReplyKind {
     Value(RmdRequest),
+    /// Nothing: only whether it went well matters.
+    Nothing,
     /// The result of a scan for this ID.
     ScanResult,
     /// A step of a sampling, which takes the reply.
@@ -142,8 +144,8 @@ impl RmdEventClient {
     fn begin_confirmation(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
-            let question = motors.bus.begin_confirmation(id)?;
-            motors.expect(id, ReplyKind::Value(RmdRequest::for_bytes(question)));
+            motors.bus.begin_confirmation(id)?;
+            motors.expect(id, ReplyKind::Nothing);
             Ok(())
         })?;
         begun.map_err(|error| rmd_error(py, &error))
@@ -239,6 +241,10 @@ impl RmdEventClient {
                     Err(error @ Error::Port(_)) => Err(rmd_error(py, &error)),
                     result => ScanResult::of(id, result)
                         .map_or_else(|| Ok(py.None()), |found| scan_result(py, found)),
+                },
+                ReplyKind::Nothing => match result {
+                    Ok(_) => Ok(py.None()),
+                    Err(error) => Err(rmd_error(py, &error)),
                 },
                 ReplyKind::Value(request) => result
                     .map_err(|error| rmd_error(py, &error))

@@ -6,7 +6,6 @@
 //! so the host's output shows which reply it matched to which request. The drive records a
 //! [`Journal`]: the true and the false values that it sent, and the host's transfers.
 //! [`Scenario::judge`] compares the output of the host, [`HostOutput`], with the journal.
-//! [`HostOutput`] against it.
 
 mod journal;
 mod judge;

@@ -1,4 +1,6 @@
 //! What a node needs of others to read its drives.
+//!
+//! `cli` implements [`Reader`] with `motorlink_monitor::drive`, so this crate does not depend on the monitor.
 
 use std::collections::BTreeMap;
 use std::pin::Pin;

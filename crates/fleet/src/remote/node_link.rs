@@ -1,4 +1,7 @@
 //! Questions to a node.
+//!
+//! Stops have the highest priority, and nothing is batched. Messages are dropped when a network is
+//! congested: `CongestionControl::Block` would close the connection.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

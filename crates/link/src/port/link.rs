@@ -3,33 +3,9 @@
 use std::time::Duration;
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::st::Profile;
 
 use super::error::PortError;
 use crate::clock::Clock;
-
-/// Another program that holds the port, and sends requests to the drives for this one. Its replies
-/// are always those of the last request to a motor. If there is none, it says why:
-/// [`PortError::NotDone`]. It repeats stops itself before it gives a reason.
-#[derive(Debug, Clone, Copy)]
-pub struct Holder {
-    /// The longest time that it takes for a reply or a reason.
-    pub patience: Duration,
-    /// The profile in which it reads frames of ST's protocol.
-    pub profile: Option<Profile>,
-}
-
-/// What a program that holds a port does with the motors of a client that leaves, however it leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Ending {
-    /// It stops them.
-    #[default]
-    Stop,
-    /// It switches RMD motors off, and stops ST motors.
-    Off,
-    /// It leaves them as they are. They belong to no program then.
-    Nothing,
-}
 
 /// The common functions of serial lines and CAN buses. A wrapper implements
 /// [`within`](Self::within); the other functions then forward to the wrapped link.
@@ -54,51 +30,6 @@ pub trait Link: Send {
     fn trouble(&self) -> Option<&'static str> {
         self.within()?.trouble()
     }
-
-    /// The program that holds the port, if it is not this one.
-    fn holder(&self) -> Option<Holder> {
-        self.within()?.holder()
-    }
-
-    /// The next request to a motor (0: any) asks whether the replies so far belong to their requests. A
-    /// program that holds the port checks this for all requests to the motor, also those of others.
-    fn confirm_next(&self, motor: u8) {
-        if let Some(within) = self.within() {
-            within.confirm_next(motor);
-        }
-    }
-
-    /// The next request must not be sent later than this. A program that holds the port refuses it
-    /// then.
-    fn expire_next(&self, time_to_live: Duration) {
-        if let Some(within) = self.within() {
-            within.expire_next(time_to_live);
-        }
-    }
-
-    /// From now on, whether requests are only for motors that this client owns: no other program has moved,
-    /// taken or stopped them since. A program that holds the port refuses the others
-    /// ([`NotDone::Held`](super::NotDone::Held)).
-    fn only_own(&self, is_set: bool) {
-        if let Some(within) = self.within() {
-            within.only_own(is_set);
-        }
-    }
-
-    /// This client has moved these motors before the port was opened again. A program that holds the port
-    /// takes them for motors of this client, unless another client has moved them there.
-    fn claim(&self, motors: &[u8]) {
-        if let Some(within) = self.within() {
-            within.claim(motors);
-        }
-    }
-
-    /// From now on, what a program that holds the port does with the motors of this client when it leaves.
-    fn end_with(&self, ending: Ending) {
-        if let Some(within) = self.within() {
-            within.end_with(ending);
-        }
-    }
 }
 
 impl<L: Link + ?Sized> Link for Box<L> {
@@ -112,30 +43,6 @@ impl<L: Link + ?Sized> Link for Box<L> {
 
     fn trouble(&self) -> Option<&'static str> {
         (**self).trouble()
-    }
-
-    fn holder(&self) -> Option<Holder> {
-        (**self).holder()
-    }
-
-    fn confirm_next(&self, motor: u8) {
-        (**self).confirm_next(motor);
-    }
-
-    fn expire_next(&self, time_to_live: Duration) {
-        (**self).expire_next(time_to_live);
-    }
-
-    fn only_own(&self, is_set: bool) {
-        (**self).only_own(is_set);
-    }
-
-    fn claim(&self, motors: &[u8]) {
-        (**self).claim(motors);
-    }
-
-    fn end_with(&self, ending: Ending) {
-        (**self).end_with(ending);
     }
 }
 

@@ -1,12 +1,12 @@
 //! A kind of port, and the name of a port.
 
-use std::any::Any;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::PortError;
 use super::event::{EventBytes, EventCan};
+use super::holder::HeldPort;
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError};
 use super::place::Place;
@@ -113,8 +113,8 @@ pub trait Port: fmt::Debug + Send + Sync {
         false
     }
 
-    /// The program that holds the port, and stops the motors of its clients: what the scheme knows of it.
-    fn holder(&self) -> Option<&dyn Any> {
+    /// The port as one that another program holds; `None` if it is none. It opens as nothing else.
+    fn as_held(&self) -> Option<&dyn HeldPort> {
         None
     }
 
@@ -220,14 +220,14 @@ impl PortName {
         self.0.is_in_process()
     }
 
-    /// As [`Port::holder`].
-    pub fn holder(&self) -> Option<&dyn Any> {
-        self.0.holder()
+    /// As [`Port::as_held`].
+    pub fn as_held(&self) -> Option<&dyn HeldPort> {
+        self.0.as_held()
     }
 
     /// Whether another program holds the port, and stops the motors of its clients.
     pub fn is_held(&self) -> bool {
-        self.holder().is_some()
+        self.as_held().is_some()
     }
 
     /// As [`Port::is_device`].

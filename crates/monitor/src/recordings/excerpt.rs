@@ -1,4 +1,7 @@
 //! What a recording has, and a part of it for a plot.
+//!
+//! A part has the frames and columns of a share: JSON has no NaN, and numbers as text are three times as
+//! long.
 
 use std::collections::BTreeMap;
 use std::fs::File;

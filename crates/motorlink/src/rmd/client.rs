@@ -5,7 +5,7 @@ use std::error;
 use std::sync::Arc;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Ending, Link, PortError, PortName};
+use motorlink_link::port::{CanLink, Ending, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
@@ -17,6 +17,7 @@ use super::driven::Driven;
 use super::session::Session;
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
+use crate::way::Way;
 
 /// What a scan found under an ID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +43,15 @@ pub enum Asked {
     Request([u8; 8]),
     /// Whether the replies so far belong to their requests.
     Confirmation,
+}
+
+impl Asked {
+    pub(super) fn request(self) -> Option<[u8; 8]> {
+        match self {
+            Asked::Request(request) => Some(request),
+            Asked::Confirmation => None,
+        }
+    }
 }
 
 /// A CAN bus with RMD motors: shared by reference between threads.
@@ -73,25 +83,27 @@ impl Client {
         options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = move || Ok(wrap(name.open_can()?));
-        Self::open_with(&port.to_string(), Box::new(open), options)
+        let open = move || Way::open(&name, |port| Ok(wrap(port.open_can()?)));
+        let opened = Reopening::open(&port.to_string(), Box::new(open), options.back_off)?;
+        Ok(Self::on(opened, options))
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
-        open: Opener<Box<dyn CanLink>>,
+        mut open: Opener<Box<dyn CanLink>>,
         options: Options,
     ) -> Result<Self, Error> {
+        let open = Box::new(move || open().map(Way::Line));
         Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
     }
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn CanLink>, options: Options) -> Self {
-        Self::on(Reopening::over(name, link), options)
+        Self::on(Reopening::over(name, Way::Line(link)), options)
     }
 
-    fn on(port: Reopening<Box<dyn CanLink>>, options: Options) -> Self {
+    fn on(port: Reopening<Way<Box<dyn CanLink>>>, options: Options) -> Self {
         Self::driving(Driven::new(port, &options))
     }
 
@@ -132,7 +144,7 @@ impl Client {
 
     /// Why frames may not get to the bus, as far as its adapter tells.
     pub fn trouble(&self) -> Option<&'static str> {
-        self.turns.take().port.open_link().and_then(|link| link.trouble())
+        self.turns.take().port.open_link().and_then(Way::trouble)
     }
 
     /// Frames that belonged to no exchange.
@@ -188,17 +200,13 @@ impl Client {
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut driven = self.turns.take();
         driven.ready([request])?;
-        self.exchange(driven, id, request)
-    }
-
-    fn exchange(
-        &self,
-        mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
-        id: MotorId,
-        request: [u8; 8],
-    ) -> Result<[u8; 8], Error> {
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
+        self.conclude(driven)
+    }
+
+    /// The reply to what was begun.
+    fn conclude(&self, driven: Turn<'_, Driven<Box<dyn CanLink>>>) -> Result<[u8; 8], Error> {
         let mut outcome = None;
         self.run(driven, |_, result, _| outcome = Some(result))?;
         outcome.expect("an exchange that was begun ends")
@@ -212,10 +220,10 @@ impl Client {
     /// of [`raw`](Self::raw).
     pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
         let mut driven = self.turns.take();
-        let question = driven.session.question(id);
-        driven.ready([question])?;
-        driven.confirm_next(id);
-        self.exchange(driven, id, question)?;
+        driven.ready([])?;
+        let now = driven.port.now();
+        driven.session.insist(now, id, Asked::Confirmation)?;
+        self.conclude(driven)?;
         self.turns.take().session.confirmed(id)
     }
 
@@ -246,8 +254,8 @@ impl Client {
         for (id, exchange) in requests {
             driven.session.check_limits(*id, &exchange.request())?;
         }
-        let requests = requests.iter().map(|(id, exchange)| (*id, exchange.request()));
-        self.begin_all(driven, requests, Session::request, |id, result, _| {
+        let requests = requests.iter().map(|(id, it)| (*id, Asked::Request(it.request())));
+        self.begin_all(driven, requests, Session::begin, |id, result, _| {
             each(id, result.map(|reply| X::reply(&reply)));
         })
     }
@@ -256,7 +264,7 @@ impl Client {
     /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
     /// ports do nothing then.
     pub fn end_with(&self, ending: Ending) {
-        self.turns.take().port.end_with(ending);
+        self.turns.take().end_with(ending);
     }
 
     /// The next call opens a closed port at once.
@@ -266,20 +274,20 @@ impl Client {
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().port.only_own(true);
+        self.turns.take().only_own(true);
         let result = act();
-        self.turns.take().port.only_own(false);
+        self.turns.take().only_own(false);
         result
     }
 
     /// Whether another program holds the port.
     pub(super) fn is_held(&self) -> bool {
-        self.turns.take().session.is_held
+        self.turns.take().session.is_held()
     }
 
     /// The motors that a program that holds the port knows, and of which it had no reply.
     pub(super) fn missed(&self) -> MotorSet {
-        self.turns.take().session.missed
+        self.turns.take().session.missed()
     }
 
     /// Whether this is what a program that holds the port says after it has repeated a stop.
@@ -294,7 +302,8 @@ impl Client {
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
         let each = |id, result, _| each(id, result);
-        self.begin_all(self.turns.take(), requests, Session::ask, each)
+        let requests = requests.map(|(id, request)| (id, Asked::Request(request)));
+        self.begin_all(self.turns.take(), requests, Session::insist, each)
     }
 
     /// As [`cycle`](Self::cycle), with confirmations among the exchanges. The reply of a confirmation says
@@ -308,19 +317,7 @@ impl Client {
         asked: &[(MotorId, Asked)],
         each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
-        let mut driven = self.turns.take();
-        let request = |&(id, asked): &(MotorId, Asked)| match asked {
-            Asked::Request(request) => (id, request),
-            Asked::Confirmation => (id, driven.session.question(id)),
-        };
-        let requests: Vec<_> = asked.iter().map(request).collect();
-        driven.ready(requests.iter().map(|(_, request)| *request))?;
-        for (id, asked) in asked {
-            if *asked == Asked::Confirmation {
-                driven.confirm_next(*id);
-            }
-        }
-        self.begin_all(driven, requests.into_iter(), Session::request, each)
+        self.begin_all(self.turns.take(), asked.iter().copied(), Session::begin, each)
     }
 
     /// Whether a motor's replies went to their own requests, behind a confirmation of
@@ -336,14 +333,14 @@ impl Client {
     fn begin_all(
         &self,
         mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
-        requests: impl Iterator<Item = (MotorId, [u8; 8])> + Clone,
-        begin: fn(&mut Session, time::Instant, MotorId, [u8; 8]) -> Result<(), Error>,
+        asked: impl Iterator<Item = (MotorId, Asked)> + Clone,
+        begin: fn(&mut Session, time::Instant, MotorId, Asked) -> Result<(), Error>,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
-        driven.ready(requests.clone().map(|(_, request)| request))?;
-        for (id, request) in requests {
+        driven.ready(asked.clone().filter_map(|(_, asked)| asked.request()))?;
+        for (id, asked) in asked {
             let now = driven.port.now();
-            if let Err(error) = begin(&mut driven.session, now, id, request) {
+            if let Err(error) = begin(&mut driven.session, now, id, asked) {
                 each(id, Err(error), now);
             }
         }

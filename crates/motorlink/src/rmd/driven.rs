@@ -2,34 +2,52 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{CanLink, Link, PortError};
+use motorlink_link::port::{CanLink, Ending, PortError};
 use motorlink_link::reopening::Reopening;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time;
 
 use super::session::{Session, SessionOutput, ends_motion};
 use super::{Error, Options};
+use crate::way::{Declared, Way};
 
 /// A session and its port.
 pub(super) struct Driven<L> {
-    pub(super) port: Reopening<L>,
+    pub(super) port: Reopening<Way<L>>,
     pub(super) session: Session,
+    pub(super) declared: Declared,
     /// Exchanges and cycles so far: another number says that the one before it was given up.
     pub(super) exchanges: u64,
 }
 
 impl<L: CanLink> Driven<L> {
-    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
-        let port = port.by(|link| link.clock());
+    pub(super) fn new(port: Reopening<Way<L>>, options: &Options) -> Self {
+        let port = port.by(Way::clock);
         let mut session = Session::new(port.name.clone(), options);
-        if port.open_link().is_some_and(Link::is_fresh) {
+        if port.open_link().is_some_and(Way::is_fresh) {
             session.trust();
         }
-        if let Some(holder) = port.open_link().and_then(Link::holder) {
-            session.set_holder(holder);
-            session.trust();
+        if let Some(line) = port.open_link().and_then(Way::held) {
+            session.set_holder(line);
         }
-        Driven { port, session, exchanges: 0 }
+        Driven { port, session, declared: Declared::default(), exchanges: 0 }
+    }
+
+    /// See [`Client::end_with`](super::Client::end_with).
+    pub(super) fn end_with(&mut self, ending: Ending) {
+        self.declared.ending = ending;
+        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
+            holder.end_with(ending);
+        }
+    }
+
+    /// From now on, whether requests are only for motors of this client, if another program holds the port.
+    pub(super) fn only_own(&mut self, is_set: bool) {
+        self.declared.only_own = is_set;
+        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
+            holder.only_own(is_set);
+        }
     }
 
     /// Makes ready for these requests.
@@ -66,35 +84,61 @@ impl<L: CanLink> Driven<L> {
     /// pass for a reply to what is sent now.
     pub(super) fn listen(&mut self) -> Result<(), Error> {
         let now = self.port.now();
-        let (link, reopened) = self.port.link()?;
+        let (way, reopened) = self.port.link()?;
         if reopened {
             let moved = self.session.moving().union(self.session.unexpected());
-            link.claim(&moved.map(MotorId::number).collect::<Vec<_>>());
+            self.declared.tell(way, moved.map(MotorId::number));
             self.session.reopened(now);
-            if link.is_fresh() {
+            if way.is_fresh() {
                 self.session.trust();
             }
         }
-        let is_held = link.holder().is_some();
         loop {
-            match self.port.link()?.0.receive(Some(Duration::ZERO)) {
+            match self.take(Some(Duration::ZERO)) {
                 // A bus that is never silent has to do: an Off must get through.
-                Ok(Some(_)) if self.port.now().since(now) > BABBLE => break,
-                Ok(Some(frame)) => self.session.receive(now, &frame),
-                Ok(None) => break,
-                Err(error) => self.failed(error)?,
+                Ok(true) if self.port.now().since(now) <= BABBLE => {}
+                Ok(_) => return Ok(()),
+                Err(error) => return Err(self.closed(error)),
             }
         }
-        if is_held {
-            self.session.trust_idle();
-        }
-        Ok(())
     }
 
-    /// Asks whether the replies of a motor went to their own requests.
-    pub(super) fn confirm_next(&mut self, id: MotorId) {
-        if let Some(link) = self.port.open_link() {
-            link.confirm_next(id.number());
+    /// Takes what comes next, if something comes until then.
+    pub(super) fn take(&mut self, wait: Option<Duration>) -> Result<bool, PortError> {
+        match self.port.link()?.0 {
+            Way::Line(link) => {
+                let Some(frame) = link.receive(wait)? else { return Ok(false) };
+                self.session.receive(self.port.now(), &frame);
+            }
+            Way::Holder(holder) => {
+                let Some(end) = holder.receive(wait)? else { return Ok(false) };
+                self.session.ended(end);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Hands the request to a motor to the program that holds the port.
+    pub(super) fn hand_over(&mut self, now: time::Instant, id: MotorId) -> Result<(), PortError> {
+        match self.port.link()?.0 {
+            Way::Line(_) => Ok(()),
+            Way::Holder(holder) => self.session.hand_over(now, id, holder.as_mut()),
+        }
+    }
+
+    /// Sends a frame.
+    pub(super) fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        match self.port.link()?.0 {
+            Way::Line(link) => link.send(frame),
+            Way::Holder(_) => Ok(()),
+        }
+    }
+
+    /// With what the adapter of the bus tells.
+    pub(super) fn behind(&self, error: Error) -> Error {
+        match self.port.open_link().and_then(Way::trouble) {
+            Some(why) => error.behind(why),
+            None => error,
         }
     }
 
@@ -107,16 +151,10 @@ impl<L: CanLink> Driven<L> {
         loop {
             let now = self.port.now();
             let moved = match self.session.poll(now) {
-                SessionOutput::Transmit(frame) => {
-                    self.port.link().and_then(|(link, _)| link.send(&frame))
-                }
+                SessionOutput::Transmit(frame) => self.send(&frame),
+                SessionOutput::HandOver(id) => self.hand_over(now, id),
                 SessionOutput::Done(id, result) => {
-                    let link = self.port.open_link();
-                    let result = result.map_err(|error| match link {
-                        Some(link) => error.behind(link),
-                        None => error,
-                    });
-                    each(id, result, self.session.sent(id));
+                    each(id, result.map_err(|error| self.behind(error)), self.session.sent(id));
                     Ok(())
                 }
                 SessionOutput::Wait(None) => return Ok(true),
@@ -127,28 +165,14 @@ impl<L: CanLink> Driven<L> {
                         return Ok(false);
                     }
                     let wait = [Some(until.since(now).into()), left].into_iter().flatten().min();
-                    let came = self.port.link().and_then(|(link, _)| link.receive(wait));
-                    came.map(|frame| match frame {
-                        Some(frame) => self.session.receive(self.port.now(), &frame),
-                        None => _ = self.session.silent(),
-                    })
+                    let came = self.take(wait);
+                    if let Ok(false) = came {
+                        self.session.silent();
+                    }
+                    came.map(drop)
                 }
             };
-            if let Err(error) = moved {
-                self.failed(error)?;
-            }
-        }
-    }
-
-    /// The port failed, or the program that holds it has no reply.
-    pub(super) fn failed(&mut self, error: PortError) -> Result<(), Error> {
-        match not_done(error) {
-            Ok((id, why)) => {
-                let now = self.port.now();
-                self.session.not_done(now, id, why);
-                Ok(())
-            }
-            Err(error) => Err(self.closed(error)),
+            moved.map_err(|error| self.closed(error))?;
         }
     }
 
@@ -158,16 +182,6 @@ impl<L: CanLink> Driven<L> {
             self.port.close();
         }
         error.into()
-    }
-}
-
-/// The motor whose request has no reply, and why, if the error is about one request.
-pub(super) fn not_done(error: PortError) -> Result<(MotorId, PortError), PortError> {
-    match error {
-        PortError::NotDone { motor, .. } => {
-            MotorId::new(motor).map(|id| (id, error.clone())).ok_or(error)
-        }
-        error => Err(error),
     }
 }
 

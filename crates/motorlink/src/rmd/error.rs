@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink_link::port::{CanLink, PortError};
+use motorlink_link::port::PortError;
 use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, NotArrived, SpinDirection};
 use motorlink_proto::units::TurnCentiDegrees;
 
@@ -160,12 +160,10 @@ pub enum Error {
 
 impl Error {
     /// With what the adapter of the bus tells.
-    pub(super) fn behind(self, link: &(impl CanLink + ?Sized)) -> Self {
-        match (self, link.trouble()) {
-            (Error::Timeout { port, motor: id, .. }, Some(why)) => {
-                Error::Adapter { port, motor: id, why }
-            }
-            (error, _) => error,
+    pub(super) fn behind(self, why: &'static str) -> Self {
+        match self {
+            Error::Timeout { port, motor, .. } => Error::Adapter { port, motor, why },
+            error => error,
         }
     }
 

@@ -9,9 +9,10 @@ use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
 
-use super::driven::{Driven, not_done};
+use super::driven::Driven;
 use super::session::SessionOutput;
 use super::{Asked, Client, Error, Options};
+use crate::way::Way;
 
 /// Frames that are taken from the bus in one step: the loop has others to serve.
 const STEP: usize = 64;
@@ -43,26 +44,33 @@ impl EventClient {
         options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = move || Ok(wrap(name.open_event_can()?));
-        Self::open_with(&port.to_string(), Box::new(open), options)
+        let open = move || Way::open(&name, |port| Ok(wrap(port.open_event_can()?)));
+        Self::opened(&port.to_string(), Box::new(open), &options)
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
-        open: Opener<Box<dyn EventCan>>,
+        mut open: Opener<Box<dyn EventCan>>,
         options: Options,
     ) -> Result<Self, Error> {
-        let port = Reopening::open(name, open, options.back_off)?;
-        Ok(Self::driving(port, &options))
+        Self::opened(name, Box::new(move || open().map(Way::Line)), &options)
+    }
+
+    fn opened(
+        name: &str,
+        open: Opener<Way<Box<dyn EventCan>>>,
+        options: &Options,
+    ) -> Result<Self, Error> {
+        Ok(Self::driving(Reopening::open(name, open, options.back_off)?, options))
     }
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn EventCan>, options: Options) -> Self {
-        Self::driving(Reopening::over(name, link), &options)
+        Self::driving(Reopening::over(name, Way::Line(link)), &options)
     }
 
-    fn driving(port: Reopening<Box<dyn EventCan>>, options: &Options) -> Self {
+    fn driving(port: Reopening<Way<Box<dyn EventCan>>>, options: &Options) -> Self {
         EventClient { driven: Driven::new(port, options) }
     }
 
@@ -82,7 +90,7 @@ impl EventClient {
     /// What is readable when there is something to receive; `None` while the port is closed, or
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driven.port.open_link().and_then(|link| link.descriptor())
+        self.driven.port.open_link().and_then(Way::descriptor)
     }
 
     /// The clock of the port.
@@ -98,7 +106,7 @@ impl EventClient {
 
     /// Why frames may not get to the bus, as far as its adapter tells.
     pub fn trouble(&self) -> Option<&'static str> {
-        self.driven.port.open_link().and_then(|link| link.trouble())
+        self.driven.port.open_link().and_then(Way::trouble)
     }
 
     /// How long a reply may take.
@@ -113,13 +121,13 @@ impl EventClient {
 
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
-        self.driven.port.end_with(ending);
+        self.driven.end_with(ending);
     }
 
     /// The next request to any motor must not be sent later than this, if another program holds the port.
-    pub fn expire_next(&self, time_to_live: Duration) {
-        if let Some(link) = self.driven.port.open_link() {
-            link.expire_next(time_to_live);
+    pub fn expire_next(&mut self, time_to_live: Duration) {
+        if let Some(Way::Holder(holder)) = self.driven.port.open_link_mut() {
+            holder.expire_next(time_to_live);
         }
     }
 
@@ -183,14 +191,9 @@ impl EventClient {
     /// # Errors
     /// Those of [`ask`](Self::ask).
     pub fn begin(&mut self, id: MotorId, asked: Asked) -> Result<(), Error> {
-        match asked {
-            Asked::Request(request) => self.request(id, request),
-            Asked::Confirmation => {
-                self.request(id, self.driven.session.question(id))?;
-                self.driven.confirm_next(id);
-                Ok(())
-            }
-        }
+        self.driven.listen_for(asked.request())?;
+        let now = self.driven.port.now();
+        self.driven.session.begin(now, id, asked)
     }
 
     /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Client::set_torque4`].
@@ -203,19 +206,15 @@ impl EventClient {
         self.driven.session.set_torque4(now, torques, expect)
     }
 
-    /// Begins a confirmation ([`Client::confirm`]): asks a question whose code differs from that of
-    /// the last request, and gives it. After the exchange [`confirmed`](Self::confirmed) gives the
-    /// result.
+    /// Begins a confirmation ([`Client::confirm`]). After the exchange [`confirmed`](Self::confirmed)
+    /// gives the result.
     ///
     /// # Errors
     /// Those of [`ask`](Self::ask).
-    pub fn begin_confirmation(&mut self, id: MotorId) -> Result<[u8; 8], Error> {
-        let question = self.driven.session.question(id);
-        self.driven.listen_for([question])?;
-        self.driven.confirm_next(id);
+    pub fn begin_confirmation(&mut self, id: MotorId) -> Result<(), Error> {
+        self.driven.listen()?;
         let now = self.driven.port.now();
-        self.driven.session.ask(now, id, question)?;
-        Ok(question)
+        self.driven.session.insist(now, id, Asked::Confirmation)
     }
 
     /// Whether the motor's replies went to their own requests, after
@@ -234,7 +233,7 @@ impl EventClient {
 
     /// Whether another program holds the port.
     pub fn is_held(&self) -> bool {
-        self.driven.session.is_held
+        self.driven.session.is_held()
     }
 
     /// Whether this is what a program that holds the port says after it has repeated a stop.
@@ -268,57 +267,42 @@ impl EventClient {
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
     pub fn into_client(self) -> Client {
-        let Driven { port, session, exchanges } = self.driven;
-        let port = port.map(|link| link as Box<dyn CanLink>);
-        Client::driving(Driven { port, session, exchanges })
+        let Driven { port, session, declared, exchanges } = self.driven;
+        let port = port.map(|way| way.map(|link| link as Box<dyn CanLink>));
+        Client::driving(Driven { port, session, declared, exchanges })
     }
 
     fn moved(
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let Driven { port, session, .. } = &mut self.driven;
-        let clock = port.clock();
-        let Some(link) = port.open_link_mut() else { return Ok(None) };
+        let driven = &mut self.driven;
+        if driven.port.open_link().is_none() {
+            return Ok(None);
+        }
         let mut listens = STEP;
         loop {
-            let now = clock.now();
-            match session.poll(now) {
-                SessionOutput::Transmit(frame) => {
-                    if let Err(error) = link.send(&frame) {
-                        let (id, why) = not_done(error)?;
-                        session.not_done(now, id, why);
-                    }
-                }
+            let now = driven.port.now();
+            match driven.session.poll(now) {
+                SessionOutput::Transmit(frame) => driven.send(&frame)?,
+                SessionOutput::HandOver(id) => driven.hand_over(now, id)?,
                 SessionOutput::Done(id, result) => {
-                    each(id, result.map_err(|error| error.behind(link.as_ref())));
+                    each(id, result.map_err(|error| driven.behind(error)));
                 }
                 SessionOutput::Wait(until) => {
                     let is_over = until.is_some_and(|until| until <= now);
-                    let came = match listens {
-                        0 if !is_over => Ok(None),
-                        _ => link.receive(Some(Duration::ZERO)),
-                    };
-                    let came = match came {
-                        Ok(came) => came,
-                        Err(error) => {
-                            let (id, why) = not_done(error)?;
-                            session.not_done(now, id, why);
-                            continue;
-                        }
-                    };
-                    let Some(frame) = came else {
-                        if session.silent() {
-                            continue;
-                        }
-                        let wait = until.map(|until| until.since(now).into());
-                        let full = link.flush()?.then_some(FULL);
-                        // Frames that the link holds already do not make the descriptor readable.
-                        let more = (listens == 0).then_some(Duration::ZERO);
-                        return Ok([wait, full, more].into_iter().flatten().min());
-                    };
-                    session.receive(now, &frame);
-                    listens = listens.saturating_sub(1);
+                    if (listens > 0 || is_over) && driven.take(Some(Duration::ZERO))? {
+                        listens = listens.saturating_sub(1);
+                        continue;
+                    }
+                    if driven.session.silent() {
+                        continue;
+                    }
+                    let wait = until.map(|until| until.since(now).into());
+                    let full = driven.port.link()?.0.flush()?.then_some(FULL);
+                    // Frames that the link holds already do not make the descriptor readable.
+                    let more = (listens == 0).then_some(Duration::ZERO);
+                    return Ok([wait, full, more].into_iter().flatten().min());
                 }
             }
         }

@@ -2,11 +2,12 @@
 
 mod errors;
 mod held;
+mod pending_torques;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{Holder, NotDone, PortError};
+use motorlink_link::port::PortError;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
@@ -14,15 +15,16 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time::{Instant, Micros};
 
-use super::{Error, Options};
+use super::{Asked, Error, Options};
 use crate::overdue::Overdue;
+use held::HeldExchanges;
 
 /// The longest time for which a motor with doubtful replies may go on sending, in addition to the
 /// times of its exchanges.
 const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 
-/// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
-/// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`set_torque4`](Self::set_torque4),
+/// A host that waits for motors in quarantine, and for those that it asks for the first time, with the
+/// motors that it set moving, and its errors in words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`set_torque4`](Self::set_torque4),
 /// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
@@ -46,7 +48,7 @@ pub(super) struct Session {
     /// Those of them whose request cannot leave yet.
     waiting: MotorSet,
     /// Torques whose motors are asked for the first time.
-    held: Option<Held>,
+    torques: Option<PendingTorques>,
     /// Motors whose torques were given up, and the reason. Each is an outcome of its own.
     unsent: MotorSet,
     unsent_for: Option<RequestError>,
@@ -57,13 +59,9 @@ pub(super) struct Session {
     losses: [u32; MotorId::COUNT],
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
-    /// Whether another program holds the port.
-    pub(super) is_held: bool,
-    /// Motors of which that program has no reply, and knows that they are there.
-    pub(super) missed: MotorSet,
+    /// The exchanges with the program that holds the port, in place of those of the host.
+    held: Option<HeldExchanges>,
     timeout: Duration,
-    /// What the program that holds the port has no reply to, and why.
-    not_done: Vec<(MotorId, PortError)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -78,6 +76,8 @@ struct PendingRequest {
 pub(super) enum SessionOutput {
     /// Send this frame, then poll again.
     Transmit(CanFrame),
+    /// [Hand](Session::hand_over) the request to this motor to the program that holds the port.
+    HandOver(MotorId),
     /// The exchange with a motor is over.
     Done(MotorId, Result<[u8; 8], Error>),
     /// Hand in what comes until then; `None` while no exchange is under way.
@@ -86,7 +86,7 @@ pub(super) enum SessionOutput {
 
 /// Torques for motors 1 to 4 that wait until the motors can be trusted.
 #[derive(Debug, Clone, Copy)]
-struct Held {
+struct PendingTorques {
     torques: SetTorque4,
     expect: MotorSet,
     /// Those of them that have answered.
@@ -116,60 +116,21 @@ impl Session {
             pending: [nothing; MotorId::COUNT],
             insisting: MotorSet::EMPTY,
             waiting: MotorSet::EMPTY,
-            held: None,
+            torques: None,
             unsent: MotorSet::EMPTY,
             unsent_for: None,
             sent: [Instant(0); MotorId::COUNT],
             overdue: Overdue::default(),
             losses: [0; MotorId::COUNT],
             is_retired: false,
-            is_held: false,
-            missed: MotorSet::EMPTY,
+            held: None,
             timeout: options.timeout,
-            not_done: Vec::new(),
         }
     }
 
     /// How long a reply may take.
     pub(super) fn timeout(&self) -> Duration {
         self.timeout
-    }
-
-    /// Another program holds the port. It gives a reply or a reason within its patience.
-    pub(super) fn set_holder(&mut self, holder: Holder) {
-        self.is_held = true;
-        self.timeout = holder.patience;
-        self.host.set_timeout(holder.patience.into());
-    }
-
-    /// Whether another program holds the port, and this is what it says after it has repeated a stop.
-    pub(super) fn is_given_up(&self, error: &Error) -> bool {
-        match error {
-            Error::Port(error) => error.is_given_up(),
-            error => self.is_held && matches!(error, Error::Timeout { .. }),
-        }
-    }
-
-    /// No late reply comes to the motors that have no exchange under way.
-    pub(super) fn trust_idle(&mut self) {
-        self.host.trust(MotorSet::ALL.without(self.busy()));
-    }
-
-    /// The program that holds the port has no reply to the request of this motor.
-    pub(super) fn not_done(&mut self, now: Instant, id: MotorId, why: PortError) {
-        if matches!(why, PortError::NotDone { kind: NotDone::Silent, .. }) {
-            self.missed.insert(id);
-        }
-        // Who holds the motor answers for it.
-        if why.is_of_another() || why.is_unsent() && self.begun.contains(id) {
-            self.moving.remove(id);
-            self.unexpected.remove(id);
-        }
-        if self.busy().contains(id) {
-            self.cancel(now, id);
-            self.host.trust(id.into());
-            self.not_done.push((id, why));
-        }
     }
 
     pub(super) fn counters(&self) -> Counters {
@@ -205,14 +166,16 @@ impl Session {
 
     /// The motors with an exchange under way.
     pub(super) fn busy(&self) -> MotorSet {
-        let held = if self.held.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };
-        let not_done = self.not_done.iter().map(|(id, _)| *id).collect();
-        self.host.busy().union(self.waiting).union(self.unsent).union(held).union(not_done)
+        if let Some(held) = &self.held {
+            return held.busy();
+        }
+        let torques = if self.torques.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };
+        self.host.busy().union(self.waiting).union(self.unsent).union(torques)
     }
 
     /// Whether a request to a motor is sent at once. Otherwise late replies are awaited before.
     pub(super) fn sends_at_once(&self, id: MotorId) -> bool {
-        self.is_held || self.host.is_trusted(id)
+        self.held.is_some() || self.host.is_trusted(id)
     }
 
     /// Tells that the bus was opened anew.
@@ -271,6 +234,9 @@ impl Session {
         id: MotorId,
         request: [u8; 8],
     ) -> Result<(), Error> {
+        if self.held.is_some() {
+            return self.begin_held(now, id, request);
+        }
         self.make_way(&request);
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
@@ -287,6 +253,9 @@ impl Session {
     /// # Errors
     /// As [`request`](Self::request).
     pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        if self.held.is_some() {
+            return self.begin_held(now, id, request);
+        }
         self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
@@ -297,6 +266,30 @@ impl Session {
         self.insisting.insert(id);
         self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
         Ok(())
+    }
+
+    /// As [`request`](Self::request), also for a confirmation.
+    pub(super) fn begin(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
+        match asked {
+            Asked::Request(request) => self.request(now, id, request),
+            Asked::Confirmation => {
+                self.request(now, id, self.question(id))?;
+                self.confirm_begun(id);
+                Ok(())
+            }
+        }
+    }
+
+    /// As [`ask`](Self::ask), also for a confirmation.
+    pub(super) fn insist(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
+        match asked {
+            Asked::Request(request) => self.ask(now, id, request),
+            Asked::Confirmation => {
+                self.ask(now, id, self.question(id))?;
+                self.confirm_begun(id);
+                Ok(())
+            }
+        }
     }
 
     /// Begins an exchange with those of motors 1 to 4 that are expected to answer. Those that are asked
@@ -314,6 +307,9 @@ impl Session {
         for id in MotorSet::TORQUE4 {
             self.free(id, &torque)?;
         }
+        if self.held.is_some() {
+            return self.begin_held_torques(now, torques, expect);
+        }
         let begun = self.host.set_torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
         self.expected = expect;
@@ -322,7 +318,8 @@ impl Session {
             self.pending[id.index()] = PendingRequest { request: torque, until };
         }
         if expect.into_iter().any(|id| self.host.is_unknown(id)) {
-            self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
+            self.torques =
+                Some(PendingTorques { torques, expect, answered: MotorSet::EMPTY, until });
         }
         Ok(())
     }
@@ -343,7 +340,9 @@ impl Session {
         }
         let output = self.next(now);
         match output {
-            SessionOutput::Transmit(_) => self.overdue.sent(now, self.timeout),
+            SessionOutput::Transmit(_) | SessionOutput::HandOver(_) => {
+                self.overdue.sent(now, self.timeout);
+            }
             SessionOutput::Wait(Some(until)) => self.overdue.waits(until),
             // Others may be waited for.
             SessionOutput::Done(..) | SessionOutput::Wait(None) => {}
@@ -352,11 +351,12 @@ impl Session {
     }
 
     fn next(&mut self, now: Instant) -> SessionOutput {
+        if let Some(held) = &mut self.held {
+            let output = held.poll(now);
+            return self.held_output(output);
+        }
         loop {
-            if let Some((id, why)) = self.not_done.pop() {
-                return SessionOutput::Done(id, Err(self.undone(id, why)));
-            }
-            let mut again = self.send_held(now);
+            let mut again = self.send_torques(now);
             if let Some(id) = self.unsent.next() {
                 return SessionOutput::Done(id, Err(self.why_unsent(id)));
             }
@@ -382,9 +382,7 @@ impl Session {
             match self.host.poll(now) {
                 proto::Output::Transmit(frame) => {
                     self.moved_by(&frame);
-                    if let Some(id) =
-                        frame.eight_bytes().and_then(|(id, _)| MotorId::from_can_id(id.into()))
-                    {
+                    if let Some(id) = MotorId::from_can_id(frame.id()) {
                         self.sent[id.index()] = now;
                     }
                     return SessionOutput::Transmit(frame);
@@ -394,20 +392,15 @@ impl Session {
                 {
                     self.waiting.insert(id);
                 }
-                proto::Output::Done { id, result } if self.is_held(id) => {
-                    if let Some(outcome) = self.held_answered(id, result) {
+                proto::Output::Done { id, result } if self.awaits_torques(id) => {
+                    if let Some(outcome) = self.torques_answered(id, result) {
                         return outcome;
                     }
                 }
                 proto::Output::Done { id, result } => {
                     let is_outlasted = self.insisting.contains(id);
                     self.insisting.remove(id);
-                    // A motor counts as moving from the request on, whose reply may be lost, and
-                    // until it has acknowledged that it is off or stopped.
-                    if result.as_ref().is_ok_and(ends_motion) {
-                        self.moving.remove(id);
-                        self.unexpected.remove(id);
-                    }
+                    self.acknowledged(id, result.as_ref().ok());
                     // The motor's quarantine forgets it.
                     if result.is_err() && self.host.has_stray(id) {
                         self.lost(id);
@@ -431,10 +424,27 @@ impl Session {
             true => moved.without(self.expected),
             false => MotorSet::EMPTY,
         };
+        self.moved(moved, unexpected);
+    }
+
+    fn moved(&mut self, moved: MotorSet, unexpected: MotorSet) {
         let before = self.moving.union(self.unexpected);
         self.begun = self.begun.union(moved).without(moved.intersection(before));
         self.unexpected = self.unexpected.union(unexpected);
         self.moving = self.moving.union(moved.without(unexpected));
+    }
+
+    /// A motor counts as moving from the request on, whose reply may be lost, and until it has
+    /// acknowledged that it is off or stopped.
+    fn acknowledged(&mut self, id: MotorId, reply: Option<&[u8; 8]>) {
+        if reply.is_some_and(ends_motion) {
+            self.at_rest(id);
+        }
+    }
+
+    fn at_rest(&mut self, id: MotorId) {
+        self.moving.remove(id);
+        self.unexpected.remove(id);
     }
 
     /// Gives up the exchange with a motor, if there is one. Its reply may still come.
@@ -442,12 +452,15 @@ impl Session {
         if self.busy().contains(id) {
             self.lost(id);
         }
+        if let Some(held) = &mut self.held {
+            held.cancel(id);
+            return;
+        }
         self.insisting.remove(id);
         self.waiting.remove(id);
         self.unsent.remove(id);
-        self.not_done.retain(|(other, _)| *other != id);
         if MotorSet::TORQUE4.contains(id) {
-            self.drop_held(None);
+            self.drop_torques(None);
             self.unsent.remove(id);
         }
         self.host.cancel(now, id);
@@ -461,7 +474,7 @@ impl Session {
     /// What ends motion goes before torques that are held.
     fn make_way(&mut self, request: &[u8; 8]) {
         if ends_motion(request) {
-            self.drop_held(None);
+            self.drop_torques(None);
         }
     }
 
@@ -470,8 +483,8 @@ impl Session {
         if self.is_retired && !ends_motion(request) {
             return Err(PortError::Retired { port: self.port.to_string() }.into());
         }
-        let is_held = self.held.is_some() && MotorSet::TORQUE4.contains(id);
-        match self.waiting.contains(id) || is_held {
+        let awaits = self.torques.is_some() && MotorSet::TORQUE4.contains(id);
+        match self.waiting.contains(id) || awaits {
             true => Err(Error::Twice(id)),
             false => Ok(()),
         }

@@ -9,13 +9,14 @@ use motorlink_link::printable;
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Confirmation, Counters, MAX_FRAME, MotorNumber, Profile, Recovery, Request, SyncState,
+    Confirmation, Counters, MotorNumber, Profile, Recovery, Request, SyncState,
 };
 
-use super::driven::{Driven, of_profile};
+use super::driven::{Driven, opener};
 use super::session::{Exchanged, Rules};
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
+use crate::way::Way;
 use proto::Started;
 
 /// What GET_BOARD_INFO tells (4.7).
@@ -70,27 +71,28 @@ impl Client {
         mut wrap: impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static,
         options: Options,
     ) -> Result<Self, Error> {
-        let name = port.clone();
-        let open = move || Ok(wrap(name.open_bytes()?));
-        Self::open_with(&port.to_string(), Box::new(open), options.on(port))
+        let open = move |port: &PortName| Ok(wrap(port.open_bytes()?));
+        let open = opener(port, options.profile, open);
+        let opened = Reopening::open(&port.to_string(), open, options.back_off)?;
+        Ok(Self::on(opened, options.on(port)))
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
-        open: Opener<Box<dyn ByteLink>>,
+        mut open: Opener<Box<dyn ByteLink>>,
         options: Options,
     ) -> Result<Self, Error> {
-        let open = of_profile(name, open, options.profile);
+        let open = Box::new(move || open().map(Way::Line));
         Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
     }
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn ByteLink>, options: Options) -> Self {
-        Self::on(Reopening::over(name, link), options)
+        Self::on(Reopening::over(name, Way::Line(link)), options)
     }
 
-    fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
+    fn on(port: Reopening<Way<Box<dyn ByteLink>>>, options: Options) -> Self {
         Self::driving(Driven::new(port, &options))
     }
 
@@ -168,7 +170,7 @@ impl Client {
     /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
     /// ports do nothing then.
     pub fn end_with(&self, ending: Ending) {
-        self.turns.take().port.end_with(ending);
+        self.turns.take().end_with(ending);
     }
 
     /// The next call opens a closed port at once.
@@ -178,9 +180,9 @@ impl Client {
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().port.only_own(true);
+        self.turns.take().only_own(true);
         let result = act();
-        self.turns.take().port.only_own(false);
+        self.turns.take().only_own(false);
         result
     }
 
@@ -306,8 +308,9 @@ impl Client {
     }
 
     fn answers(&self, confirmation: &Confirmation) -> Seen<()> {
-        let accepted = |payload: &[u8]| confirmation.accepts(payload.len()).then_some(());
         let mut driven = self.turns.take();
+        let confirms = driven.session.confirms(confirmation);
+        let accepted = |payload: &[u8]| confirms(payload.len()).then_some(());
         match driven.ask(confirmation) {
             Ok(()) => self.conclude(driven, accepted),
             Err(error) => (Err(error), None),
@@ -317,15 +320,13 @@ impl Client {
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
     /// not answer. Afterwards the line is lost.
     pub fn stop_unheard(&self, motor: MotorNumber) -> Result<(), Error> {
-        let mut frame = [0; MAX_FRAME];
         let mut driven = self.turns.take();
         driven.abandon();
-        let stop = driven.session.stop_unheard(motor, &mut frame);
-        let written = driven.port.link().and_then(|(link, _)| link.write(stop));
-        if written.is_err() {
+        let sent = driven.stop_unheard(motor);
+        if sent.is_err() {
             driven.port.close();
         }
-        Ok(written?)
+        Ok(sent?)
     }
 
     /// What a stop ends in when the drive has just failed to answer another.

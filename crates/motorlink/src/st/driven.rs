@@ -2,22 +2,26 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{ByteLink, Link, PortError};
+use motorlink_link::port::{ByteLink, Ending, PortError, PortName};
 use motorlink_link::reopening::{Opener, Reopening};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{Confirmation, Effect, MotorNumber, Output, Profile, Request};
+use motorlink_proto::st::{
+    Command, Confirmation, Effect, Frame, MAX_FRAME, MotorNumber, Output, Profile, Request,
+};
 use motorlink_proto::time::{self, Instant};
 
-use super::session::Session;
+use super::session::{Session, request_bytes};
 use super::{Error, Options};
+use crate::way::{Declared, Way};
 
 /// How an exchange ended: with what was made of the acknowledge's payload, and its size.
 pub(super) type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 
 /// A session and its port.
 pub(super) struct Driven<L> {
-    pub(super) port: Reopening<L>,
+    pub(super) port: Reopening<Way<L>>,
     pub(super) session: Session,
+    pub(super) declared: Declared,
     pub(super) received: [u8; 256],
     /// When the last exchange ended.
     pub(super) ended: Instant,
@@ -25,36 +29,51 @@ pub(super) struct Driven<L> {
     pub(super) exchanges: u64,
 }
 
-/// Opens a port. If another program holds it, that program has to read frames in the same profile:
+/// Opens a port. If another program holds it, that program has to read requests in the same profile:
 /// the same bytes may be other values in the other profile.
-pub(super) fn of_profile<L: ByteLink + 'static>(
-    name: &str,
-    mut open: Opener<L>,
+pub(super) fn opener<L: 'static>(
+    port: &PortName,
     profile: Profile,
-) -> Opener<L> {
-    let port = name.to_owned();
+    mut open: impl FnMut(&PortName) -> Result<L, PortError> + Send + 'static,
+) -> Opener<Way<L>> {
+    let port = port.clone();
     Box::new(move || {
-        let link = open()?;
-        match link.holder().and_then(|holder| holder.profile) {
+        let way = Way::open(&port, &mut open)?;
+        match way.held().and_then(|line| line.profile) {
             Some(other) if other != profile => {
-                Err(PortError::HeldInProfile { port: port.clone(), profile: other.name() })
+                Err(PortError::HeldInProfile { port: port.to_string(), profile: other.name() })
             }
-            _ => Ok(link),
+            _ => Ok(way),
         }
     })
 }
 
 impl<L: ByteLink> Driven<L> {
-    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
-        let port = port.by(|link| link.clock());
+    pub(super) fn new(port: Reopening<Way<L>>, options: &Options) -> Self {
+        let port = port.by(Way::clock);
         let mut session = Session::new(port.name.clone(), options);
-        if port.open_link().is_some_and(Link::is_fresh) {
+        if port.open_link().is_some_and(Way::is_fresh) {
             session.trust_line();
         }
-        if let Some(holder) = port.open_link().and_then(Link::holder) {
-            session.set_holder(holder);
+        if let Some(line) = port.open_link().and_then(Way::held) {
+            session.set_holder(line, port.clock());
         }
-        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
+        let (ended, declared) = (port.now(), Declared::default());
+        Driven { port, session, declared, received: [0; 256], ended, exchanges: 0 }
+    }
+
+    /// The open port. One that is opened again belongs to another line.
+    pub(super) fn way(&mut self) -> Result<&mut Way<L>, PortError> {
+        let (way, reopened) = self.port.link()?;
+        if reopened {
+            let started = self.session.started().motors();
+            self.declared.tell(way, started.map(MotorNumber::number));
+            self.session.reopened();
+            if way.is_fresh() {
+                self.session.trust_line();
+            }
+        }
+        Ok(way)
     }
 
     /// Begins an exchange with motor number `motor`.
@@ -66,9 +85,6 @@ impl<L: ByteLink> Driven<L> {
     /// Begins the exchange of a confirmation.
     pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
         self.ready()?;
-        if let Some(link) = self.port.open_link() {
-            link.confirm_next(0);
-        }
         self.session.ask(confirmation)
     }
 
@@ -96,30 +112,24 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn ready(&mut self) -> Result<(), PortError> {
         let idle = self.port.now().since(self.ended) > IDLE;
         self.abandon();
-        let (link, reopened) = self.port.link()?;
-        if reopened {
-            let started = self.session.started().motors().map(MotorNumber::number);
-            link.claim(&started.collect::<Vec<_>>());
-            self.session.reopened();
-            if link.is_fresh() {
-                self.session.trust_line();
-            }
-        }
-        if idle {
-            let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
-                Ok(size) => size,
-                // It is about a request that was abandoned.
-                Err(PortError::NotDone { .. }) => 0,
-                Err(error) => {
-                    self.port.close();
-                    return Err(error);
-                }
-            };
-            let now = self.port.now();
-            self.session.receive(now, &self.received[..size]);
-        }
-        if self.port.open_link().is_some_and(|link| link.holder().is_some()) {
+        if let Way::Holder(_) = self.way()? {
             self.session.trust_line();
+        }
+        if idle && let Err(error) = self.take_unasked() {
+            self.port.close();
+            return Err(error);
+        }
+        Ok(())
+    }
+
+    /// Takes note of what came since the last exchange.
+    fn take_unasked(&mut self) -> Result<(), PortError> {
+        match self.port.link()?.0 {
+            Way::Line(link) => {
+                let size = link.read(&mut self.received, Some(Duration::ZERO))?;
+                self.session.receive(self.port.now(), &self.received[..size]);
+            }
+            Way::Holder(holder) => while holder.receive(Some(Duration::ZERO))?.is_some() {},
         }
         Ok(())
     }
@@ -128,6 +138,38 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn abandon(&mut self) {
         self.session.abandon();
         self.exchanges += 1;
+    }
+
+    /// Sends a stop whose answer is not awaited.
+    pub(super) fn stop_unheard(&mut self, motor: MotorNumber) -> Result<(), PortError> {
+        self.session.lost();
+        let stop = Request::ExecuteCommand(Command::StopMotor);
+        let motor = motor.number();
+        match self.way()? {
+            Way::Line(link) => {
+                let mut frame = [0; MAX_FRAME];
+                link.write(Frame::command(motor, &stop, &mut frame).unwrap_or(&[]))
+            }
+            Way::Holder(holder) => {
+                holder.request(motor, &request_bytes(&stop).unwrap_or_default()).map(drop)
+            }
+        }
+    }
+
+    /// See [`Client::end_with`](super::Client::end_with).
+    pub(super) fn end_with(&mut self, ending: Ending) {
+        self.declared.ending = ending;
+        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
+            holder.end_with(ending);
+        }
+    }
+
+    /// From now on, whether requests are only for motors of this client, if another program holds the port.
+    pub(super) fn only_own(&mut self, is_set: bool) {
+        self.declared.only_own = is_set;
+        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
+            holder.only_own(is_set);
+        }
     }
 
     /// The port failed in the middle of an exchange, or did not want to wait for its end.
@@ -148,8 +190,15 @@ impl<L: ByteLink> Driven<L> {
     ) -> Result<Option<Outcome<T>>, PortError> {
         loop {
             let now = self.port.now();
+            let link = match self.port.link()?.0 {
+                Way::Line(link) => link,
+                Way::Holder(holder) => {
+                    let ended = self.session.advance_held(holder.as_mut(), pause)?;
+                    return Ok(ended.map(|result| outcome(result, reply)));
+                }
+            };
             match self.session.poll(now) {
-                Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
+                Output::Transmit(bytes) => link.write(bytes)?,
                 Output::Wait(until) => {
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
@@ -158,19 +207,25 @@ impl<L: ByteLink> Driven<L> {
                     }
                     let wait = until.map(|until| until.since(now).into());
                     let wait = wait.into_iter().chain(left).min();
-                    let size = self.port.link()?.0.read(&mut self.received, wait)?;
+                    let size = link.read(&mut self.received, wait)?;
                     if size == 0 {
                         self.session.silent();
                     }
                     let now = self.port.now();
                     self.session.receive(now, &self.received[..size]);
                 }
-                Output::Done(result) => {
-                    return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
-                }
+                Output::Done(result) => return Ok(Some(outcome(result, reply))),
             }
         }
     }
+}
+
+/// What is made of the end of an exchange.
+pub(super) fn outcome<T, P: AsRef<[u8]>>(
+    result: Result<P, proto::ExchangeError>,
+    reply: impl FnOnce(&[u8]) -> Option<T>,
+) -> Outcome<T> {
+    result.map(|payload| (reply(payload.as_ref()), payload.as_ref().len()))
 }
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a

@@ -1,7 +1,7 @@
 //! The client for event loops. Only the opening of the port waits.
 
 use std::os::fd::BorrowedFd;
-use std::time::Duration;
+use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
 use motorlink_link::port::{ByteLink, Ending, EventBytes, PortError, PortName};
@@ -11,8 +11,9 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Instant;
 
-use super::driven::{Driven, of_profile};
+use super::driven::{Driven, opener, outcome};
 use super::{Client, Error, Exchanged, Options};
+use crate::way::Way;
 
 /// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when
 /// the descriptor is readable and when the time that it said has passed.
@@ -50,20 +51,27 @@ impl EventClient {
         mut wrap: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
         options: Options,
     ) -> Result<Self, Error> {
-        let name = port.clone();
-        let open = move || Ok(wrap(name.open_event_bytes()?));
-        Self::open_with(&port.to_string(), Box::new(open), options.on(port))
+        let open = move |port: &PortName| Ok(wrap(port.open_event_bytes()?));
+        let open = opener(port, options.profile, open);
+        Self::opened(&port.to_string(), open, &options.on(port))
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
-        open: Opener<Box<dyn EventBytes>>,
+        mut open: Opener<Box<dyn EventBytes>>,
         options: Options,
     ) -> Result<Self, Error> {
-        let open = of_profile(name, open, options.profile);
+        Self::opened(name, Box::new(move || open().map(Way::Line)), &options)
+    }
+
+    fn opened(
+        name: &str,
+        open: Opener<Way<Box<dyn EventBytes>>>,
+        options: &Options,
+    ) -> Result<Self, Error> {
         let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventClient { driven: Driven::new(port, &options) })
+        Ok(EventClient { driven: Driven::new(port, options) })
     }
 
     /// Whether the port is open.
@@ -82,7 +90,7 @@ impl EventClient {
     /// What is readable when there is something to receive; `None` while the port is closed, or
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driven.port.open_link().and_then(|link| link.descriptor())
+        self.driven.port.open_link().and_then(Way::descriptor)
     }
 
     /// The clock of the port.
@@ -107,13 +115,13 @@ impl EventClient {
 
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
-        self.driven.port.end_with(ending);
+        self.driven.end_with(ending);
     }
 
     /// The next request must not be sent later than this, if another program holds the port.
-    pub fn expire_next(&self, time_to_live: Duration) {
-        if let Some(link) = self.driven.port.open_link() {
-            link.expire_next(time_to_live);
+    pub fn expire_next(&mut self, time_to_live: Duration) {
+        if let Some(Way::Holder(holder)) = self.driven.port.open_link_mut() {
+            holder.expire_next(time_to_live);
         }
     }
 
@@ -184,7 +192,8 @@ impl EventClient {
     /// Moves a confirmation as far as [`advance`](Self::advance) does an exchange.
     pub fn advance_confirmation(&mut self, confirmation: &mut Confirmation) -> Progress<()> {
         loop {
-            match self.advance(|payload| confirmation.accepts(payload.len()).then_some(())) {
+            let confirms = self.driven.session.confirms(confirmation);
+            match self.advance(|payload| confirms(payload.len()).then_some(())) {
                 Progress::Done(Err(Error::Refused { .. }))
                     if self.driven.session.repeat(confirmation) =>
                 {
@@ -221,9 +230,9 @@ impl EventClient {
     /// The client that waits, with what this one knows of the line: to stop what was started.
     pub fn into_client(mut self) -> Client {
         self.abandon();
-        let Driven { port, session, received, ended, exchanges } = self.driven;
-        let port = port.map(|link| link as Box<dyn ByteLink>);
-        Client::driving(Driven { port, session, received, ended, exchanges })
+        let Driven { port, session, declared, received, ended, exchanges } = self.driven;
+        let port = port.map(|way| way.map(|link| link as Box<dyn ByteLink>));
+        Client::driving(Driven { port, session, declared, received, ended, exchanges })
     }
 
     fn moved<T>(
@@ -232,7 +241,17 @@ impl EventClient {
     ) -> Result<Progress<T>, PortError> {
         let Driven { port, session, received, .. } = &mut self.driven;
         let clock = port.clock();
-        let Some(link) = port.open_link_mut() else { return Ok(Progress::Wait(None)) };
+        let link = match port.open_link_mut() {
+            None => return Ok(Progress::Wait(None)),
+            Some(Way::Line(link)) => link,
+            Some(Way::Holder(holder)) => {
+                let pause = Some(machine::Instant::now());
+                return Ok(match session.advance_held(holder.as_mut(), pause)? {
+                    Some(result) => Progress::Done(session.conclude(outcome(result, reply))),
+                    None => Progress::Wait(session.held_wait(clock.now())),
+                });
+            }
+        };
         // What is left in the port wakes the loop again; it has others to serve.
         let mut listens = true;
         loop {
@@ -260,7 +279,7 @@ impl EventClient {
                     listens = false;
                 }
                 Output::Done(result) => {
-                    let outcome = result.map(|payload| (reply(payload), payload.len()));
+                    let outcome = outcome(result, reply);
                     return Ok(Progress::Done(session.conclude(outcome)));
                 }
             }

@@ -1,21 +1,25 @@
 //! One end of a line to an ST drive without the line: what the blocking client and event loops share.
 
+mod held;
+
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{Holder, NotDone, PortError};
+use motorlink_link::port::{NotDone, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_FRAME,
-    MAX_PAYLOAD, Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError,
-    Started, SyncState,
+    Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_PAYLOAD,
+    Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError, Started,
+    SyncState,
 };
 use motorlink_proto::time::Instant;
 
 use super::error::{Target, advice, hint};
 use super::{Error, LimitError, Limits, Options};
 use crate::overdue::Overdue;
+use held::HeldExchange;
+pub(super) use held::request_bytes;
 
 /// What a request is held to before it leaves.
 #[derive(Debug, Clone, Copy)]
@@ -43,8 +47,8 @@ pub(super) struct Session {
     overdue: Overdue,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
-    /// Whether another program holds the port.
-    is_held: bool,
+    /// The exchange with the program that holds the port, in place of one of the master.
+    held: Option<HeldExchange>,
     timeout: Duration,
 }
 
@@ -115,7 +119,7 @@ impl Session {
             pending: asked,
             last: LastExchange::default(),
             is_retired: false,
-            is_held: false,
+            held: None,
             timeout: options.timeout,
         }
     }
@@ -129,13 +133,6 @@ impl Session {
         self.timeout
     }
 
-    /// Another program holds the port. It gives a reply or a reason within its patience.
-    pub(super) fn set_holder(&mut self, holder: Holder) {
-        self.is_held = true;
-        self.timeout = holder.patience;
-        self.master.config_mut().timeout = holder.patience.into();
-    }
-
     pub(super) fn rules(&self) -> Rules {
         self.rules
     }
@@ -146,7 +143,7 @@ impl Session {
 
     /// Whether a request is sent at once. Otherwise the line is recovered before.
     pub(super) fn sends_at_once(&self) -> bool {
-        self.is_held || self.sync_state() == SyncState::InSync
+        self.held.is_some() || self.sync_state() == SyncState::InSync
     }
 
     pub(super) fn counters(&self) -> Counters {
@@ -176,13 +173,23 @@ impl Session {
 
     /// Begins the exchange of a confirmation. A retired session does so, too, to confirm its stops.
     pub(super) fn ask(&mut self, confirmation: &Confirmation) -> Result<(), Error> {
-        self.begin(0, &confirmation.request())
+        let question = confirmation.request();
+        match &mut self.held {
+            Some(held) => {
+                held.confirm();
+                self.begun(Ok(()), 0, What::of(&question))
+            }
+            None => self.begin(0, &question),
+        }
     }
 
     fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         let checked = self.account.check(self.master.counters(), motor, request);
         let effect = checked.map_err(|why| limited(motor, why))?;
-        let begun = self.master.request(motor, request);
+        let begun = match &mut self.held {
+            Some(held) => held.request(motor, request),
+            None => self.master.request(motor, request),
+        };
         self.begun(begun, motor, What::of(request))?;
         self.account.sent(motor, effect);
         Ok(())
@@ -197,7 +204,13 @@ impl Session {
         let frame = Frame { header: Frame::header(code, motor), payload };
         let checked = self.account.check_frame(self.master.counters(), &frame);
         let effect = checked.map_err(|why| limited(motor, why))?;
-        let begun = self.master.request_raw(frame.header, payload);
+        let begun = match &mut self.held {
+            Some(held) => {
+                held.raw(motor, code, payload);
+                Ok(())
+            }
+            None => self.master.request_raw(frame.header, payload),
+        };
         self.begun(begun, motor, What::Raw(code))?;
         self.account.sent_frame(&frame, effect);
         self.last.requested(self.master.counters());
@@ -277,8 +290,8 @@ impl Session {
                 let what = what.to_string();
                 Err(Error::Refused { port, motor: target, request: what, code, hint: hint(code) })
             }
-            Err(proto::ExchangeError::Failed(proto::Failure::Timeout)) if self.is_held => {
-                self.last.restart();
+            Err(proto::ExchangeError::Failed(proto::Failure::Timeout)) if self.held.is_some() => {
+                self.lost();
                 Err(PortError::HolderSilent { port: port.to_string() }.into())
             }
             Err(proto::ExchangeError::Failed(failure)) => {
@@ -327,15 +340,22 @@ impl Session {
     /// Gives up the exchange under way, if there is one. Its reply may still come.
     pub(super) fn abandon(&mut self) {
         self.master.abandon();
+        if self.held.as_mut().is_some_and(HeldExchange::abandon) {
+            self.master.lost();
+        }
     }
 
     /// Tells that the exchange under way failed with the port. Its reply may still come.
     pub(super) fn failed(&mut self) {
-        self.master.abandon();
+        match self.held {
+            Some(_) => self.master.lost(),
+            None => self.master.abandon(),
+        }
         self.last.restart();
     }
 
-    fn lost(&mut self) {
+    /// A reply may still come that nobody waits for.
+    pub(super) fn lost(&mut self) {
         self.master.lost();
         self.last.restart();
     }
@@ -350,17 +370,6 @@ impl Session {
     /// Tells that nothing is left in the line from before.
     pub(super) fn trust_line(&mut self) {
         self.master.trust_line();
-    }
-
-    /// A STOP_MOTOR that is sent outside the exchanges. No answer is expected.
-    pub(super) fn stop_unheard<'a>(
-        &mut self,
-        motor: MotorNumber,
-        frame: &'a mut [u8; MAX_FRAME],
-    ) -> &'a [u8] {
-        self.lost();
-        let stop = Request::ExecuteCommand(Command::StopMotor);
-        Frame::command(motor.number(), &stop, frame).unwrap_or(&[])
     }
 
     /// What a stop ends in when the drive has just failed to answer another.

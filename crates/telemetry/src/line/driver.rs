@@ -19,7 +19,7 @@ pub(super) trait Driver: Send {
     fn link_state(&self) -> LinkState;
     fn reopen(&mut self) -> Result<(), LineError>;
     fn descriptor(&self) -> Option<BorrowedFd<'_>>;
-    fn expire_next(&self, time_to_live: Duration);
+    fn expire_next(&mut self, time_to_live: Duration);
     fn stop_started(self: Box<Self>) -> Vec<Stopped>;
 }
 
@@ -157,7 +157,7 @@ macro_rules! driver {
                 self.client.descriptor()
             }
 
-            fn expire_next(&self, time_to_live: Duration) {
+            fn expire_next(&mut self, time_to_live: Duration) {
                 self.client.expire_next(time_to_live);
             }
 
@@ -226,7 +226,7 @@ impl RmdDriver for DirectRmd {
     fn begin(&mut self, id: MotorId, asked: rmd::Asked) -> Result<(), rmd::Error> {
         match asked {
             rmd::Asked::Request(request) => self.client.ask(id, request),
-            rmd::Asked::Confirmation => self.client.begin_confirmation(id).map(drop),
+            rmd::Asked::Confirmation => self.client.begin_confirmation(id),
         }
     }
 

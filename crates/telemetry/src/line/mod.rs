@@ -197,7 +197,7 @@ pub trait Line: Send {
     fn sends_at_once(&self, lane: Lane) -> bool;
 
     /// The next request must not be sent later than this. It is for ports that another program holds.
-    fn expire_next(&self, time_to_live: Duration);
+    fn expire_next(&mut self, time_to_live: Duration);
 
     /// Begins an exchange in a lane that has none.
     ///

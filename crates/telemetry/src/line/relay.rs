@@ -209,7 +209,7 @@ impl<R: Owned> Driver for Relayed<R> {
     }
 
     /// No commands go through the relay.
-    fn expire_next(&self, _: Duration) {}
+    fn expire_next(&mut self, _: Duration) {}
 
     /// The owner stops its motors.
     fn stop_started(self: Box<Self>) -> Vec<Stopped> {

@@ -83,7 +83,7 @@ impl Line for RmdLine {
         MotorId::new(lane.0).is_none_or(|id| self.driver.sends_at_once(id))
     }
 
-    fn expire_next(&self, time_to_live: Duration) {
+    fn expire_next(&mut self, time_to_live: Duration) {
         self.driver.expire_next(time_to_live);
     }
 

@@ -234,7 +234,7 @@ impl Line for StLine {
         self.driver.sends_at_once()
     }
 
-    fn expire_next(&self, time_to_live: Duration) {
+    fn expire_next(&mut self, time_to_live: Duration) {
         self.driver.expire_next(time_to_live);
     }
 

@@ -1,4 +1,7 @@
 //! A share at a Unix socket: one thread for all programs.
+//!
+//! All queues between an engine and a program have limits. The server takes from them only what the
+//! program reads, so a slow program delays no other one.
 
 use std::io::{self, Read, Write};
 use std::os::fd::AsFd;

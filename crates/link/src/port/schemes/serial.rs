@@ -1,4 +1,4 @@
-//! UARTs, and ptys that emulate them.
+//! UARTs, and ptys that emulate them. They are locked before they are configured.
 //!
 //! Eight data bits, no parity, one stop bit, no flow control. The default latency timer of an FTDI
 //! adapter delays received bytes by 16 ms; it is set to 1 ms if this user has permission.

@@ -29,26 +29,7 @@ impl Session {
         }
     }
 
-    /// If the motor does not answer the other program, or a reply of it cannot be trusted, the error is
-    /// that of a port of one's own.
-    pub(super) fn undone(&self, id: MotorId, why: PortError) -> Error {
-        match why {
-            PortError::NotDone { kind: NotDone::Unconfirmed, .. } => {
-                Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }
-            }
-            PortError::NotDone { kind: NotDone::Silent | NotDone::Unheard, .. } => {
-                let [code, ..] = self.pending[id.index()].request;
-                let port = Arc::clone(&self.port);
-                Error::Timeout { port, motor: id, request: Code::from(code) }
-            }
-            why => why.into(),
-        }
-    }
-
     pub(super) fn failed(&self, id: MotorId, error: proto::Failure) -> Error {
-        if self.is_held && error == proto::Failure::Timeout {
-            return PortError::HolderSilent { port: self.port.to_string() }.into();
-        }
         let port = Arc::clone(&self.port);
         let [code, ..] = self.pending[id.index()].request;
         let code = Code::from(code);

@@ -1,5 +1,8 @@
 //! Recovery: makes replies match requests again, on a line that was just opened or where an
 //! exchange failed (SPEC-NOTES S16).
+//!
+//! Silence without an answered question is not enough: a reply that is later than the silence would be
+//! matched to a newer request.
 
 use super::config::{MasterConfig, Recovery, TIMEOUT};
 use super::question::{FLAGS, INFO, PADDING, Question, REVUP, STATUS};

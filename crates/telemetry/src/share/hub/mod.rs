@@ -1,6 +1,7 @@
 //! The share without a socket: lines, programs, whose motors are whose.
 //!
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
+//! Deadlines are by the clocks of the lines and by the time of [`Hub::at`], so tests run on virtual time.
 
 mod completions;
 mod error_mapping;

@@ -1,20 +1,21 @@
 //! The connection of a port to its share.
 
-use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::os::fd::BorrowedFd;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{self, FdLink, Holder, Link, PortError};
+use motorlink::port::{self, Declined, FdLink, HeldLine, Holder, NotDone, PortError, RequestEnd};
 use motorlink::st::Profile;
 
 use super::line_address::{Deadlines, LineAddress};
 use super::pulse::Socket;
 use crate::share::VERSION;
-use crate::share::client_codec::{ClientCodec, CodecError, Ended, Heard};
+use crate::share::client_codec::{ClientCodec, CodecError, Ended, Heard, Refusal};
 use crate::share::command_kind::CommandKind;
 use crate::share::drive_protocol::DriveProtocol;
-use crate::share::message::{Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Text};
+use crate::share::message::{
+    Answer, Ask, Ending, LONGEST_NAME, Line, MotorName, Protocol, Reason, Text,
+};
 
 /// How long a share may take for the answer to hello.
 const OPENING: Duration = Duration::from_secs(5);
@@ -27,15 +28,15 @@ pub(super) struct Connection {
     port: LineAddress,
     socket: Socket,
     codec: ClientCodec,
-    holder: Holder,
+    line: HeldLine,
     /// The time to live of the next request, if it is shorter.
-    expires: Cell<Duration>,
+    expires: Duration,
     /// Whether requests are for motors that no other program has moved since.
-    is_own: Cell<bool>,
+    is_own: bool,
     /// Motors that this program has moved through a connection before this one.
-    claims: Cell<Vec<u8>>,
+    claims: Vec<u8>,
     /// What the share does with the motors of this program when it leaves, and what it knows of that.
-    ending: Cell<Ending>,
+    ending: Ending,
     declared: Ending,
     /// The motors that were taken from other programs.
     taken: BTreeSet<u8>,
@@ -54,11 +55,11 @@ impl Connection {
             has_deadlines: false,
             port: port.clone(),
             codec: ClientCodec::default(),
-            holder: Holder { patience: OPENING, profile: None },
-            expires: Cell::new(TIME_TO_LIVE),
-            is_own: Cell::new(false),
-            claims: Cell::default(),
-            ending: Cell::default(),
+            line: HeldLine { patience: OPENING, profile: None },
+            expires: TIME_TO_LIVE,
+            is_own: false,
+            claims: Vec::new(),
+            ending: Ending::default(),
             declared: Ending::default(),
             taken: BTreeSet::new(),
             closing: None,
@@ -67,14 +68,14 @@ impl Connection {
         let Answer::Lines { lines, .. } = opened.opening(Ask::Lines)? else {
             return Err(opened.no_share());
         };
-        opened.holder = opened.holder_of(&lines)?;
+        opened.line = opened.held_line(&lines)?;
         Ok(opened)
     }
 
     /// The answer to a request before the first command.
     fn opening(&mut self, ask: Ask) -> Result<Answer, PortError> {
         let id = self.ask(ask)?;
-        let ended = self.receive(Some(OPENING))?.filter(|ended| ended.id == id);
+        let ended = self.next_end(Some(OPENING))?.filter(|ended| ended.id == id);
         let ended = ended.ok_or_else(|| self.no_share())?;
         ended.result.map_err(|refusal| self.port.failed(refusal.message))
     }
@@ -84,7 +85,7 @@ impl Connection {
     }
 
     /// What the share says of the line.
-    fn holder_of(&self, lines: &[Line]) -> Result<Holder, PortError> {
+    fn held_line(&self, lines: &[Line]) -> Result<HeldLine, PortError> {
         let own = |it: &&Line| it.line == self.port.line && it.protocol == self.port.protocol;
         let Some(line) = lines.iter().find(own) else {
             let names: Vec<_> = lines.iter().map(|it| it.line.as_str()).collect();
@@ -92,42 +93,12 @@ impl Connection {
             return Err(self.port.failed(why));
         };
         let patience = line.patience();
-        let Some(name) = &line.profile else { return Ok(Holder { patience, profile: None }) };
+        let Some(name) = &line.profile else { return Ok(HeldLine { patience, profile: None }) };
         let profile = Profile::ALL.into_iter().find(|profile| profile.name() == name);
         match profile {
-            Some(_) => Ok(Holder { patience, profile }),
+            Some(_) => Ok(HeldLine { patience, profile }),
             None => Err(self.port.failed(format!("the share uses the unknown profile {name}"))),
         }
-    }
-
-    pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
-        self.socket.descriptor()
-    }
-
-    /// Sends a command to a motor; gives its id.
-    pub(super) fn command(&mut self, motor: u8, bytes: Vec<u8>) -> Result<u32, PortError> {
-        let time_to_live = self.expires.replace(TIME_TO_LIVE).as_secs_f64();
-        let line = self.port.line.clone();
-        let (claims, changes) = (self.claims.take(), self.changes(motor, &bytes));
-        if !self.has_deadlines && (changes || !claims.is_empty()) {
-            self.has_deadlines = true;
-            self.declare_deadlines()?;
-        }
-        let motion = self.ending.get();
-        if motion != self.declared && (changes || !claims.is_empty()) {
-            self.declared = motion;
-            self.ask(Ask::Ending { motion })?;
-        }
-        for motor in claims {
-            let motor = MotorName { line: line.clone(), motor };
-            self.ask(Ask::Claim { motor })?;
-        }
-        if self.port.at.takes() && changes && self.taken.insert(motor) {
-            let motor = MotorName { line: line.clone(), motor };
-            self.ask(Ask::Take { motor })?;
-        }
-        let (continues, own) = (false, self.is_own.get());
-        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues, own })
     }
 
     /// From now on the share ends the motion of this program if it does not seem to live. One that only
@@ -146,20 +117,20 @@ impl Connection {
 
     fn changes(&self, motor: u8, bytes: &[u8]) -> bool {
         let speaks = match self.port.protocol {
-            Protocol::St => DriveProtocol::St(self.holder.profile.unwrap_or_default()),
+            Protocol::St => DriveProtocol::St(self.line.profile.unwrap_or_default()),
             Protocol::Rmd => DriveProtocol::Rmd,
         };
         CommandKind::of_bytes(speaks, motor, bytes).changes()
     }
 
     /// Sends a request; gives its id.
-    pub(super) fn ask(&mut self, ask: Ask) -> Result<u32, PortError> {
+    fn ask(&mut self, ask: Ask) -> Result<u32, PortError> {
         let request = self.codec.request(ask);
         let (id, stream) = request.map_err(|error| self.port.failed(error.to_string()))?;
         match self.socket.write(&stream) {
             Ok(()) => Ok(id),
             // What came before the end says why.
-            Err(error @ PortError::Closed { .. }) => match self.receive(Some(Duration::ZERO)) {
+            Err(error @ PortError::Closed { .. }) => match self.next_end(Some(Duration::ZERO)) {
                 Err(why) => Err(why),
                 Ok(_) => Err(error),
             },
@@ -168,10 +139,7 @@ impl Connection {
     }
 
     /// The next end of a request. Waits at most `timeout`.
-    pub(super) fn receive(
-        &mut self,
-        timeout: Option<Duration>,
-    ) -> Result<Option<Ended>, PortError> {
+    fn next_end(&mut self, timeout: Option<Duration>) -> Result<Option<Ended>, PortError> {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut bytes = [0; 4096];
         loop {
@@ -198,29 +166,95 @@ impl Connection {
     }
 }
 
-impl Link for Connection {
-    fn holder(&self) -> Option<Holder> {
-        Some(self.holder)
+impl Holder for Connection {
+    fn line(&self) -> HeldLine {
+        self.line
     }
 
-    fn expire_next(&self, time_to_live: Duration) {
-        self.expires.set(time_to_live.min(TIME_TO_LIVE));
+    fn descriptor(&self) -> BorrowedFd<'_> {
+        self.socket.descriptor()
     }
 
-    fn claim(&self, motors: &[u8]) {
-        self.claims.set(motors.to_vec());
+    fn request(&mut self, motor: u8, request: &[u8]) -> Result<u32, PortError> {
+        let time_to_live = std::mem::replace(&mut self.expires, TIME_TO_LIVE).as_secs_f64();
+        let line = self.port.line.clone();
+        let claims = std::mem::take(&mut self.claims);
+        let changes = self.changes(motor, request);
+        if !self.has_deadlines && (changes || !claims.is_empty()) {
+            self.has_deadlines = true;
+            self.declare_deadlines()?;
+        }
+        let motion = self.ending;
+        if motion != self.declared && (changes || !claims.is_empty()) {
+            self.declared = motion;
+            self.ask(Ask::Ending { motion })?;
+        }
+        for motor in claims {
+            let motor = MotorName { line: line.clone(), motor };
+            self.ask(Ask::Claim { motor })?;
+        }
+        if self.port.at.takes() && changes && self.taken.insert(motor) {
+            let motor = MotorName { line: line.clone(), motor };
+            self.ask(Ask::Take { motor })?;
+        }
+        let (bytes, continues, own) = (request.to_vec(), false, self.is_own);
+        self.ask(Ask::Command { line, motor, bytes, time_to_live, continues, own })
     }
 
-    fn only_own(&self, is_set: bool) {
-        self.is_own.set(is_set);
+    fn confirm(&mut self, motor: u8) -> Result<u32, PortError> {
+        self.ask(Ask::Confirm { line: self.port.line.clone(), motor })
     }
 
-    fn end_with(&self, ending: port::Ending) {
-        self.ending.set(match ending {
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<RequestEnd>, PortError> {
+        let Some(Ended { id, result }) = self.next_end(timeout)? else { return Ok(None) };
+        let result = match result {
+            Ok(Answer::Command { bytes }) => Ok(bytes),
+            Ok(_) => Ok(Vec::new()),
+            Err(Refusal { code: Some(code), .. }) => Err(Declined::ByDrive(code)),
+            Err(Refusal { reason, message, .. }) => {
+                let why = format!("`{}`: {message}", self.port.name());
+                Err(Declined::ByHolder(not_done(reason), why))
+            }
+        };
+        Ok(Some(RequestEnd { number: id, result }))
+    }
+
+    fn expire_next(&mut self, time_to_live: Duration) {
+        self.expires = time_to_live.min(TIME_TO_LIVE);
+    }
+
+    fn only_own(&mut self, is_set: bool) {
+        self.is_own = is_set;
+    }
+
+    fn claim(&mut self, motors: Vec<u8>) {
+        self.claims = motors;
+    }
+
+    fn end_with(&mut self, ending: port::Ending) {
+        self.ending = match ending {
             port::Ending::Stop => Ending::Stop,
             port::Ending::Off => Ending::Off,
             port::Ending::Nothing => Ending::Nothing,
-        });
+        };
+    }
+}
+
+/// What it means to a client that a share did not carry a request out.
+fn not_done(reason: Reason) -> NotDone {
+    match reason {
+        Reason::Usage | Reason::Version => NotDone::Usage,
+        Reason::Latched => NotDone::Latched,
+        Reason::Held => NotDone::Held,
+        Reason::Overtaken | Reason::Refused => NotDone::Refused,
+        Reason::Expired | Reason::Busy => NotDone::Unsent,
+        Reason::Silent => NotDone::Silent,
+        Reason::Unheard => NotDone::Unheard,
+        Reason::Unconfirmed => NotDone::Unconfirmed,
+        // It is unknown what the drive did.
+        Reason::Displaced | Reason::Line | Reason::Forbidden | Reason::Lapsed | Reason::Later => {
+            NotDone::Line
+        }
     }
 }
 

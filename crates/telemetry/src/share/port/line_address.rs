@@ -3,11 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink::port::{NotDone, PortError};
+use motorlink::port::PortError;
 
 use crate::share::address::{Address, Unreachable};
-use crate::share::client_codec::Refusal;
-use crate::share::message::{Protocol, Reason};
+use crate::share::message::Protocol;
 
 /// When a share ends the motion of a program that is connected and does not seem to live.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,31 +51,5 @@ impl LineAddress {
     /// The share cannot be used.
     pub(super) fn failed(&self, why: impl Into<String>) -> PortError {
         PortError::Holder { port: self.name(), why: why.into() }
-    }
-
-    /// The share did not carry a request out.
-    pub(super) fn not_done(
-        &self,
-        motor: u8,
-        Refusal { reason, message, .. }: Refusal,
-    ) -> PortError {
-        let kind = match reason {
-            Reason::Usage | Reason::Version => NotDone::Usage,
-            Reason::Latched => NotDone::Latched,
-            Reason::Held => NotDone::Held,
-            Reason::Overtaken | Reason::Refused => NotDone::Refused,
-            Reason::Expired | Reason::Busy => NotDone::Unsent,
-            Reason::Silent => NotDone::Silent,
-            Reason::Unheard => NotDone::Unheard,
-            Reason::Unconfirmed => NotDone::Unconfirmed,
-            // It is unknown what the drive did.
-            Reason::Displaced
-            | Reason::Line
-            | Reason::Forbidden
-            | Reason::Lapsed
-            | Reason::Later => NotDone::Line,
-        };
-        let port = self.name();
-        PortError::NotDone { motor, kind, why: format!("`{port}`: {message}"), port }
     }
 }

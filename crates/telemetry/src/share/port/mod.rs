@@ -1,25 +1,25 @@
 //! The port `share:`: a line of a running share. Other schemes have lines of shares elsewhere.
+//!
+//! A request that the share did not carry out is [`PortError::NotDone`], which does not close the port: the
+//! share would stop the motors of the client.
 
-mod bus;
 mod connection;
 mod line_address;
 mod pulse;
-mod serial;
 
 use std::any::Any;
 use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::port::{
-    self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
-    NameError, Port, PortError, PortName, Scheme,
+    self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, HeldPort, Holder,
+    LinePort, NameError, Port, PortError, PortName, Scheme,
 };
 
 use super::address::{Address, Local};
 use super::message::{LONGEST_DEADLINE, Protocol, SHORTEST_DEADLINE};
-use bus::ShareBus;
+use connection::Connection;
 use line_address::{Deadlines, LineAddress};
-use serial::ShareLine;
 
 /// Registers the port `share:` in this process.
 pub fn register() {
@@ -28,7 +28,7 @@ pub fn register() {
 
 /// Where the share is and the name of the line there, if the port is a line of a share.
 pub fn place_of(port: &PortName) -> Option<(Arc<dyn Address>, String)> {
-    let place: &LineAddress = port.holder()?.downcast_ref()?;
+    let place: &LineAddress = port.as_held()?.as_any().downcast_ref()?;
     Some((Arc::clone(&place.at), place.line.clone()))
 }
 
@@ -148,18 +148,28 @@ impl Port for SharePort {
         (self.0.protocol == Protocol::Rmd).then_some(self)
     }
 
-    fn holder(&self) -> Option<&dyn Any> {
-        Some(&self.0)
+    fn as_held(&self) -> Option<&dyn HeldPort> {
+        Some(self)
+    }
+}
+
+impl HeldPort for SharePort {
+    fn open(&self) -> Result<Box<dyn Holder>, PortError> {
+        Ok(Box::new(Connection::open(&self.0)?))
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        &self.0
     }
 }
 
 impl LinePort for SharePort {
     fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
-        Ok(Box::new(ShareLine::open(&self.0)?))
+        Err(self.carries_requests())
     }
 
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
-        Ok(Box::new(ShareLine::open(&self.0)?))
+        Err(self.carries_requests())
     }
 
     fn label(&self) -> String {
@@ -169,14 +179,16 @@ impl LinePort for SharePort {
 
 impl CanPort for SharePort {
     fn open(&self) -> Result<Box<dyn CanLink>, PortError> {
-        Ok(Box::new(ShareBus::open(&self.0)?))
+        Err(self.carries_requests())
     }
 
     fn open_event(&self) -> Result<Box<dyn EventCan>, PortError> {
-        Ok(Box::new(ShareBus::open(&self.0)?))
+        Err(self.carries_requests())
     }
+}
 
-    fn is_paced(&self) -> bool {
-        true
+impl SharePort {
+    fn carries_requests(&self) -> PortError {
+        self.0.failed("a share carries requests out, and gives no frames: use its port")
     }
 }
