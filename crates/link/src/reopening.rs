@@ -207,7 +207,7 @@ impl<L> Reopening<L> {
 
 impl<L: 'static> Reopening<L> {
     /// The same port, with another type of link.
-    pub fn map<M: 'static>(self, form: fn(L) -> M) -> Reopening<M> {
+    pub fn map<M: 'static>(self, form: impl Fn(L) -> M + Copy + Send + 'static) -> Reopening<M> {
         let Reopening {
             name,
             link,

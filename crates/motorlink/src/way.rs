@@ -1,9 +1,11 @@
 //! What is behind a port: the line itself, or a program that holds it.
 
+use std::ops::{Deref, DerefMut};
 use std::os::fd::BorrowedFd;
 
 use motorlink_link::Clock;
 use motorlink_link::port::{Ending, Evented, HeldLine, Holder, Link, PortError, PortName};
+use motorlink_link::reopening::Reopening;
 
 /// An open port.
 pub(crate) enum Way<L> {
@@ -13,11 +15,11 @@ pub(crate) enum Way<L> {
     Holder(Box<dyn Holder>),
 }
 
-/// What a program that holds the port is told of this client, also after the port was opened again.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Declared {
-    pub(crate) only_own: bool,
-    pub(crate) ending: Ending,
+/// A port that may go away. A program that holds it is told of this client each time it is opened.
+pub(crate) struct Port<L> {
+    reopening: Reopening<Way<L>>,
+    only_own: bool,
+    ending: Ending,
 }
 
 impl<L> Way<L> {
@@ -86,13 +88,74 @@ impl<L: Evented> Way<L> {
     }
 }
 
-impl Declared {
-    /// Tells it, and which motors this client has moved through an earlier connection.
-    pub(crate) fn tell<L>(self, way: &mut Way<L>, moved: impl Iterator<Item = u8>) {
-        if let Way::Holder(holder) = way {
+impl<L> Port<L> {
+    pub(crate) fn new(reopening: Reopening<Way<L>>) -> Self
+    where
+        L: Link,
+    {
+        let reopening = reopening.by(Way::clock);
+        Port { reopening, only_own: false, ending: Ending::default() }
+    }
+
+    /// The open port, and whether this call opened it. Then its holder is told which motors this client has
+    /// moved.
+    pub(crate) fn ready(
+        &mut self,
+        moved: impl Iterator<Item = u8>,
+    ) -> Result<(&mut Way<L>, bool), PortError> {
+        let (way, reopened) = self.reopening.link()?;
+        if let (Way::Holder(holder), true) = (&mut *way, reopened) {
             holder.only_own(self.only_own);
             holder.end_with(self.ending);
             holder.claim(moved.collect());
         }
+        Ok((way, reopened))
+    }
+
+    /// See [`Client::end_with`](crate::st::Client::end_with).
+    pub(crate) fn end_with(&mut self, ending: Ending) {
+        self.ending = ending;
+        if let Some(holder) = self.holder() {
+            holder.end_with(ending);
+        }
+    }
+
+    /// From now on, whether requests are only for motors of this client, if another program holds the port.
+    pub(crate) fn only_own(&mut self, is_set: bool) {
+        self.only_own = is_set;
+        if let Some(holder) = self.holder() {
+            holder.only_own(is_set);
+        }
+    }
+
+    /// The program that holds the port, while it is open.
+    pub(crate) fn holder(&mut self) -> Option<&mut dyn Holder> {
+        match self.reopening.open_link_mut()? {
+            Way::Line(_) => None,
+            Way::Holder(holder) => Some(holder.as_mut()),
+        }
+    }
+
+    /// The same port, with another type of line.
+    pub(crate) fn map<M: 'static>(self, form: fn(L) -> M) -> Port<M>
+    where
+        L: 'static,
+    {
+        let Port { reopening, only_own, ending } = self;
+        Port { reopening: reopening.map(move |way: Way<L>| way.map(form)), only_own, ending }
+    }
+}
+
+impl<L> Deref for Port<L> {
+    type Target = Reopening<Way<L>>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.reopening
+    }
+}
+
+impl<L> DerefMut for Port<L> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.reopening
     }
 }

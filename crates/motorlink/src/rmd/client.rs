@@ -264,7 +264,7 @@ impl Client {
     /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
     /// ports do nothing then.
     pub fn end_with(&self, ending: Ending) {
-        self.turns.take().end_with(ending);
+        self.turns.take().port.end_with(ending);
     }
 
     /// The next call opens a closed port at once.
@@ -274,9 +274,9 @@ impl Client {
 
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().only_own(true);
+        self.turns.take().port.only_own(true);
         let result = act();
-        self.turns.take().only_own(false);
+        self.turns.take().port.only_own(false);
         result
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{CanLink, Ending, PortError};
+use motorlink_link::port::{CanLink, PortError};
 use motorlink_link::reopening::Reopening;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::MotorId;
@@ -10,20 +10,19 @@ use motorlink_proto::time;
 
 use super::session::{Session, SessionOutput, ends_motion};
 use super::{Error, Options};
-use crate::way::{Declared, Way};
+use crate::way::{Port, Way};
 
 /// A session and its port.
 pub(super) struct Driven<L> {
-    pub(super) port: Reopening<Way<L>>,
+    pub(super) port: Port<L>,
     pub(super) session: Session,
-    pub(super) declared: Declared,
     /// Exchanges and cycles so far: another number says that the one before it was given up.
     pub(super) exchanges: u64,
 }
 
 impl<L: CanLink> Driven<L> {
     pub(super) fn new(port: Reopening<Way<L>>, options: &Options) -> Self {
-        let port = port.by(Way::clock);
+        let port = Port::new(port);
         let mut session = Session::new(port.name.clone(), options);
         if port.open_link().is_some_and(Way::is_fresh) {
             session.trust();
@@ -31,23 +30,7 @@ impl<L: CanLink> Driven<L> {
         if let Some(line) = port.open_link().and_then(Way::held) {
             session.set_holder(line);
         }
-        Driven { port, session, declared: Declared::default(), exchanges: 0 }
-    }
-
-    /// See [`Client::end_with`](super::Client::end_with).
-    pub(super) fn end_with(&mut self, ending: Ending) {
-        self.declared.ending = ending;
-        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
-            holder.end_with(ending);
-        }
-    }
-
-    /// From now on, whether requests are only for motors of this client, if another program holds the port.
-    pub(super) fn only_own(&mut self, is_set: bool) {
-        self.declared.only_own = is_set;
-        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
-            holder.only_own(is_set);
-        }
+        Driven { port, session, exchanges: 0 }
     }
 
     /// Makes ready for these requests.
@@ -84,10 +67,9 @@ impl<L: CanLink> Driven<L> {
     /// pass for a reply to what is sent now.
     pub(super) fn listen(&mut self) -> Result<(), Error> {
         let now = self.port.now();
-        let (way, reopened) = self.port.link()?;
+        let moved = self.session.moving().union(self.session.unexpected());
+        let (way, reopened) = self.port.ready(moved.map(MotorId::number))?;
         if reopened {
-            let moved = self.session.moving().union(self.session.unexpected());
-            self.declared.tell(way, moved.map(MotorId::number));
             self.session.reopened(now);
             if way.is_fresh() {
                 self.session.trust();
@@ -118,11 +100,11 @@ impl<L: CanLink> Driven<L> {
         Ok(true)
     }
 
-    /// Hands the request to a motor to the program that holds the port.
-    pub(super) fn hand_over(&mut self, now: time::Instant, id: MotorId) -> Result<(), PortError> {
-        match self.port.link()?.0 {
-            Way::Line(_) => Ok(()),
-            Way::Holder(holder) => self.session.hand_over(now, id, holder.as_mut()),
+    /// Sends what was begun, if another program holds the port.
+    pub(super) fn hand_over(&mut self, now: time::Instant) -> Result<(), PortError> {
+        match self.port.holder() {
+            Some(holder) => self.session.hand_over(now, holder),
+            None => Ok(()),
         }
     }
 
@@ -150,9 +132,9 @@ impl<L: CanLink> Driven<L> {
     ) -> Result<bool, Error> {
         loop {
             let now = self.port.now();
+            self.hand_over(now).map_err(|error| self.closed(error))?;
             let moved = match self.session.poll(now) {
                 SessionOutput::Transmit(frame) => self.send(&frame),
-                SessionOutput::HandOver(id) => self.hand_over(now, id),
                 SessionOutput::Done(id, result) => {
                     each(id, result.map_err(|error| self.behind(error)), self.session.sent(id));
                     Ok(())

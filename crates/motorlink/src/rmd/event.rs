@@ -121,12 +121,12 @@ impl EventClient {
 
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
-        self.driven.end_with(ending);
+        self.driven.port.end_with(ending);
     }
 
     /// The next request to any motor must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(Way::Holder(holder)) = self.driven.port.open_link_mut() {
+        if let Some(holder) = self.driven.port.holder() {
             holder.expire_next(time_to_live);
         }
     }
@@ -267,9 +267,9 @@ impl EventClient {
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
     pub fn into_client(self) -> Client {
-        let Driven { port, session, declared, exchanges } = self.driven;
-        let port = port.map(|way| way.map(|link| link as Box<dyn CanLink>));
-        Client::driving(Driven { port, session, declared, exchanges })
+        let Driven { port, session, exchanges } = self.driven;
+        let port = port.map(|link| link as Box<dyn CanLink>);
+        Client::driving(Driven { port, session, exchanges })
     }
 
     fn moved(
@@ -283,9 +283,9 @@ impl EventClient {
         let mut listens = STEP;
         loop {
             let now = driven.port.now();
+            driven.hand_over(now)?;
             match driven.session.poll(now) {
                 SessionOutput::Transmit(frame) => driven.send(&frame)?,
-                SessionOutput::HandOver(id) => driven.hand_over(now, id)?,
                 SessionOutput::Done(id, result) => {
                     each(id, result.map_err(|error| driven.behind(error)));
                 }

@@ -76,8 +76,6 @@ struct PendingRequest {
 pub(super) enum SessionOutput {
     /// Send this frame, then poll again.
     Transmit(CanFrame),
-    /// [Hand](Session::hand_over) the request to this motor to the program that holds the port.
-    HandOver(MotorId),
     /// The exchange with a motor is over.
     Done(MotorId, Result<[u8; 8], Error>),
     /// Hand in what comes until then; `None` while no exchange is under way.
@@ -235,7 +233,7 @@ impl Session {
         request: [u8; 8],
     ) -> Result<(), Error> {
         if self.held.is_some() {
-            return self.begin_held(now, id, request);
+            return self.begin_held(id, Asked::Request(request));
         }
         self.make_way(&request);
         self.free(id, &request)?;
@@ -254,7 +252,7 @@ impl Session {
     /// As [`request`](Self::request).
     pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
         if self.held.is_some() {
-            return self.begin_held(now, id, request);
+            return self.begin_held(id, Asked::Request(request));
         }
         self.make_way(&request);
         self.free(id, &request)?;
@@ -271,24 +269,18 @@ impl Session {
     /// As [`request`](Self::request), also for a confirmation.
     pub(super) fn begin(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
         match asked {
+            asked if self.held.is_some() => self.begin_held(id, asked),
             Asked::Request(request) => self.request(now, id, request),
-            Asked::Confirmation => {
-                self.request(now, id, self.question(id))?;
-                self.confirm_begun(id);
-                Ok(())
-            }
+            Asked::Confirmation => self.request(now, id, self.question(id)),
         }
     }
 
     /// As [`ask`](Self::ask), also for a confirmation.
     pub(super) fn insist(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
         match asked {
+            asked if self.held.is_some() => self.begin_held(id, asked),
             Asked::Request(request) => self.ask(now, id, request),
-            Asked::Confirmation => {
-                self.ask(now, id, self.question(id))?;
-                self.confirm_begun(id);
-                Ok(())
-            }
+            Asked::Confirmation => self.ask(now, id, self.question(id)),
         }
     }
 
@@ -308,7 +300,7 @@ impl Session {
             self.free(id, &torque)?;
         }
         if self.held.is_some() {
-            return self.begin_held_torques(now, torques, expect);
+            return self.begin_held_torques(torques, expect);
         }
         let begun = self.host.set_torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
@@ -340,9 +332,7 @@ impl Session {
         }
         let output = self.next(now);
         match output {
-            SessionOutput::Transmit(_) | SessionOutput::HandOver(_) => {
-                self.overdue.sent(now, self.timeout);
-            }
+            SessionOutput::Transmit(_) => self.overdue.sent(now, self.timeout),
             SessionOutput::Wait(Some(until)) => self.overdue.waits(until),
             // Others may be waited for.
             SessionOutput::Done(..) | SessionOutput::Wait(None) => {}
@@ -352,8 +342,7 @@ impl Session {
 
     fn next(&mut self, now: Instant) -> SessionOutput {
         if let Some(held) = &mut self.held {
-            let output = held.poll(now);
-            return self.held_output(output);
+            return held.poll(now, &self.port);
         }
         loop {
             let mut again = self.send_torques(now);

@@ -2,7 +2,7 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{ByteLink, Ending, PortError, PortName};
+use motorlink_link::port::{ByteLink, PortError, PortName};
 use motorlink_link::reopening::{Opener, Reopening};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
@@ -12,16 +12,15 @@ use motorlink_proto::time::{self, Instant};
 
 use super::session::{Session, request_bytes};
 use super::{Error, Options};
-use crate::way::{Declared, Way};
+use crate::way::{Port, Way};
 
 /// How an exchange ended: with what was made of the acknowledge's payload, and its size.
 pub(super) type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 
 /// A session and its port.
 pub(super) struct Driven<L> {
-    pub(super) port: Reopening<Way<L>>,
+    pub(super) port: Port<L>,
     pub(super) session: Session,
-    pub(super) declared: Declared,
     pub(super) received: [u8; 256],
     /// When the last exchange ended.
     pub(super) ended: Instant,
@@ -50,24 +49,22 @@ pub(super) fn opener<L: 'static>(
 
 impl<L: ByteLink> Driven<L> {
     pub(super) fn new(port: Reopening<Way<L>>, options: &Options) -> Self {
-        let port = port.by(Way::clock);
+        let port = Port::new(port);
         let mut session = Session::new(port.name.clone(), options);
         if port.open_link().is_some_and(Way::is_fresh) {
             session.trust_line();
         }
         if let Some(line) = port.open_link().and_then(Way::held) {
-            session.set_holder(line, port.clock());
+            session.set_holder(line);
         }
-        let (ended, declared) = (port.now(), Declared::default());
-        Driven { port, session, declared, received: [0; 256], ended, exchanges: 0 }
+        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
     /// The open port. One that is opened again belongs to another line.
     pub(super) fn way(&mut self) -> Result<&mut Way<L>, PortError> {
-        let (way, reopened) = self.port.link()?;
+        let started = self.session.started().motors();
+        let (way, reopened) = self.port.ready(started.map(MotorNumber::number))?;
         if reopened {
-            let started = self.session.started().motors();
-            self.declared.tell(way, started.map(MotorNumber::number));
             self.session.reopened();
             if way.is_fresh() {
                 self.session.trust_line();
@@ -115,23 +112,34 @@ impl<L: ByteLink> Driven<L> {
         if let Way::Holder(_) = self.way()? {
             self.session.trust_line();
         }
-        if idle && let Err(error) = self.take_unasked() {
+        if idle && let Err(error) = self.take(Some(Duration::ZERO)) {
             self.port.close();
             return Err(error);
         }
         Ok(())
     }
 
-    /// Takes note of what came since the last exchange.
-    fn take_unasked(&mut self) -> Result<(), PortError> {
+    /// Takes what comes next, if something comes until then.
+    pub(super) fn take(&mut self, wait: Option<Duration>) -> Result<bool, PortError> {
         match self.port.link()?.0 {
             Way::Line(link) => {
-                let size = link.read(&mut self.received, Some(Duration::ZERO))?;
+                let size = link.read(&mut self.received, wait)?;
                 self.session.receive(self.port.now(), &self.received[..size]);
+                Ok(size > 0)
             }
-            Way::Holder(holder) => while holder.receive(Some(Duration::ZERO))?.is_some() {},
+            Way::Holder(holder) => match holder.receive(wait)? {
+                Some(end) => self.session.ended(end).map(|()| true),
+                None => Ok(false),
+            },
         }
-        Ok(())
+    }
+
+    /// Sends what was begun, if another program holds the port.
+    pub(super) fn hand_over(&mut self, now: Instant) -> Result<(), PortError> {
+        match self.port.holder() {
+            Some(holder) => self.session.hand_over(now, holder),
+            None => Ok(()),
+        }
     }
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.
@@ -156,22 +164,6 @@ impl<L: ByteLink> Driven<L> {
         }
     }
 
-    /// See [`Client::end_with`](super::Client::end_with).
-    pub(super) fn end_with(&mut self, ending: Ending) {
-        self.declared.ending = ending;
-        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
-            holder.end_with(ending);
-        }
-    }
-
-    /// From now on, whether requests are only for motors of this client, if another program holds the port.
-    pub(super) fn only_own(&mut self, is_set: bool) {
-        self.declared.only_own = is_set;
-        if let Some(Way::Holder(holder)) = self.port.open_link_mut() {
-            holder.only_own(is_set);
-        }
-    }
-
     /// The port failed in the middle of an exchange, or did not want to wait for its end.
     pub(super) fn lost(&mut self, error: PortError) -> Error {
         self.session.failed();
@@ -190,15 +182,13 @@ impl<L: ByteLink> Driven<L> {
     ) -> Result<Option<Outcome<T>>, PortError> {
         loop {
             let now = self.port.now();
-            let link = match self.port.link()?.0 {
-                Way::Line(link) => link,
-                Way::Holder(holder) => {
-                    let ended = self.session.advance_held(holder.as_mut(), pause)?;
-                    return Ok(ended.map(|result| outcome(result, reply)));
-                }
-            };
+            self.hand_over(now)?;
             match self.session.poll(now) {
-                Output::Transmit(bytes) => link.write(bytes)?,
+                Output::Transmit(bytes) => {
+                    if let Way::Line(link) = self.port.link()?.0 {
+                        link.write(bytes)?;
+                    }
+                }
                 Output::Wait(until) => {
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
@@ -206,26 +196,16 @@ impl<L: ByteLink> Driven<L> {
                         return Ok(None);
                     }
                     let wait = until.map(|until| until.since(now).into());
-                    let wait = wait.into_iter().chain(left).min();
-                    let size = link.read(&mut self.received, wait)?;
-                    if size == 0 {
+                    if !self.take(wait.into_iter().chain(left).min())? {
                         self.session.silent();
                     }
-                    let now = self.port.now();
-                    self.session.receive(now, &self.received[..size]);
                 }
-                Output::Done(result) => return Ok(Some(outcome(result, reply))),
+                Output::Done(result) => {
+                    return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
+                }
             }
         }
     }
-}
-
-/// What is made of the end of an exchange.
-pub(super) fn outcome<T, P: AsRef<[u8]>>(
-    result: Result<P, proto::ExchangeError>,
-    reply: impl FnOnce(&[u8]) -> Option<T>,
-) -> Outcome<T> {
-    result.map(|payload| (reply(payload.as_ref()), payload.as_ref().len()))
 }
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a

@@ -1,7 +1,7 @@
 //! The client for event loops. Only the opening of the port waits.
 
 use std::os::fd::BorrowedFd;
-use std::time::{self as machine, Duration};
+use std::time::Duration;
 
 use motorlink_link::Clock;
 use motorlink_link::port::{ByteLink, Ending, EventBytes, PortError, PortName};
@@ -11,7 +11,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Instant;
 
-use super::driven::{Driven, opener, outcome};
+use super::driven::{Driven, opener};
 use super::{Client, Error, Exchanged, Options};
 use crate::way::Way;
 
@@ -115,12 +115,12 @@ impl EventClient {
 
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
-        self.driven.end_with(ending);
+        self.driven.port.end_with(ending);
     }
 
     /// The next request must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(Way::Holder(holder)) = self.driven.port.open_link_mut() {
+        if let Some(holder) = self.driven.port.holder() {
             holder.expire_next(time_to_live);
         }
     }
@@ -230,57 +230,47 @@ impl EventClient {
     /// The client that waits, with what this one knows of the line: to stop what was started.
     pub fn into_client(mut self) -> Client {
         self.abandon();
-        let Driven { port, session, declared, received, ended, exchanges } = self.driven;
-        let port = port.map(|way| way.map(|link| link as Box<dyn ByteLink>));
-        Client::driving(Driven { port, session, declared, received, ended, exchanges })
+        let Driven { port, session, received, ended, exchanges } = self.driven;
+        let port = port.map(|link| link as Box<dyn ByteLink>);
+        Client::driving(Driven { port, session, received, ended, exchanges })
     }
 
     fn moved<T>(
         &mut self,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<Progress<T>, PortError> {
-        let Driven { port, session, received, .. } = &mut self.driven;
-        let clock = port.clock();
-        let link = match port.open_link_mut() {
-            None => return Ok(Progress::Wait(None)),
-            Some(Way::Line(link)) => link,
-            Some(Way::Holder(holder)) => {
-                let pause = Some(machine::Instant::now());
-                return Ok(match session.advance_held(holder.as_mut(), pause)? {
-                    Some(result) => Progress::Done(session.conclude(outcome(result, reply))),
-                    None => Progress::Wait(session.held_wait(clock.now())),
-                });
-            }
-        };
-        // What is left in the port wakes the loop again; it has others to serve.
+        let driven = &mut self.driven;
+        let Some(way) = driven.port.open_link() else { return Ok(Progress::Wait(None)) };
+        // What is left in the port wakes the loop again; it has others to serve. A holder's connection may
+        // have read several ends at once.
+        let is_held = way.held().is_some();
         let mut listens = true;
         loop {
-            let now = clock.now();
-            match session.poll(now) {
+            let now = driven.port.now();
+            driven.hand_over(now)?;
+            match driven.session.poll(now) {
                 Output::Transmit(bytes) => {
-                    link.write(bytes)?;
-                    listens = link.descriptor().is_none();
+                    if let Some(Way::Line(link)) = driven.port.open_link_mut() {
+                        link.write(bytes)?;
+                        listens = link.descriptor().is_none();
+                    }
                 }
                 Output::Wait(until) => {
                     let is_over = until.is_some_and(|until| until <= now);
-                    let size = match listens || is_over {
-                        true => link.read(received, Some(Duration::ZERO))?,
-                        false => 0,
-                    };
-                    if size == 0 {
-                        if session.silent() {
-                            continue;
-                        }
-                        let wait = until.map(|until| until.since(now).into());
-                        let full = link.flush()?.then_some(FULL);
-                        return Ok(Progress::Wait(wait.into_iter().chain(full).min()));
+                    if (listens || is_over) && driven.take(Some(Duration::ZERO))? {
+                        listens = is_held;
+                        continue;
                     }
-                    session.receive(now, &received[..size]);
-                    listens = false;
+                    if driven.session.silent() {
+                        continue;
+                    }
+                    let wait = until.map(|until| until.since(now).into());
+                    let full = driven.port.link()?.0.flush()?.then_some(FULL);
+                    return Ok(Progress::Wait(wait.into_iter().chain(full).min()));
                 }
                 Output::Done(result) => {
-                    let outcome = outcome(result, reply);
-                    return Ok(Progress::Done(session.conclude(outcome)));
+                    let outcome = result.map(|payload| (reply(payload), payload.len()));
+                    return Ok(Progress::Done(driven.session.conclude(outcome)));
                 }
             }
         }

@@ -206,7 +206,7 @@ impl Session {
         let effect = checked.map_err(|why| limited(motor, why))?;
         let begun = match &mut self.held {
             Some(held) => {
-                held.raw(motor, code, payload);
+                held.begin(motor, Some([&[code], payload].concat()));
                 Ok(())
             }
             None => self.master.request_raw(frame.header, payload),
@@ -257,7 +257,10 @@ impl Session {
         if self.overdue.reads_first(now) {
             return Output::Wait(Some(now));
         }
-        let output = self.master.poll(now);
+        let output = match &mut self.held {
+            Some(held) => held.poll(now),
+            None => self.master.poll(now),
+        };
         match output {
             Output::Transmit(_) => self.sent = now,
             Output::Wait(Some(until)) => self.overdue.waits(until),

@@ -1,66 +1,42 @@
-//! Exchanges through a program that holds the bus, one with each motor. The reply to a request is its own.
+//! Exchanges through a program that holds the bus, one with each motor, in place of those of the host.
 
 use motorlink_link::port::{Declined, HeldLine, Holder, NotDone, RequestEnd};
 
 use super::*;
+use crate::held::HeldRequests;
 
-/// What the program is asked.
 #[derive(Debug, Clone)]
 pub(super) struct HeldExchanges {
-    patience: Micros,
-    /// Motors whose request is not sent yet.
-    begun: MotorSet,
-    /// Those that are asked for a confirmation instead.
-    confirming: MotorSet,
-    /// Those whose end nobody waits for.
+    requests: HeldRequests<MotorId>,
+    /// Motors whose end nobody waits for.
     unawaited: MotorSet,
-    /// Requests without an end: the number, and the end of the patience.
-    sent: [Option<(u32, Instant)>; MotorId::COUNT],
-    /// Requests that are over. The reply to a confirmation says nothing.
-    over: Vec<(MotorId, Result<[u8; 8], Declined>)>,
+    /// The reply to a confirmation says nothing.
+    over: Vec<(MotorId, Result<[u8; 8], Error>)>,
     /// Motors of which the program has no reply, and knows that they are there.
     missed: MotorSet,
 }
 
-/// What comes next.
-pub(super) enum HeldOutput {
-    HandOver(MotorId),
-    Done(MotorId, Result<[u8; 8], Declined>),
-    /// The program did not answer in time.
-    Silent(MotorId),
-    Wait(Option<Instant>),
-}
-
 impl HeldExchanges {
     pub(super) fn busy(&self) -> MotorSet {
-        let sent = MotorSet::ALL.filter(|id| self.sent[id.index()].is_some());
         let over = self.over.iter().map(|(id, _)| *id);
-        sent.chain(over).collect::<MotorSet>().union(self.begun).without(self.unawaited)
+        self.requests.lanes().chain(over).collect::<MotorSet>().without(self.unawaited)
     }
 
     pub(super) fn cancel(&mut self, id: MotorId) {
-        self.begun.remove(id);
-        self.confirming.remove(id);
-        self.unawaited.remove(id);
-        self.sent[id.index()] = None;
+        self.requests.cancel(id);
         self.over.retain(|(other, _)| *other != id);
     }
 
-    pub(super) fn poll(&mut self, now: Instant) -> HeldOutput {
-        if let Some((id, result)) = self.over.pop() {
-            return HeldOutput::Done(id, result);
+    pub(super) fn poll(&mut self, now: Instant, port: &str) -> SessionOutput {
+        while let Some(id) = self.requests.overdue(now) {
+            let silent = PortError::HolderSilent { port: port.to_owned() };
+            self.over.push((id, Err(silent.into())));
         }
-        if let Some(id) = self.begun.next() {
-            return HeldOutput::HandOver(id);
-        }
-        let awaited = MotorSet::ALL.without(self.unawaited);
-        let waits = awaited.filter_map(|id| Some((self.sent[id.index()]?.1, id)));
-        match waits.min() {
-            Some((until, id)) if until <= now => {
-                self.sent[id.index()] = None;
-                HeldOutput::Silent(id)
-            }
-            first => HeldOutput::Wait(first.map(|(until, _)| until)),
+        self.over.retain(|(id, _)| !self.unawaited.contains(*id));
+        match self.over.pop() {
+            Some((id, result)) => SessionOutput::Done(id, result),
+            None if self.busy().is_empty() => SessionOutput::Wait(None),
+            None => SessionOutput::Wait(self.requests.until()),
         }
     }
 }
@@ -70,11 +46,8 @@ impl Session {
     pub(in crate::rmd) fn set_holder(&mut self, line: HeldLine) {
         self.timeout = line.patience;
         self.held = Some(HeldExchanges {
-            patience: line.patience.into(),
-            begun: MotorSet::EMPTY,
-            confirming: MotorSet::EMPTY,
+            requests: HeldRequests::new(line),
             unawaited: MotorSet::EMPTY,
-            sent: [None; MotorId::COUNT],
             over: Vec::new(),
             missed: MotorSet::EMPTY,
         });
@@ -98,33 +71,22 @@ impl Session {
         }
     }
 
-    /// What was just begun asks that program whether the replies of the motor went to their own requests. A
-    /// host finds this out by a question.
-    pub(super) fn confirm_begun(&mut self, id: MotorId) {
-        if let Some(held) = &mut self.held {
-            held.confirming.insert(id);
-        }
-    }
-
-    pub(super) fn begin_held(
-        &mut self,
-        now: Instant,
-        id: MotorId,
-        request: [u8; 8],
-    ) -> Result<(), Error> {
-        self.free(id, &request)?;
+    /// Begins an exchange, or a confirmation, for which that program needs no question.
+    pub(super) fn begin_held(&mut self, id: MotorId, asked: Asked) -> Result<(), Error> {
         if self.busy().contains(id) {
             return Err(Error::Twice(id));
         }
-        self.check_limits(id, &request)?;
-        self.give(now, id, request);
+        if let Some(request) = asked.request() {
+            self.free(id, &request)?;
+            self.check_limits(id, &request)?;
+        }
+        self.give(id, asked, true);
         Ok(())
     }
 
     /// Each motor gets its torque in a request of its own.
     pub(super) fn begin_held_torques(
         &mut self,
-        now: Instant,
         torques: SetTorque4,
         expect: MotorSet,
     ) -> Result<(), Error> {
@@ -139,80 +101,59 @@ impl Session {
         for (id, request) in requests.clone() {
             self.check_limits(id, &request)?;
         }
-        requests.for_each(|(id, request)| self.give(now, id, request));
-        if let Some(held) = &mut self.held {
-            held.unawaited = MotorSet::TORQUE4.without(expect);
+        for (id, request) in requests {
+            self.give(id, Asked::Request(request), expect.contains(id));
         }
         Ok(())
     }
 
-    fn give(&mut self, now: Instant, id: MotorId, request: [u8; 8]) {
-        if let Some(held) = &mut self.held {
-            held.begun.insert(id);
-            held.confirming.remove(id);
-            held.unawaited.remove(id);
+    fn give(&mut self, id: MotorId, asked: Asked, is_awaited: bool) {
+        let Some(held) = &mut self.held else { return };
+        let request = asked.request();
+        held.cancel(id);
+        held.requests.begin(id, id.number(), request.map(|bytes| bytes.to_vec()));
+        match is_awaited {
+            true => held.unawaited.remove(id),
+            false => held.unawaited.insert(id),
         }
-        self.pending[id.index()] = PendingRequest { request, until: now };
+        self.pending[id.index()].request = request.unwrap_or_default();
     }
 
-    /// Hands the request to a motor over.
+    /// Sends what was begun.
     pub(in crate::rmd) fn hand_over(
         &mut self,
         now: Instant,
-        id: MotorId,
         holder: &mut dyn Holder,
     ) -> Result<(), PortError> {
         let Some(held) = &mut self.held else { return Ok(()) };
-        self.sent[id.index()] = now;
-        let number = match held.confirming.contains(id) {
-            true => holder.confirm(id.number())?,
-            false => {
-                let request = self.pending[id.index()].request;
-                let moved = MotorSet::moved_by(&CanFrame::new(id.can_id(), request));
-                let unexpected = moved.intersection(held.unawaited);
-                self.moved(moved, unexpected);
-                holder.request(id.number(), &request)?
+        let (mut moved, sent, pending) = (MotorSet::EMPTY, &mut self.sent, &self.pending);
+        let result = held.requests.hand_over(now, holder, |id, asked| {
+            sent[id.index()] = now;
+            if asked.request.is_some() {
+                let request = pending[id.index()].request;
+                moved = moved.union(MotorSet::moved_by(&CanFrame::new(id.can_id(), request)));
             }
-        };
-        let Some(held) = &mut self.held else { return Ok(()) };
-        held.sent[id.index()] = Some((number, now + held.patience));
-        Ok(())
+        });
+        let unexpected = moved.intersection(held.unawaited);
+        self.moved(moved, unexpected);
+        result
     }
 
     /// The end of a request. One that nobody waits for is ignored.
-    pub(in crate::rmd) fn ended(&mut self, RequestEnd { number, result }: RequestEnd) {
+    pub(in crate::rmd) fn ended(&mut self, end: RequestEnd) {
         let Some(held) = &mut self.held else { return };
-        let is_meant = |id: &MotorId| held.sent[id.index()].is_some_and(|(sent, _)| sent == number);
-        let Some(id) = MotorSet::ALL.into_iter().find(is_meant) else { return };
-        held.sent[id.index()] = None;
-        let is_confirmation = held.confirming.contains(id);
-        held.confirming.remove(id);
-        let result = result.and_then(|reply| match is_confirmation {
-            true => Ok([0; 8]),
-            false => reply.try_into().map_err(|_| {
-                Declined::ByHolder(NotDone::Line, "the reply has not 8 bytes".to_owned())
+        let Some((id, asked, result)) = held.requests.end(end) else { return };
+        let result = match result {
+            Ok(reply) if asked.request.is_some() => reply.try_into().map_err(|_| {
+                let why = "the program that holds the port gives another reply".to_owned();
+                Declined::ByHolder(NotDone::Line, why)
             }),
-        });
-        match result {
-            Err(why) if held.unawaited.contains(id) => _ = self.declined(id, why),
-            _ if held.unawaited.contains(id) => {}
-            result => held.over.push((id, result)),
-        }
-    }
-
-    pub(super) fn held_output(&mut self, output: HeldOutput) -> SessionOutput {
-        match output {
-            HeldOutput::HandOver(id) => SessionOutput::HandOver(id),
-            HeldOutput::Wait(until) => SessionOutput::Wait(until),
-            HeldOutput::Silent(id) => {
-                let silent = PortError::HolderSilent { port: self.port.to_string() };
-                SessionOutput::Done(id, Err(silent.into()))
-            }
-            HeldOutput::Done(id, Ok(reply)) => {
-                self.acknowledged(id, Some(&reply));
-                SessionOutput::Done(id, Ok(reply))
-            }
-            HeldOutput::Done(id, Err(why)) => SessionOutput::Done(id, Err(self.declined(id, why))),
+            result => result.map(|_| [0; 8]),
+        };
+        let result = result.map_err(|why| self.declined(id, why));
+        self.acknowledged(id, result.as_ref().ok().filter(|_| asked.request.is_some()));
+        if let Some(held) = &mut self.held {
+            held.over.push((id, result));
         }
     }
 
@@ -228,8 +169,8 @@ impl Session {
             held.missed.insert(id);
         }
         self.lost(id);
-        let port = self.port.to_string();
-        let error = PortError::NotDone { port, motor: id.number(), kind, why };
+        let error =
+            PortError::NotDone { port: self.port.to_string(), motor: id.number(), kind, why };
         // Who holds the motor answers for it.
         if error.is_of_another() || error.is_unsent() && self.begun.contains(id) {
             self.at_rest(id);

@@ -1,39 +1,23 @@
-//! An exchange through a program that holds the port. Its reply is that of its request.
+//! An exchange through a program that holds the port, in place of one of the master.
 
-use std::time::{self as machine, Duration};
-
-use motorlink_link::Clock;
 use motorlink_link::port::{Declined, HeldLine, Holder, PortError, RequestEnd};
 use motorlink_proto::st::{
-    ExchangeError, Failure, MAX_PAYLOAD, MotorNumber, Request, RequestError,
+    ExchangeError, Failure, MAX_PAYLOAD, MotorNumber, Output, Request, RequestError,
 };
-use motorlink_proto::time::{Instant, Micros};
+use motorlink_proto::time::Instant;
 
 use super::{Confirmation, Session};
+use crate::held::HeldRequests;
 
-/// What the program is asked, one thing at a time.
 #[derive(Debug, Clone)]
 pub(super) struct HeldExchange {
-    clock: Clock,
-    patience: Micros,
+    requests: HeldRequests<()>,
     /// A motor that the drive has, for confirmations: the last request of any program has selected
     /// motor 0.
     motor: u8,
-    step: Step,
-}
-
-#[derive(Debug, Clone)]
-enum Step {
-    Idle,
-    /// A frame code and a payload for a motor are to be sent.
-    Begun(u8, Vec<u8>),
-    Confirming,
-    /// The request with this number has no end.
-    Sent {
-        number: u32,
-        motor: u8,
-        until: Instant,
-    },
+    end: Option<Result<(), ExchangeError>>,
+    /// Of the last acknowledge.
+    payload: Vec<u8>,
 }
 
 /// Frame code and payload; `None` if no frame can carry them.
@@ -45,31 +29,48 @@ pub(in crate::st) fn request_bytes(request: &Request<'_>) -> Option<Vec<u8>> {
 
 impl HeldExchange {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), RequestError> {
-        self.step = Step::Begun(motor, request_bytes(request).ok_or(RequestError::TooLong)?);
+        let bytes = request_bytes(request).ok_or(RequestError::TooLong)?;
+        self.begin(motor, Some(bytes));
         Ok(())
     }
 
-    pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) {
-        self.step = Step::Begun(motor, [&[code], payload].concat());
+    /// With the frame code and the payload; `None`: a confirmation.
+    pub(super) fn begin(&mut self, motor: u8, request: Option<Vec<u8>>) {
+        self.end = None;
+        self.requests.begin((), motor, request);
     }
 
     pub(super) fn confirm(&mut self) {
-        self.step = Step::Confirming;
+        self.begin(self.motor, None);
     }
 
     /// Whether there was a request without an end.
     pub(super) fn abandon(&mut self) -> bool {
-        matches!(std::mem::replace(&mut self.step, Step::Idle), Step::Sent { .. })
+        self.end = None;
+        self.requests.cancel(())
+    }
+
+    pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
+        if self.requests.overdue(now).is_some() {
+            self.end = Some(Err(ExchangeError::Failed(Failure::Timeout)));
+        }
+        match self.end.take() {
+            Some(end) => Output::Done(end.map(|()| self.payload.as_slice())),
+            None => Output::Wait(self.requests.until()),
+        }
     }
 }
 
 impl Session {
     /// Another program holds the port. It gives a reply or a reason within its patience.
-    pub(in crate::st) fn set_holder(&mut self, line: HeldLine, clock: Clock) {
+    pub(in crate::st) fn set_holder(&mut self, line: HeldLine) {
         self.timeout = line.patience;
-        let patience = line.patience.into();
-        let motor = MotorNumber::FIRST.number();
-        self.held = Some(HeldExchange { clock, patience, motor, step: Step::Idle });
+        self.held = Some(HeldExchange {
+            requests: HeldRequests::new(line),
+            motor: MotorNumber::FIRST.number(),
+            end: None,
+            payload: Vec::new(),
+        });
     }
 
     /// Whether an answer of this size confirms the replies before it. A program that holds the port says
@@ -82,73 +83,40 @@ impl Session {
         move |size| is_held || confirmation.accepts(size)
     }
 
-    /// Moves the exchange on, and waits until `pause` at most. Gives its end; `None` if it is not over, or
-    /// none is under way.
-    ///
-    /// # Errors
-    /// The connection's, or that the program has no reply.
-    pub(in crate::st) fn advance_held(
+    /// Sends what was begun.
+    pub(in crate::st) fn hand_over(
         &mut self,
+        now: Instant,
         holder: &mut dyn Holder,
-        pause: Option<machine::Instant>,
-    ) -> Result<Option<Result<Vec<u8>, ExchangeError>>, PortError> {
-        let Some(held) = &mut self.held else { return Ok(None) };
-        let begun = match &held.step {
-            Step::Begun(motor, bytes) => Some((*motor, holder.request(*motor, bytes)?)),
-            Step::Confirming => Some((0, holder.confirm(held.motor)?)),
-            Step::Idle | Step::Sent { .. } => None,
-        };
-        if let Some((motor, number)) = begun {
-            self.sent = held.clock.now();
-            held.step = Step::Sent { number, motor, until: self.sent + held.patience };
-        }
-        loop {
-            let left = match held.step {
-                Step::Sent { until, .. } => until.since(held.clock.now()).into(),
-                _ => Duration::ZERO,
-            };
-            let pause = pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
-            let wait = pause.map_or(left, |pause| pause.min(left));
-            let came = holder.receive(Some(wait))?;
-            let Step::Sent { number, motor, until } = held.step else {
-                match came {
-                    Some(_) => continue,
-                    None => return Ok(None),
-                }
-            };
-            let result = match came {
-                Some(RequestEnd { number: other, .. }) if other != number => continue,
-                Some(RequestEnd { result, .. }) => result,
-                None if held.clock.now() < until => match pause {
-                    Some(Duration::ZERO) => return Ok(None),
-                    _ => continue,
-                },
-                None => {
-                    held.step = Step::Idle;
-                    return Ok(Some(Err(ExchangeError::Failed(Failure::Timeout))));
-                }
-            };
-            held.step = Step::Idle;
-            return match result {
-                Ok(payload) => {
-                    if motor != 0 {
-                        held.motor = motor;
-                    }
-                    Ok(Some(Ok(payload)))
-                }
-                Err(Declined::ByDrive(code)) => Ok(Some(Err(ExchangeError::Refused(code.into())))),
-                Err(Declined::ByHolder(kind, why)) => {
-                    Err(PortError::NotDone { port: self.port.to_string(), motor, kind, why })
-                }
-            };
+    ) -> Result<(), PortError> {
+        match &mut self.held {
+            Some(held) => held.requests.hand_over(now, holder, |(), _| self.sent = now),
+            None => Ok(()),
         }
     }
 
-    /// How long the exchange with the program that holds the port may still take.
-    pub(in crate::st) fn held_wait(&self, now: Instant) -> Option<Duration> {
-        match self.held.as_ref()?.step {
-            Step::Sent { until, .. } => Some(until.since(now).into()),
-            _ => None,
-        }
+    /// The end of a request. One that nobody waits for is ignored.
+    ///
+    /// # Errors
+    /// The program has no reply.
+    pub(in crate::st) fn ended(&mut self, end: RequestEnd) -> Result<(), PortError> {
+        let Some(held) = &mut self.held else { return Ok(()) };
+        let Some(((), asked, result)) = held.requests.end(end) else { return Ok(()) };
+        let motor = asked.motor;
+        held.end = Some(match result {
+            Ok(payload) => {
+                if motor != 0 {
+                    held.motor = motor;
+                }
+                held.payload = payload;
+                Ok(())
+            }
+            Err(Declined::ByDrive(code)) => Err(ExchangeError::Refused(code.into())),
+            Err(Declined::ByHolder(kind, why)) => {
+                let port = self.port.to_string();
+                return Err(PortError::NotDone { port, motor, kind, why });
+            }
+        });
+        Ok(())
     }
 }
