@@ -1,9 +1,10 @@
 //! A clock that follows the machine's clock, or a virtual one that advances only during waits.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Weak};
 use std::time::Duration as Span;
 
-use motorlink_proto::time::{Instant, Micros};
+use motorlink_proto::time::Instant;
 use rustix::time::{ClockId, clock_gettime};
 
 /// A clock that starts at 0. Clones share the same clock.
@@ -12,13 +13,11 @@ use rustix::time::{ClockId, clock_gettime};
 /// is too old then is too old. A virtual clock advances immediately to the end of
 /// each wait.
 #[derive(Debug, Clone)]
-pub struct Clock(Arc<Mutex<Pace>>);
+pub struct Clock(Arc<AtomicU64>);
 
-#[derive(Debug, Clone, Copy)]
-enum Pace {
-    Running { since: Span, from: Instant },
-    Virtual(Instant),
-}
+/// The bit of a virtual clock. The others are its time. Those of a running one are the time of the machine
+/// at which it was 0, which may be before the machine was started: one bit less of it.
+const VIRTUAL: u64 = 1 << 63;
 
 impl Default for Clock {
     fn default() -> Self {
@@ -29,46 +28,44 @@ impl Default for Clock {
 impl Clock {
     /// A clock that follows the machine's clock.
     pub fn running() -> Self {
-        let pace = Pace::Running { since: uptime(), from: Instant(0) };
-        Clock(Arc::new(Mutex::new(pace)))
+        Clock(Arc::new(AtomicU64::new(running_from(Instant(0)))))
     }
 
     /// A virtual clock.
     pub fn virtual_time() -> Self {
-        Clock(Arc::new(Mutex::new(Pace::Virtual(Instant(0)))))
+        Clock(Arc::new(AtomicU64::new(VIRTUAL)))
     }
 
     /// The current time.
     pub fn now(&self) -> Instant {
-        self.lock().now()
+        time_of(self.0.load(Ordering::SeqCst))
     }
 
     /// Whether the clock is virtual, or held.
     pub fn is_virtual(&self) -> bool {
-        matches!(*self.lock(), Pace::Virtual(_))
+        self.0.load(Ordering::SeqCst) & VIRTUAL != 0
     }
 
     /// Holds the clock at its current time, or lets it run from there.
     pub fn hold(&self, held: bool) {
-        let mut pace = self.lock();
-        *pace = match (held, *pace) {
-            (true, running @ Pace::Running { .. }) => Pace::Virtual(running.now()),
-            (false, Pace::Virtual(from)) => Pace::Running { since: uptime(), from },
-            (_, same) => same,
-        };
+        // It fails if the clock is held or runs already.
+        let _ = self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |state| {
+            match (held, state & VIRTUAL != 0) {
+                (true, false) => Some(VIRTUAL | time_of(state).0),
+                (false, true) => Some(running_from(time_of(state))),
+                _ => None,
+            }
+        });
     }
 
     /// Waits until `until`. A virtual clock advances to it at once.
     pub fn wait(&self, until: Instant) {
-        let left = {
-            let mut pace = self.lock();
-            if let Pace::Virtual(now) = &mut *pace {
-                *now = until.max(*now);
-                return;
-            }
-            until.since(pace.now())
-        };
-        std::thread::sleep(left.into());
+        let advanced = self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |state| {
+            (state & VIRTUAL != 0).then(|| state.max(VIRTUAL | until.0))
+        });
+        if let Err(state) = advanced {
+            std::thread::sleep(until.since(time_of(state)).into());
+        }
     }
 
     /// The end of a wait that starts now; `None` means no limit.
@@ -84,15 +81,11 @@ impl Clock {
     pub(crate) fn downgrade(&self) -> WeakClock {
         WeakClock(Arc::downgrade(&self.0))
     }
-
-    fn lock(&self) -> MutexGuard<'_, Pace> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// A reference to a clock that does not keep it alive.
 #[derive(Debug)]
-pub(crate) struct WeakClock(Weak<Mutex<Pace>>);
+pub(crate) struct WeakClock(Weak<AtomicU64>);
 
 impl WeakClock {
     pub(crate) fn upgrade(&self) -> Option<Clock> {
@@ -100,18 +93,24 @@ impl WeakClock {
     }
 }
 
-impl Pace {
-    fn now(self) -> Instant {
-        match self {
-            Pace::Running { since, from } => from + Micros::from(uptime().saturating_sub(since)),
-            Pace::Virtual(now) => now,
-        }
+/// The time of a clock in this state.
+fn time_of(state: u64) -> Instant {
+    match state & VIRTUAL {
+        0 => Instant(uptime().wrapping_sub(state) & !VIRTUAL),
+        _ => Instant(state & !VIRTUAL),
     }
 }
 
-/// The time since the machine was started, with the time in which it was suspended.
-fn uptime() -> Span {
-    Span::try_from(clock_gettime(ClockId::Boottime)).unwrap_or_default()
+/// The state of a clock that runs and has this time now.
+fn running_from(time: Instant) -> u64 {
+    uptime().wrapping_sub(time.0) & !VIRTUAL
+}
+
+/// The time since the machine was started, with the time in which it was suspended, in µs.
+fn uptime() -> u64 {
+    let now = clock_gettime(ClockId::Boottime);
+    // Neither is ever negative.
+    now.tv_sec.cast_unsigned() * 1_000_000 + now.tv_nsec.cast_unsigned() / 1_000
 }
 
 #[cfg(test)]

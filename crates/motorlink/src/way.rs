@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::os::fd::BorrowedFd;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{Ending, Evented, HeldLine, Holder, Link, PortError, PortName};
+use motorlink_link::port::{Carries, Ending, Evented, HeldLine, Holder, Link, PortError, PortName};
 use motorlink_link::reopening::Reopening;
 
 /// An open port.
@@ -23,12 +23,13 @@ pub(crate) struct Port<L> {
 }
 
 impl<L> Way<L> {
-    /// Opens a port: with `open`, unless another program holds it.
+    /// Opens a port that carries this: with `open`, unless another program holds it.
     pub(crate) fn open(
         port: &PortName,
+        carries: Carries,
         open: impl FnOnce(&PortName) -> Result<L, PortError>,
     ) -> Result<Self, PortError> {
-        match port.as_held() {
+        match port.held(carries)? {
             Some(held) => held.open().map(Way::Holder),
             None => open(port).map(Way::Line),
         }

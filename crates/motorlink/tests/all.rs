@@ -3,6 +3,7 @@
 mod arrival;
 mod event;
 mod full_turn;
+mod holder;
 mod host_faults;
 mod interruption;
 mod limits;

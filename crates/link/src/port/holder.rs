@@ -51,11 +51,16 @@ pub trait Holder: Send {
     fn descriptor(&self) -> BorrowedFd<'_>;
 
     /// Sends a request to a motor: of ST's protocol the frame code and the payload, of RMD the eight
-    /// bytes. Gives its number.
+    /// bytes. Gives its number. It must not be sent to the motor later than `time_to_live`, if there is one.
     ///
     /// # Errors
     /// The connection's.
-    fn request(&mut self, motor: u8, request: &[u8]) -> Result<u32, PortError>;
+    fn request(
+        &mut self,
+        motor: u8,
+        request: &[u8],
+        time_to_live: Option<Duration>,
+    ) -> Result<u32, PortError>;
 
     /// Asks whether the replies so far belong to their requests, also those of others. Gives the number of
     /// the request.
@@ -69,9 +74,6 @@ pub trait Holder: Send {
     /// # Errors
     /// The connection's.
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<RequestEnd>, PortError>;
-
-    /// The next request must not be sent later than this. It is refused then.
-    fn expire_next(&mut self, time_to_live: Duration);
 
     /// From now on, whether requests are only for motors that this client owns: no other program has moved,
     /// taken or stopped them since. The others are refused ([`NotDone::Held`]).
@@ -102,4 +104,12 @@ pub enum Declined {
     ByDrive(u8),
     /// The program has no reply.
     ByHolder(NotDone, String),
+}
+
+impl Declined {
+    /// What came is no reply to the request.
+    pub fn unfit() -> Self {
+        let why = "the program that holds the port gives the reply to another request";
+        Declined::ByHolder(NotDone::Line, why.to_owned())
+    }
 }

@@ -5,6 +5,7 @@ use std::sync::{PoisonError, RwLock};
 
 use super::error::PortError;
 use super::event::{EventBytes, EventCan};
+use super::holder::HeldPort;
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError, check_printable, unknown_form};
 use super::scheme::{CanPort, Carries, LinePort, PortName, Scheme, parse};
@@ -72,6 +73,19 @@ impl PortName {
     /// Opens the port as a CAN bus for an event loop. Opening itself may wait.
     pub fn open_event_can(&self) -> Result<Box<dyn EventCan>, PortError> {
         self.can()?.open_event()
+    }
+
+    /// The program that holds the port, if there is one.
+    ///
+    /// # Errors
+    /// The port does not carry what is wanted.
+    pub fn held(&self, wanted: Carries) -> Result<Option<&dyn HeldPort>, PortError> {
+        match wanted {
+            Carries::Bytes => self.line().map(drop)?,
+            Carries::Frames => self.can().map(drop)?,
+            Carries::Both => {}
+        }
+        Ok(self.as_held())
     }
 
     fn line(&self) -> Result<&dyn LinePort, PortError> {

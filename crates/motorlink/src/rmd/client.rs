@@ -5,7 +5,7 @@ use std::error;
 use std::sync::Arc;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Ending, PortError, PortName};
+use motorlink_link::port::{CanLink, Carries, Ending, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
@@ -13,6 +13,7 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time;
 
+use super::asked::Asked;
 use super::driven::Driven;
 use super::session::Session;
 use super::{Error, Options};
@@ -35,24 +36,6 @@ pub enum ScanResult {
 
 /// IDs that a scan asks at once.
 pub const SCAN_WIDTH: usize = 8;
-
-/// What [`Client::ask_each`] asks a motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
-    /// Eight bytes.
-    Request([u8; 8]),
-    /// Whether the replies so far belong to their requests.
-    Confirmation,
-}
-
-impl Asked {
-    pub(super) fn request(self) -> Option<[u8; 8]> {
-        match self {
-            Asked::Request(request) => Some(request),
-            Asked::Confirmation => None,
-        }
-    }
-}
 
 /// A CAN bus with RMD motors: shared by reference between threads.
 ///
@@ -83,7 +66,7 @@ impl Client {
         options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = move || Way::open(&name, |port| Ok(wrap(port.open_can()?)));
+        let open = move || Way::open(&name, Carries::Frames, |port| Ok(wrap(port.open_can()?)));
         let opened = Reopening::open(&port.to_string(), Box::new(open), options.back_off)?;
         Ok(Self::on(opened, options))
     }
@@ -201,7 +184,7 @@ impl Client {
         let mut driven = self.turns.take();
         driven.ready([request])?;
         let now = driven.port.now();
-        driven.session.ask(now, id, request)?;
+        driven.session.insist(now, id, Asked::Request(request))?;
         self.conclude(driven)
     }
 
@@ -220,10 +203,16 @@ impl Client {
     /// of [`raw`](Self::raw).
     pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
         let mut driven = self.turns.take();
+        let losses = driven.session.losses(id);
         driven.ready([])?;
+        let is_same_port = driven.session.losses(id) == losses;
         let now = driven.port.now();
         driven.session.insist(now, id, Asked::Confirmation)?;
+        let port = Arc::clone(&driven.port.name);
         self.conclude(driven)?;
+        if !is_same_port {
+            return Err(Error::Unconfirmed { port, motor: id });
+        }
         self.turns.take().session.confirmed(id)
     }
 
@@ -391,6 +380,9 @@ impl Client {
                 Err(error @ Error::Port(_)) => failed = Some(error),
                 outcome => ScanResult::of(id, outcome).into_iter().for_each(&mut each),
             })?;
+            if let Some(error) = failed {
+                return Err(error);
+            }
             for id in doubtful {
                 let outcome = self.raw(id, ReadStatus.encode());
                 if let Err(error @ Error::Port(_)) = outcome {

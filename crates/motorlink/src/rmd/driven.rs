@@ -45,10 +45,7 @@ impl<L: CanLink> Driven<L> {
     /// Gives up what is under way. Replies may still come.
     pub(super) fn abandon(&mut self) {
         self.exchanges += 1;
-        let now = self.port.now();
-        for id in self.session.busy() {
-            self.session.cancel(now, id);
-        }
+        self.session.abandon(self.port.now());
     }
 
     /// As [`listen`](Self::listen), before these requests are sent.

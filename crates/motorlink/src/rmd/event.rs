@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Ending, EventCan, PortError, PortName};
+use motorlink_link::port::{CanLink, Carries, Ending, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
@@ -44,7 +44,8 @@ impl EventClient {
         options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = move || Way::open(&name, |port| Ok(wrap(port.open_event_can()?)));
+        let open =
+            move || Way::open(&name, Carries::Frames, |port| Ok(wrap(port.open_event_can()?)));
         Self::opened(&port.to_string(), Box::new(open), &options)
     }
 
@@ -126,9 +127,7 @@ impl EventClient {
 
     /// The next request to any motor must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(holder) = self.driven.port.holder() {
-            holder.expire_next(time_to_live);
-        }
+        self.driven.session.expire_next(time_to_live);
     }
 
     /// Whether a request to a motor is sent at once. Otherwise late replies of the motor are awaited
@@ -173,7 +172,7 @@ impl EventClient {
     pub fn ask(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
         self.driven.listen_for([request])?;
         let now = self.driven.port.now();
-        self.driven.session.ask(now, id, request)
+        self.driven.session.insist(now, id, Asked::Request(request))
     }
 
     /// Begins an exchange, as one of those of [`Client::cycle`]: a motor in quarantine is an error.
@@ -183,7 +182,7 @@ impl EventClient {
     pub fn request(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
         self.driven.listen_for([request])?;
         let now = self.driven.port.now();
-        self.driven.session.request(now, id, request)
+        self.driven.session.begin(now, id, Asked::Request(request))
     }
 
     /// Begins an exchange, as one of those of [`Client::ask_each`]: a motor in quarantine is an error.
@@ -258,9 +257,7 @@ impl EventClient {
         each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, Error> {
         self.moved(each).map_err(|error| {
-            for id in self.busy() {
-                self.cancel(id);
-            }
+            self.driven.abandon();
             self.driven.closed(error)
         })
     }

@@ -13,12 +13,14 @@
 //! ```
 
 mod arrival;
+mod asked;
 mod client;
 mod driven;
 mod error;
 mod event;
 pub(crate) mod follow;
 mod full_turn;
+mod held;
 mod motor;
 mod options;
 mod session;
@@ -29,7 +31,8 @@ pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
 pub use arrival::ArrivalOptions;
-pub use client::{Asked, Client, SCAN_WIDTH, ScanResult};
+pub use asked::Asked;
+pub use client::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;

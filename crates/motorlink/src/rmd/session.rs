@@ -15,16 +15,17 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time::{Instant, Micros};
 
-use super::{Asked, Error, Options};
+use super::asked::Asked;
+use super::held::HeldExchanges;
+use super::{Error, Options};
 use crate::overdue::Overdue;
-use held::HeldExchanges;
 
 /// The longest time for which a motor with doubtful replies may go on sending, in addition to the
 /// times of its exchanges.
 const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the
-/// motors that it set moving, and its errors in words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`set_torque4`](Self::set_torque4),
+/// motors that it set moving, and its errors in words: sans I/O. [`begin`](Self::begin), [`insist`](Self::insist) or [`set_torque4`](Self::set_torque4),
 /// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
@@ -61,6 +62,8 @@ pub(super) struct Session {
     is_retired: bool,
     /// The exchanges with the program that holds the port, in place of those of the host.
     held: Option<HeldExchanges>,
+    /// Motors of which that program has no reply, and knows that they are there.
+    missed: MotorSet,
     timeout: Duration,
 }
 
@@ -122,6 +125,7 @@ impl Session {
             losses: [0; MotorId::COUNT],
             is_retired: false,
             held: None,
+            missed: MotorSet::EMPTY,
             timeout: options.timeout,
         }
     }
@@ -133,6 +137,11 @@ impl Session {
 
     pub(super) fn counters(&self) -> Counters {
         *self.host.counters()
+    }
+
+    /// See [`Session::missed`].
+    pub(super) fn missed(&self) -> MotorSet {
+        self.missed
     }
 
     pub(super) fn moving(&self) -> MotorSet {
@@ -178,8 +187,9 @@ impl Session {
 
     /// Tells that the bus was opened anew.
     pub(super) fn reopened(&mut self, now: Instant) {
-        for id in self.busy() {
-            self.cancel(now, id);
+        self.abandon(now);
+        if let Some(held) = &mut self.held {
+            held.clear();
         }
         MotorSet::ALL.into_iter().for_each(|id| self.lost(id));
         self.host.reopened(now);
@@ -226,15 +236,7 @@ impl Session {
     ///
     /// # Errors
     /// Nothing is sent then.
-    pub(super) fn request(
-        &mut self,
-        now: Instant,
-        id: MotorId,
-        request: [u8; 8],
-    ) -> Result<(), Error> {
-        if self.held.is_some() {
-            return self.begin_held(id, Asked::Request(request));
-        }
+    fn request(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
         self.make_way(&request);
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
@@ -250,10 +252,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`request`](Self::request).
-    pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        if self.held.is_some() {
-            return self.begin_held(id, Asked::Request(request));
-        }
+    fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
         self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
@@ -341,8 +340,15 @@ impl Session {
     }
 
     fn next(&mut self, now: Instant) -> SessionOutput {
-        if let Some(held) = &mut self.held {
-            return held.poll(now, &self.port);
+        while let Some(held) = &mut self.held {
+            match held.next(now) {
+                Ok(over) => {
+                    if let Some(output) = self.held_output(over) {
+                        return output;
+                    }
+                }
+                Err(until) => return SessionOutput::Wait(until),
+            }
         }
         loop {
             let mut again = self.send_torques(now);
@@ -443,6 +449,8 @@ impl Session {
         }
         if let Some(held) = &mut self.held {
             held.cancel(id);
+            // A frame with the torques of others would not be sent, either.
+            held.drop_unawaited();
             return;
         }
         self.insisting.remove(id);

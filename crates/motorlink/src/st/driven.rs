@@ -2,7 +2,7 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{ByteLink, PortError, PortName};
+use motorlink_link::port::{ByteLink, Carries, PortError, PortName};
 use motorlink_link::reopening::{Opener, Reopening};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
@@ -10,7 +10,8 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::{self, Instant};
 
-use super::session::{Session, request_bytes};
+use super::held::request_bytes;
+use super::session::Session;
 use super::{Error, Options};
 use crate::way::{Port, Way};
 
@@ -37,7 +38,7 @@ pub(super) fn opener<L: 'static>(
 ) -> Opener<Way<L>> {
     let port = port.clone();
     Box::new(move || {
-        let way = Way::open(&port, &mut open)?;
+        let way = Way::open(&port, Carries::Bytes, &mut open)?;
         match way.held().and_then(|line| line.profile) {
             Some(other) if other != profile => {
                 Err(PortError::HeldInProfile { port: port.to_string(), profile: other.name() })
@@ -150,16 +151,17 @@ impl<L: ByteLink> Driven<L> {
 
     /// Sends a stop whose answer is not awaited.
     pub(super) fn stop_unheard(&mut self, motor: MotorNumber) -> Result<(), PortError> {
-        self.session.lost();
         let stop = Request::ExecuteCommand(Command::StopMotor);
         let motor = motor.number();
-        match self.way()? {
+        self.way()?;
+        self.session.lost();
+        match self.port.link()?.0 {
             Way::Line(link) => {
                 let mut frame = [0; MAX_FRAME];
                 link.write(Frame::command(motor, &stop, &mut frame).unwrap_or(&[]))
             }
             Way::Holder(holder) => {
-                holder.request(motor, &request_bytes(&stop).unwrap_or_default()).map(drop)
+                holder.request(motor, &request_bytes(&stop).unwrap_or_default(), None).map(drop)
             }
         }
     }

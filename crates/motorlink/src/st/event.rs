@@ -120,9 +120,7 @@ impl EventClient {
 
     /// The next request must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(holder) = self.driven.port.holder() {
-            holder.expire_next(time_to_live);
-        }
+        self.driven.session.expire_next(time_to_live);
     }
 
     /// Whether a request is sent at once. Otherwise the line is recovered first. While an exchange is

@@ -19,6 +19,7 @@ mod driven;
 mod error;
 mod event;
 pub(crate) mod follow;
+mod held;
 mod motor;
 mod options;
 mod scan;

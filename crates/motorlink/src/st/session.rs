@@ -16,10 +16,9 @@ use motorlink_proto::st::{
 use motorlink_proto::time::Instant;
 
 use super::error::{Target, advice, hint};
+use super::held::HeldExchange;
 use super::{Error, LimitError, Limits, Options};
 use crate::overdue::Overdue;
-use held::HeldExchange;
-pub(super) use held::request_bytes;
 
 /// What a request is held to before it leaves.
 #[derive(Debug, Clone, Copy)]
@@ -177,6 +176,8 @@ impl Session {
         match &mut self.held {
             Some(held) => {
                 held.confirm();
+                // What is acknowledged next is not the request before.
+                self.account.sent(0, Effect::of(&question));
                 self.begun(Ok(()), 0, What::of(&question))
             }
             None => self.begin(0, &question),
@@ -206,7 +207,7 @@ impl Session {
         let effect = checked.map_err(|why| limited(motor, why))?;
         let begun = match &mut self.held {
             Some(held) => {
-                held.begin(motor, Some([&[code], payload].concat()));
+                held.begin(motor, Some([&[frame.code()], payload].concat()));
                 Ok(())
             }
             None => self.master.request_raw(frame.header, payload),
@@ -365,6 +366,9 @@ impl Session {
 
     /// Tells that the line was closed and opened again.
     pub(super) fn reopened(&mut self) {
+        if let Some(held) = &mut self.held {
+            held.requests.clear();
+        }
         self.last.restart();
         self.account.reopened();
         self.master.reopened();

@@ -1,56 +1,15 @@
-//! Exchanges through a program that holds the bus, one with each motor, in place of those of the host.
+//! The session at a port that another program holds.
 
 use motorlink_link::port::{Declined, HeldLine, Holder, NotDone, RequestEnd};
 
 use super::*;
-use crate::held::HeldRequests;
-
-#[derive(Debug, Clone)]
-pub(super) struct HeldExchanges {
-    requests: HeldRequests<MotorId>,
-    /// Motors whose end nobody waits for.
-    unawaited: MotorSet,
-    /// The reply to a confirmation says nothing.
-    over: Vec<(MotorId, Result<[u8; 8], Error>)>,
-    /// Motors of which the program has no reply, and knows that they are there.
-    missed: MotorSet,
-}
-
-impl HeldExchanges {
-    pub(super) fn busy(&self) -> MotorSet {
-        let over = self.over.iter().map(|(id, _)| *id);
-        self.requests.lanes().chain(over).collect::<MotorSet>().without(self.unawaited)
-    }
-
-    pub(super) fn cancel(&mut self, id: MotorId) {
-        self.requests.cancel(id);
-        self.over.retain(|(other, _)| *other != id);
-    }
-
-    pub(super) fn poll(&mut self, now: Instant, port: &str) -> SessionOutput {
-        while let Some(id) = self.requests.overdue(now) {
-            let silent = PortError::HolderSilent { port: port.to_owned() };
-            self.over.push((id, Err(silent.into())));
-        }
-        self.over.retain(|(id, _)| !self.unawaited.contains(*id));
-        match self.over.pop() {
-            Some((id, result)) => SessionOutput::Done(id, result),
-            None if self.busy().is_empty() => SessionOutput::Wait(None),
-            None => SessionOutput::Wait(self.requests.until()),
-        }
-    }
-}
+use crate::rmd::held::{HeldExchanges, Over, moved_by};
 
 impl Session {
     /// Another program holds the port. It gives a reply or a reason within its patience.
     pub(in crate::rmd) fn set_holder(&mut self, line: HeldLine) {
         self.timeout = line.patience;
-        self.held = Some(HeldExchanges {
-            requests: HeldRequests::new(line),
-            unawaited: MotorSet::EMPTY,
-            over: Vec::new(),
-            missed: MotorSet::EMPTY,
-        });
+        self.held = Some(HeldExchanges::new(line));
     }
 
     /// Whether another program holds the port.
@@ -58,9 +17,11 @@ impl Session {
         self.held.is_some()
     }
 
-    /// Motors of which that program has no reply, and knows that they are there.
-    pub(in crate::rmd) fn missed(&self) -> MotorSet {
-        self.held.as_ref().map_or(MotorSet::EMPTY, |held| held.missed)
+    /// The next request must not be sent later than this, if another program holds the port.
+    pub(in crate::rmd) fn expire_next(&mut self, time_to_live: Duration) {
+        if let Some(held) = &mut self.held {
+            held.requests.expire_next(time_to_live);
+        }
     }
 
     /// Whether another program holds the port, and this is what it says after it has repeated a stop.
@@ -68,6 +29,16 @@ impl Session {
         match error {
             Error::Port(error) => error.is_given_up(),
             error => self.is_held() && matches!(error, Error::Timeout { .. }),
+        }
+    }
+
+    /// Gives up the exchanges under way, and what is not sent yet.
+    pub(in crate::rmd) fn abandon(&mut self, now: Instant) {
+        for id in self.busy() {
+            self.cancel(now, id);
+        }
+        if let Some(held) = &mut self.held {
+            held.drop_unawaited();
         }
     }
 
@@ -108,15 +79,11 @@ impl Session {
     }
 
     fn give(&mut self, id: MotorId, asked: Asked, is_awaited: bool) {
-        let Some(held) = &mut self.held else { return };
-        let request = asked.request();
-        held.cancel(id);
-        held.requests.begin(id, id.number(), request.map(|bytes| bytes.to_vec()));
-        match is_awaited {
-            true => held.unawaited.remove(id),
-            false => held.unawaited.insert(id),
+        let request = asked.request().unwrap_or_else(|| self.question(id));
+        self.pending[id.index()].request = request;
+        if let Some(held) = &mut self.held {
+            held.begin(id, asked, is_awaited);
         }
-        self.pending[id.index()].request = request.unwrap_or_default();
     }
 
     /// Sends what was begun.
@@ -125,54 +92,59 @@ impl Session {
         now: Instant,
         holder: &mut dyn Holder,
     ) -> Result<(), PortError> {
-        let Some(held) = &mut self.held else { return Ok(()) };
-        let (mut moved, sent, pending) = (MotorSet::EMPTY, &mut self.sent, &self.pending);
-        let result = held.requests.hand_over(now, holder, |id, asked| {
-            sent[id.index()] = now;
-            if asked.request.is_some() {
-                let request = pending[id.index()].request;
-                moved = moved.union(MotorSet::moved_by(&CanFrame::new(id.can_id(), request)));
-            }
+        let Some(mut held) = self.held.take() else { return Ok(()) };
+        let HeldExchanges { requests, unawaited, .. } = &mut held;
+        let result = requests.hand_over(now, holder, |id, asked| {
+            self.sent[id.index()] = now;
+            self.overdue.sent(now, self.timeout);
+            let moved = moved_by(id, asked);
+            self.moved(moved, moved.intersection(*unawaited));
         });
-        let unexpected = moved.intersection(held.unawaited);
-        self.moved(moved, unexpected);
+        self.held = Some(held);
         result
     }
 
-    /// The end of a request. One that nobody waits for is ignored.
+    /// Takes the end of a request.
     pub(in crate::rmd) fn ended(&mut self, end: RequestEnd) {
-        let Some(held) = &mut self.held else { return };
-        let Some((id, asked, result)) = held.requests.end(end) else { return };
-        let result = match result {
-            Ok(reply) if asked.request.is_some() => reply.try_into().map_err(|_| {
-                let why = "the program that holds the port gives another reply".to_owned();
-                Declined::ByHolder(NotDone::Line, why)
-            }),
-            result => result.map(|_| [0; 8]),
-        };
-        let result = result.map_err(|why| self.declined(id, why));
-        self.acknowledged(id, result.as_ref().ok().filter(|_| asked.request.is_some()));
         if let Some(held) = &mut self.held {
-            held.over.push((id, result));
+            held.ended(end);
         }
     }
 
+    /// What an exchange that is over shows; `None` if nobody waits for it.
+    pub(super) fn held_output(&mut self, over: Over) -> Option<SessionOutput> {
+        let Over { id, moved, is_awaited, result } = over;
+        let result = match result {
+            Some(Ok(reply)) => {
+                self.acknowledged(id, Some(&reply));
+                Ok(reply)
+            }
+            Some(Err(why)) => Err(self.declined(id, moved, why)),
+            None => {
+                self.lost(id);
+                Err(PortError::HolderSilent { port: self.port.to_string() }.into())
+            }
+        };
+        is_awaited.then_some(SessionOutput::Done(id, result))
+    }
+
     /// If the motor does not answer the other program, or a reply of it cannot be trusted, the error is
-    /// that of a port of one's own.
-    fn declined(&mut self, id: MotorId, why: Declined) -> Error {
+    /// that of a port of one's own. `moved` is the motor, if the request moves it.
+    fn declined(&mut self, id: MotorId, moved: MotorSet, why: Declined) -> Error {
         let (kind, why) = match why {
             Declined::ByHolder(kind, why) => (kind, why),
             // A code of ST's protocol.
             Declined::ByDrive(code) => (NotDone::Refused, format!("error code {code}")),
         };
-        if let (NotDone::Silent, Some(held)) = (kind, &mut self.held) {
-            held.missed.insert(id);
+        if kind == NotDone::Silent {
+            self.missed.insert(id);
         }
         self.lost(id);
         let error =
             PortError::NotDone { port: self.port.to_string(), motor: id.number(), kind, why };
-        // Who holds the motor answers for it.
-        if error.is_of_another() || error.is_unsent() && self.begun.contains(id) {
+        // Who holds the motor answers for it. Nothing turns a motor whose only motion was not sent.
+        let is_at_rest = error.is_unsent() && moved.contains(id) && self.begun.contains(id);
+        if error.is_of_another() || is_at_rest {
             self.at_rest(id);
         }
         let port = Arc::clone(&self.port);

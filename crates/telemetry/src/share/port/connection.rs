@@ -29,8 +29,6 @@ pub(super) struct Connection {
     socket: Socket,
     codec: ClientCodec,
     line: HeldLine,
-    /// The time to live of the next request, if it is shorter.
-    expires: Duration,
     /// Whether requests are for motors that no other program has moved since.
     is_own: bool,
     /// Motors that this program has moved through a connection before this one.
@@ -56,7 +54,6 @@ impl Connection {
             port: port.clone(),
             codec: ClientCodec::default(),
             line: HeldLine { patience: OPENING, profile: None },
-            expires: TIME_TO_LIVE,
             is_own: false,
             claims: Vec::new(),
             ending: Ending::default(),
@@ -99,6 +96,29 @@ impl Connection {
             Some(_) => Ok(HeldLine { patience, profile }),
             None => Err(self.port.failed(format!("the share uses the unknown profile {name}"))),
         }
+    }
+
+    /// Says what the share has to know of this program before it changes something, or has changed it through
+    /// an earlier connection.
+    fn declare(&mut self, changes: bool) -> Result<(), PortError> {
+        let claims = std::mem::take(&mut self.claims);
+        if !changes && claims.is_empty() {
+            return Ok(());
+        }
+        if !self.has_deadlines {
+            self.has_deadlines = true;
+            self.declare_deadlines()?;
+        }
+        let motion = self.ending;
+        if motion != self.declared {
+            self.declared = motion;
+            self.ask(Ask::Ending { motion })?;
+        }
+        for motor in claims {
+            let motor = MotorName { line: self.port.line.clone(), motor };
+            self.ask(Ask::Claim { motor })?;
+        }
+        Ok(())
     }
 
     /// From now on the share ends the motion of this program if it does not seem to live. One that only
@@ -175,33 +195,26 @@ impl Holder for Connection {
         self.socket.descriptor()
     }
 
-    fn request(&mut self, motor: u8, request: &[u8]) -> Result<u32, PortError> {
-        let time_to_live = std::mem::replace(&mut self.expires, TIME_TO_LIVE).as_secs_f64();
-        let line = self.port.line.clone();
-        let claims = std::mem::take(&mut self.claims);
+    fn request(
+        &mut self,
+        motor: u8,
+        request: &[u8],
+        time_to_live: Option<Duration>,
+    ) -> Result<u32, PortError> {
         let changes = self.changes(motor, request);
-        if !self.has_deadlines && (changes || !claims.is_empty()) {
-            self.has_deadlines = true;
-            self.declare_deadlines()?;
-        }
-        let motion = self.ending;
-        if motion != self.declared && (changes || !claims.is_empty()) {
-            self.declared = motion;
-            self.ask(Ask::Ending { motion })?;
-        }
-        for motor in claims {
-            let motor = MotorName { line: line.clone(), motor };
-            self.ask(Ask::Claim { motor })?;
-        }
+        self.declare(changes)?;
+        let line = self.port.line.clone();
         if self.port.at.takes() && changes && self.taken.insert(motor) {
             let motor = MotorName { line: line.clone(), motor };
             self.ask(Ask::Take { motor })?;
         }
+        let time_to_live = time_to_live.unwrap_or(TIME_TO_LIVE).min(TIME_TO_LIVE).as_secs_f64();
         let (bytes, continues, own) = (request.to_vec(), false, self.is_own);
         self.ask(Ask::Command { line, motor, bytes, time_to_live, continues, own })
     }
 
     fn confirm(&mut self, motor: u8) -> Result<u32, PortError> {
+        self.declare(false)?;
         self.ask(Ask::Confirm { line: self.port.line.clone(), motor })
     }
 
@@ -209,7 +222,8 @@ impl Holder for Connection {
         let Some(Ended { id, result }) = self.next_end(timeout)? else { return Ok(None) };
         let result = match result {
             Ok(Answer::Command { bytes }) => Ok(bytes),
-            Ok(_) => Ok(Vec::new()),
+            Ok(Answer::Confirm) => Ok(Vec::new()),
+            Ok(_) => Err(Declined::unfit()),
             Err(Refusal { code: Some(code), .. }) => Err(Declined::ByDrive(code)),
             Err(Refusal { reason, message, .. }) => {
                 let why = format!("`{}`: {message}", self.port.name());
@@ -217,10 +231,6 @@ impl Holder for Connection {
             }
         };
         Ok(Some(RequestEnd { number: id, result }))
-    }
-
-    fn expire_next(&mut self, time_to_live: Duration) {
-        self.expires = time_to_live.min(TIME_TO_LIVE);
     }
 
     fn only_own(&mut self, is_set: bool) {

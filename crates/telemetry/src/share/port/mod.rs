@@ -189,6 +189,6 @@ impl CanPort for SharePort {
 
 impl SharePort {
     fn carries_requests(&self) -> PortError {
-        self.0.failed("a share carries requests out, and gives no frames: use its port")
+        self.0.failed("a share carries requests out, and gives no frames")
     }
 }
