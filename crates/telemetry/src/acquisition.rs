@@ -88,6 +88,9 @@ pub struct Acquisition {
     failures: Map<Lane, u32>,
     /// The shortest time between two confirmations on a good line.
     confirmation: Micros,
+    /// Room for the exchanges that end in one step.
+    over: Vec<Over>,
+    finished: Vec<Finished>,
 }
 
 /// An exchange that is over, and what it was.
@@ -158,6 +161,8 @@ impl Acquisition {
             unfit: BTreeSet::new(),
             failures: Map::new(),
             confirmation: CONFIRMATION,
+            over: Vec::new(),
+            finished: Vec::new(),
         }
     }
 
@@ -328,7 +333,7 @@ impl Acquisition {
         self.reopen_if_due();
         self.trust_again();
         let mut until = self.begin_all(ended);
-        let mut finished = Vec::new();
+        let mut finished = std::mem::take(&mut self.finished);
         let mut moved = self.exchange(&mut finished);
         if moved.is_ok() && self.schedule.has_stop(self.clock.now()) {
             // A stop that waited goes out before consumers receive these results.
@@ -338,9 +343,8 @@ impl Acquisition {
         self.tell_stops();
         let has_more = !finished.is_empty() || self.schedule.has_stop(self.clock.now());
         let again = has_more.then_some(Duration::ZERO);
-        for one in finished {
-            self.pass_on(one, ended);
-        }
+        finished.drain(..).for_each(|one| self.pass_on(one, ended));
+        self.finished = finished;
         let wait = match moved {
             Ok(wait) if self.line.link_state() == LinkState::Open => wait,
             Ok(_) if !self.is_open => None,
@@ -357,9 +361,10 @@ impl Acquisition {
         if !self.is_open {
             return Ok(None);
         }
-        let mut over = Vec::new();
+        let mut over = std::mem::take(&mut self.over);
         let moved = self.line.advance(&mut |one| over.push(one));
-        finished.extend(over.into_iter().map(|one| self.finish(one)));
+        finished.extend(over.drain(..).map(|one| self.finish(one)));
+        self.over = over;
         let line = &self.line;
         self.schedule.recovering(|lane| !line.sends_at_once(lane));
         moved
@@ -406,10 +411,11 @@ impl Acquisition {
     }
 
     fn begin(&mut self, lane: Lane, job: Job<Arc<Command>>, ended: &mut Ended<'_>) {
-        let request = match job {
+        let begun = match job {
             Job::Poll(id, instant) => {
                 self.instants.insert(lane, instant);
-                self.polls.get(&id).map(|poll| poll.request())
+                let poll = self.polls.get(&id);
+                poll.map_or(Err(LineError::Protocol), |it| self.line.begin(lane, &it.request()))
             }
             Job::Command(id, command) => {
                 if let Some(latch) =
@@ -424,7 +430,7 @@ impl Acquisition {
                     if let Some(deadline) = command.deadline {
                         self.line.expire_next(deadline.since(self.clock.now()).into());
                     }
-                    Some(command.request.clone())
+                    self.line.begin(lane, &command.request)
                 } else {
                     return self.recover(lane, id, &command, ended);
                 }
@@ -438,10 +444,9 @@ impl Acquisition {
                     Some(Displaced::Unsent(id)) => ended(id, Err(CommandError::Overtaken)),
                     Some(Displaced::Poll(_) | Displaced::Recovery | Displaced::Stop) | None => {}
                 }
-                Some(command.request.clone())
+                self.line.begin(lane, &command.request)
             }
         };
-        let begun = request.map_or(Err(LineError::Protocol), |it| self.line.begin(lane, &it));
         if let Err(error) = begun {
             let sent = self.clock.now();
             let over = Over { lane, result: Err(error), sent, shows: Shows::Nothing };

@@ -23,6 +23,8 @@ pub struct RmdLine {
     confirming: MotorSet,
     /// Motors with a cancelled exchange. They had sent a reply without a request before it.
     strayed: MotorSet,
+    /// Room for the exchanges that end in one step.
+    over: Vec<(MotorId, Result<[u8; 8], Error>)>,
 }
 
 impl RmdLine {
@@ -45,7 +47,7 @@ impl RmdLine {
     }
 
     fn over(driver: Box<dyn RmdDriver>) -> Self {
-        RmdLine { driver, confirming: MotorSet::EMPTY, strayed: MotorSet::EMPTY }
+        RmdLine { driver, confirming: MotorSet::EMPTY, strayed: MotorSet::EMPTY, over: Vec::new() }
     }
 }
 
@@ -118,9 +120,9 @@ impl Line for RmdLine {
     }
 
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError> {
-        let mut over = Vec::new();
+        let mut over = std::mem::take(&mut self.over);
         let wait = self.driver.advance(&mut |id, result| over.push((id, result)));
-        for (id, result) in over {
+        for (id, result) in over.drain(..) {
             let is_confirmation = self.confirming.contains(id);
             self.confirming.remove(id);
             let mut shows = Shows::Nothing;
@@ -146,6 +148,7 @@ impl Line for RmdLine {
             self.strayed.remove(id);
             done(Over { lane: lane(id), result, sent: self.driver.sent(id), shows });
         }
+        self.over = over;
         if wait.is_err() {
             self.confirming = MotorSet::EMPTY;
         }

@@ -84,6 +84,9 @@ impl<C: Clone> LaneState<C> {
 
     /// The stop to begin now, if the lane is free for it or what is under way gives way to it.
     fn due_stop(&self, now: Instant, preempts: bool) -> Option<usize> {
+        if self.stops.is_empty() {
+            return None;
+        }
         let Some(exchange) = self.under_way else { return self.stops.in_turn(now) };
         if !matches!(exchange.kind, ExchangeKind::Stop) {
             return self.stops.in_turn(now).filter(|_| preempts || exchange.is_unsent);
