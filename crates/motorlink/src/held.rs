@@ -93,7 +93,7 @@ impl<K: Copy + PartialEq> HeldRequests<K> {
         sent
     }
 
-    /// Takes the end of a request; `None` if nobody waits for it.
+    /// Takes the end of a request; `None` if it is not awaited any more.
     pub(crate) fn end(
         &mut self,
         RequestEnd { number, result }: RequestEnd,

@@ -15,7 +15,7 @@ pub(crate) enum Way<L> {
     Holder(Box<dyn Holder>),
 }
 
-/// A port that may go away. A program that holds it is told of this client each time it is opened.
+/// A port that may go away, with what its holder has to know of this client.
 pub(crate) struct Port<L> {
     reopening: Reopening<Way<L>>,
     only_own: bool,

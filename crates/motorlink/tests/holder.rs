@@ -260,7 +260,7 @@ fn torques_that_were_not_sent_are_not_sent_later() {
 
 #[test]
 fn the_end_of_a_request_is_not_that_of_a_request_of_an_earlier_connection() {
-    // Motors 2 to 4 never answer, and nobody waits for them.
+    // Motors 2 to 4 never answer. Their replies are not awaited.
     fn answer(bytes: &[u8]) -> End {
         (bytes[0] != Code::SetTorque.number() || bytes[4] == 0).then(|| Ok(bytes.to_vec()))
     }

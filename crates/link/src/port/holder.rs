@@ -107,7 +107,7 @@ pub enum Declined {
 }
 
 impl Declined {
-    /// What came is no reply to the request.
+    /// The reply belongs to another request.
     pub fn unfit() -> Self {
         let why = "the program that holds the port gives the reply to another request";
         Declined::ByHolder(NotDone::Line, why.to_owned())

@@ -1,5 +1,5 @@
 //! The blocking client: many motors, one lock around one exchange or cycle, no thread, no
-//! allocation in an exchange.
+//! allocation in an exchange on a bus of its own.
 
 use std::error;
 use std::sync::Arc;
@@ -338,7 +338,8 @@ impl Client {
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
     /// place n of the result is motor n + 1. Motors that are used for the first time are asked for their
-    /// status before; if none of them answers, nothing is sent.
+    /// status before; if none of them answers, nothing is sent. A program that holds the port gets a request
+    /// for each motor.
     ///
     /// # Errors
     /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then. Nor

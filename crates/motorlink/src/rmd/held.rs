@@ -13,7 +13,7 @@ use crate::held::{HeldRequest, HeldRequests};
 #[derive(Debug, Clone)]
 pub(super) struct HeldExchanges {
     pub(super) requests: HeldRequests<MotorId>,
-    /// Motors whose end nobody waits for.
+    /// Motors whose reply is not awaited.
     pub(super) unawaited: MotorSet,
     over: VecDeque<Over>,
 }
@@ -25,7 +25,7 @@ pub(super) struct Over {
     /// The motor, if its request has moved it.
     pub(super) moved: MotorSet,
     pub(super) is_awaited: bool,
-    /// Nothing says anything in the reply to a confirmation. `None`: the program did not answer in time.
+    /// The reply to a confirmation has no meaning. `None`: the program did not answer in time.
     pub(super) result: Option<Result<[u8; 8], Declined>>,
 }
 
@@ -55,7 +55,7 @@ impl HeldExchanges {
         self.over.retain(|over| over.id != id);
     }
 
-    /// What nobody waits for is not sent any more.
+    /// Requests whose reply is not awaited are not sent any more.
     pub(super) fn drop_unawaited(&mut self) {
         let unawaited = self.unawaited;
         self.requests.drop_unsent(|id| unawaited.contains(id));
@@ -67,7 +67,7 @@ impl HeldExchanges {
         (self.unawaited, self.over) = (MotorSet::EMPTY, VecDeque::new());
     }
 
-    /// Takes the end of a request. One that nobody knows any more is ignored.
+    /// Takes the end of a request. One that is not known any more is ignored.
     pub(super) fn ended(&mut self, end: RequestEnd) {
         let Some((id, asked, result)) = self.requests.end(end) else { return };
         let result = result.and_then(|reply| match &asked.bytes {

@@ -61,7 +61,7 @@ impl HeldExchange {
         }
     }
 
-    /// The end of a request. One that nobody waits for is ignored.
+    /// The end of a request. One that is not awaited is ignored.
     ///
     /// # Errors
     /// The program has no reply.

@@ -358,7 +358,7 @@ impl Session {
         self.last.restart();
     }
 
-    /// A reply may still come that nobody waits for.
+    /// A reply may still come. It is not awaited.
     pub(super) fn lost(&mut self) {
         self.master.lost();
         self.last.restart();

@@ -111,7 +111,7 @@ impl Session {
         }
     }
 
-    /// What an exchange that is over shows; `None` if nobody waits for it.
+    /// The output of an exchange that is over; `None` if it is not awaited.
     pub(super) fn held_output(&mut self, over: Over) -> Option<SessionOutput> {
         let Over { id, moved, is_awaited, result } = over;
         let result = match result {
