@@ -271,12 +271,12 @@ impl Client {
 
     /// Whether another program holds the port.
     pub(super) fn is_held(&self) -> bool {
-        self.turns.take().session.is_held()
+        self.turns.take().session.held.is_some()
     }
 
     /// The motors that a program that holds the port knows, and of which it had no reply.
     pub(super) fn missed(&self) -> MotorSet {
-        self.turns.take().session.missed()
+        self.turns.take().session.missed
     }
 
     /// Whether this is what a program that holds the port says after it has repeated a stop.

@@ -91,7 +91,9 @@ impl<L: CanLink> Driven<L> {
             }
             Way::Holder(holder) => {
                 let Some(end) = holder.receive(wait)? else { return Ok(false) };
-                self.session.ended(end);
+                if let Some(held) = &mut self.session.held {
+                    held.ended(end);
+                }
             }
         }
         Ok(true)

@@ -127,7 +127,9 @@ impl EventClient {
 
     /// The next request to any motor must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        self.driven.session.expire_next(time_to_live);
+        if let Some(held) = &mut self.driven.session.held {
+            held.requests.expire_next(time_to_live);
+        }
     }
 
     /// Whether a request to a motor is sent at once. Otherwise late replies of the motor are awaited
@@ -232,7 +234,7 @@ impl EventClient {
 
     /// Whether another program holds the port.
     pub fn is_held(&self) -> bool {
-        self.driven.session.is_held()
+        self.driven.session.held.is_some()
     }
 
     /// Whether this is what a program that holds the port says after it has repeated a stop.

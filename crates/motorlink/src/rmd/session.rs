@@ -61,9 +61,9 @@ pub(super) struct Session {
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// The exchanges with the program that holds the port, in place of those of the host.
-    held: Option<HeldExchanges>,
+    pub(super) held: Option<HeldExchanges>,
     /// Motors of which that program has no reply, and knows that they are there.
-    missed: MotorSet,
+    pub(super) missed: MotorSet,
     timeout: Duration,
 }
 
@@ -137,11 +137,6 @@ impl Session {
 
     pub(super) fn counters(&self) -> Counters {
         *self.host.counters()
-    }
-
-    /// See [`Session::missed`].
-    pub(super) fn missed(&self) -> MotorSet {
-        self.missed
     }
 
     pub(super) fn moving(&self) -> MotorSet {

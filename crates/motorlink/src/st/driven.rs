@@ -128,18 +128,22 @@ impl<L: ByteLink> Driven<L> {
                 self.session.receive(self.port.now(), &self.received[..size]);
                 Ok(size > 0)
             }
-            Way::Holder(holder) => match holder.receive(wait)? {
-                Some(end) => self.session.ended(end).map(|()| true),
-                None => Ok(false),
-            },
+            Way::Holder(holder) => {
+                let Some(end) = holder.receive(wait)? else { return Ok(false) };
+                if let Some(held) = &mut self.session.held {
+                    held.ended(&self.port.name, end)?;
+                }
+                Ok(true)
+            }
         }
     }
 
     /// Sends what was begun, if another program holds the port.
     pub(super) fn hand_over(&mut self, now: Instant) -> Result<(), PortError> {
-        match self.port.holder() {
-            Some(holder) => self.session.hand_over(now, holder),
-            None => Ok(()),
+        let Session { held, sent, .. } = &mut self.session;
+        match (held, self.port.holder()) {
+            (Some(held), Some(holder)) => held.requests.hand_over(now, holder, |(), _| *sent = now),
+            _ => Ok(()),
         }
     }
 

@@ -120,7 +120,9 @@ impl EventClient {
 
     /// The next request must not be sent later than this, if another program holds the port.
     pub fn expire_next(&mut self, time_to_live: Duration) {
-        self.driven.session.expire_next(time_to_live);
+        if let Some(held) = &mut self.driven.session.held {
+            held.requests.expire_next(time_to_live);
+        }
     }
 
     /// Whether a request is sent at once. Otherwise the line is recovered first. While an exchange is

@@ -1,12 +1,10 @@
 //! One end of a line to an ST drive without the line: what the blocking client and event loops share.
 
-mod held;
-
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::{NotDone, PortError};
+use motorlink_link::port::{HeldLine, NotDone, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_PAYLOAD,
@@ -41,13 +39,13 @@ pub(super) struct Session {
     last: LastExchange,
     /// What had come unasked before the last exchange.
     before: Counters,
-    /// When the last frame was sent.
-    sent: Instant,
+    /// When the last frame or request was sent.
+    pub(super) sent: Instant,
     overdue: Overdue,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
     /// The exchange with the program that holds the port, in place of one of the master.
-    held: Option<HeldExchange>,
+    pub(super) held: Option<HeldExchange>,
     timeout: Duration,
 }
 
@@ -130,6 +128,19 @@ impl Session {
     /// How long a reply may take.
     pub(super) fn timeout(&self) -> Duration {
         self.timeout
+    }
+
+    /// Another program holds the port. It gives a reply or a reason within its patience.
+    pub(super) fn set_holder(&mut self, line: HeldLine) {
+        self.timeout = line.patience;
+        self.held = Some(HeldExchange::new(line));
+    }
+
+    /// Whether an answer of this size confirms the replies before it. A program that holds the port says
+    /// so without an answer of the drive.
+    pub(super) fn confirms(&self, confirmation: &Confirmation) -> impl Fn(usize) -> bool + use<> {
+        let (is_held, confirmation) = (self.held.is_some(), *confirmation);
+        move |size| is_held || confirmation.accepts(size)
     }
 
     pub(super) fn rules(&self) -> Rules {

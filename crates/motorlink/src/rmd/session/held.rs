@@ -1,6 +1,6 @@
 //! The session at a port that another program holds.
 
-use motorlink_link::port::{Declined, HeldLine, Holder, NotDone, RequestEnd};
+use motorlink_link::port::{Declined, HeldLine, Holder, NotDone};
 
 use super::*;
 use crate::rmd::held::{HeldExchanges, Over, moved_by};
@@ -12,23 +12,11 @@ impl Session {
         self.held = Some(HeldExchanges::new(line));
     }
 
-    /// Whether another program holds the port.
-    pub(in crate::rmd) fn is_held(&self) -> bool {
-        self.held.is_some()
-    }
-
-    /// The next request must not be sent later than this, if another program holds the port.
-    pub(in crate::rmd) fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(held) = &mut self.held {
-            held.requests.expire_next(time_to_live);
-        }
-    }
-
     /// Whether another program holds the port, and this is what it says after it has repeated a stop.
     pub(in crate::rmd) fn is_given_up(&self, error: &Error) -> bool {
         match error {
             Error::Port(error) => error.is_given_up(),
-            error => self.is_held() && matches!(error, Error::Timeout { .. }),
+            error => self.held.is_some() && matches!(error, Error::Timeout { .. }),
         }
     }
 
@@ -102,13 +90,6 @@ impl Session {
         });
         self.held = Some(held);
         result
-    }
-
-    /// Takes the end of a request.
-    pub(in crate::rmd) fn ended(&mut self, end: RequestEnd) {
-        if let Some(held) = &mut self.held {
-            held.ended(end);
-        }
     }
 
     /// The output of an exchange that is over; `None` if it is not awaited.
