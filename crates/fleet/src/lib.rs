@@ -1,7 +1,7 @@
 //! Drives at other computers, over [Zenoh](https://zenoh.io).
 //!
 //! A node is a share (`motorlink_telemetry::share`) that programs of other computers use, too. [`node`] is
-//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port`] the name `zenoh:NODE/LINE`
+//! its side, [`remote`] the side of a program, [`directory`] lists nodes, [`port_scheme`] the name `zenoh:NODE/LINE`
 //! of a line, [`whole`] makes one share of all nodes, [`view`] sees what they publish, [`site`] writes the
 //! certificates and rights of a network with a router. Both sides
 //! exchange the messages of a share; [`message`] has what goes around them, [`key`] the keys, [`clock`] the
@@ -18,7 +18,6 @@
 mod certificate_info;
 pub mod clock;
 pub mod computer;
-mod config;
 pub mod directory;
 pub mod key;
 mod membership;
@@ -32,6 +31,7 @@ pub mod ros2;
 pub mod site;
 pub mod view;
 pub mod whole;
+mod zenoh_file;
 
 /// The version of keys and messages.
 pub const VERSION: u32 = 1;

@@ -10,9 +10,9 @@ use zenoh::config::EndPoint;
 use zenoh::{Config, Session, Wait};
 
 use crate::certificate_info::Certificate;
-use crate::config::ConfigFile;
 use crate::key::Name;
 use crate::site::{self, Role};
+use crate::zenoh_file::ConfigFile;
 
 /// The address of a router, of ROS 2 and of the first node of a computer.
 pub const USUAL: &str = "tcp/127.0.0.1:7447";

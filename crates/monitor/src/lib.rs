@@ -14,6 +14,6 @@ pub mod drive;
 pub mod foxglove;
 pub mod message;
 mod page_session;
-mod rate_limit;
 pub mod recordings;
 pub mod server;
+mod websocket_limits;

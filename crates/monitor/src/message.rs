@@ -28,7 +28,7 @@ pub use recordings::{
 #[serde(untagged)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum FromPage {
-    /// A sign of life, each 100 ms.
+    /// A sign of life, each 50 ms.
     Alive(Alive),
     /// A request to the server of the monitor.
     Request(Request),

@@ -21,7 +21,7 @@ use crate::dead_man::{DeadMan, Lapse, Ticket};
 use crate::drive::MotionPermit;
 use crate::message::{Answer, Ask, FromPage, Request, Role, RunResult, Text};
 use crate::recordings::Recordings;
-use crate::server::link::{Link, lost, stop_all};
+use crate::server::share_link::{ShareLink, lost, stop_all};
 
 /// Requests of a page about drives that are under way.
 const REQUESTS: usize = 64;
@@ -31,7 +31,7 @@ pub struct Page {
     name: String,
     may: Permissions,
     clock: Clock,
-    link: Arc<Link>,
+    link: Arc<ShareLink>,
     control: Mutex<Control>,
     /// The share stops the motors that the page turns if it gets no sign of life for this time, in seconds:
     /// this server hangs or is stopped, or it would have stopped them itself.
@@ -74,7 +74,7 @@ impl Page {
         name: String,
         may: Permissions,
         deadline: Micros,
-        link: Arc<Link>,
+        link: Arc<ShareLink>,
         recordings: Arc<Recordings>,
         out: mpsc::Sender<String>,
     ) -> Self {

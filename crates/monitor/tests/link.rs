@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::drive_writes::{limit, limits};
 use crate::world::{LIMIT, Page, World, st};
 use motorlink_monitor::message::Mode;
-use motorlink_monitor::server::link::Link;
+use motorlink_monitor::server::share_link::ShareLink;
 use motorlink_proto::st::Profile;
 use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::message::{Answer, Ask, EventKind, Reason, Text, decode};
@@ -21,20 +21,20 @@ fn turn() -> Ask {
 }
 
 /// A link whose share has ended.
-async fn lost(name: &str) -> Arc<Link> {
+async fn lost(name: &str) -> Arc<ShareLink> {
     lost_of(name, |link| link).await
 }
 
-async fn lost_of(name: &str, with: fn(Link) -> Link) -> Arc<Link> {
+async fn lost_of(name: &str, with: fn(ShareLink) -> ShareLink) -> Arc<ShareLink> {
     let world = World::new(name, Profile::Spec);
-    let link = joined(with(Link::new(world.share()))).await;
+    let link = joined(with(ShareLink::new(world.share()))).await;
     drop(world);
     joins(&link, false).await;
     link
 }
 
 /// A link that is kept and connected.
-async fn joined(link: Link) -> Arc<Link> {
+async fn joined(link: ShareLink) -> Arc<ShareLink> {
     let link = Arc::new(link);
     let kept = Arc::clone(&link);
     tokio::spawn(async move { kept.keep().await });
@@ -43,7 +43,7 @@ async fn joined(link: Link) -> Arc<Link> {
 }
 
 /// Waits until the server itself is connected to the share, or is not.
-async fn joins(link: &Link, is_joined: bool) {
+async fn joins(link: &ShareLink, is_joined: bool) {
     let joins = async {
         while link.drives().await.is_ok() != is_joined {
             tokio::task::yield_now().await;
@@ -53,7 +53,7 @@ async fn joins(link: &Link, is_joined: bool) {
 }
 
 /// The first connection of a page to the share that was started again.
-async fn connected(link: &Link) -> Program {
+async fn connected(link: &ShareLink) -> Program {
     let connected = async {
         loop {
             if let Ok((program, listener, _)) = link.connect("page 1 (control)").await {
@@ -135,7 +135,7 @@ async fn a_stop_that_is_too_old_is_not_sent() {
 #[tokio::test]
 async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() {
     let world = World::new("link-latch", Profile::Spec);
-    let link = joined(Link::new(world.share())).await;
+    let link = joined(ShareLink::new(world.share())).await;
     link.stop_all().await.unwrap();
     drop(world);
     joins(&link, false).await;
@@ -161,7 +161,7 @@ async fn a_latch_holds_for_a_share_that_is_started_again_and_stops_its_motors() 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn limits_of_pages_hold_when_the_share_has_other_lines() {
     let world = World::new("link-limits", Profile::Spec);
-    let link = joined(Link::new(world.share())).await;
+    let link = joined(ShareLink::new(world.share())).await;
     let before = link.drives().await.unwrap();
     let page = Page { drives: before.clone(), ..world.page().await };
     page.ask(limit(st(1), Mode::Speed, Some(1000.0))).await.unwrap();

@@ -27,7 +27,7 @@ use crate::span::span_up_to;
 use listen::Listen;
 use shown::{Running, Shown};
 
-/// Signs of life come each 100 ms.
+/// Signs of life come each 50 ms.
 const SHORTEST_DEADLINE: Duration = Duration::from_millis(200);
 /// Simulated drives, without -p.
 const SIMULATED: &str = "sim:";
@@ -91,7 +91,7 @@ struct Web {
 
 pub fn run(mut args: Args) -> Result<(), Failure> {
     if args.deadline < SHORTEST_DEADLINE {
-        return Err(Failure::usage("--deadline is 200ms to 2s: signs of life come each 100 ms"));
+        return Err(Failure::usage("--deadline is 200ms to 2s: signs of life come each 50 ms"));
     }
     let running = args.running.shown(&args.lines, args.at.is_some())?;
     // Before the ports: if no browser can connect, no drive is touched.

@@ -1,11 +1,11 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
-mod common;
-mod drive_backend;
+mod drive_reader;
 mod motor_queries;
-mod peer_discovery;
+mod node_state;
+mod peer_watch;
 mod publisher;
-mod request_admission;
+mod request_order;
 mod send_buffer;
 mod session;
 mod session_router;
@@ -26,9 +26,9 @@ use crate::computer;
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
-use common::Common;
+use node_state::Common;
 
-pub use drive_backend::{Drive, Reader, Reading};
+pub use drive_reader::{Drive, Reader, Reading};
 
 /// The longest time until others see a node.
 const SEEN: Duration = Duration::from_secs(2);
@@ -117,7 +117,7 @@ impl Node {
             sessions,
             members,
         });
-        peer_discovery::follow(&common).map_err(failed)?;
+        peer_watch::follow(&common).map_err(failed)?;
         runtime.block_on(publisher::start(&common, period))?;
         runtime.block_on(motor_queries::open(&common, reader))?;
         let alive = session_router::open(&common, &runtime).map_err(failed)?;
@@ -148,7 +148,7 @@ impl Node {
 
     /// Leaves the network, and says that its motors have been stopped.
     pub fn end(self) {
-        peer_discovery::say_end(&self.common);
+        peer_watch::say_end(&self.common);
     }
 
     /// What ROS 2 machines see of it.

@@ -16,8 +16,8 @@ use zenoh::bytes::Encoding;
 use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
-use super::common::{Common, covers, refuse, reply_with};
-use super::drive_backend::{Drive, Reader};
+use super::drive_reader::{Drive, Reader};
+use super::node_state::{Common, covers, refuse, reply_with};
 use crate::key::{self, MotorQuery};
 use crate::message::{Identity, NoAnswer};
 

@@ -25,7 +25,7 @@ use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::common::{Common, State, covers, reply};
+use super::node_state::{Common, State, covers, reply};
 use crate::key;
 use crate::message::Info;
 use crate::request_permission::Lines;

@@ -11,14 +11,14 @@ const ANSWER: usize = 1 << 18;
 
 /// Messages of the share, numbered from 1 on.
 #[derive(Debug, Default)]
-pub struct Outbox {
+pub struct SendBuffer {
     /// How many the program has.
     gone: u64,
     waiting: VecDeque<Vec<u8>>,
     bytes: usize,
 }
 
-impl Outbox {
+impl SendBuffer {
     /// Whether more should be read from the share.
     pub fn has_room(&self) -> bool {
         self.bytes < FULL
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn messages_wait_until_the_program_has_them() {
-        let mut outbox = Outbox::default();
+        let mut outbox = SendBuffer::default();
         for size in 1..=3 {
             outbox.push(&text(size));
         }
@@ -98,13 +98,13 @@ mod tests {
 
     #[test]
     fn an_answer_and_the_box_have_a_limit() {
-        let mut outbox = Outbox::default();
+        let mut outbox = SendBuffer::default();
         while outbox.has_room() {
             outbox.push(&text(100_000));
         }
         assert_eq!(outbox.waiting.len(), FULL.div_ceil(100_008));
         assert_eq!(outbox.next().1, 2);
-        let mut long = Outbox::default();
+        let mut long = SendBuffer::default();
         long.push(&text(ANSWER + 1));
         assert_eq!(long.next().1, 1);
     }

@@ -13,9 +13,9 @@ use tokio::sync::mpsc::Receiver;
 use tokio::time::{sleep, timeout};
 use zenoh::query::Query;
 
-use super::common::{Common, answer, answer_with};
-use super::request_admission::{RequestOrder, Verdict, age};
-use super::send_buffer::Outbox;
+use super::node_state::{Common, answer, answer_with};
+use super::request_order::{RequestOrder, Verdict, age};
+use super::send_buffer::SendBuffer;
 use super::sessions::{Asked, Asking};
 use crate::clock::span;
 use crate::key::Scope;
@@ -43,7 +43,7 @@ pub(super) struct Session {
     pub(super) listener: Listener,
     pub(super) deadline: f64,
     pub(super) motion: Option<f64>,
-    pub(super) outbox: Outbox,
+    pub(super) outbox: SendBuffer,
     /// The requests that the share has not answered.
     pub(super) waiting: BTreeSet<u32>,
     pub(super) pull: Option<Pull>,

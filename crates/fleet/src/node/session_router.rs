@@ -13,9 +13,9 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::query::Query;
 use zenoh::sample::SampleKind;
 
-use super::common::{Common, answer};
-use super::request_admission::RequestOrder;
-use super::send_buffer::Outbox;
+use super::node_state::{Common, answer};
+use super::request_order::RequestOrder;
+use super::send_buffer::SendBuffer;
 use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
@@ -162,7 +162,7 @@ impl Common {
                     motion,
                     program,
                     listener,
-                    outbox: Outbox::default(),
+                    outbox: SendBuffer::default(),
                     waiting: BTreeSet::new(),
                     pull: None,
                     last_pull: 0,

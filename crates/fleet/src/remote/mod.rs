@@ -3,7 +3,7 @@
 //! A tunnel stands between the program's socket and the network. It takes the requests of the program,
 //! says how old they may become, sends them until the node has them, and brings what the share says.
 
-mod node_link;
+mod node_queries;
 mod outgoing;
 mod tunnel;
 

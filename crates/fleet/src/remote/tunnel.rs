@@ -22,7 +22,7 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::Priority;
 use zenoh::sample::{Sample, SampleKind};
 
-use super::node_link::{ASKED, NodeLink, PAUSE, first_of, run_of};
+use super::node_queries::{ASKED, NodeQueries, PAUSE, first_of, run_of};
 use super::outgoing::Outgoing;
 use crate::VERSION;
 use crate::clock::{Boot, Clock, NodeClock, span};
@@ -104,7 +104,7 @@ enum Next {
 }
 
 pub(super) struct Tunnel {
-    link: NodeLink,
+    link: NodeQueries,
     outgoing: Outgoing,
     lines: Lines,
     deadline: f64,
@@ -152,7 +152,7 @@ impl Tunnel {
             None => run_of(&zenoh, &node).await?,
         };
         let session = Name::random().map_err(|error| failed(error.to_string()))?;
-        let link = NodeLink { zenoh, node, who, session, boot };
+        let link = NodeQueries { zenoh, node, who, session, boot };
         let here = key::session_token(&link.node, &link.boot, &link.who, &link.session);
         let here = link.zenoh.liveliness().declare_token(here).await;
         let here = here.map_err(|error| failed(error.to_string()))?;

@@ -20,13 +20,13 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::Sample;
 use zenoh::{Session as Zenoh, Wait};
 
-use super::command_arbiter::{Commands, Order, Output};
+use super::command_arbiter::{CommandArbiter, Order, Output};
 use super::joint::Joint;
-use super::motion_executor::{Failed, Mover};
+use super::motion_executor::{Failed, MotionExecutor};
 use super::motor_client::MotorClient;
 use super::rmw_zenoh::{Attachment, Endpoint};
-use super::status_messages::{self, Known};
-use super::value_cache::Readings;
+use super::state_messages::{self, Known};
+use super::value_cache::ValueCache;
 use crate::clock::Clock;
 
 /// How often diagnostics are published.
@@ -45,9 +45,9 @@ pub struct Machine {
     /// Older values are none, in seconds.
     pub fresh: f64,
     /// The commands.
-    pub commands: Commands,
+    pub commands: CommandArbiter,
     /// The last values.
-    pub readings: Readings,
+    pub readings: ValueCache,
     /// The lines of the share.
     pub lines: Vec<Line>,
     /// Who refuses motion.
@@ -89,7 +89,7 @@ impl Shared {
         let shared = Shared { node, program, clock, zenoh, machine, wake, runtime, motors };
         let shared = Arc::new(shared);
         for ((number, (motor, _)), orders) in shared.motors.iter().enumerate().zip(orders) {
-            let mover = Mover::new(motor.clone(), Arc::clone(&shared.clock));
+            let mover = MotionExecutor::new(motor.clone(), Arc::clone(&shared.clock));
             let (asked, failing) = (Arc::clone(&shared), Arc::clone(&shared));
             let goes_on = move |order: Order| {
                 asked.with(|machine, _| machine.commands.goes_on(number, order.motion))
@@ -201,7 +201,7 @@ impl Shared {
         loop {
             ticks.tick().await;
             let state = self.with(|machine, now| {
-                status_messages::joint_state(&machine.joints, &machine.readings, now, machine.fresh)
+                state_messages::joint_state(&machine.joints, &machine.readings, now, machine.fresh)
             });
             // Programs complain about a state that comes twice.
             if let Some(state) = state.filter(|it| it.stamp != last) {

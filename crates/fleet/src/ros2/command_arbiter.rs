@@ -1,5 +1,5 @@
 //! Which commands of other computers are obeyed, and when motors stop. It uses no clock and no network
-//! itself: the time is an argument, in seconds. After each input, take all [`next`](Commands::next) outputs.
+//! itself: the time is an argument, in seconds. After each input, take all [`next`](CommandArbiter::next) outputs.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -7,8 +7,8 @@ use motorlink_recording::schema::{JointState, Message as _};
 
 use super::joint::{Joint, Mode, Reference};
 use super::rmw_zenoh::{Attachment, Gid};
-use super::staleness::{Late, Pace};
-use super::value_cache::Readings;
+use super::staleness::{Late, Staleness};
+use super::value_cache::ValueCache;
 
 /// The most publishers that are remembered.
 const PUBLISHERS: usize = 16;
@@ -37,10 +37,10 @@ impl Rules {
 
 /// The commands of all joints of a node.
 #[derive(Debug)]
-pub struct Commands {
+pub struct CommandArbiter {
     rules: Rules,
     joints: Vec<Commanded>,
-    publishers: BTreeMap<Gid, Pace>,
+    publishers: BTreeMap<Gid, Staleness>,
     /// Who commands, and when it did last.
     holder: Option<(Gid, f64)>,
     motions: u64,
@@ -88,7 +88,7 @@ impl Phase {
 pub enum Output {
     /// Send it a command.
     Send(Order),
-    /// Stop it, and say with [`Commands::stopped`] how it went.
+    /// Stop it, and say with [`CommandArbiter::stopped`] how it went.
     Stop(usize),
 }
 
@@ -117,10 +117,10 @@ pub struct CommandStatus<'a> {
 /// Why a sample moves nothing: a kind that is counted, and words.
 type Refused = (&'static str, String);
 
-impl Commands {
-    /// Commands of these joints.
+impl CommandArbiter {
+    /// CommandArbiter of these joints.
     pub fn new(joints: &[Joint], rules: Rules) -> Self {
-        Commands {
+        CommandArbiter {
             rules,
             joints: joints
                 .iter()
@@ -142,7 +142,7 @@ impl Commands {
         now: f64,
         attachment: Option<&[u8]>,
         payload: &[u8],
-        readings: &Readings,
+        readings: &ValueCache,
     ) {
         match self.obey(now, attachment, payload, readings) {
             Ok(()) => self.accepted += 1,
@@ -263,7 +263,7 @@ impl Commands {
         now: f64,
         attachment: Option<&[u8]>,
         payload: &[u8],
-        readings: &Readings,
+        readings: &ValueCache,
     ) -> Result<(), Refused> {
         let attachment = attachment.and_then(Attachment::decode).ok_or_else(|| {
             let why = "a sample without the attachment of rmw_zenoh 0.2.4 or later";
@@ -314,13 +314,13 @@ impl Commands {
             },
             None => {
                 if self.publishers.len() == PUBLISHERS {
-                    let by_age = |(_, one): &(&Gid, &Pace), (_, two): &(&Gid, &Pace)| {
+                    let by_age = |(_, one): &(&Gid, &Staleness), (_, two): &(&Gid, &Staleness)| {
                         one.heard().total_cmp(&two.heard())
                     };
                     let oldest = self.publishers.iter().min_by(by_age).map(|(gid, _)| *gid);
                     oldest.and_then(|gid| self.publishers.remove(&gid));
                 }
-                self.publishers.insert(sample.gid, Pace::new(now, sample));
+                self.publishers.insert(sample.gid, Staleness::new(now, sample));
                 Late::New
             }
         };
@@ -394,7 +394,7 @@ impl Commands {
         number: usize,
         mode: Mode,
         value: f64,
-        readings: &Readings,
+        readings: &ValueCache,
     ) -> Result<(), Refused> {
         let Commanded { joint, phase, stops } = &self.joints[number];
         let name = &joint.name;

@@ -9,7 +9,7 @@ mod motor_client;
 mod rmw_zenoh;
 mod service;
 mod staleness;
-mod status_messages;
+mod state_messages;
 mod trigger_type;
 mod type_hash;
 mod value_cache;
@@ -26,12 +26,12 @@ use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
 use bridge::{Machine, NAME, Shared};
-use command_arbiter::{Commands, Rules};
+use command_arbiter::{CommandArbiter, Rules};
 use motorlink_recording::schema::{DiagnosticArray, JointState, Message};
 use rmw_zenoh::{Endpoint, EndpointKind, Graph};
 use service::Service;
 use trigger_type::{TRIGGER, trigger};
-use value_cache::Readings;
+use value_cache::ValueCache;
 
 pub use joint::Settings;
 
@@ -98,10 +98,10 @@ impl Ros2 {
         };
         let machine = Machine {
             takes_all: joints.is_empty(),
-            commands: Commands::new(&joints, rules),
+            commands: CommandArbiter::new(&joints, rules),
             joints,
             fresh,
-            readings: Readings::default(),
+            readings: ValueCache::default(),
             lines,
             latched_by: None,
         };

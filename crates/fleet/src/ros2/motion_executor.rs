@@ -20,7 +20,7 @@ const RAMP_MS: u16 = 50;
 const PATIENCE: f64 = 0.5;
 
 /// Moves the motor of a joint.
-pub struct Mover {
+pub struct MotionExecutor {
     motor: MotorClient,
     clock: Arc<dyn Clock>,
     /// The last motion.
@@ -54,10 +54,10 @@ pub struct Failed {
     pub stops: bool,
 }
 
-impl Mover {
+impl MotionExecutor {
     /// One that has moved nothing.
     pub fn new(motor: MotorClient, clock: Arc<dyn Clock>) -> Self {
-        Mover { motor, clock, motion: None }
+        MotionExecutor { motor, clock, motion: None }
     }
 
     /// Carries out the newest order, again and again, if its motion goes on. Reports motions that fail.

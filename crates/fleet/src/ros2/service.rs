@@ -76,7 +76,7 @@ impl Service {
 }
 
 async fn stop_all(shared: &Arc<Shared>) -> Vec<String> {
-    // Commands that come now must not turn them again.
+    // CommandArbiter that come now must not turn them again.
     shared.with(|machine, now| machine.commands.block_all(now, "stop_all was called"));
     match motor_client::stop_all(&shared.program).await {
         Ok(motors) => motors

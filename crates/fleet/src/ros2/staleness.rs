@@ -10,7 +10,7 @@ const DRIFT: f64 = 500e-6;
 
 /// The pace of a publisher. Times are in seconds.
 #[derive(Debug, Clone)]
-pub struct Pace {
+pub struct Staleness {
     sequence: i64,
     /// From sending, by the clock of the publisher, to the arrival here: the least so far.
     least: f64,
@@ -33,11 +33,11 @@ pub enum Late {
     New,
 }
 
-impl Pace {
+impl Staleness {
     /// After the first sample.
     pub fn new(now: f64, first: &Attachment) -> Self {
         let least = now - sent(first);
-        Pace { sequence: first.sequence, least, at: now, window: (least, now), known: now }
+        Staleness { sequence: first.sequence, least, at: now, window: (least, now), known: now }
     }
 
     /// When the last sample came that was in time.
@@ -94,8 +94,8 @@ mod tests {
     }
 
     /// A publisher whose first 20 samples came in time.
-    fn settled() -> Pace {
-        let mut pace = Pace::new(0.0, &sample(0));
+    fn settled() -> Staleness {
+        let mut pace = Staleness::new(0.0, &sample(0));
         for number in 1..20 {
             let is_new = on_time(number) < LIVE;
             let expected = if is_new { Err(Late::New) } else { Ok(()) };
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn samples_of_a_publisher_that_is_not_known_yet_are_not_obeyed_while_they_catch_up() {
-        let mut pace = Pace::new(100.0, &sample(0));
+        let mut pace = Staleness::new(100.0, &sample(0));
         for number in 1..1000 {
             // A slow network gives 30 s of samples in 6 s.
             let now = 100.0 + 0.004 * f64::from(number);

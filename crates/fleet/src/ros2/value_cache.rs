@@ -15,7 +15,7 @@ pub type MotorKey = (String, u8);
 
 /// The last values of all motors.
 #[derive(Debug, Default)]
-pub struct Readings {
+pub struct ValueCache {
     /// Wall clock minus the clock of the line, in seconds.
     walls: BTreeMap<String, f64>,
     groups: BTreeMap<u32, (MotorKey, Vec<String>)>,
@@ -45,7 +45,7 @@ struct Value {
 /// For how long values are counted, in seconds.
 const COUNTED: f64 = 1.0;
 
-impl Readings {
+impl ValueCache {
     /// The clocks of the lines.
     pub fn learn(&mut self, lines: &[Line]) {
         let walls = lines.iter().map(|line| (line.line.clone(), line.wall - line.t));
@@ -162,9 +162,9 @@ pub(super) mod tests {
     use super::super::joint::tests::{joint, lines};
     use super::*;
 
-    /// Readings with a row of each of these motors.
-    pub(in super::super) fn readings(rows: &[(&str, &[(&str, f64)])]) -> Readings {
-        let mut readings = Readings::default();
+    /// ValueCache with a row of each of these motors.
+    pub(in super::super) fn readings(rows: &[(&str, &[(&str, f64)])]) -> ValueCache {
+        let mut readings = ValueCache::default();
         let mut lines = lines();
         lines.iter_mut().for_each(|line| (line.t, line.wall) = (10.0, 1_000_010.0));
         readings.learn(&lines);

@@ -8,8 +8,8 @@ use std::path::Path;
 use super::authority::{Authority, Pair};
 use super::error::SiteError;
 use crate::certificate_info::Certificate;
-use crate::config::ConfigFile;
 use crate::key::Name;
+use crate::zenoh_file::ConfigFile;
 
 /// Creates a folder if it is not there.
 pub(super) fn create(path: &Path) -> Result<(), SiteError> {

@@ -28,8 +28,8 @@ use base64::prelude::BASE64_STANDARD;
 use serde_json::json;
 
 use crate::certificate_info::Certificate;
-use crate::config::ConfigFile;
 use crate::key::Name;
+use crate::zenoh_file::ConfigFile;
 use authority::{Authority, Pair};
 pub use error::SiteError;
 pub use role::Role;

@@ -17,7 +17,7 @@ use crate::directory::{self, Run};
 use crate::key::{self, Name};
 use crate::network::{Network, NetworkError};
 use crate::remote;
-use snapshot::Picture;
+use snapshot::Snapshot;
 pub use snapshot::{Drive, Node};
 
 /// How long nodes may take to say their columns.
@@ -38,7 +38,7 @@ pub struct View {
 
 struct Shared {
     zenoh: Arc<Zenoh>,
-    picture: Mutex<Picture>,
+    picture: Mutex<Snapshot>,
     /// When columns were asked for last.
     asked: Mutex<f64>,
 }
@@ -119,7 +119,7 @@ impl View {
 }
 
 impl Shared {
-    fn picture(&self) -> MutexGuard<'_, Picture> {
+    fn picture(&self) -> MutexGuard<'_, Snapshot> {
         self.picture.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -39,7 +39,7 @@ pub struct Node {
 type Values = (BTreeMap<String, f64>, f64);
 
 #[derive(Debug, Default)]
-pub(super) struct Picture {
+pub(super) struct Snapshot {
     /// The runs that are there, as the network says.
     here: BTreeSet<Run>,
     nodes: BTreeMap<Run, Node>,
@@ -47,7 +47,7 @@ pub(super) struct Picture {
     values: BTreeMap<(Name, String, u8), Values>,
 }
 
-impl Picture {
+impl Snapshot {
     /// A run of a node is there.
     pub(super) fn came(&mut self, run: Run) {
         self.here.insert(run);
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn the_last_value_of_each_signal_is_kept() {
-        let mut picture = Picture::default();
+        let mut picture = Snapshot::default();
         picture.state(node(), info("a", &[1, 2]), 1.0);
         assert!(!picture.samples(node(), "rmd0", 1, &data(7, &[1.0], &[24.0]), 1.0));
         picture.columns(node(), group(7));
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn nodes_with_one_name_are_shown_both_and_no_value_is_that_of_another() {
-        let mut picture = Picture::default();
+        let mut picture = Snapshot::default();
         let run = |boot: &str| (node(), boot.parse().unwrap());
         for boot in ["a-1111", "b-2222"] {
             picture.came(run(boot));
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_node_that_was_started_again_has_no_old_values() {
-        let mut picture = Picture::default();
+        let mut picture = Snapshot::default();
         picture.state(node(), info("a", &[1]), 1.0);
         picture.columns(node(), group(7));
         picture.samples(node(), "rmd0", 1, &data(7, &[1.0], &[24.0]), 1.0);

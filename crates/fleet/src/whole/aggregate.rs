@@ -2,7 +2,7 @@
 //!
 //! It has no socket and reads no clock. Times come from the caller, in seconds.
 
-mod answers;
+mod node_answers;
 mod rounds;
 mod subscriptions;
 
@@ -17,9 +17,9 @@ use motorlink_telemetry::share::message::{
     Answer, Ask, Event, EventKind, Line, Reason, Request, SignalName, Text, decode, encode,
 };
 
-use super::latch_state::Latches;
 use super::member::{Member, State};
 use super::names;
+use super::process_latch::Latches;
 use super::round::{Round, RoundKind};
 use crate::key::Name;
 

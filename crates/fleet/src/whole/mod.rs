@@ -5,9 +5,9 @@
 
 mod aggregate;
 mod fleet_session;
-mod latch_state;
 mod member;
 mod names;
+mod process_latch;
 mod round;
 
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ use crate::network::Network;
 use crate::remote::{self, Remote};
 use aggregate::Aggregate;
 use fleet_session::{AbsentNodes, FleetSession};
-use latch_state::Latches;
+use process_latch::Latches;
 
 /// The nodes of a network.
 #[derive(Debug, Clone)]

@@ -41,7 +41,8 @@ pub enum Ending {
     Nothing,
 }
 
-/// The connection to a program that holds a port. Each request has one end: a reply or a reason. The
+/// The connection to a program that holds a port, such as that of `share:` and `zenoh:` in
+/// `motorlink-telemetry` (`share::port::connection`). Each request has one end: a reply or a reason. The
 /// program repeats stops itself before it gives a reason.
 pub trait Holder: Send {
     /// What it says of the line.

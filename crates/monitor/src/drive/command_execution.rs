@@ -9,7 +9,7 @@ use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::motor_exchange::{ATTEMPTS, Exchanges, Target, is_worth_repeating};
 
 use super::commands::Command;
-use super::motion_interlock::{Control, MotionPermit, MotionSession};
+use super::motion_control::{Control, MotionPermit, MotionSession};
 use crate::message::Value;
 
 /// A command of a page.

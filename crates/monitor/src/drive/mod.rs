@@ -8,7 +8,7 @@ mod command_execution;
 mod commands;
 mod description;
 mod limits;
-mod motion_interlock;
+mod motion_control;
 mod motor_scan;
 mod register_write;
 mod registers;
@@ -26,9 +26,9 @@ use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
 use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
-use motion_interlock::Control;
+use motion_control::Control;
 
-pub use motion_interlock::MotionPermit;
+pub use motion_control::MotionPermit;
 
 /// Carries out the requests of pages about drives. Copies are the same drives.
 #[derive(Clone)]

@@ -9,7 +9,7 @@ use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
-use super::motion_interlock::{Control, MotionPermit, MotionSession, send};
+use super::motion_control::{Control, MotionPermit, MotionSession, send};
 use super::registers::{self, ValueSource};
 use super::settings;
 use super::value_format;

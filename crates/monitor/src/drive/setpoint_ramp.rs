@@ -25,7 +25,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
 use super::command_execution::started;
-use super::motion_interlock::{Control, MOTION, MotionPermit, MotionSession, Running, send};
+use super::motion_control::{Control, MOTION, MotionPermit, MotionSession, Running, send};
 use crate::message::{Answer, Mode, RunResult};
 
 /// The time between two references.

@@ -15,7 +15,7 @@ use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target, is_refused_by_motor};
 use motorlink_telemetry::signal::Motor;
 
-use super::motion_interlock::Control;
+use super::motion_control::Control;
 use crate::message::{self, Answer};
 
 /// The settings of a motor of either protocol.

@@ -6,9 +6,9 @@
 mod protocol;
 mod session;
 mod socket;
-mod viewer_feed;
+mod viewers;
 
 pub use protocol::SUBPROTOCOLS;
 pub use session::LONGEST_TEXT;
 pub use socket::{PACKED, serve};
-pub use viewer_feed::Viewers;
+pub use viewers::Viewers;

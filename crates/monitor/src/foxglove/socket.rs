@@ -9,8 +9,8 @@ use tokio::time::{Instant, timeout};
 
 use super::protocol::{Level, status};
 use super::session::Out;
-use super::viewer_feed::{Viewer, Viewers};
-use crate::rate_limit::{Budget, PATIENCE, Sink, close};
+use super::viewers::{Viewer, Viewers};
+use crate::websocket_limits::{Budget, PATIENCE, Sink, close};
 
 /// How much is handed to the system at once, in bytes: a viewer that takes this in time is there.
 pub const PACKED: usize = 1 << 10;

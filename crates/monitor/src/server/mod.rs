@@ -5,9 +5,9 @@
 mod assets;
 mod auth;
 mod connections;
-pub mod link;
 mod recordings;
 mod routes;
+pub mod share_link;
 mod socket;
 mod state;
 mod tls;
@@ -28,7 +28,7 @@ pub use tls::{Tls, TlsError};
 use crate::message::Role;
 use crate::recordings::Recordings;
 use auth::Auth;
-use link::Link;
+use share_link::ShareLink;
 use state::State;
 
 /// The usual deadline of a page that turned motors.
@@ -73,7 +73,7 @@ impl Server {
         let bare_address = foxglove.as_ref().map(TcpListener::local_addr).transpose()?;
         let auth = Auth::new(address.port(), tls.is_some(), names)?;
         let recordings = Recordings::new(recordings, Arc::clone(&share));
-        let state = Arc::new(State::new(auth, Link::new(share), recordings, settings)?);
+        let state = Arc::new(State::new(auth, ShareLink::new(share), recordings, settings)?);
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("monitor")

@@ -14,12 +14,12 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
-use super::link::{AGAIN, Link};
+use super::share_link::{AGAIN, ShareLink};
 use super::state::{Settings, State};
 use crate::dead_man::Lapse;
 use crate::message::{Recorded, Role, Text, Welcome};
 use crate::page_session::{Broken, Page, Permissions, encode};
-use crate::rate_limit::{Budget, PATIENCE, Sink, close};
+use crate::websocket_limits::{Budget, PATIENCE, Sink, close};
 
 /// The longest text of a page.
 pub const LONGEST_TEXT: usize = 1 << 16;
@@ -169,7 +169,7 @@ async fn write(
 
 /// The session that sees.
 struct View {
-    link: Arc<Link>,
+    link: Arc<ShareLink>,
     name: String,
     state: LinkState,
 }
@@ -189,7 +189,7 @@ impl Drop for ReconnectTask {
 }
 
 impl ReconnectTask {
-    fn new(link: Arc<Link>, name: String) -> Self {
+    fn new(link: Arc<ShareLink>, name: String) -> Self {
         ReconnectTask(tokio::spawn(async move {
             loop {
                 if let Ok((program, listener, _)) = link.connect(&name).await {
@@ -203,7 +203,7 @@ impl ReconnectTask {
 
 impl View {
     /// `listener` is `None` if the share is lost.
-    fn new(link: Arc<Link>, name: String, listener: Option<Listener>) -> Self {
+    fn new(link: Arc<ShareLink>, name: String, listener: Option<Listener>) -> Self {
         let state = match listener {
             Some(listener) => LinkState::Up(listener),
             None => LinkState::Down(ReconnectTask::new(Arc::clone(&link), name.clone())),

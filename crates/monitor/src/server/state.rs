@@ -9,7 +9,7 @@ use std::time::Duration;
 use tokio::sync::Semaphore;
 
 use super::auth::{Auth, random_word};
-use super::link::Link;
+use super::share_link::ShareLink;
 use crate::foxglove::Viewers;
 use crate::page_session::Page;
 use crate::recordings::Recordings;
@@ -32,7 +32,7 @@ pub struct Settings {
 /// A server with its pages.
 pub struct State {
     pub auth: Auth,
-    pub link: Arc<Link>,
+    pub link: Arc<ShareLink>,
     pub settings: Settings,
     pub recordings: Arc<Recordings>,
     pub run: String,
@@ -50,7 +50,7 @@ impl State {
     /// The system has no random numbers.
     pub fn new(
         auth: Auth,
-        link: Link,
+        link: ShareLink,
         recordings: Recordings,
         settings: Settings,
     ) -> io::Result<Self> {

@@ -96,7 +96,7 @@ impl<C: Clone> LaneState<C> {
     }
 
     /// Whether a stop may begin at this time, and whether it is a precaution.
-    pub(super) fn is_precaution_due(&self, now: Instant, preempts: bool) -> Option<bool> {
+    pub(super) fn due_stop_is_precaution(&self, now: Instant, preempts: bool) -> Option<bool> {
         Some(self.stops.is_precaution(self.due_stop(now, preempts)?))
     }
 

@@ -288,14 +288,15 @@ impl<C: Clone> Schedule<C> {
     pub fn has_stop(&self, now: Instant) -> bool {
         let preempts = self.rules.stop_preempts;
         self.is_open
-            && self.lanes.values().any(|lane| lane.is_precaution_due(now, preempts).is_some())
+            && self.lanes.values().any(|lane| lane.due_stop_is_precaution(now, preempts).is_some())
     }
 
     fn next_stop(&mut self, now: Instant) -> Option<(Lane, Job<C>)> {
         let preempts = self.rules.stop_preempts;
         let lanes = self.lanes.iter();
-        let due = lanes
-            .filter_map(|(lane, state)| Some((state.is_precaution_due(now, preempts)?, *lane)));
+        let due = lanes.filter_map(|(lane, state)| {
+            Some((state.due_stop_is_precaution(now, preempts)?, *lane))
+        });
         let (_, lane) = due.min()?;
         let state = self.lanes.get_mut(&lane)?;
         let command = state.begin_stop(now, preempts)?;

@@ -211,7 +211,7 @@ impl Program {
         self.shared.pending().ended.is_some()
     }
 
-    /// Sends a request with an id below [`OWN_IDS`]. The [`Listener`] gives its end.
+    /// Sends a request. The [`Listener`] gives its end if its id is below [`OWN_IDS`].
     ///
     /// # Errors
     /// The share has ended.
@@ -311,5 +311,5 @@ impl Shared {
 }
 
 fn ended() -> Refusal {
-    Refusal::new(Reason::Line, "the share has ended; it stops the motors that this page turned")
+    Refusal::new(Reason::Line, "the share has ended; it stops the motors that this program turned")
 }

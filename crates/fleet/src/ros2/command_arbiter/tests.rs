@@ -7,18 +7,18 @@ const LIVE: f64 = 0.2;
 /// When the values of the motors came.
 const READ: f64 = 100.0;
 
-fn commands() -> Commands {
+fn commands() -> CommandArbiter {
     let joints = [
         joint("arm", "line=rmd0 motor=1 command=position max_velocity_rad_per_s=1"),
         joint("wheel", "line=st0 motor=1 command=velocity max_velocity_rad_per_s=20"),
         joint("watched", "line=rmd0 motor=2"),
     ];
     let rules = Rules { time_to_live: LIVE, start_within: 0.2, fresh: 5.0 };
-    Commands::new(&joints, rules)
+    CommandArbiter::new(&joints, rules)
 }
 
 /// The arm is at half a turn.
-fn measured() -> Readings {
+fn measured() -> ValueCache {
     readings(&[("rmd0", &[("multi_turn_angle_degrees", 180.0)])])
 }
 
@@ -40,13 +40,13 @@ impl Publisher {
         Attachment { sequence: self.sequence, sent_ns, gid: self.gid }.encode()
     }
 
-    fn send(&mut self, commands: &mut Commands, now: f64, message: &JointState) {
+    fn send(&mut self, commands: &mut CommandArbiter, now: f64, message: &JointState) {
         let attachment = self.attachment(now);
         commands.receive(now, Some(&attachment), &message.encode(), &measured());
     }
 
     /// A publisher whose pace is known at `now`, without motion.
-    fn known(&mut self, commands: &mut Commands, now: f64) {
+    fn known(&mut self, commands: &mut CommandArbiter, now: f64) {
         let nothing = JointState::default();
         for step in 0..=10 {
             self.send(commands, now - LIVE + 0.02 * f64::from(step) - 1e-3, &nothing);
@@ -55,7 +55,7 @@ impl Publisher {
     }
 }
 
-fn outputs(commands: &mut Commands) -> Vec<Output> {
+fn outputs(commands: &mut CommandArbiter) -> Vec<Output> {
     std::iter::from_fn(|| commands.next()).collect()
 }
 
@@ -79,12 +79,12 @@ fn sends(output: &Output) -> bool {
     matches!(output, Output::Send(_))
 }
 
-fn count(commands: &Commands, kind: &str) -> u64 {
+fn count(commands: &CommandArbiter, kind: &str) -> u64 {
     commands.counts().find(|(name, _)| *name == kind).map_or(0, |(_, count)| count)
 }
 
-/// Commands with a publisher whose pace is known at `READ`.
-fn ready() -> (Commands, Publisher) {
+/// CommandArbiter with a publisher whose pace is known at `READ`.
+fn ready() -> (CommandArbiter, Publisher) {
     let (mut commands, mut publisher) = (commands(), Publisher::new(1));
     publisher.known(&mut commands, READ);
     (commands, publisher)

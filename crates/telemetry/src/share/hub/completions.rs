@@ -6,13 +6,13 @@ use motorlink::ownership::Carried;
 use motorlink_proto::Motion;
 
 use super::Hub;
+use super::completion_types::{EngineCompletion, Sent, WorkResult};
 use super::error_mapping::{may_be_executed, reason};
 use super::line::SharedLine;
+use super::line_stops::Address;
 use super::pending_stops::Why;
 use super::session::UNHEARD;
 use super::session_id::SessionId;
-use super::stop_state::Address;
-use super::work_results::{EngineCompletion, Sent, WorkResult};
 use crate::acquisition::Rate;
 use crate::event::CommandError;
 use crate::line::Reply;

@@ -3,24 +3,24 @@
 //! The caller moves payloads between programs and the hub. Nothing in it waits, except for the end.
 //! Deadlines are by the clocks of the lines and by the time of [`Hub::at`], so tests run on virtual time.
 
+mod background_jobs;
+mod completion_types;
 mod completions;
 mod error_mapping;
 mod leases;
 mod line;
-mod line_lifecycle;
+mod line_stops;
 mod motor_state;
 mod pending_stops;
-mod port_jobs;
+mod port_requests;
 mod requests;
 mod session;
 mod session_id;
-mod session_liveness;
+mod signs_of_life;
 mod stop_dispatch;
-mod stop_state;
-mod subscription_feed;
+mod subscription_encoder;
 mod subscriptions;
 mod watchdog;
-mod work_results;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -37,12 +37,12 @@ use crate::event::CommandError;
 use crate::line::Stopped;
 use crate::runner::Ended;
 use crate::signal::Motor;
+use background_jobs::Jobs;
+use completion_types::{Completion, EngineCompletion, WorkResult};
 use line::Lines;
 use pending_stops::{PendingPortStops, Why};
-use port_jobs::Jobs;
 use session::Session;
 use session_id::wall_now;
-use work_results::{Completion, EngineCompletion, WorkResult};
 
 pub use line::SharedLine;
 pub use session_id::SessionId;

@@ -6,10 +6,10 @@ use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
 
 use super::Hub;
+use super::completion_types::{Sent, WorkResult};
 use super::error_mapping::reason;
 use super::session::Session;
 use super::session_id::SessionId;
-use super::work_results::{Sent, WorkResult};
 use crate::event::CommandError;
 use crate::line::Request;
 

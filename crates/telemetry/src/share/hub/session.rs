@@ -7,8 +7,8 @@ use litemap::LiteMap as Map;
 use motorlink_proto::st::RegisterId;
 
 use super::line::Lines;
-use super::session_liveness::Life;
-use super::subscription_feed::Feed;
+use super::signs_of_life::SignsOfLife;
+use super::subscription_encoder::Feed;
 use crate::share::frame::Frame;
 use crate::share::message::{
     self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
@@ -33,7 +33,7 @@ pub(super) struct Session {
     pub(super) only_stops: Option<String>,
     /// What becomes of its motors when it leaves.
     pub(super) ending: Ending,
-    pub(super) life: Life,
+    pub(super) life: SignsOfLife,
     answers: VecDeque<Text>,
     events: VecDeque<Event>,
     missed: u64,

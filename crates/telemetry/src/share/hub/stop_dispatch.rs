@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::Hub;
+use super::completion_types::{EngineCompletion, WorkResult};
 use super::line::SharedLine;
 use super::pending_stops::{AGAIN, LONGEST_PAUSE, Why};
 use super::requests::Refused;
 use super::session::{NO_MOTOR, Part, UNANSWERED};
 use super::session_id::SessionId;
-use super::work_results::{EngineCompletion, WorkResult};
 use crate::acquisition::Acquisition;
 use crate::event::CommandError;
 use crate::line::Request;

@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use litemap::LiteMap as Map;
 
 use super::Hub;
+use super::completion_types::WorkResult;
 use super::line::SharedLine;
 use super::requests::{Refused, ended, span, usage};
 use super::session_id::SessionId;
-use super::subscription_feed::Feed;
-use super::work_results::WorkResult;
+use super::subscription_encoder::Feed;
 use crate::acquisition::Acquisition;
 use crate::share::message::{
     Answer, Column, DropRule, LONGEST_QUEUE, MOST_SIGNALS, MOST_SUBSCRIPTIONS, MotorName, Reason,

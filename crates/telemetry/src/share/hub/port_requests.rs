@@ -9,11 +9,13 @@ use motorlink::st::Profile;
 use motorlink_proto::time::Micros;
 
 use super::Hub;
+use super::background_jobs::{
+    Asker, Closed, Job, JobId, JobResult, PortOperation, Scanned, found_ports,
+};
+use super::completion_types::Completion;
 use super::line::SharedLine;
-use super::port_jobs::{Asker, Closed, Job, JobId, JobResult, PortOperation, Scanned, found_ports};
 use super::requests::{Refused, usage};
 use super::session_id::SessionId;
-use super::work_results::Completion;
 use crate::line::Stopped;
 use crate::share::message::{
     ANY_MOTOR, Answer, EventKind, FoundPort, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,

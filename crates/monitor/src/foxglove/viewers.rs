@@ -13,7 +13,7 @@ use tokio::time::sleep;
 use super::protocol::{Channel, Level, Text, encode, status};
 use super::session::Session;
 use crate::drive::Drives;
-use crate::server::link::{AGAIN, Link};
+use crate::server::share_link::{AGAIN, ShareLink};
 
 /// Viewers at the same time.
 const VIEWERS: usize = 32;
@@ -24,7 +24,7 @@ const NAME: &str = "viewers";
 
 /// The viewers of a server.
 pub struct Viewers {
-    link: Arc<Link>,
+    link: Arc<ShareLink>,
     program: String,
     session: String,
     pub(super) places: Semaphore,
@@ -86,7 +86,7 @@ impl Drop for Joined {
 
 impl Viewers {
     /// Without viewers. `session` names this run of the server.
-    pub fn new(link: Arc<Link>, program: String, session: String) -> Self {
+    pub fn new(link: Arc<ShareLink>, program: String, session: String) -> Self {
         let (places, present) = (Semaphore::new(VIEWERS), Mutex::default());
         Viewers { link, program, session, places, present }
     }
@@ -166,7 +166,7 @@ impl Present {
 }
 
 /// Reads the share for viewers, until it is aborted.
-async fn feed(link: Arc<Link>, viewers: Weak<Viewers>) {
+async fn feed(link: Arc<ShareLink>, viewers: Weak<Viewers>) {
     loop {
         let drives = loop {
             if let Ok(drives) = link.drives().await {
@@ -184,7 +184,7 @@ async fn feed(link: Arc<Link>, viewers: Weak<Viewers>) {
 }
 
 /// Reads these lines until what it gives is dropped.
-fn follow(link: &Link, viewers: &Weak<Viewers>, drives: &Drives) -> Option<Live> {
+fn follow(link: &ShareLink, viewers: &Weak<Viewers>, drives: &Drives) -> Option<Live> {
     let (their, mut numbers) = (Weak::clone(viewers), Vec::new());
     let put = move |item| {
         if let Some(viewers) = their.upgrade() {

@@ -8,7 +8,7 @@ use zenoh::Wait;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::{Sample, SampleKind};
 
-use super::common::Common;
+use super::node_state::Common;
 use crate::key::{self, Name};
 use crate::membership::Membership;
 

@@ -27,7 +27,7 @@ pub(super) const PAUSE: Duration = Duration::from_millis(50);
 
 /// Asks a node.
 #[derive(Clone)]
-pub(super) struct NodeLink {
+pub(super) struct NodeQueries {
     pub(super) zenoh: Arc<Zenoh>,
     pub(super) node: Name,
     pub(super) who: Name,
@@ -35,10 +35,10 @@ pub(super) struct NodeLink {
     pub(super) boot: Name,
 }
 
-impl NodeLink {
+impl NodeQueries {
     /// What is said if the node is there, and does not answer `join`.
     pub(super) fn unanswered(&self, scope: Scope) -> String {
-        let NodeLink { node, who, .. } = self;
+        let NodeQueries { node, who, .. } = self;
         let right = scope.word();
         format!(
             "node {node} is there, but does not answer: it is busy or hangs, or {who} may not be allowed to {right}"

@@ -3,15 +3,15 @@
 use motorlink_recording::schema::{DiagnosticArray, DiagnosticStatus, JointState, Level, Time};
 use motorlink_telemetry::share::message::Line;
 
-use super::command_arbiter::Commands;
+use super::command_arbiter::CommandArbiter;
 use super::joint::Joint;
-use super::value_cache::{Reading, Readings};
+use super::value_cache::{Reading, ValueCache};
 
 /// The state of all joints whose values are not older than `age` seconds. NaN marks a missing value. Without a
 /// torque constant there are no efforts. The stamp is that of the oldest value. `None` without joints.
 pub fn joint_state(
     joints: &[Joint],
-    readings: &Readings,
+    readings: &ValueCache,
     now: f64,
     age: f64,
 ) -> Option<JointState> {
@@ -44,9 +44,9 @@ pub struct Known<'a> {
     /// Who refuses motion.
     pub latched_by: Option<&'a str>,
     /// The last values.
-    pub readings: &'a Readings,
+    pub readings: &'a ValueCache,
     /// The commands.
-    pub commands: &'a Commands,
+    pub commands: &'a CommandArbiter,
     /// The clock of the node.
     pub now: f64,
     /// The age from which on values are stale, in seconds.
@@ -145,7 +145,7 @@ mod tests {
     }
 
     /// An error of the arm: the voltage is low.
-    fn values() -> Readings {
+    fn values() -> ValueCache {
         let arm: &[_] = &[
             ("multi_turn_angle_degrees", 180.0),
             ("speed_dps", 360.0),
@@ -178,7 +178,7 @@ mod tests {
             lines,
             latched_by: None,
             readings: &readings,
-            commands: &Commands::new(&joints, rules),
+            commands: &CommandArbiter::new(&joints, rules),
             now,
             age: 0.5,
         };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::port_jobs::JobId;
+use super::background_jobs::JobId;
 use super::session::Part;
 use super::session_id::SessionId;
 use motorlink_proto::Motion;

@@ -29,7 +29,7 @@ pub const AGAIN: Duration = Duration::from_millis(250);
 const PENDING: Duration = Duration::from_secs(10);
 
 /// A share that may end and be started again.
-pub struct Link {
+pub struct ShareLink {
     share: Arc<dyn Address>,
     /// The stops of all pages.
     stops: Arc<Mutex<Stops>>,
@@ -61,10 +61,10 @@ struct Joined {
     drives: Drives,
 }
 
-impl Link {
+impl ShareLink {
     /// To a share. [`keep`](Self::keep) connects to it.
     pub fn new(share: Arc<dyn Address>) -> Self {
-        Link {
+        ShareLink {
             share,
             stops: Arc::default(),
             pending: Mutex::default(),
@@ -77,7 +77,7 @@ impl Link {
 
     /// With another time for which a stop waits for a share that is lost.
     pub fn with_stops_waiting(self, stop_waits: Duration) -> Self {
-        Link { stop_waits, ..self }
+        ShareLink { stop_waits, ..self }
     }
 
     /// The stops of all pages.

@@ -8,7 +8,7 @@ use crate::signal::Motor;
 
 /// What a program has declared, and what was heard of it.
 #[derive(Default)]
-pub(super) struct Life {
+pub(super) struct SignsOfLife {
     /// Nothing may be missing for longer than this.
     pub(super) silence: Option<Micros>,
     /// No motor that it moves may be without a new command for longer than this.
@@ -17,7 +17,7 @@ pub(super) struct Life {
     commanded: Map<(usize, Motor), Instant>,
 }
 
-impl Life {
+impl SignsOfLife {
     /// The program has made a request at this time.
     pub(super) fn heard(&mut self, made: Instant) {
         self.heard = self.heard.max(made);
