@@ -54,8 +54,9 @@ impl<K: Copy + PartialEq> HeldRequests<K> {
         self.asked.retain(|(lane, asked)| asked.sent.is_some() || !is_meant(*lane));
     }
 
-    /// Forgets everything: the next connection counts its requests anew.
-    pub(crate) fn clear(&mut self) {
+    /// The port was opened again: the new connection counts its requests anew.
+    pub(crate) fn reopened(&mut self, line: HeldLine) {
+        self.patience = line.patience.into();
         self.asked.clear();
     }
 

@@ -67,7 +67,7 @@ impl<L: CanLink> Driven<L> {
         let moved = self.session.moving().union(self.session.unexpected());
         let (way, reopened) = self.port.ready(moved.map(MotorId::number))?;
         if reopened {
-            self.session.reopened(now);
+            self.session.reopened(now, way.held());
             if way.is_fresh() {
                 self.session.trust();
             }

@@ -62,8 +62,8 @@ impl HeldExchanges {
     }
 
     /// The port was opened again.
-    pub(super) fn clear(&mut self) {
-        self.requests.clear();
+    pub(super) fn reopened(&mut self, line: HeldLine) {
+        self.requests.reopened(line);
         (self.unawaited, self.over) = (MotorSet::EMPTY, VecDeque::new());
     }
 

@@ -7,7 +7,7 @@ mod pending_torques;
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink_link::port::PortError;
+use motorlink_link::port::{HeldLine, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
@@ -181,10 +181,11 @@ impl Session {
     }
 
     /// Tells that the bus was opened anew.
-    pub(super) fn reopened(&mut self, now: Instant) {
+    pub(super) fn reopened(&mut self, now: Instant, line: Option<HeldLine>) {
         self.abandon(now);
-        if let Some(held) = &mut self.held {
-            held.clear();
+        if let (Some(held), Some(line)) = (&mut self.held, line) {
+            self.timeout = line.patience;
+            held.reopened(line);
         }
         MotorSet::ALL.into_iter().for_each(|id| self.lost(id));
         self.host.reopened(now);

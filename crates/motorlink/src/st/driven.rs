@@ -66,7 +66,7 @@ impl<L: ByteLink> Driven<L> {
         let started = self.session.started().motors();
         let (way, reopened) = self.port.ready(started.map(MotorNumber::number))?;
         if reopened {
-            self.session.reopened();
+            self.session.reopened(way.held());
             if way.is_fresh() {
                 self.session.trust_line();
             }

@@ -376,9 +376,10 @@ impl Session {
     }
 
     /// Tells that the line was closed and opened again.
-    pub(super) fn reopened(&mut self) {
-        if let Some(held) = &mut self.held {
-            held.requests.clear();
+    pub(super) fn reopened(&mut self, line: Option<HeldLine>) {
+        if let (Some(held), Some(line)) = (&mut self.held, line) {
+            self.timeout = line.patience;
+            held.requests.reopened(line);
         }
         self.last.restart();
         self.account.reopened();
