@@ -80,6 +80,8 @@ def test_a_motor_stops_when_the_command_that_started_it_has_ended(share, run, di
     assert said not in waited.ended(0).err
     assert said in run("st", "-p", share.st, "ramp", "1000", "100").ended(0).err
     assert said in run("rmd", "-p", share.rmd, "--id", "3", "raw", "A2 00 00 00 30 75 00 00").ended(0).err
+    torques = ["torque4", 0.1, 0.1, 0, 0, "--expect", "1,2"]
+    assert said in run("rmd", "-p", share.rmd, *torques).ended(0).err
     assert said not in run("rmd", "-p", share.rmd, "--id", "3", "status").ended(0).err
     # Two shares would own the same motor.
     for holder in ("share", "node"):

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use motorlink::port::{
-    ByteLink, CanLink, CanPort, Declined, Ending, EventBytes, EventCan, HeldLine, HeldPort, Holder,
-    LinePort, NotDone, Port, PortError, PortName, RequestEnd,
+    Carries, Declined, Ending, HeldLine, HeldPort, Holder, NotDone, Port, PortError, PortName,
+    RequestEnd,
 };
 use motorlink::rmd::{
     self, CentiDps, Code, IqCommand, MotorId, MotorSet, Quantity, ReadStatus, SetTorque4,
@@ -133,20 +133,16 @@ impl Port for Named {
         "held".to_owned()
     }
 
-    fn as_line(&self) -> Option<&dyn LinePort> {
-        Some(self)
-    }
-
-    fn as_can(&self) -> Option<&dyn CanPort> {
-        Some(self)
-    }
-
     fn as_held(&self) -> Option<&dyn HeldPort> {
         Some(self)
     }
 }
 
 impl HeldPort for Named {
+    fn carries(&self) -> Carries {
+        Carries::Both
+    }
+
     fn open(&self) -> Result<Box<dyn Holder>, PortError> {
         let (script, socket) = (self.0.clone(), UnixStream::pair().unwrap().0);
         Ok(Box::new(Connection { script, last: 0, ends: VecDeque::new(), socket }))
@@ -154,30 +150,6 @@ impl HeldPort for Named {
 
     fn as_any(&self) -> &dyn Any {
         self
-    }
-}
-
-impl LinePort for Named {
-    fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
-        Err(closed())
-    }
-
-    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
-        Err(closed())
-    }
-
-    fn label(&self) -> String {
-        self.body()
-    }
-}
-
-impl CanPort for Named {
-    fn open(&self) -> Result<Box<dyn CanLink>, PortError> {
-        Err(closed())
-    }
-
-    fn open_event(&self) -> Result<Box<dyn EventCan>, PortError> {
-        Err(closed())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::{PortError, PortName};
+use motorlink::port::{Carries, PortError, PortName};
 use motorlink::st::{Error, ScanResult, scan};
 use motorlink_telemetry::share::message::Finding;
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use crate::values;
 
 fn line(py: Python<'_>, name: &str) -> PyResult<PortName> {
     let port: PortName = name.parse().map_err(|error| invalid_value(py, error))?;
-    if port.as_line().is_none() || port.is_in_process() {
+    if !port.carries(Carries::Bytes) || port.is_in_process() {
         return Err(invalid_value(py, format_args!("`{port}` has no baud rate to scan")));
     }
     Ok(port)

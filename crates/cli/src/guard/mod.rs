@@ -7,7 +7,7 @@ mod words;
 use std::ffi::OsString;
 use std::time::Duration;
 
-use motorlink::port::PortName;
+use motorlink::port::{Carries, PortName};
 use motorlink::relay::{Event, Relay, RelayOptions};
 use motorlink::rmd::StopAction;
 use motorlink_link::serve::ServeName;
@@ -145,7 +145,7 @@ pub fn run(args: Args, program: &[OsString]) -> Result<(), Failure> {
 
 fn guard_st(args: &StArgs, program: &[OsString]) -> Result<(), Failure> {
     let port = args.port.name()?;
-    if port.as_line().is_none() {
+    if !port.carries(Carries::Bytes) {
         return Err(Failure::usage(format!(
             "`{port}` is a CAN bus, but an ST drive needs a serial line"
         ))

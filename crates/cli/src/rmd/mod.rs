@@ -76,8 +76,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
                 (true, _) => failure.of_motion("the motors", "motorlink rmd stop --all"),
                 _ => failure,
             })?;
-            let is_raw = matches!(act, Act::Raw { .. });
-            if act.can_turn() || is_raw && !session.bus.moving().is_empty() {
+            let may_move = matches!(act, Act::Raw { .. } | Act::Torque4 { .. });
+            if act.can_turn() || may_move && !session.bus.moving().is_empty() {
                 tell_of_stop(&port);
             }
             Ok(())

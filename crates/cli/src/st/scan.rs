@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::PortName;
+use motorlink::port::{Carries, PortName};
 use motorlink::st::BAUD_RATES;
 use motorlink_telemetry::share::message::{Finding, Protocol};
 use motorlink_telemetry::share::scan::{Found, scan};
@@ -18,7 +18,7 @@ pub fn run(
     patience: Duration,
     rates: &[u32],
 ) -> Result<(), Failure> {
-    if port.as_line().is_none() || port.is_in_process() {
+    if !port.carries(Carries::Bytes) || port.is_in_process() {
         return Err(Failure::usage(format!("`{port}` has no baud rate to scan")));
     }
     if connection.fault.is_some() {

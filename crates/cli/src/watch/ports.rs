@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink::port::PortName;
+use motorlink::port::{Carries, PortName};
 use motorlink::rmd::{MotorSet, Stop};
 use motorlink::st::{Command, MotorNumber, Request as StRequest};
 use motorlink_telemetry::acquisition::Acquisition;
@@ -29,7 +29,7 @@ pub struct Opened {
 pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failure> {
     let port: PortName = text.parse()?;
     let mut opened = Vec::new();
-    if port.as_line().is_some() {
+    if port.carries(Carries::Bytes) {
         let mut options = motorlink::st::Options { profile: args.profile, ..Default::default() };
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = StLine::open(&port, options).map_err(Failure::from)?;
@@ -37,7 +37,7 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
         let given = numbers.filter(|it| args.motor.contains(&it.number())).map(Motor::St).collect();
         opened.push(Opened::new(text, Box::new(line), Protocol::St, given, by)?);
     }
-    if port.as_can().is_some() {
+    if port.carries(Carries::Frames) {
         let mut options = motorlink::rmd::Options::default();
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = RmdLine::open(&port, options).map_err(Failure::from)?;

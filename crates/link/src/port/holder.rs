@@ -6,10 +6,14 @@ use std::time::Duration;
 
 use motorlink_proto::st::Profile;
 
+use super::carries::Carries;
 use super::error::{NotDone, PortError};
 
 /// A port that another program holds, and that stops the motors of its clients.
 pub trait HeldPort {
+    /// What would pass it if no program held it.
+    fn carries(&self) -> Carries;
+
     /// Connects to the program.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 //! A [`Scheme`] is one kind of port: the syntax of its names, how to open them, and the ports of
 //! this machine. The schemes of this crate are built in; [`register`] adds others.
 
+mod carries;
 mod deadline;
 mod descriptors;
 mod echo;
@@ -29,6 +30,7 @@ mod socketcan;
 mod system;
 mod tap;
 
+pub use carries::Carries;
 pub use descriptors::open_descriptors;
 pub use echo::EchoCanceller;
 pub use error::{NotDone, PortError};
@@ -40,7 +42,7 @@ pub use link::{ByteLink, CanLink, Link};
 pub use name::{Given, NameError};
 pub use place::Place;
 pub use registry::{register, schemes};
-pub use scheme::{CanPort, Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
+pub use scheme::{CanPort, Form, LinePort, Port, PortInfo, PortName, Scheme};
 pub use schemes::DEFAULT_BAUD;
 pub use slcan::SlcanLink;
 pub use socketcan::SocketCanLink;

@@ -3,12 +3,13 @@
 use std::str::FromStr;
 use std::sync::{PoisonError, RwLock};
 
+use super::carries::Carries;
 use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::holder::HeldPort;
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError, check_printable, unknown_form};
-use super::scheme::{CanPort, Carries, LinePort, PortName, Scheme, parse};
+use super::scheme::{CanPort, LinePort, PortName, Scheme, parse};
 use super::schemes::BUILT_IN;
 
 static REGISTERED: RwLock<Vec<&'static dyn Scheme>> = RwLock::new(Vec::new());
@@ -80,24 +81,23 @@ impl PortName {
     /// # Errors
     /// The port does not carry what is wanted.
     pub fn held(&self, wanted: Carries) -> Result<Option<&dyn HeldPort>, PortError> {
-        match wanted {
-            Carries::Bytes => self.line().map(drop)?,
-            Carries::Frames => self.can().map(drop)?,
-            Carries::Both => {}
+        match self.as_held() {
+            Some(held) if !held.carries().serves(wanted) => Err(self.unusable(wanted)),
+            held => Ok(held),
         }
-        Ok(self.as_held())
     }
 
     fn line(&self) -> Result<&dyn LinePort, PortError> {
-        self.as_line().ok_or_else(|| self.unusable("serial line", Carries::Bytes))
+        self.as_line().ok_or_else(|| self.unusable(Carries::Bytes))
     }
 
     fn can(&self) -> Result<&dyn CanPort, PortError> {
-        self.as_can().ok_or_else(|| self.unusable("CAN bus", Carries::Frames))
+        self.as_can().ok_or_else(|| self.unusable(Carries::Frames))
     }
 
-    fn unusable(&self, wanted: &'static str, carries: Carries) -> PortError {
+    fn unusable(&self, carries: Carries) -> PortError {
         let usable = listed(&schemes(), |form| form.serves(carries), "or");
+        let wanted = if carries == Carries::Bytes { "serial line" } else { "CAN bus" };
         PortError::WrongKind { port: self.to_string(), wanted, usable }
     }
 }

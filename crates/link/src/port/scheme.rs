@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::carries::Carries;
 use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::holder::HeldPort;
@@ -60,24 +61,6 @@ pub struct Form {
     pub help: &'static str,
     /// What its ports carry.
     pub carries: Carries,
-}
-
-/// What a port carries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Carries {
-    /// Bytes: a serial line.
-    Bytes,
-    /// CAN frames: a bus.
-    Frames,
-    /// Either.
-    Both,
-}
-
-impl Carries {
-    /// Whether a port that carries this can be used for `wanted`.
-    pub fn serves(self, wanted: Carries) -> bool {
-        self == wanted || self == Carries::Both
-    }
 }
 
 /// A parsed port.
@@ -223,6 +206,16 @@ impl PortName {
     /// As [`Port::as_held`].
     pub fn as_held(&self) -> Option<&dyn HeldPort> {
         self.0.as_held()
+    }
+
+    /// Whether it is a serial line, a CAN bus, or either, also one that another program holds.
+    pub fn carries(&self, wanted: Carries) -> bool {
+        let own = match wanted {
+            Carries::Bytes => self.as_line().is_some(),
+            Carries::Frames => self.as_can().is_some(),
+            Carries::Both => self.as_line().is_some() && self.as_can().is_some(),
+        };
+        own || self.as_held().is_some_and(|held| held.carries().serves(wanted))
     }
 
     /// Whether another program holds the port, and stops the motors of its clients.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use motorlink::port::PortName;
+use motorlink::port::{Carries, PortName};
 use motorlink::rmd::MotorSet;
 use motorlink::{rmd, st};
 use motorlink_proto::st::{FullScale, MotorNumber, Profile};
@@ -63,8 +63,8 @@ pub(super) fn open(
 ) -> Result<Vec<Opened>, RecordError> {
     let mut lines = Vec::new();
     for port in ports {
-        lines.extend(port.name.as_line().map(|_| (port, Protocol::St)));
-        lines.extend(port.name.as_can().map(|_| (port, Protocol::Rmd)));
+        lines.extend(port.name.carries(Carries::Bytes).then_some((port, Protocol::St)));
+        lines.extend(port.name.carries(Carries::Frames).then_some((port, Protocol::Rmd)));
     }
     for (protocol, is_named) in [
         (Protocol::St, ports.iter().any(|port| !port.motors.is_empty())),
@@ -77,8 +77,11 @@ pub(super) fn open(
         }
     }
     let name = |(port, protocol): &(&Port, Protocol)| {
-        let has_both = port.name.as_line().is_some() && port.name.as_can().is_some();
-        if has_both { protocol.word().to_owned() } else { port.name.to_string() }
+        if port.name.carries(Carries::Both) {
+            protocol.word().to_owned()
+        } else {
+            port.name.to_string()
+        }
     };
     let names = lines.iter().map(name);
     let names: Vec<String> = names.chain(clients.iter().map(|it| it.port.clone())).collect();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::PortName;
+use motorlink::port::{Carries, PortName};
 use motorlink::st::Profile;
 use motorlink::{rmd, st};
 
@@ -60,8 +60,9 @@ pub enum OpenError {
 impl PortConfig {
     /// The protocols that the port can have.
     pub fn protocols(&self) -> Vec<Protocol> {
-        let st = self.port.as_line().map(|_| Protocol::St);
-        st.into_iter().chain(self.port.as_can().map(|_| Protocol::Rmd)).collect()
+        let kinds = [(Carries::Bytes, Protocol::St), (Carries::Frames, Protocol::Rmd)];
+        let kinds = kinds.into_iter().filter(|(carries, _)| self.port.carries(*carries));
+        kinds.map(|(_, protocol)| protocol).collect()
     }
 
     /// Opens the port, which may wait.

@@ -18,6 +18,7 @@ use rustix::termios::{
     tcsetattr, tcsetwinsize,
 };
 
+use super::super::carries::Carries;
 use super::super::error::{PortError, owning_group, permission_hint};
 use super::super::event::EventBytes;
 use super::super::fd::FdLink;
@@ -25,7 +26,7 @@ use super::super::link::ByteLink;
 use super::super::name::{Given, NameError};
 use super::super::place::Place;
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
+use super::super::scheme::{Form, LinePort, Port, PortInfo, PortName, Scheme};
 use super::super::system;
 
 /// Links that lead to each other have an end.

@@ -2,13 +2,14 @@
 
 use motorlink_slcan::Bitrate;
 
+use super::super::carries::Carries;
 use super::super::echo::EchoCanceller;
 use super::super::error::PortError;
 use super::super::event::EventCan;
 use super::super::link::CanLink;
 use super::super::name::{Given, NameError};
 use super::super::place::Place;
-use super::super::scheme::{CanPort, Carries, Form, LinePort, Port, PortName, Scheme, parse};
+use super::super::scheme::{CanPort, Form, LinePort, Port, PortName, Scheme, parse};
 use super::super::slcan::SlcanLink;
 use super::serial::{Device, Serial};
 

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use super::super::carries::Carries;
 use super::super::error::PortError;
 use super::super::event::EventCan;
 use super::super::interface::{Interface, up_hint};
 use super::super::link::CanLink;
 use super::super::name::{Given, NameError};
 use super::super::queued::QueuedCan;
-use super::super::scheme::{CanPort, Carries, Form, Port, PortInfo, PortName, Scheme};
+use super::super::scheme::{CanPort, Form, Port, PortInfo, PortName, Scheme};
 use super::super::socketcan::SocketCanLink;
 use super::super::system;
 use crate::text::printable;

@@ -6,6 +6,7 @@ use std::{fmt, io};
 
 use rustix::net::sockopt;
 
+use super::super::carries::Carries;
 use super::super::emulated::EmulatedBytes;
 use super::super::error::PortError;
 use super::super::event::EventBytes;
@@ -14,7 +15,7 @@ use super::super::link::ByteLink;
 use super::super::name::{Given, NameError, host_and_port};
 use super::super::place::Place;
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
+use super::super::scheme::{Form, LinePort, Port, PortName, Scheme};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 /// Keep-alive: idle time before the first probe, interval between probes, and number of probes.

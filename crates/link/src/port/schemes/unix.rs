@@ -4,13 +4,14 @@ use std::io;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 
+use super::super::carries::Carries;
 use super::super::error::PortError;
 use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError};
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
+use super::super::scheme::{Form, LinePort, Port, PortName, Scheme};
 
 /// `unix:PATH`.
 pub(super) struct Unix;

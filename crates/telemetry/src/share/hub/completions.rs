@@ -183,15 +183,21 @@ impl Hub {
                 }
             }
             Err(error) => {
+                use CommandError::{Closed, Displaced, Expired, Overtaken};
                 let code = error.code().map(u8::from);
-                let is_unheard = motor
-                    .zip(self.lines.get(&line))
-                    .is_some_and(|(motor, held)| !held.is_there(motor));
+                let of_motor = motor.zip(self.lines.get(&line));
+                let is_unheard = of_motor.is_some_and(|(motor, held)| !held.is_there(motor));
+                let text = match (&error, of_motor) {
+                    (Expired | Overtaken | Displaced | Closed, Some((motor, held))) => {
+                        format!("{}, motor {}: {error}", held.name, motor.number())
+                    }
+                    _ => error.to_string(),
+                };
                 let reason = match reason(&error) {
                     Reason::Silent if is_unheard => Reason::Unheard,
                     reason => reason,
                 };
-                session.refuse_with(id, reason, error.to_string(), code);
+                session.refuse_with(id, reason, text, code);
             }
         }
     }

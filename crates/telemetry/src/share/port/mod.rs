@@ -12,8 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::port::{
-    self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, HeldPort, Holder,
-    LinePort, NameError, Port, PortError, PortName, Scheme,
+    self, Carries, Form, Given, HeldPort, Holder, NameError, Port, PortError, PortName, Scheme,
 };
 
 use super::address::{Address, Local};
@@ -140,55 +139,24 @@ impl Port for SharePort {
         self.0.name()
     }
 
-    fn as_line(&self) -> Option<&dyn LinePort> {
-        (self.0.protocol == Protocol::St).then_some(self)
-    }
-
-    fn as_can(&self) -> Option<&dyn CanPort> {
-        (self.0.protocol == Protocol::Rmd).then_some(self)
-    }
-
     fn as_held(&self) -> Option<&dyn HeldPort> {
         Some(self)
     }
 }
 
 impl HeldPort for SharePort {
+    fn carries(&self) -> Carries {
+        match self.0.protocol {
+            Protocol::St => Carries::Bytes,
+            Protocol::Rmd => Carries::Frames,
+        }
+    }
+
     fn open(&self) -> Result<Box<dyn Holder>, PortError> {
         Ok(Box::new(Connection::open(&self.0)?))
     }
 
     fn as_any(&self) -> &dyn Any {
         &self.0
-    }
-}
-
-impl LinePort for SharePort {
-    fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
-        Err(self.carries_requests())
-    }
-
-    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
-        Err(self.carries_requests())
-    }
-
-    fn label(&self) -> String {
-        self.name()
-    }
-}
-
-impl CanPort for SharePort {
-    fn open(&self) -> Result<Box<dyn CanLink>, PortError> {
-        Err(self.carries_requests())
-    }
-
-    fn open_event(&self) -> Result<Box<dyn EventCan>, PortError> {
-        Err(self.carries_requests())
-    }
-}
-
-impl SharePort {
-    fn carries_requests(&self) -> PortError {
-        self.0.failed("a share carries requests out, and gives no frames")
     }
 }
