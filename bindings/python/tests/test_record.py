@@ -69,8 +69,10 @@ def test_ports_are_recorded(served: Served, tmp_path: Path) -> None:
     ) as recorder:
         assert recorder.motors == ("st0/motor1", "can0/motor1", "can0/motor3")
         recorded(recorder)
+        # On a busy machine a line is in sync later.
+        eventually(lambda: not recorder.status().gaps, "values of each motor", within=30)
         status = recorder.status()
-        assert status.files == (path,) and not status.is_over and (status.lost, status.gaps) == (0, {})
+        assert status.files == (path,) and not status.is_over and status.lost == 0
         assert status.values == status.rows > 0 and status.frames > 0
     ended = recorder.status()
     assert ended.is_over and ended.bytes == path.stat().st_size and ended.rows >= status.rows
