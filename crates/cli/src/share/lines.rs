@@ -6,7 +6,7 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::message::{Line, Protocol};
-use motorlink_telemetry::share::port_config::{Limits, OpenError, PortConfig};
+use motorlink_telemetry::share::port_config::{Limits, OpenError, PortConfig, protocols_of};
 
 use crate::connection::missing_port;
 use crate::failure::Failure;
@@ -63,7 +63,7 @@ impl Lines {
                 .trying("use that one: programs connect to it"));
             }
             let wish = PortConfig { port, profile, timeout, limits };
-            for protocol in wish.protocols() {
+            for protocol in protocols_of(&wish.port) {
                 let number = match protocol {
                     Protocol::St => &mut st,
                     Protocol::Rmd => &mut rmd,

@@ -102,7 +102,7 @@ pub struct RequestEnd {
     pub result: Result<Vec<u8>, Declined>,
 }
 
-/// Why there is no reply.
+/// The reason for a request without a reply.
 #[derive(Debug, Clone)]
 pub enum Declined {
     /// A drive that speaks ST's protocol refused, with this error code.

@@ -213,7 +213,7 @@ impl PortName {
         let own = match wanted {
             Carries::Bytes => self.as_line().is_some(),
             Carries::Frames => self.as_can().is_some(),
-            Carries::Both => self.as_line().is_some() && self.as_can().is_some(),
+            Carries::Both => self.carries(Carries::Bytes) && self.carries(Carries::Frames),
         };
         own || self.as_held().is_some_and(|held| held.carries().serves(wanted))
     }

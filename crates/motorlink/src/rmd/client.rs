@@ -205,12 +205,12 @@ impl Client {
         let mut driven = self.turns.take();
         let losses = driven.session.losses(id);
         driven.ready([])?;
-        let is_same_port = driven.session.losses(id) == losses;
+        let is_lost = driven.session.losses(id) != losses;
         let now = driven.port.now();
         driven.session.insist(now, id, Asked::Confirmation)?;
         let port = Arc::clone(&driven.port.name);
         self.conclude(driven)?;
-        if !is_same_port {
+        if is_lost {
             return Err(Error::Unconfirmed { port, motor: id });
         }
         self.turns.take().session.confirmed(id)

@@ -25,8 +25,10 @@ use crate::overdue::Overdue;
 const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the
-/// motors that it set moving, and its errors in words: sans I/O. [`begin`](Self::begin), [`insist`](Self::insist) or [`set_torque4`](Self::set_torque4),
-/// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
+/// motors that it set moving, and its errors in words: sans I/O.
+///
+/// Begin with [`begin`](Self::begin), [`insist`](Self::insist) or [`set_torque4`](Self::set_torque4). Then
+/// [`poll`](Self::poll) until it waits, and hand in with [`receive`](Self::receive) what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
     port: Arc<str>,

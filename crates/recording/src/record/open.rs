@@ -14,6 +14,7 @@ use motorlink_telemetry::search;
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::share::port::place_of;
+use motorlink_telemetry::share::port_config::protocols_of;
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
@@ -63,8 +64,7 @@ pub(super) fn open(
 ) -> Result<Vec<Opened>, RecordError> {
     let mut lines = Vec::new();
     for port in ports {
-        lines.extend(port.name.carries(Carries::Bytes).then_some((port, Protocol::St)));
-        lines.extend(port.name.carries(Carries::Frames).then_some((port, Protocol::Rmd)));
+        lines.extend(protocols_of(&port.name).map(|protocol| (port, protocol)));
     }
     for (protocol, is_named) in [
         (Protocol::St, ports.iter().any(|port| !port.motors.is_empty())),

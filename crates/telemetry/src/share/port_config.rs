@@ -57,14 +57,14 @@ pub enum OpenError {
     Rmd(#[from] rmd::Error),
 }
 
-impl PortConfig {
-    /// The protocols that the port can have.
-    pub fn protocols(&self) -> Vec<Protocol> {
-        let kinds = [(Carries::Bytes, Protocol::St), (Carries::Frames, Protocol::Rmd)];
-        let kinds = kinds.into_iter().filter(|(carries, _)| self.port.carries(*carries));
-        kinds.map(|(_, protocol)| protocol).collect()
-    }
+/// The protocols that a port can have.
+pub fn protocols_of(port: &PortName) -> impl Iterator<Item = Protocol> {
+    let kinds = [(Carries::Bytes, Protocol::St), (Carries::Frames, Protocol::Rmd)];
+    let kinds = kinds.into_iter().filter(|(carries, _)| port.carries(*carries));
+    kinds.map(|(_, protocol)| protocol)
+}
 
+impl PortConfig {
     /// Opens the port, which may wait.
     ///
     /// # Errors

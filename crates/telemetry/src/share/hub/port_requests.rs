@@ -21,7 +21,7 @@ use crate::share::message::{
     ANY_MOTOR, Answer, EventKind, FoundPort, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
     Protocol, Reason, StoppedMotor,
 };
-use crate::share::port_config::{OpenError, Opened, PortConfig};
+use crate::share::port_config::{OpenError, Opened, PortConfig, protocols_of};
 use crate::share::scan::{self, Found};
 
 /// The shortest time for a reply, in seconds.
@@ -67,7 +67,7 @@ impl Hub {
         let port = self.free_port(port)?;
         let (timeout, limits) = (timeout.map(Duration::from_secs_f64), self.limits);
         let wish = PortConfig { port, profile, timeout, limits };
-        if !wish.protocols().contains(&protocol) {
+        if !protocols_of(&wish.port).any(|it| it == protocol) {
             let port = &wish.port;
             return Err(usage(match protocol {
                 Protocol::St => format!("{port} is a CAN bus, which has no ST drive"),
