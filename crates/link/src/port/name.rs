@@ -80,16 +80,6 @@ pub enum NameError {
         /// What was given, without these characters.
         name: String,
     },
-    /// The form exists on other systems only.
-    #[error("`{name}`: `{scheme}:` exists on {systems} only")]
-    OtherSystem {
-        /// The given name.
-        name: String,
-        /// Its scheme.
-        scheme: &'static str,
-        /// The systems that have it.
-        systems: String,
-    },
     /// The part after the scheme is missing.
     #[error("`{name}` lacks {what}; write it like {example}")]
     Incomplete {

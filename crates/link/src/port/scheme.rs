@@ -26,11 +26,6 @@ pub trait Scheme: Sync {
         false
     }
 
-    /// The systems that support it, by Rust's names; empty means all.
-    fn systems(&self) -> &'static [&'static str] {
-        &[]
-    }
-
     /// Parses a name. `rest` is the part between the colon and the options. The options follow the
     /// last `?`; take them from `given`. `all` is for a scheme whose ports wrap those of others.
     fn parse(
@@ -305,13 +300,5 @@ pub(super) fn parse(
     let named = body.split_once(':').and_then(|(name, rest)| Some((of(name)?, rest)));
     let bare = || all.iter().copied().find(|scheme| scheme.is_bare(body)).map(|it| (it, body));
     let (scheme, rest) = named.or_else(bare)?;
-    let systems = scheme.systems();
-    if !systems.is_empty() && !systems.contains(&std::env::consts::OS) {
-        let (name, systems) = (given.name.to_owned(), systems.join(", "));
-        return Some((
-            scheme,
-            Err(NameError::OtherSystem { name, scheme: scheme.name(), systems }),
-        ));
-    }
     Some((scheme, scheme.parse(rest, given, all)))
 }

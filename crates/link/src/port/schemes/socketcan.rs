@@ -30,10 +30,6 @@ impl Scheme for SocketCan {
         &[Form { text: "socketcan:can0", help: HELP, carries: Carries::Frames }]
     }
 
-    fn systems(&self) -> &'static [&'static str] {
-        &["linux"]
-    }
-
     fn parse(
         &self,
         rest: &str,
