@@ -1,6 +1,7 @@
 //! A kind of port, and the name of a port.
 
 use std::fmt;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -183,26 +184,6 @@ impl PortName {
         PortName(Arc::new(port))
     }
 
-    /// As [`Port::as_line`].
-    pub fn as_line(&self) -> Option<&dyn LinePort> {
-        self.0.as_line()
-    }
-
-    /// As [`Port::as_can`].
-    pub fn as_can(&self) -> Option<&dyn CanPort> {
-        self.0.as_can()
-    }
-
-    /// As [`Port::is_in_process`].
-    pub fn is_in_process(&self) -> bool {
-        self.0.is_in_process()
-    }
-
-    /// As [`Port::as_held`].
-    pub fn as_held(&self) -> Option<&dyn HeldPort> {
-        self.0.as_held()
-    }
-
     /// Whether it is a serial line, a CAN bus, or either, also one that another program holds.
     pub fn carries(&self, wanted: Carries) -> bool {
         let own = match wanted {
@@ -216,21 +197,6 @@ impl PortName {
     /// Whether another program holds the port, and stops the motors of its clients.
     pub fn is_held(&self) -> bool {
         self.as_held().is_some()
-    }
-
-    /// As [`Port::is_device`].
-    pub fn is_device(&self) -> bool {
-        self.0.is_device()
-    }
-
-    /// As [`Port::is_address`].
-    pub fn is_address(&self) -> bool {
-        self.0.is_address()
-    }
-
-    /// As [`Port::place`].
-    pub fn place(&self) -> Place {
-        self.0.place()
     }
 
     /// As [`LinePort::baud`].
@@ -247,22 +213,20 @@ impl PortName {
     pub fn at_bitrate(&self, bitrate: u32) -> Option<PortName> {
         self.as_can()?.at_bitrate(bitrate)
     }
+}
 
-    /// As [`Port::body`].
-    pub(super) fn body(&self) -> String {
-        self.0.body()
-    }
+impl Deref for PortName {
+    type Target = dyn Port;
 
-    /// As [`Port::options`].
-    pub(super) fn options(&self) -> Vec<String> {
-        self.0.options()
+    fn deref(&self) -> &Self::Target {
+        &*self.0
     }
 }
 
 /// The whole name. Options with their default value are omitted.
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0.name())
+        f.write_str(&self.name())
     }
 }
 
