@@ -36,12 +36,7 @@ impl Scheme for Zenoh {
         &["via", "as", "deadline", "motion", "take", "raw"]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let (node, line) = rest.split_once('/').unwrap_or((rest, ""));
         given.present(node, "the name of the node", EXAMPLE)?;
         let what = BadName.to_string();

@@ -38,12 +38,7 @@ impl Scheme for Sim {
         &[SIM, Form { text: "sim:FILE.toml", help: "the drives of a file", ..SIM }]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        _: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, _: &mut Given<'_>) -> Result<PortName, NameError> {
         Ok(PortName::new(SimPort((!rest.is_empty()).then(|| rest.into()))))
     }
 }

@@ -1,58 +1,6 @@
-//! The parts of a port's name.
+//! Why a string is not the name of a port, and what all names share.
 
 use crate::text::{is_printable, printable};
-
-/// A given name while a scheme parses it.
-#[derive(Debug)]
-pub struct Given<'a> {
-    /// The whole name, for messages.
-    pub name: &'a str,
-    /// The part before the options. The options follow the last `?`, so a path may contain a `?`.
-    pub body: &'a str,
-    options: Vec<(&'a str, &'a str)>,
-}
-
-impl<'a> Given<'a> {
-    pub(crate) fn new(name: &'a str) -> Self {
-        let (body, query) = name.rsplit_once('?').unwrap_or((name, ""));
-        let options = query.split('&').filter(|option| !option.is_empty());
-        let options = options.map(|option| option.split_once('=').unwrap_or((option, "")));
-        Given { name, body, options: options.collect() }
-    }
-
-    /// Takes the value of an option, if it was given.
-    pub fn take(&mut self, key: &str) -> Option<&'a str> {
-        let place = self.options.iter().position(|(given, _)| *given == key)?;
-        Some(self.options.remove(place).1)
-    }
-
-    /// Refuses options that were not taken. `known` are the valid options.
-    pub fn refuse_others(&self, known: &[&str]) -> Result<(), NameError> {
-        let Some((key, _)) = self.options.first() else { return Ok(()) };
-        if known.contains(key) {
-            let (name, key) = (self.name.to_owned(), (*key).to_owned());
-            return Err(NameError::OptionTwice { name, key });
-        }
-        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-        Err(NameError::UnknownOption { name: self.name.to_owned(), key: (*key).to_owned(), known })
-    }
-
-    /// Checks that a part is not empty. `example` is a valid name for the error.
-    pub fn present<'p>(
-        &self,
-        part: &'p str,
-        what: &'static str,
-        example: &'static str,
-    ) -> Result<&'p str, NameError> {
-        present(self.name, part, what, example)
-    }
-
-    /// The error for an option with an invalid value.
-    pub fn bad_option(&self, key: &'static str, value: &str, usable: String) -> NameError {
-        let (name, value) = (self.name.to_owned(), value.to_owned());
-        NameError::BadOption { name, key, value, usable }
-    }
-}
 
 /// Why a string is not the name of a port.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -8,8 +8,8 @@ use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::holder::HeldPort;
 use super::link::{ByteLink, CanLink};
-use super::name::{Given, NameError, check_printable, unknown_form};
-use super::scheme::{CanPort, LinePort, PortName, Scheme, parse};
+use super::name::{NameError, check_printable, unknown_form};
+use super::scheme::{CanPort, Given, LinePort, PortName, Scheme, parse};
 use super::schemes::BUILT_IN;
 
 static REGISTERED: RwLock<Vec<&'static dyn Scheme>> = RwLock::new(Vec::new());
@@ -34,9 +34,9 @@ impl FromStr for PortName {
     fn from_str(name: &str) -> Result<Self, NameError> {
         check_printable(name)?;
         let schemes = schemes();
-        let mut given = Given::new(name);
+        let mut given = Given::new(name, &schemes);
         let body = given.body;
-        match parse(body, &mut given, &schemes) {
+        match parse(body, &mut given) {
             Some((scheme, port)) => {
                 let port = port?;
                 given.refuse_others(scheme.options())?;

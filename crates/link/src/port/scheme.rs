@@ -10,7 +10,7 @@ use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::holder::HeldPort;
 use super::link::{ByteLink, CanLink};
-use super::name::{Given, NameError};
+use super::name::{NameError, present};
 use super::place::Place;
 
 /// One kind of port: the syntax and the meaning of its names. Everything about the kind is defined
@@ -28,13 +28,8 @@ pub trait Scheme: Sync {
     }
 
     /// Parses a name. `rest` is the part between the colon and the options. The options follow the
-    /// last `?`; take them from `given`. `all` is for a scheme whose ports wrap those of others.
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        all: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError>;
+    /// last `?`; take them from `given`.
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError>;
 
     /// The options of its names.
     fn options(&self) -> &'static [&'static str] {
@@ -45,6 +40,59 @@ pub trait Scheme: Sync {
     /// opened, because that would reset some boards.
     fn list(&self, _root: &Path) -> Vec<PortInfo> {
         Vec::new()
+    }
+}
+
+/// A given name while a scheme parses it.
+pub struct Given<'a> {
+    /// The whole name, for messages.
+    pub name: &'a str,
+    /// The part before the options. The options follow the last `?`, so a path may contain a `?`.
+    pub body: &'a str,
+    /// The known schemes, for a scheme whose ports wrap those of others.
+    pub schemes: &'a [&'static dyn Scheme],
+    options: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Given<'a> {
+    pub(super) fn new(name: &'a str, schemes: &'a [&'static dyn Scheme]) -> Self {
+        let (body, query) = name.rsplit_once('?').unwrap_or((name, ""));
+        let options = query.split('&').filter(|option| !option.is_empty());
+        let options = options.map(|option| option.split_once('=').unwrap_or((option, "")));
+        Given { name, body, schemes, options: options.collect() }
+    }
+
+    /// Takes the value of an option, if it was given.
+    pub fn take(&mut self, key: &str) -> Option<&'a str> {
+        let place = self.options.iter().position(|(given, _)| *given == key)?;
+        Some(self.options.remove(place).1)
+    }
+
+    /// Refuses options that were not taken. `known` are the valid options.
+    pub fn refuse_others(&self, known: &[&str]) -> Result<(), NameError> {
+        let Some((key, _)) = self.options.first() else { return Ok(()) };
+        if known.contains(key) {
+            let (name, key) = (self.name.to_owned(), (*key).to_owned());
+            return Err(NameError::OptionTwice { name, key });
+        }
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        Err(NameError::UnknownOption { name: self.name.to_owned(), key: (*key).to_owned(), known })
+    }
+
+    /// Checks that a part is not empty. `example` is a valid name for the error.
+    pub fn present<'p>(
+        &self,
+        part: &'p str,
+        what: &'static str,
+        example: &'static str,
+    ) -> Result<&'p str, NameError> {
+        present(self.name, part, what, example)
+    }
+
+    /// The error for an option with an invalid value.
+    pub fn bad_option(&self, key: &'static str, value: &str, usable: String) -> NameError {
+        let (name, value) = (self.name.to_owned(), value.to_owned());
+        NameError::BadOption { name, key, value, usable }
     }
 }
 
@@ -258,11 +306,11 @@ pub struct PortInfo {
 pub(super) fn parse(
     body: &str,
     given: &mut Given<'_>,
-    all: &[&'static dyn Scheme],
 ) -> Option<(&'static dyn Scheme, Result<PortName, NameError>)> {
+    let all = given.schemes;
     let of = |name: &str| all.iter().copied().find(|scheme| scheme.name() == name);
     let named = body.split_once(':').and_then(|(name, rest)| Some((of(name)?, rest)));
     let bare = || all.iter().copied().find(|scheme| scheme.is_bare(body)).map(|it| (it, body));
     let (scheme, rest) = named.or_else(bare)?;
-    Some((scheme, scheme.parse(rest, given, all)))
+    Some((scheme, scheme.parse(rest, given)))
 }

@@ -173,12 +173,7 @@ impl Scheme for Elsewhere {
         &[Form { text: "elsewhere:NAME", help: "a port of a test", carries: Carries::Bytes }]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        _: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, _: &mut Given<'_>) -> Result<PortName, NameError> {
         Ok(PortName::new(Nowhere(rest.to_owned())))
     }
 }

@@ -23,10 +23,10 @@ use super::super::error::{PortError, owning_group, permission_hint};
 use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
-use super::super::name::{Given, NameError};
+use super::super::name::NameError;
 use super::super::place::Place;
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Form, LinePort, Port, PortInfo, PortName, Scheme};
+use super::super::scheme::{Form, Given, LinePort, Port, PortInfo, PortName, Scheme};
 use super::super::system;
 
 /// Links that lead to each other have an end.
@@ -59,12 +59,7 @@ impl Scheme for Serial {
         name.starts_with(['/', '.']) || (name.contains("tty") && !name.contains(':'))
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let path = given.present(rest, "a device", "serial:/dev/ttyACM0")?;
         Device::at(path).with_options(given)
     }

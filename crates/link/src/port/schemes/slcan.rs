@@ -7,9 +7,9 @@ use super::super::echo::EchoCanceller;
 use super::super::error::PortError;
 use super::super::event::EventCan;
 use super::super::link::CanLink;
-use super::super::name::{Given, NameError};
+use super::super::name::NameError;
 use super::super::place::Place;
-use super::super::scheme::{CanPort, Form, LinePort, Port, PortName, Scheme, parse};
+use super::super::scheme::{CanPort, Form, Given, LinePort, Port, PortName, Scheme, parse};
 use super::super::slcan::SlcanLink;
 use super::serial::{Device, Serial};
 
@@ -34,12 +34,7 @@ impl Scheme for Slcan {
         ]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        all: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let rest = given.present(rest, "a device", "slcan:/dev/ttyACM0")?;
         let bitrate = match given.take("bitrate") {
             Some(value) => value
@@ -54,8 +49,8 @@ impl Scheme for Slcan {
             Some("0") | None => false,
             Some(value) => return Err(given.bad_option("echo", value, "0 or 1".to_owned())),
         };
-        let (scheme, line) = parse(rest, given, all)
-            .unwrap_or_else(|| (&Serial, Device::at(rest).with_options(given)));
+        let (scheme, line) =
+            parse(rest, given).unwrap_or_else(|| (&Serial, Device::at(rest).with_options(given)));
         let adapter = Adapter { line: line?, bitrate, echo };
         if adapter.line.as_line().is_none() {
             let (name, behind) = (given.name.to_owned(), rest.to_owned());

@@ -7,9 +7,9 @@ use super::super::error::PortError;
 use super::super::event::EventCan;
 use super::super::interface::{Interface, up_hint};
 use super::super::link::CanLink;
-use super::super::name::{Given, NameError};
+use super::super::name::NameError;
 use super::super::queued::QueuedCan;
-use super::super::scheme::{CanPort, Form, Port, PortInfo, PortName, Scheme};
+use super::super::scheme::{CanPort, Form, Given, Port, PortInfo, PortName, Scheme};
 use super::super::socketcan::SocketCanLink;
 use super::super::system;
 use crate::text::printable;
@@ -30,12 +30,7 @@ impl Scheme for SocketCan {
         &[Form { text: "socketcan:can0", help: HELP, carries: Carries::Frames }]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let interface = given.present(rest, "an interface", "socketcan:can0")?;
         Ok(PortName::new(CanInterface(interface.to_owned())))
     }

@@ -12,10 +12,10 @@ use super::super::error::PortError;
 use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
-use super::super::name::{Given, NameError, host_and_port};
+use super::super::name::{NameError, host_and_port};
 use super::super::place::Place;
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Form, LinePort, Port, PortName, Scheme};
+use super::super::scheme::{Form, Given, LinePort, Port, PortName, Scheme};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 /// Keep-alive: idle time before the first probe, interval between probes, and number of probes.
@@ -44,12 +44,7 @@ impl Scheme for Tcp {
         &[FORM, EMULATED]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let address = TcpAddress::parse(given, rest, "tcp:192.168.1.5:4000")?;
         let clock = given.take("clock");
         let clock = clock.map(|clock| {

@@ -9,9 +9,9 @@ use super::super::error::PortError;
 use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
-use super::super::name::{Given, NameError};
+use super::super::name::NameError;
 use super::super::queued::QueuedBytes;
-use super::super::scheme::{Form, LinePort, Port, PortName, Scheme};
+use super::super::scheme::{Form, Given, LinePort, Port, PortName, Scheme};
 
 /// `unix:PATH`.
 pub(super) struct Unix;
@@ -26,12 +26,7 @@ impl Scheme for Unix {
         &[Form { text: "unix:PATH", help: HELP, carries: Carries::Bytes }]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         let path = given.present(rest, "a path", "unix:./drive")?;
         Ok(PortName::new(Socket(path.into())))
     }

@@ -71,12 +71,7 @@ impl Scheme for Share {
         &["deadline", "motion"]
     }
 
-    fn parse(
-        &self,
-        rest: &str,
-        given: &mut Given<'_>,
-        _: &[&'static dyn Scheme],
-    ) -> Result<PortName, NameError> {
+    fn parse(&self, rest: &str, given: &mut Given<'_>) -> Result<PortName, NameError> {
         const EXAMPLE: &str = "share:./share/st0";
         let (path, line) = rest.rsplit_once('/').unwrap_or((rest, ""));
         given.present(path, "the path of the share's socket", EXAMPLE)?;
