@@ -71,8 +71,7 @@ const ST: Kind = Kind {
             link = tap.around_line(link);
         }
         let mut link = Some(link);
-        let open =
-            move || link.take().ok_or_else(|| PortError::NotFound { port: "memory".to_owned() });
+        let open = move || link.take().ok_or_else(|| PortError::NotFound("memory".to_owned()));
         let client = st::EventClient::open_with("memory", Box::new(open), st::Options::default())?;
         Ok(Box::new(StLine::new(client)))
     },

@@ -322,7 +322,7 @@ impl CanLink for PythonCanLink {
                 return came.map(Some);
             }
             if state.is_ended {
-                return Err(PortError::Closed { port: hub.bus.name.clone() });
+                return Err(PortError::Closed(hub.bus.name.clone()));
             }
             // From now on each received frame wakes the reader.
             while (&hub.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}

@@ -31,7 +31,7 @@ const ACKNOWLEDGE: &str = "remove the cause, then `motorlink st fault-ack`";
 
 pub fn port(error: &PortError) -> Option<&'static str> {
     match error {
-        PortError::NotFound { .. } | PortError::NoSuchInterface { .. } => {
+        PortError::NotFound(..) | PortError::NoSuchInterface(..) => {
             Some("`motorlink ports` lists what is there")
         }
         PortError::NoHolder { port, .. } if is_of_node(port) => {
@@ -49,8 +49,8 @@ pub fn port(error: &PortError) -> Option<&'static str> {
         PortError::NotDone { kind: NotDone::Held, .. } => {
             Some("wait until it is free, or take it: add `?take` to the port")
         }
-        PortError::Closed { port } if port.contains(UNIX) => Some(SHARE_SOCKET),
-        PortError::NotSerial { .. } => Some("`motorlink ports` lists those that are"),
+        PortError::Closed(port) if port.contains(UNIX) => Some(SHARE_SOCKET),
+        PortError::NotSerial(..) => Some("`motorlink ports` lists those that are"),
         _ => None,
     }
 }

@@ -36,7 +36,7 @@ fn program() {
         }
     });
     let motor = client.motor(1).unwrap();
-    while !matches!(motor.start(), Err(Error::Port(PortError::Retired { .. }))) {}
+    while !matches!(motor.start(), Err(Error::Port(PortError::Retired(..)))) {}
     loop {
         thread::park();
     }
@@ -131,7 +131,7 @@ fn a_retired_bus_only_stops_motors() {
     assert_eq!(bus.retire().len(), 1);
     assert!(bus.moving().is_empty());
     let is_retired = |error: rmd::Error| match error {
-        rmd::Error::Port(error) => matches!(error, PortError::Retired { .. }),
+        rmd::Error::Port(error) => matches!(error, PortError::Retired(..)),
         _ => false,
     };
     assert!(is_retired(bus.raw(motor.id(), speed).unwrap_err()));

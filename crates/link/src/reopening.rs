@@ -149,7 +149,7 @@ impl<L> Reopening<L> {
     /// busy device server accepts each connection and closes it.
     pub fn close(&mut self) {
         if self.link.take().is_some() {
-            self.trouble = PortError::Closed { port: self.name.to_string() }.to_string();
+            self.trouble = PortError::Closed(self.name.to_string()).to_string();
         }
         let now = Instant::now();
         let earliest = self.reopened.map_or(now, |reopened| reopened + self.back_off.first);
@@ -179,11 +179,10 @@ impl<L> Reopening<L> {
     pub fn link(&mut self) -> Result<(&mut L, bool), PortError> {
         let mut reopened = false;
         if self.link.is_none() {
-            let closed = || PortError::Closed { port: self.name.to_string() };
+            let closed = || PortError::Closed(self.name.to_string());
             let open = self.open.as_mut().ok_or_else(closed)?;
             if Instant::now() < self.not_before {
-                let (port, why) = (self.name.to_string(), self.trouble.clone());
-                return Err(PortError::Away { port, why });
+                return Err(PortError::Away(self.trouble.clone()));
             }
             match open() {
                 Ok(link) => {
@@ -201,7 +200,7 @@ impl<L> Reopening<L> {
         }
         let name = &self.name;
         let link = self.link.as_mut();
-        Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
+        Ok((link.ok_or_else(|| PortError::Closed(name.to_string()))?, reopened))
     }
 }
 
@@ -239,7 +238,7 @@ mod tests {
         let open: Opener<Wire> = Box::new(move || {
             attempts += 1;
             let port = "can0".to_owned();
-            if attempts == 1 { Ok(Wire) } else { Err(PortError::NoSuchInterface { port }) }
+            if attempts == 1 { Ok(Wire) } else { Err(PortError::NoSuchInterface(port)) }
         });
         let hour = Duration::from_secs(3600);
         let mut port = Reopening::open("socketcan:can0", open, BackOff { first: hour, cap: hour })

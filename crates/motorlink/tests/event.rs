@@ -67,7 +67,7 @@ fn over_pairs(
         Some(end) => {
             Ok(Box::new(Fresh(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventBytes>)
         }
-        None => Err(PortError::NotFound { port: "pair".to_owned() }),
+        None => Err(PortError::NotFound("pair".to_owned())),
     };
     st::EventClient::open_with("pair", Box::new(open), options)
 }
@@ -130,7 +130,7 @@ fn a_port_that_fails_ends_the_exchange_and_comes_back_behind_the_back_off() {
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));
     drop(theirs);
     let lost = finish(&mut client).unwrap_err();
-    assert!(matches!(lost, st::Error::Port(PortError::Closed { .. })), "{lost}");
+    assert!(matches!(lost, st::Error::Port(PortError::Closed(..))), "{lost}");
     assert!(client.descriptor().is_none());
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(None)));
 
@@ -229,7 +229,7 @@ fn a_line_on_a_boards_time_is_refused_before_it_is_opened() {
             true => port.open_event_can().err(),
             false => port.open_event_bytes().err(),
         };
-        assert!(matches!(error, Some(PortError::Emulated { .. })), "{error:?}");
+        assert!(matches!(error, Some(PortError::Emulated(..))), "{error:?}");
         assert!(error.unwrap().to_string().contains("leave out `clock=`"));
     }
 }

@@ -59,7 +59,7 @@ impl Script {
 }
 
 fn closed() -> PortError {
-    PortError::Closed { port: "held".to_owned() }
+    PortError::Closed("held".to_owned())
 }
 
 fn id(number: u8) -> MotorId {

@@ -188,7 +188,7 @@ struct Disturbance {
 impl Disturbed {
     fn look(&self) -> Result<(), PortError> {
         match self.disturbance.lock().unwrap().is_gone {
-            true => Err(PortError::Closed { port: "bench".to_owned() }),
+            true => Err(PortError::Closed("bench".to_owned())),
             false => Ok(()),
         }
     }

@@ -50,7 +50,7 @@ fn a_stop_from_within_a_wait_is_sent_at_once_and_the_wait_ends() {
     let sent = wire.clone();
     in_time(move || {
         let error = client.get().unwrap().motor(1).unwrap().start().expect_err("it was given up");
-        assert!(matches!(error, st::Error::Port(PortError::Overtaken { .. })), "{error}");
+        assert!(matches!(error, st::Error::Port(PortError::Overtaken(..))), "{error}");
         assert!(error.to_string().contains("what the drive did is unknown"), "{error}");
         assert!(!error.is_line_failure());
     });
@@ -67,7 +67,7 @@ fn a_whole_stop_from_within_a_wait_does_not_wait_for_recovery() {
     let started = Arc::clone(&client);
     in_time(move || {
         let error = client.get().unwrap().motor(1).unwrap().start().expect_err("it was given up");
-        assert!(matches!(error, st::Error::Port(PortError::Overtaken { .. })), "{error}");
+        assert!(matches!(error, st::Error::Port(PortError::Overtaken(..))), "{error}");
     });
     assert_eq!(wire.sent()[..8], [START, STOP].concat());
     assert_eq!(started.get().unwrap().started().count(), 1, "it is not known to have stopped");
@@ -148,7 +148,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
         let error = bus.cycle(&[(rmd::MotorId::new(1).unwrap(), speed)], |_, _| {});
         let error = error.expect_err("it was given up");
         let rmd::Error::Port(error) = error else { panic!("{error}") };
-        assert!(matches!(error, PortError::Overtaken { .. }), "{error}");
+        assert!(matches!(error, PortError::Overtaken(..)), "{error}");
         bus.moving()
     });
     assert!(moving.is_empty());

@@ -162,8 +162,8 @@ fn a_port_of_the_other_kind_and_drives_within_the_process_are_refused() {
     assert!(matches!(st("slcan:/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));
     assert!(matches!(st("socketcan:can0"), Some(RelayError::Port(WrongKind { .. }))));
     assert!(matches!(rmd("/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));
-    assert!(matches!(st("/dev/ttyNONE0"), Some(RelayError::Port(NotFound { .. }))));
-    assert!(matches!(rmd("slcan:/dev/ttyNONE0"), Some(RelayError::Port(NotFound { .. }))));
+    assert!(matches!(st("/dev/ttyNONE0"), Some(RelayError::Port(NotFound(..)))));
+    assert!(matches!(rmd("slcan:/dev/ttyNONE0"), Some(RelayError::Port(NotFound(..)))));
     motorlink_testbench::register();
     for refused in [st("sim:"), rmd("sim:")] {
         assert!(matches!(refused, Some(RelayError::Simulated(_))));

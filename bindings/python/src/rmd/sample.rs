@@ -79,7 +79,7 @@ impl RmdSampling {
         let Err(error) = self.owner.carry_out(bus, doubt) else { return Ok(()) };
         match &error {
             // A signal handler used the bus. The row is lost.
-            Error::Port(PortError::Overtaken { .. }) => {
+            Error::Port(PortError::Overtaken(..)) => {
                 self.lock().gave_up();
                 Python::attach(look)
             }
@@ -167,7 +167,7 @@ impl RmdSampling {
 
     /// The port could not be used for what is pending.
     fn fail(&self) {
-        self.fail_pending(&PortError::Closed { port: self.port.to_string() }.into());
+        self.fail_pending(&PortError::Closed(self.port.to_string()).into());
     }
 
     /// The new rows, each a time in s and values of eight bytes, and the skipped instants.

@@ -93,7 +93,7 @@ impl StSampling {
         let over = step.carry_out(client);
         match &over.result {
             // A signal handler used the client. The row is lost.
-            Err(Error::Port(PortError::Overtaken { .. })) => {
+            Err(Error::Port(PortError::Overtaken(..))) => {
                 self.lock().gave_up();
                 Python::attach(look)
             }
@@ -180,7 +180,7 @@ impl StSampling {
 
     /// The port could not be used for what is pending.
     fn fail(&self) {
-        let closed = PortError::Closed { port: self.port.to_string() };
+        let closed = PortError::Closed(self.port.to_string());
         self.relay.ended((), StOver { result: Err(closed.into()), exchanged: None });
     }
 

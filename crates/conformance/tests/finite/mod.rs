@@ -29,7 +29,7 @@ impl<S, T> Finite<S, T> {
     fn alive(&self) -> Result<(), PortError> {
         match self.now() < END {
             true => Ok(()),
-            false => Err(PortError::Closed { port: "a minute is over".to_owned() }),
+            false => Err(PortError::Closed("a minute is over".to_owned())),
         }
     }
 

@@ -384,7 +384,7 @@ mod tests {
         drop(far_clock);
         let data = FdLink::new(data, "data").unwrap();
         let error = EmulatedBytes::new(data, link(clock), name()).expect_err("closed");
-        assert!(matches!(error, PortError::Closed { .. }), "{error}");
+        assert!(matches!(error, PortError::Closed(..)), "{error}");
     }
 
     #[test]

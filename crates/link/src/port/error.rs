@@ -15,11 +15,8 @@ use super::interface::up_hint;
 #[non_exhaustive]
 pub enum PortError {
     /// No device has this name.
-    #[error("there is no `{port}`: is it plugged in?")]
-    NotFound {
-        /// The port.
-        port: String,
-    },
+    #[error("there is no `{0}`: is it plugged in?")]
+    NotFound(String),
     /// The device exists and this user may not open it.
     #[error("no permission to open `{port}`: {}", permission_hint(.group.as_deref()))]
     PermissionDenied {
@@ -29,19 +26,11 @@ pub enum PortError {
         group: Option<String>,
     },
     /// Another program holds the port.
-    #[error(
-        "`{port}` is in use by another program: close that one first (`fuser -v {port}` names it)"
-    )]
-    Busy {
-        /// The port.
-        port: String,
-    },
+    #[error("`{0}` is in use by another program: close that one first (`fuser -v {0}` names it)")]
+    Busy(String),
     /// The path is a directory, a plain file or a device of another kind.
-    #[error("`{port}` is not a serial device")]
-    NotSerial {
-        /// The port.
-        port: String,
-    },
+    #[error("`{0}` is not a serial device")]
+    NotSerial(String),
     /// The device cannot run at this baud rate.
     #[error("`{port}` cannot run at {baud} baud: choose another rate, such as 115200")]
     BaudRefused {
@@ -69,11 +58,8 @@ pub enum PortError {
         source: Arc<io::Error>,
     },
     /// The host exists, but no server listens.
-    #[error("`{port}` refuses the connection: does a server listen there?")]
-    Refused {
-        /// The port.
-        port: String,
-    },
+    #[error("`{0}` refuses the connection: does a server listen there?")]
+    Refused(String),
     /// The host did not answer.
     #[error("`{port}` cannot be reached: check the address and the network ({source})")]
     Unreachable {
@@ -84,20 +70,13 @@ pub enum PortError {
     },
     /// The peer closed the connection, or the adapter was unplugged.
     #[error(
-        "`{port}` was closed: the far end hung up or was unplugged; open it again when it is back"
+        "`{0}` was closed: the far end hung up or was unplugged; open it again when it is back"
     )]
-    Closed {
-        /// The port.
-        port: String,
-    },
-    /// The port could not be opened again, and the next attempt is later.
-    #[error("{why}")]
-    Away {
-        /// The port.
-        port: String,
-        /// The error of the last attempt.
-        why: String,
-    },
+    Closed(String),
+    /// The port could not be opened again, and the next attempt is later. The text is the error of the
+    /// last attempt.
+    #[error("{0}")]
+    Away(String),
     /// The port does not accept bytes or frames.
     #[error("`{port}` takes no more data: {hint}")]
     Stalled {
@@ -119,24 +98,18 @@ pub enum PortError {
     },
     /// The port runs on the time of an emulated board, but its user needs the machine's time.
     #[error(
-        "`{port}` runs on the time of an emulated board, and event loops and guards need the \
+        "`{0}` runs on the time of an emulated board, and event loops and guards need the \
          machine's time: leave out `clock=`, or use a blocking client"
     )]
-    Emulated {
-        /// The port.
-        port: String,
-    },
+    Emulated(String),
     /// This kernel has no CAN support.
     #[error(
         "this kernel has no CAN support: load it with `sudo modprobe can-raw`, or use an slcan adapter"
     )]
     NoCan,
     /// No CAN interface has this name.
-    #[error("there is no CAN interface `{port}`")]
-    NoSuchInterface {
-        /// The interface.
-        port: String,
-    },
+    #[error("there is no CAN interface `{0}`")]
+    NoSuchInterface(String),
     /// The CAN interface exists, but is not up.
     #[error("CAN interface `{port}` is down: {hint}")]
     InterfaceDown {
@@ -147,13 +120,10 @@ pub enum PortError {
     },
     /// The CAN controller left the bus after too many errors.
     #[error(
-        "`{port}` is bus-off after too many errors: check wiring, termination and bitrate, then \
-         `sudo ip link set {port} down && sudo ip link set {port} up`"
+        "`{0}` is bus-off after too many errors: check wiring, termination and bitrate, then \
+         `sudo ip link set {0} down && sudo ip link set {0} up`"
     )]
-    BusOff {
-        /// The interface.
-        port: String,
-    },
+    BusOff(String),
     /// The device does not use slcan.
     #[error(
         "`{port}` does not answer like an slcan adapter ({reason}): is this the right device and baud rate?"
@@ -176,13 +146,10 @@ pub enum PortError {
     },
     /// The slcan adapter refuses frames.
     #[error(
-        "the adapter on `{port}` refuses frames: was it reset, or is no other node on the bus? its \
+        "the adapter on `{0}` refuses frames: was it reset, or is no other node on the bus? its \
          channel is opened again with the next call"
     )]
-    AdapterRefuses {
-        /// The port.
-        port: String,
-    },
+    AdapterRefuses(String),
     /// The configuration of the port is invalid.
     #[error("`{port}`: {why}")]
     Configuration {
@@ -202,40 +169,25 @@ pub enum PortError {
     /// The link to a served pty is left over from a killed server. The pty that it points to now
     /// belongs to another program.
     #[error(
-        "`{port}` is stale: the server that made it is gone, and its pty now belongs to another \
+        "`{0}` is stale: the server that made it is gone, and its pty now belongs to another \
          program. Nothing was sent; start the server again"
     )]
-    Stale {
-        /// The link.
-        port: String,
-    },
+    Stale(String),
     /// The link of a served pty belongs to another server.
-    #[error("`{port}` is served already: end that server or choose another path")]
-    PathServed {
-        /// The path.
-        port: String,
-    },
+    #[error("`{0}` is served already: end that server or choose another path")]
+    PathServed(String),
     /// The listening address is in use.
-    #[error("`{port}` is taken by another program: choose another TCP port, or 0 for any free one")]
-    AddressInUse {
-        /// The port.
-        port: String,
-    },
+    #[error("`{0}` is taken by another program: choose another TCP port, or 0 for any free one")]
+    AddressInUse(String),
     /// The thread that waited for an exchange used the port again, for example in a signal handler.
     #[error(
-        "`{port}`: another call of the same thread, such as one in a signal handler, aborted this \
+        "`{0}`: another call of the same thread, such as one in a signal handler, aborted this \
          exchange; what the drive did is unknown"
     )]
-    Overtaken {
-        /// The port.
-        port: String,
-    },
+    Overtaken(String),
     /// The program is about to end: its client was retired.
-    #[error("`{port}`: this program is about to end, and only stops motors; nothing was sent")]
-    Retired {
-        /// The port.
-        port: String,
-    },
+    #[error("`{0}`: this program is about to end, and only stops motors; nothing was sent")]
+    Retired(String),
     /// The program that holds the port did not get a reply, or did not send the request. The
     /// connection to it stays open.
     #[error("{why}")]
@@ -251,13 +203,10 @@ pub enum PortError {
     },
     /// The program that holds the port does not answer.
     #[error(
-        "`{port}`: the program that holds this port does not answer: is it stopped or overloaded? it \
+        "`{0}`: the program that holds this port does not answer: is it stopped or overloaded? it \
          is unknown whether the drive carried the request out"
     )]
-    HolderSilent {
-        /// The port.
-        port: String,
-    },
+    HolderSilent(String),
     /// The program that holds the port reads frames in another profile.
     #[error("the program that holds `{port}` reads frames in profile {profile}; nothing was sent")]
     HeldInProfile {
@@ -319,7 +268,7 @@ impl PortError {
     /// Whether the port stays open after this error.
     pub fn leaves_open(&self) -> bool {
         self.is_interruption()
-            || matches!(self, PortError::NotDone { .. } | PortError::HolderSilent { .. })
+            || matches!(self, PortError::NotDone { .. } | PortError::HolderSilent(..))
     }
 
     /// Whether nothing can be said about the drives, because the port failed.
@@ -360,7 +309,7 @@ impl PortError {
     /// and the exchange is abandoned.
     pub fn is_interruption(&self) -> bool {
         match self {
-            PortError::Overtaken { .. } => true,
+            PortError::Overtaken(..) => true,
             PortError::Io { source, .. } => source.kind() == io::ErrorKind::Interrupted,
             _ => false,
         }
@@ -380,7 +329,7 @@ impl PortError {
                 | Errno::CONNABORTED
                 | Errno::NOTCONN
                 | Errno::TIMEDOUT,
-            ) => PortError::Closed { port },
+            ) => PortError::Closed(port),
             Some(Errno::NETDOWN) => Self::interface_down(port),
             Some(Errno::NOBUFS) => PortError::Stalled {
                 port,
@@ -399,12 +348,12 @@ impl PortError {
         let source = error.into();
         let port = path.display().to_string();
         match Errno::from_io_error(&source) {
-            Some(Errno::NOENT | Errno::NODEV | Errno::NXIO) => PortError::NotFound { port },
+            Some(Errno::NOENT | Errno::NODEV | Errno::NXIO) => PortError::NotFound(port),
             Some(Errno::ACCESS | Errno::PERM) => {
                 PortError::PermissionDenied { port, group: owning_group(path, Path::new("/")) }
             }
-            Some(Errno::BUSY | Errno::WOULDBLOCK) => PortError::Busy { port },
-            Some(Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR) => PortError::NotSerial { port },
+            Some(Errno::BUSY | Errno::WOULDBLOCK) => PortError::Busy(port),
+            Some(Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR) => PortError::NotSerial(port),
             _ => PortError::Io { port, source: source.into() },
         }
     }
@@ -456,7 +405,7 @@ mod tests {
     #[test]
     fn a_lost_line_is_distinguished_from_other_failures() {
         for errno in [Errno::IO, Errno::NODEV, Errno::CONNRESET, Errno::PIPE] {
-            assert!(matches!(PortError::in_use("p", errno), PortError::Closed { .. }), "{errno}");
+            assert!(matches!(PortError::in_use("p", errno), PortError::Closed(..)), "{errno}");
         }
         assert!(matches!(PortError::in_use("p", Errno::NOMEM), PortError::Io { .. }));
         assert_eq!(

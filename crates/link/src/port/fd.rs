@@ -129,7 +129,7 @@ impl FdLink {
         let deadline = Deadline::after(timeout);
         while self.wait(PollFlags::IN, deadline)? {
             match read(&self.fd, &mut *buffer) {
-                Ok(0) => return Err(PortError::Closed { port: self.port.clone() }),
+                Ok(0) => return Err(PortError::Closed(self.port.clone())),
                 Ok(len) => return Ok(len),
                 Err(Errno::INTR | Errno::AGAIN) => {}
                 Err(errno) => return Err(self.lost(errno)),

@@ -168,7 +168,7 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
                 Some(Answer::Refused) => {
                     self.refused_in_a_row += 1;
                     if self.refused_in_a_row >= REFUSALS {
-                        return Err(PortError::AdapterRefuses { port: self.port.clone() });
+                        return Err(PortError::AdapterRefuses(self.port.clone()));
                     }
                 }
                 Some(Answer::Done) => self.refused_in_a_row = 0,

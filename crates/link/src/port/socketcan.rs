@@ -48,14 +48,14 @@ impl SocketCanLink {
         let socket = opened.map_err(|error| match Errno::from_io_error(&error) {
             Some(Errno::AFNOSUPPORT) => PortError::NoCan,
             Some(Errno::NODEV | Errno::NXIO | Errno::INVAL) => {
-                PortError::NoSuchInterface { port: port.clone() }
+                PortError::NoSuchInterface(port.clone())
             }
             _ => PortError::in_use(&port, error),
         })?;
         match Interface::read(interface, Path::new("/sys")) {
             Some(Interface { is_up: false, .. }) => return Err(PortError::interface_down(port)),
             // A bus-off interface would accept frames and drop them.
-            Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff { port }),
+            Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff(port)),
             _ => {}
         }
         Ok(SocketCanLink { _listed: Listed::new(socket.as_fd()), socket, interface: port })
@@ -104,7 +104,7 @@ impl CanLink for SocketCanLink {
         while wait(self.as_fd(), PollFlags::IN, deadline).map_err(|errno| self.lost(errno))? {
             match self.socket.read_frame() {
                 Ok(socketcan::CanFrame::Error(_)) => {
-                    return Err(PortError::BusOff { port: self.interface.clone() });
+                    return Err(PortError::BusOff(self.interface.clone()));
                 }
                 Ok(frame) => return Ok(Some(from_kernel(&frame))),
                 Err(error) => match Errno::from_io_error(&error) {

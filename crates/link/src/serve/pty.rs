@@ -141,7 +141,7 @@ fn clear_link(link: &Path) -> Result<(), PortError> {
     let is_ours = match std::fs::read_link(link) {
         Ok(target) if target.starts_with("/dev/pts") => {
             if link.exists() && !is_older_than_its_pty(link) {
-                return Err(PortError::PathServed { port });
+                return Err(PortError::PathServed(port));
             }
             true
         }

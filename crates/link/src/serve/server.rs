@@ -201,7 +201,7 @@ fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String)
         Ok((listener, address))
     });
     listening.map_err(|source| match source.kind() {
-        std::io::ErrorKind::AddrInUse => PortError::AddressInUse { port: port.to_owned() },
+        std::io::ErrorKind::AddrInUse => PortError::AddressInUse(port.to_owned()),
         _ => PortError::Io { port: port.to_owned(), source: source.into() },
     })
 }

@@ -78,7 +78,7 @@ fn clear(path: &Path) -> Result<(), PortError> {
     match knock() {
         Err(Errno::CONNREFUSED) => std::fs::remove_file(path)
             .map_err(|source| PortError::Io { port, source: source.into() }),
-        _ => Err(PortError::PathServed { port }),
+        _ => Err(PortError::PathServed(port)),
     }
 }
 

@@ -68,7 +68,7 @@ impl<L: Link + Evented + 'static> Port<L> {
 
     /// Why nothing can be sent.
     pub(super) fn closed(&self) -> PortError {
-        PortError::Closed { port: self.name() }
+        PortError::Closed(self.name())
     }
 
     /// What opens this port for a client, while it is open itself.

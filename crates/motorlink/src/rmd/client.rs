@@ -408,8 +408,8 @@ impl Client {
             let port = Arc::clone(&driven.port.name);
             let looked;
             (driven, looked) = driven.look(&port);
-            let overtaken = (driven.exchanges != exchange)
-                .then(|| PortError::Overtaken { port: port.to_string() });
+            let overtaken =
+                (driven.exchanges != exchange).then(|| PortError::Overtaken(port.to_string()));
             if let Some(error) = looked.err().or(overtaken) {
                 return Err(driven.closed(error));
             }

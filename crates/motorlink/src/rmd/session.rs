@@ -476,7 +476,7 @@ impl Session {
     /// Whether a motor may be sent this.
     fn free(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
         if self.is_retired && !ends_motion(request) {
-            return Err(PortError::Retired { port: self.port.to_string() }.into());
+            return Err(PortError::Retired(self.port.to_string()).into());
         }
         let awaits = self.torques.is_some() && MotorSet::TORQUE4.contains(id);
         match self.waiting.contains(id) || awaits {

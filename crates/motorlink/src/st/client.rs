@@ -369,7 +369,7 @@ impl Client {
             (driven, looked) = driven.look(&port);
             let overtaken = driven.exchanges != exchange;
             if overtaken {
-                let overtaken = PortError::Overtaken { port: port.to_string() };
+                let overtaken = PortError::Overtaken(port.to_string());
                 let seen = driven.session.exchanged();
                 return (Err(looked.err().unwrap_or(overtaken).into()), Some(seen));
             }

@@ -236,7 +236,7 @@ impl Session {
 
     fn check_retired(&self, effect: Effect) -> Result<(), Error> {
         match self.is_retired && effect != Effect::Stops {
-            true => Err(PortError::Retired { port: self.port.to_string() }.into()),
+            true => Err(PortError::Retired(self.port.to_string()).into()),
             false => Ok(()),
         }
     }
@@ -307,7 +307,7 @@ impl Session {
             }
             Err(proto::ExchangeError::Failed(proto::Failure::Timeout)) if self.held.is_some() => {
                 self.lost();
-                Err(PortError::HolderSilent { port: port.to_string() }.into())
+                Err(PortError::HolderSilent(port.to_string()).into())
             }
             Err(proto::ExchangeError::Failed(failure)) => {
                 self.last.restart();

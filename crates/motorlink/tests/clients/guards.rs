@@ -85,7 +85,7 @@ fn a_guard_waits_for_a_port_that_comes_back() {
         Some(Some(stream)) => {
             Ok(Box::new(Fresh(FdLink::new(stream, "pair")?)) as Box<dyn ByteLink>)
         }
-        Some(None) => Err(PortError::Closed { port: "pair".to_owned() }),
+        Some(None) => Err(PortError::Closed("pair".to_owned())),
         None => {
             let (ours, theirs) = UnixStream::pair().unwrap();
             std::thread::spawn(move || answer_everything(theirs));

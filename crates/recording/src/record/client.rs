@@ -129,7 +129,7 @@ impl Carrier {
                 over.into_iter().for_each(|over| relay.ended((), over));
                 return Turn::Moved;
             }
-            let closed = PortError::Closed { port: port.to_string() };
+            let closed = PortError::Closed(port.to_string());
             relay.ended((), StOver { result: Err(closed.into()), exchanged: None });
             relay.close();
             Turn::Closed
@@ -150,7 +150,7 @@ impl Carrier {
                 }
                 return Turn::Moved;
             }
-            owner.fail_pending(&PortError::Closed { port: port.to_string() }.into());
+            owner.fail_pending(&PortError::Closed(port.to_string()).into());
             owner.relay().close();
             Turn::Closed
         };

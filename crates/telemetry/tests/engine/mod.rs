@@ -81,7 +81,7 @@ impl Engine {
         let mut link = Some(Polled(link));
         let open = move || match link.take() {
             Some(link) => Ok(Box::new(link) as Box<dyn EventBytes>),
-            None => Err(PortError::NotFound { port: "st".to_owned() }),
+            None => Err(PortError::NotFound("st".to_owned())),
         };
         let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
         Engine::new(Acquisition::new(Box::new(StLine::new(client))))

@@ -205,7 +205,7 @@ impl World {
         let tap = Tap::default();
         let mut link = Some(tap.around_line(Box::new(Polled(Wire::to(drives)))));
         let open = move || -> Result<Box<dyn EventBytes>, PortError> {
-            link.take().ok_or(PortError::NotFound { port: "st".to_owned() })
+            link.take().ok_or(PortError::NotFound("st".to_owned()))
         };
         let options = motorlink::st::Options { timeout, ..Default::default() };
         let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();

@@ -103,7 +103,7 @@ fn st(
     let port = "/dev/st".parse().unwrap();
     let tap = Tap::default();
     let mut link = Some(tap.around_line(around(Box::new(Polled(bench.bytes(&Faults::NONE))))));
-    let open = move || link.take().ok_or(PortError::NotFound { port: "st".to_owned() });
+    let open = move || link.take().ok_or(PortError::NotFound("st".to_owned()));
     let options = motorlink::st::Options { timeout, ..Default::default() };
     let client = motorlink::st::EventClient::open_with("st", Box::new(open), options).unwrap();
     let engine = Acquisition::new(Box::new(StLine::new(client)));

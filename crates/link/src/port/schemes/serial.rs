@@ -158,7 +158,7 @@ fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
     let device = path.canonicalize().map_err(|error| PortError::at_open(path, error))?;
     let fd = open_device(&device).map_err(|errno| PortError::at_open(path, errno))?;
     if is_stale(path, &fd) {
-        return Err(PortError::Stale { port: path.display().to_string() });
+        return Err(PortError::Stale(path.display().to_string()));
     }
     claim(&fd, &device).map_err(|errno| PortError::at_open(path, errno))?;
     let actual = configure(&fd, baud).map_err(|errno| PortError::at_open(path, errno))?;

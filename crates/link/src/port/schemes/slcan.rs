@@ -81,7 +81,7 @@ struct Adapter {
 
 impl Adapter {
     fn line(&self) -> Result<&dyn LinePort, PortError> {
-        let closed = || PortError::Closed { port: self.line.to_string() };
+        let closed = || PortError::Closed(self.line.to_string());
         self.line.as_line().ok_or_else(closed)
     }
 }

@@ -137,7 +137,7 @@ impl LinePort for TcpBytes {
 
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
         if self.clock.is_some() {
-            return Err(PortError::Emulated { port: self.label() });
+            return Err(PortError::Emulated(self.label()));
         }
         Ok(Box::new(QueuedBytes::new(connect(&self.address, self.label())?)))
     }
@@ -165,7 +165,7 @@ fn connect(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
         }
     }
     Err(match failure.kind() {
-        io::ErrorKind::ConnectionRefused => PortError::Refused { port },
+        io::ErrorKind::ConnectionRefused => PortError::Refused(port),
         _ => PortError::Unreachable { port, source: failure.into() },
     })
 }

@@ -40,7 +40,7 @@ impl Socket {
     fn connect(&self) -> Result<FdLink, PortError> {
         let port = self.label();
         let stream = UnixStream::connect(&self.0).map_err(|error| match error.kind() {
-            io::ErrorKind::ConnectionRefused => PortError::Refused { port: port.clone() },
+            io::ErrorKind::ConnectionRefused => PortError::Refused(port.clone()),
             _ => PortError::at_open(&self.0, error),
         })?;
         FdLink::new(stream, port)

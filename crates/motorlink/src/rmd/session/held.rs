@@ -103,7 +103,7 @@ impl Session {
             Some(Err(why)) => Err(self.declined(id, moved, why)),
             None => {
                 self.lost(id);
-                Err(PortError::HolderSilent { port: self.port.to_string() }.into())
+                Err(PortError::HolderSilent(self.port.to_string()).into())
             }
         };
         is_awaited.then_some(SessionOutput::Done(id, result))

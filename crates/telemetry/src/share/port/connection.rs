@@ -150,7 +150,7 @@ impl Connection {
         match self.socket.write(&stream) {
             Ok(()) => Ok(id),
             // What came before the end says why.
-            Err(error @ PortError::Closed { .. }) => match self.next_end(Some(Duration::ZERO)) {
+            Err(error @ PortError::Closed(..)) => match self.next_end(Some(Duration::ZERO)) {
                 Err(why) => Err(why),
                 Ok(_) => Err(error),
             },
@@ -175,7 +175,7 @@ impl Connection {
             match self.socket.read(&mut bytes, left) {
                 Ok(0) => return Ok(None),
                 Ok(size) => self.codec.push(&bytes[..size]),
-                Err(PortError::Closed { .. }) => return Err(self.gone()),
+                Err(PortError::Closed(..)) => return Err(self.gone()),
                 Err(error) => return Err(error),
             }
         }
