@@ -40,14 +40,6 @@ impl<C: CanLink> EchoCanceller<C> {
         EchoCanceller { clock: link.clock().unwrap_or_default(), link, expected }
     }
 
-    pub(super) fn link(&self) -> &C {
-        &self.link
-    }
-
-    pub(super) fn link_mut(&mut self) -> &mut C {
-        &mut self.link
-    }
-
     /// Removes `frame` from the expected echoes, with earlier ones of the same identifier. Those of
     /// other identifiers remain, because this may be a late reply.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
@@ -93,11 +85,11 @@ impl<C: CanLink> CanLink for EchoCanceller<C> {
 
 impl<C: CanLink + Evented> Evented for EchoCanceller<C> {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.link().descriptor()
+        self.link.descriptor()
     }
 
     fn flush(&mut self) -> Result<bool, PortError> {
-        self.link_mut().flush()
+        self.link.flush()
     }
 }
 
@@ -159,7 +151,7 @@ mod tests {
     fn a_late_echo_is_not_a_reply() -> Result<(), PortError> {
         let mut bus = mirror(1);
         bus.send(&ANGLE)?;
-        bus.link().clock.wait(Instant(3_600_000_000));
+        bus.link.clock.wait(Instant(3_600_000_000));
         assert_eq!(bus.receive(NOW)?, None);
         Ok(())
     }
@@ -188,7 +180,7 @@ mod tests {
         let mut bus = mirror(0);
         bus.send(&ANGLE)?;
         bus.send(&stop)?;
-        bus.link_mut().frames.extend([stop, ANGLE, stop]);
+        bus.link.frames.extend([stop, ANGLE, stop]);
         assert_eq!(bus.receive(NOW)?, Some(stop));
         assert_eq!(bus.receive(NOW)?, None);
         Ok(())
@@ -198,16 +190,16 @@ mod tests {
     fn a_lost_echo_removes_at_most_one_reply() -> Result<(), PortError> {
         let mut bus = mirror(0);
         bus.send(&ANGLE)?;
-        bus.link_mut().copies = 2;
+        bus.link.copies = 2;
         bus.send(&RUN)?;
         assert_eq!(bus.receive(NOW)?, Some(RUN), "the echo of RUN came after the lost one");
         assert_eq!(bus.receive(NOW)?, None);
         bus.send(&ANGLE)?;
         assert_eq!(bus.receive(NOW)?, Some(ANGLE));
 
-        bus.link_mut().copies = 0;
+        bus.link.copies = 0;
         bus.send(&RUN)?;
-        bus.link_mut().copies = 2;
+        bus.link.copies = 2;
         for replies in [0, 1, 1] {
             bus.send(&RUN)?;
             for _ in 0..replies {

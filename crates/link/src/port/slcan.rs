@@ -120,23 +120,11 @@ impl<B: ByteLink> SlcanLink<B> {
         self.codec.filled(len);
         Ok(len > 0)
     }
-
-    pub(super) fn line(&self) -> &B {
-        &self.line
-    }
-
-    pub(super) fn line_mut(&mut self) -> &mut B {
-        &mut self.line
-    }
 }
 
 impl<B: ByteLink> Link for SlcanLink<B> {
-    fn clock(&self) -> Option<Clock> {
-        self.line.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.line.is_fresh()
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.line)
     }
 
     fn trouble(&self) -> Option<&'static str> {
@@ -189,10 +177,10 @@ impl<B: ByteLink> Drop for SlcanLink<B> {
 
 impl<B: ByteLink + Evented> Evented for SlcanLink<B> {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.line().descriptor()
+        self.line.descriptor()
     }
 
     fn flush(&mut self) -> Result<bool, PortError> {
-        self.line_mut().flush()
+        self.line.flush()
     }
 }

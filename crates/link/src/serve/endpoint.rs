@@ -97,7 +97,7 @@ impl Endpoint {
         fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, listen)));
         let coming = if self.paused_until.is_some() { PollFlags::empty() } else { PollFlags::IN };
         fds.push(match &self.listener {
-            Listener::Pty(pty, _) => PollFd::new(pty.openings(), coming),
+            Listener::Pty(pty, _) => PollFd::new(&pty.openings, coming),
             Listener::Tcp(listener) => PollFd::new(listener, coming),
             Listener::Unix(server) => PollFd::new(server.listener(), coming),
         });

@@ -21,9 +21,11 @@ use crate::port::{MARKED_LINK, PortError, mark};
 /// A pty for one client after the other. The client's side is not kept open here, so the kernel
 /// reports when the last client has closed it: reading the server's side then fails.
 pub(super) struct Pty {
-    path: PathBuf,
+    /// The device that a client opens.
+    pub(super) path: PathBuf,
     link: PathBuf,
-    openings: OwnedFd,
+    /// The descriptor that becomes readable when a client opens the pty.
+    pub(super) openings: OwnedFd,
 }
 
 impl Pty {
@@ -50,16 +52,6 @@ impl Pty {
         }
         (self.path, self.openings) = (path, openings);
         Ok(master)
-    }
-
-    /// The device that a client opens.
-    pub(super) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The descriptor that becomes readable when a client opens the pty.
-    pub(super) fn openings(&self) -> &OwnedFd {
-        &self.openings
     }
 
     /// Drops the bytes that the last client did not read, and the bytes that it left for the server

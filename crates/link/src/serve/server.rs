@@ -90,7 +90,7 @@ impl Server {
             (ServeName::Pty(link), station @ AnyStation::Bytes(_))
             | (ServeName::SlcanPty(link), station @ AnyStation::Can(_)) => {
                 let (pty, master) = Pty::open(link)?;
-                let path = pty.path().display().to_string();
+                let path = pty.path.display().to_string();
                 self.endpoints.push(Endpoint::on_pty(pty, master, station));
                 path
             }
