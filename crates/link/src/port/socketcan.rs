@@ -4,13 +4,11 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
 use std::time::Duration;
 
+use motorlink_embedded::rmd::{from_can, to_can};
 use motorlink_proto::can::CanFrame;
 use rustix::event::PollFlags;
 use rustix::io::Errno;
-use socketcan::{
-    CanDataFrame, CanRemoteFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, SocketOptions,
-    StandardId,
-};
+use socketcan::{CanSocket, Socket, SocketOptions};
 
 use super::deadline::Deadline;
 use super::descriptors::Listed;
@@ -63,7 +61,8 @@ impl SocketCanLink {
 
     /// Sends `frame` if the interface's queue has space now.
     pub(crate) fn offer(&mut self, frame: &CanFrame) -> Result<bool, PortError> {
-        let frame = to_kernel(frame);
+        // The kernel has all frames of the protocol.
+        let frame = to_can::<socketcan::CanFrame>(frame).unwrap_or_default();
         loop {
             let Err(error) = self.socket.write_frame(&frame) else { return Ok(true) };
             match Errno::from_io_error(&error) {
@@ -106,7 +105,7 @@ impl CanLink for SocketCanLink {
                 Ok(socketcan::CanFrame::Error(_)) => {
                     return Err(PortError::BusOff(self.interface.clone()));
                 }
-                Ok(frame) => return Ok(Some(from_kernel(&frame))),
+                Ok(frame) => return Ok(Some(from_can(&frame))),
                 Err(error) => match Errno::from_io_error(&error) {
                     Some(Errno::INTR | Errno::AGAIN) => {}
                     _ => return Err(self.lost(error)),
@@ -114,32 +113,6 @@ impl CanLink for SocketCanLink {
             }
         }
         Ok(None)
-    }
-}
-
-fn to_kernel(frame: &CanFrame) -> socketcan::CanFrame {
-    let id = if frame.is_extended() {
-        Id::Extended(ExtendedId::new(frame.id()).unwrap_or(ExtendedId::MAX))
-    } else {
-        Id::Standard(StandardId::new(frame.id() as u16).unwrap_or(StandardId::MAX))
-    };
-    if frame.is_remote() {
-        let remote = CanRemoteFrame::new_remote(id, frame.len().into());
-        remote.unwrap_or_default().into()
-    } else {
-        CanDataFrame::new(id, frame.data()).unwrap_or_default().into()
-    }
-}
-
-fn from_kernel(frame: &socketcan::CanFrame) -> CanFrame {
-    let (id, extended) = match frame.id() {
-        Id::Standard(id) => (id.as_raw().into(), false),
-        Id::Extended(id) => (id.as_raw(), true),
-    };
-    if frame.is_remote_frame() {
-        CanFrame::remote_frame(id, extended, frame.dlc() as u8)
-    } else {
-        CanFrame::data_frame(id, extended, frame.data())
     }
 }
 
@@ -155,7 +128,8 @@ mod tests {
             CanFrame::remote_frame(0x7FF, false, 8),
             CanFrame::remote_frame(0, true, 0),
         ] {
-            assert_eq!(from_kernel(&to_kernel(&frame)), frame);
+            let to_kernel: socketcan::CanFrame = to_can(&frame).expect("the kernel has it");
+            assert_eq!(from_can(&to_kernel), frame);
         }
     }
 }
