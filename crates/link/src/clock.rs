@@ -1,7 +1,7 @@
 //! A clock that follows the machine's clock, or a virtual one that advances only during waits.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Weak};
 use std::time::Duration as Span;
 
 use motorlink_proto::time::Instant;
@@ -76,20 +76,6 @@ impl Clock {
     /// The time left of a wait: `None` means no limit, zero means it is over.
     pub(crate) fn left(&self, end: Option<Instant>) -> Option<Span> {
         end.map(|end| end.since(self.now()).into())
-    }
-
-    pub(crate) fn downgrade(&self) -> WeakClock {
-        WeakClock(Arc::downgrade(&self.0))
-    }
-}
-
-/// A reference to a clock that does not keep it alive.
-#[derive(Debug)]
-pub(crate) struct WeakClock(Weak<AtomicU64>);
-
-impl WeakClock {
-    pub(crate) fn upgrade(&self) -> Option<Clock> {
-        self.0.upgrade().map(Clock)
     }
 }
 

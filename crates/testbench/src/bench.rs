@@ -150,7 +150,7 @@ impl Bench {
         if !self.clock.is_virtual() {
             let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
             let why = "this bench is served already: end that first".to_owned();
-            return Err(PortError::Configuration { port, why });
+            return Err(PortError::Unusable { port, why });
         }
         let (stop, stopped) = UnixStream::pair().map_err(failed)?;
         let (tell, told) = mpsc::channel();

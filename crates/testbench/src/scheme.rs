@@ -53,7 +53,7 @@ impl SimPort {
     }
 
     fn refused(&self, error: &ConfigError) -> PortError {
-        PortError::Configuration { port: self.name(), why: error.to_string() }
+        PortError::Unusable { port: self.name(), why: error.to_string() }
     }
 
     fn open_st(&self) -> Result<SimBytes, PortError> {
@@ -97,10 +97,6 @@ impl LinePort for SimPort {
 
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
         Ok(Box::new(self.open_st()?))
-    }
-
-    fn label(&self) -> String {
-        self.name()
     }
 }
 

@@ -12,7 +12,6 @@ use super::error::PortError;
 use super::fd::FdLink;
 use super::link::{ByteLink, Link};
 use crate::clock::Clock;
-use crate::clock::WeakClock;
 
 /// One step of a board's time.
 const TICK: Micros = Micros(100);
@@ -185,17 +184,16 @@ impl ByteLink for EmulatedBytes {
     }
 }
 
-/// The clock of the board `name`. A reopened line continues with the clock of its clients.
+/// The clock of the board `name`. A line that is opened again continues with it.
 fn clock_of(name: &str) -> Clock {
-    static CLOCKS: Mutex<Vec<(String, WeakClock)>> = Mutex::new(Vec::new());
+    static CLOCKS: Mutex<Vec<(String, Clock)>> = Mutex::new(Vec::new());
     let mut clocks = CLOCKS.lock().unwrap_or_else(PoisonError::into_inner);
-    clocks.retain(|(_, clock)| clock.upgrade().is_some());
-    let known = clocks.iter().find(|(known, _)| known == name);
-    known.and_then(|(_, clock)| clock.upgrade()).unwrap_or_else(|| {
-        let clock = Clock::virtual_time();
-        clocks.push((name.to_owned(), clock.downgrade()));
-        clock
-    })
+    if let Some((_, clock)) = clocks.iter().find(|(known, _)| known == name) {
+        return clock.clone();
+    }
+    let clock = Clock::virtual_time();
+    clocks.push((name.to_owned(), clock.clone()));
+    clock
 }
 
 #[cfg(test)]

@@ -150,14 +150,6 @@ pub enum PortError {
          channel is opened again with the next call"
     )]
     AdapterRefuses(String),
-    /// The configuration of the port is invalid.
-    #[error("`{port}`: {why}")]
-    Configuration {
-        /// The port.
-        port: String,
-        /// The error in it.
-        why: String,
-    },
     /// A served port would replace a file that no server created.
     #[error("`{port}` exists and is not a {wanted}: remove it or choose another path")]
     PathTaken {
@@ -223,9 +215,9 @@ pub enum PortError {
         /// What is known of it.
         why: String,
     },
-    /// The program that holds the port cannot be used.
+    /// The configuration of the port is invalid, or the program that holds it cannot be used.
     #[error("`{port}`: {why}")]
-    Holder {
+    Unusable {
         /// The port.
         port: String,
         /// The reason, and what to try.

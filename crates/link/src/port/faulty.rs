@@ -41,7 +41,7 @@ impl<B: ByteLink> FaultBytes<B> {
     }
 
     fn transmit(&mut self) -> Result<(), PortError> {
-        let now = self.lanes.now();
+        let now = self.lanes.clock.now();
         let mut chunk = [0; 256];
         loop {
             let size = fill(&mut chunk, || self.lanes.sent.pop(now));
@@ -67,7 +67,7 @@ impl<C: CanLink> FaultCan<C> {
     }
 
     fn transmit(&mut self) -> Result<(), PortError> {
-        let now = self.lanes.now();
+        let now = self.lanes.clock.now();
         while let Some(frame) = self.lanes.sent.pop(now) {
             self.link.send(&frame)?;
         }
@@ -83,19 +83,19 @@ impl<B: ByteLink> Link for FaultBytes<B> {
 
 impl<B: ByteLink> ByteLink for FaultBytes<B> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let now = self.lanes.now();
+        let now = self.lanes.clock.now();
         self.lanes.sent.push(now, bytes.iter().copied());
         self.transmit()
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        let deadline = self.lanes.deadline(timeout);
+        let deadline = self.lanes.clock.end_of(timeout);
         let mut chunk = [0; 256];
         loop {
             self.transmit()?;
             let wait = self.lanes.patience(deadline);
             let came = self.link.read(&mut chunk, wait)?;
-            let now = self.lanes.now();
+            let now = self.lanes.clock.now();
             if came > 0 {
                 self.lanes.received.push(now, chunk[..came].iter().copied());
             }
@@ -115,18 +115,18 @@ impl<C: CanLink> Link for FaultCan<C> {
 
 impl<C: CanLink> CanLink for FaultCan<C> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        let free = self.lanes.now().max(self.lanes.received.free());
+        let free = self.lanes.clock.now().max(self.lanes.received.free());
         self.lanes.sent.push(free, [*frame]);
         self.transmit()
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let deadline = self.lanes.deadline(timeout);
+        let deadline = self.lanes.clock.end_of(timeout);
         loop {
             self.transmit()?;
             let wait = self.lanes.patience(deadline);
             let came = self.link.receive(wait)?;
-            let now = self.lanes.now();
+            let now = self.lanes.clock.now();
             if let Some(frame) = came {
                 self.lanes.received.push(now.max(self.lanes.sent.free()), [frame]);
             }
@@ -186,24 +186,15 @@ impl<T: Unit> Lanes<T> {
         Lanes { clock, sent: lane(Way::Sent), received: lane(Way::Received) }
     }
 
-    fn now(&self) -> Instant {
-        self.clock.now()
-    }
-
     /// Whether data are on their way.
     fn has_delayed(&self) -> bool {
         self.sent.due().or(self.received.due()).is_some()
     }
 
-    /// The end of a wait that starts now.
-    fn deadline(&self, timeout: Option<Duration>) -> Option<Instant> {
-        timeout.map(|timeout| self.now() + timeout.into())
-    }
-
     /// Maximum wait for the port: until the deadline, or until the next unit is due.
     fn patience(&self, deadline: Option<Instant>) -> Option<Duration> {
         let first = [self.sent.due(), self.received.due(), deadline].into_iter().flatten().min();
-        first.map(|first| first.since(self.now()).into())
+        self.clock.left(first)
     }
 }
 

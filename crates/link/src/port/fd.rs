@@ -1,7 +1,6 @@
 //! A byte line on a file descriptor: serial device, pty, TCP connection, socket pair.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -45,19 +44,6 @@ impl FdLink {
     }
 }
 
-/// A link with several owners: the kernel shares the descriptor.
-impl Link for Arc<FdLink> {}
-
-impl ByteLink for Arc<FdLink> {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.put(bytes)
-    }
-
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.fetch(buffer, timeout)
-    }
-}
-
 impl Link for FdLink {}
 
 impl ByteLink for FdLink {
@@ -77,7 +63,11 @@ impl AsFd for FdLink {
 }
 
 impl FdLink {
-    fn put(&self, mut bytes: &[u8]) -> Result<(), PortError> {
+    /// As [`ByteLink::write`], for a link with several owners: the kernel shares the descriptor.
+    ///
+    /// # Errors
+    /// Those of the descriptor.
+    pub fn put(&self, mut bytes: &[u8]) -> Result<(), PortError> {
         while !bytes.is_empty() {
             match self.offer(bytes)? {
                 0 => {
@@ -122,7 +112,11 @@ impl FdLink {
         }
     }
 
-    fn fetch(&self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+    /// As [`ByteLink::read`], for a link with several owners.
+    ///
+    /// # Errors
+    /// Those of the descriptor.
+    pub fn fetch(&self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         if buffer.is_empty() {
             return Ok(0);
         }

@@ -163,7 +163,7 @@ pub trait Port: fmt::Debug + Send + Sync {
 }
 
 /// A port that carries bytes.
-pub trait LinePort {
+pub trait LinePort: Port {
     /// Opens the port, on any clock.
     fn open(&self) -> Result<Box<dyn ByteLink>, PortError>;
 
@@ -171,7 +171,9 @@ pub trait LinePort {
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError>;
 
     /// The name of the port in messages.
-    fn label(&self) -> String;
+    fn label(&self) -> String {
+        self.name()
+    }
 
     /// The baud rate; `None` if the port has none.
     fn baud(&self) -> Option<u32> {

@@ -34,28 +34,27 @@ impl FromStr for ServeName {
 
     fn from_str(name: &str) -> Result<Self, NameError> {
         check_printable(name)?;
-        if let Some(path) = name.strip_prefix("pty:") {
-            return Ok(ServeName::Pty(present(name, path, "a path", "pty:./st0")?.into()));
+        let path = |path, example| present(name, path, "a path", example).map(PathBuf::from);
+        match name.split_once(':') {
+            Some(("pty", rest)) => path(rest, "pty:./st0").map(ServeName::Pty),
+            Some(("slcan-pty", rest)) => path(rest, "slcan-pty:./can0").map(ServeName::SlcanPty),
+            Some(("unix-listen", rest)) => {
+                path(rest, "unix-listen:./drive").map(ServeName::UnixListen)
+            }
+            Some(("tcp-listen", rest)) => {
+                let (host, port) = host_and_port(name, rest, "tcp-listen:127.0.0.1:4000")?;
+                Ok(ServeName::TcpListen { host, port })
+            }
+            Some(("socketcan", rest)) => {
+                let interface = present(name, rest, "an interface", "socketcan:can0")?;
+                Ok(ServeName::SocketCan(interface.to_owned()))
+            }
+            _ => {
+                let path = name.rsplit(':').next().filter(|path| !path.is_empty());
+                let nearest = format!("pty:{}", path.unwrap_or("./st0"));
+                Err(unknown_form(name, Some(nearest), FORMS.to_owned()))
+            }
         }
-        if let Some(path) = name.strip_prefix("slcan-pty:") {
-            return Ok(ServeName::SlcanPty(
-                present(name, path, "a path", "slcan-pty:./can0")?.into(),
-            ));
-        }
-        if let Some(path) = name.strip_prefix("unix-listen:") {
-            let path = present(name, path, "a path", "unix-listen:./drive")?;
-            return Ok(ServeName::UnixListen(path.into()));
-        }
-        if let Some(address) = name.strip_prefix("tcp-listen:") {
-            let (host, port) = host_and_port(name, address, "tcp-listen:127.0.0.1:4000")?;
-            return Ok(ServeName::TcpListen { host, port });
-        }
-        if let Some(interface) = name.strip_prefix("socketcan:") {
-            let interface = present(name, interface, "an interface", "socketcan:can0")?;
-            return Ok(ServeName::SocketCan(interface.to_owned()));
-        }
-        let path = name.rsplit(':').next().filter(|path| !path.is_empty()).unwrap_or("./st0");
-        Err(unknown_form(name, Some(format!("pty:{path}")), FORMS.to_owned()))
     }
 }
 

@@ -141,10 +141,6 @@ impl LinePort for TcpBytes {
         }
         Ok(Box::new(QueuedBytes::new(connect(&self.address, self.label())?)))
     }
-
-    fn label(&self) -> String {
-        self.name()
-    }
 }
 
 /// Connects to the first address of the host that accepts. `port` is for messages.

@@ -65,8 +65,4 @@ impl LinePort for Socket {
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
         Ok(Box::new(QueuedBytes::new(self.connect()?)))
     }
-
-    fn label(&self) -> String {
-        self.name()
-    }
 }

@@ -50,6 +50,6 @@ impl LineAddress {
 
     /// The share cannot be used.
     pub(super) fn failed(&self, why: impl Into<String>) -> PortError {
-        PortError::Holder { port: self.name(), why: why.into() }
+        PortError::Unusable { port: self.name(), why: why.into() }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use motorlink::port::{ByteLink, FdLink, PortError};
+use motorlink::port::{FdLink, PortError};
 
 use crate::share::frame::{FrameKind, append};
 use crate::share::message::{Ask, Request, encode};
@@ -18,14 +18,14 @@ const SIGNS: u32 = 4;
 pub(super) struct Socket(Arc<Shared>);
 
 struct Shared {
-    link: Arc<FdLink>,
+    link: FdLink,
     /// A message is written as a whole.
     writing: Mutex<()>,
 }
 
 impl Socket {
     pub(super) fn new(link: FdLink) -> Self {
-        Socket(Arc::new(Shared { link: Arc::new(link), writing: Mutex::default() }))
+        Socket(Arc::new(Shared { link, writing: Mutex::default() }))
     }
 
     pub(super) fn descriptor(&self) -> BorrowedFd<'_> {
@@ -34,7 +34,7 @@ impl Socket {
 
     pub(super) fn write(&self, bytes: &[u8]) -> Result<(), PortError> {
         let _turn = self.0.writing.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(&self.0.link).write(bytes)
+        self.0.link.put(bytes)
     }
 
     pub(super) fn read(
@@ -42,7 +42,7 @@ impl Socket {
         buffer: &mut [u8],
         timeout: Option<Duration>,
     ) -> Result<usize, PortError> {
-        Arc::clone(&self.0.link).read(buffer, timeout)
+        self.0.link.fetch(buffer, timeout)
     }
 
     /// Gives signs of life from now on, as long as the socket is open. This is the only thread that the
