@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use motorlink::time::{Instant, Micros};
-use motorlink_link::fault::{Faults, Lane, Rng, Unit, Way};
+use motorlink_link::fault::{Direction, Faults, Lane, Rng, Unit};
 
 use crate::life::Life;
 use crate::tally::{Tally, Violation};
@@ -73,8 +73,8 @@ impl<E: Ends> Run<E> {
         Run {
             ends,
             beyond,
-            out: Lane::new(faults, Way::Sent, unit, protocol.clone()),
-            back: Lane::new(faults, Way::Received, unit, protocol),
+            out: Lane::new(faults, Direction::Sent, unit, protocol.clone()),
+            back: Lane::new(faults, Direction::Received, unit, protocol),
             now: Instant(0),
             ended: Instant(0),
             inbox: VecDeque::new(),

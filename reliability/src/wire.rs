@@ -1,6 +1,6 @@
 //! Bytes and frames with their origin.
 
-use motorlink_link::fault::{Rng, Struck, Unit, Way};
+use motorlink_link::fault::{Direction, Rng, Struck, Unit};
 
 /// A unit on the wire with its origin.
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +64,7 @@ impl<T: Unit> Unit for Tagged<T> {
         Tagged { copy: true, ..self }
     }
 
-    fn noise(way: Way, protocol: &T::Protocol, rng: &mut Rng) -> Self {
+    fn noise(way: Direction, protocol: &T::Protocol, rng: &mut Rng) -> Self {
         let unit = T::noise(way, protocol, rng);
         Tagged { unit, source: None, changed: false, copy: false }
     }

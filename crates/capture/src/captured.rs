@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+pub use motorlink_link::port::Direction;
 use motorlink_proto::can::CanFrame;
 
 /// One entry of a capture.
@@ -58,15 +59,6 @@ impl fmt::Display for Stamp {
             _ => write!(f, "{sign}{seconds}.{below:09}"),
         }
     }
-}
-
-/// The direction as seen by the machine that captured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
-    /// This machine sent it.
-    Sent,
-    /// Another node sent it.
-    Received,
 }
 
 /// What was on the wire.

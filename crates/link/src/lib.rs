@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 mod clock;
+mod direction;
 pub mod fault;
 pub mod list;
 pub mod port;

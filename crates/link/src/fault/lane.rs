@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use fastrand::Rng;
 use motorlink_proto::time::{Instant, Micros};
 
-use super::{Faults, Span, Struck, Unit, Way};
+use super::{Direction, Faults, Span, Struck, Unit};
 
 /// Minimum interval between bytes of a stuck or flooded line: that of 115200 baud.
 const NOISE_PACE: Micros = Micros(87);
@@ -14,7 +14,7 @@ const NOISE_PACE: Micros = Micros(87);
 /// time of arrival.
 #[derive(Debug, Clone)]
 pub struct Lane<T: Unit> {
-    way: Way,
+    way: Direction,
     protocol: T::Protocol,
     rng: Rng,
     pace: Micros,
@@ -44,9 +44,9 @@ pub struct Lane<T: Unit> {
 impl<T: Unit> Lane<T> {
     /// A lane in one direction. A unit takes `pace` to transmit; zero if the link limits the pace
     /// itself. Noise avoids valid commands of `protocol`.
-    pub fn new(faults: &Faults, way: Way, pace: Micros, protocol: T::Protocol) -> Self {
+    pub fn new(faults: &Faults, way: Direction, pace: Micros, protocol: T::Protocol) -> Self {
         let mut rng = Rng::with_seed(faults.seed);
-        if way == Way::Received {
+        if way == Direction::Received {
             rng = rng.fork();
         }
         let spared = faults.only.is_some_and(|only| only != way);
@@ -249,7 +249,7 @@ mod tests {
     use motorlink_proto::can::CanFrame;
 
     fn lane<T: Unit<Protocol: Default>>(faults: &str, pace: u64) -> Lane<T> {
-        Lane::new(&faults.parse().unwrap(), Way::Sent, Micros(pace), T::Protocol::default())
+        Lane::new(&faults.parse().unwrap(), Direction::Sent, Micros(pace), T::Protocol::default())
     }
 
     /// All units that arrive if `units` are pushed at 0, with their times.
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_line_without_faults_transmits_everything_at_its_pace() {
-        let mut lane = Lane::new(&Faults::NONE, Way::Sent, Micros(87), ());
+        let mut lane = Lane::new(&Faults::NONE, Direction::Sent, Micros(87), ());
         assert_eq!(outcome(&mut lane, [1u8, 2, 3]), [(87, 1), (174, 2), (261, 3)]);
         assert_eq!(lane.free(), Instant(261));
     }
@@ -281,9 +281,13 @@ mod tests {
             let mut lane = Lane::new(&text.parse().unwrap(), way, Micros(87), ());
             outcome(&mut lane, bytes(1_000))
         };
-        assert_eq!(run(7, Way::Sent), run(7, Way::Sent));
-        assert_ne!(run(7, Way::Sent), run(8, Way::Sent));
-        assert_ne!(run(7, Way::Sent), run(7, Way::Received), "the ways do not suffer alike");
+        assert_eq!(run(7, Direction::Sent), run(7, Direction::Sent));
+        assert_ne!(run(7, Direction::Sent), run(8, Direction::Sent));
+        assert_ne!(
+            run(7, Direction::Sent),
+            run(7, Direction::Received),
+            "the ways do not suffer alike"
+        );
     }
 
     /// Whether the number of hits of `rate` in `trials` is within five standard deviations.

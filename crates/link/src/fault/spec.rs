@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use motorlink_proto::time::Micros;
 
+use crate::direction::Direction;
+
 /// The faults of a line. Rates are probabilities from 0 to 1. A unit is a byte of a serial line or
 /// a frame of a CAN bus.
 ///
@@ -49,7 +51,7 @@ pub struct Faults {
     /// Times during which a serial line carries only 0xFF.
     pub stuck1: Spell,
     /// The only direction with faults; `None` means both.
-    pub only: Option<Way>,
+    pub only: Option<Direction>,
     /// Seed of the random faults.
     pub seed: u64,
 }
@@ -79,15 +81,6 @@ pub struct Flood {
     pub rate: f64,
     /// Number of units.
     pub count: u32,
-}
-
-/// A direction, from the program's point of view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Way {
-    /// From the program to the drive.
-    Sent,
-    /// From the drive to the program.
-    Received,
 }
 
 /// Why a text does not describe [`Faults`].
@@ -209,8 +202,8 @@ impl Faults {
             }
             "only" => {
                 self.only = Some(match value {
-                    "sent" => Way::Sent,
-                    "received" => Way::Received,
+                    "sent" => Direction::Sent,
+                    "received" => Direction::Received,
                     _ => return Err(bad("only", value, "sent or received")),
                 });
             }
@@ -280,8 +273,8 @@ impl fmt::Display for Faults {
             parts.push(format!("flood={}@{:e}", self.flood.count, self.flood.rate));
         }
         match self.only {
-            Some(Way::Sent) => parts.push("only=sent".to_owned()),
-            Some(Way::Received) => parts.push("only=received".to_owned()),
+            Some(Direction::Sent) => parts.push("only=sent".to_owned()),
+            Some(Direction::Received) => parts.push("only=received".to_owned()),
             None => {}
         }
         if self.seed != 0 {
@@ -363,7 +356,7 @@ mod tests {
         assert_eq!(read(&faults.to_string()), Ok(faults));
         assert_eq!(faults.delay.least, Micros::from_millis(5));
         assert_eq!(faults.pause.length.most, Micros(1_500));
-        assert_eq!(faults.only, Some(Way::Sent));
+        assert_eq!(faults.only, Some(Direction::Sent));
         let plain = read(" drop = 0.25 , seed=18446744073709551615 ").unwrap();
         assert_eq!(plain.to_string(), "drop=2.5e-1,seed=18446744073709551615");
     }

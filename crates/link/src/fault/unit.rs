@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use fastrand::Rng;
 use motorlink_proto::can::{CanFrame, Identifiers};
 
-use super::spec::Way;
+use crate::direction::Direction;
 
 /// The effect of an inverted bit on a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub trait Unit: Copy {
     type Protocol: Clone + Debug;
 
     /// A random unit.
-    fn noise(way: Way, protocol: &Self::Protocol, rng: &mut Rng) -> Self;
+    fn noise(way: Direction, protocol: &Self::Protocol, rng: &mut Rng) -> Self;
 
     /// The unit on a line that is stuck at 0 or 1; `None` if nothing arrives.
     fn stuck(high: bool) -> Option<Self>;
@@ -62,7 +62,7 @@ impl Unit for u8 {
         self
     }
 
-    fn noise(_: Way, (): &(), rng: &mut Rng) -> Self {
+    fn noise(_: Direction, (): &(), rng: &mut Rng) -> Self {
         rng.u8(..)
     }
 
@@ -101,9 +101,9 @@ impl Unit for CanFrame {
 
     /// To the drives: a frame outside their protocol, so that no motor moves. To the program: such
     /// a frame, or a reply without a request.
-    fn noise(way: Way, protocol: &Identifiers, rng: &mut Rng) -> Self {
+    fn noise(way: Direction, protocol: &Identifiers, rng: &mut Rng) -> Self {
         let data = rng.u64(..).to_le_bytes();
-        if way == Way::Received && !protocol.replies.is_empty() && rng.bool() {
+        if way == Direction::Received && !protocol.replies.is_empty() && rng.bool() {
             return CanFrame::new(rng.u16(protocol.replies.clone()), data);
         }
         if rng.bool() {
@@ -133,9 +133,9 @@ mod tests {
         let mut rng = Rng::with_seed(1);
         let mut replies = 0;
         for _ in 0..20_000 {
-            let frame = CanFrame::noise(Way::Sent, &protocol, &mut rng);
+            let frame = CanFrame::noise(Direction::Sent, &protocol, &mut rng);
             assert!(frame.is_extended() || !is_used(frame.id() as u16), "{frame:?}");
-            let frame = CanFrame::noise(Way::Received, &protocol, &mut rng);
+            let frame = CanFrame::noise(Direction::Received, &protocol, &mut rng);
             let is_reply = !frame.is_extended() && protocol.replies.contains(&(frame.id() as u16));
             replies += usize::from(is_reply);
         }

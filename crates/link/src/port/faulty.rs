@@ -10,7 +10,8 @@ use super::error::PortError;
 use super::event::Evented;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
-use crate::fault::{Faults, Lane, Unit, Way};
+use crate::direction::Direction;
+use crate::fault::{Faults, Lane, Unit};
 
 /// A byte line with faults in both directions.
 ///
@@ -183,7 +184,7 @@ impl<T: Unit> Lanes<T> {
     fn new(faults: &Faults, pace: Duration, protocol: T::Protocol, clock: Option<Clock>) -> Self {
         let lane = |way| Lane::new(faults, way, pace.into(), protocol.clone());
         let clock = clock.unwrap_or_default();
-        Lanes { clock, sent: lane(Way::Sent), received: lane(Way::Received) }
+        Lanes { clock, sent: lane(Direction::Sent), received: lane(Direction::Received) }
     }
 
     /// Whether data are on their way.

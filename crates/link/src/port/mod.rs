@@ -46,7 +46,9 @@ pub use scheme::{CanPort, Form, Given, LinePort, Port, PortInfo, PortName, Schem
 pub use schemes::DEFAULT_BAUD;
 pub use slcan::SlcanLink;
 pub use socketcan::SocketCanLink;
-pub use tap::{Direction, TapBytes, TapCan};
+pub use tap::{TapBytes, TapCan};
+
+pub use crate::direction::Direction;
 
 pub(crate) use fd::timespec;
 pub(crate) use name::{check_printable, host_and_port, present, unknown_form};

@@ -10,15 +10,7 @@ use super::error::PortError;
 use super::event::Evented;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
-
-/// A direction, from the program's point of view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// From the program to the port.
-    Sent,
-    /// From the port to the program.
-    Received,
-}
+use crate::direction::Direction;
 
 /// Passes every chunk of a byte line to an observer.
 ///

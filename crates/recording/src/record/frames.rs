@@ -4,15 +4,12 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{
-    ByteLink, CanLink, Direction as Way, EventBytes, EventCan, TapBytes, TapCan,
-};
-use motorlink_capture as captured;
+use motorlink::port::{ByteLink, CanLink, Direction, EventBytes, EventCan, TapBytes, TapCan};
 use motorlink_capture::st::{self, Piece};
 use motorlink_proto::st::HEADER_NACK;
 
 use super::wall::{Anchor, moment, wall_at, wall_now};
-use crate::schema::{Direction, Frame, FrameResult, Time};
+use crate::schema::{Frame, FrameResult, Time};
 use crate::write::{Queue, Weighed};
 
 /// The memory for what a tap has seen, until it is taken.
@@ -156,11 +153,7 @@ impl Drop for Plug {
 }
 
 impl Seen {
-    fn new(began: Time, way: Way, at: Duration, what: Wire) -> Self {
-        let direction = match way {
-            Way::Sent => Direction::Sent,
-            Way::Received => Direction::Received,
-        };
+    fn new(began: Time, direction: Direction, at: Duration, what: Wire) -> Self {
         let since = u64::try_from(at.as_nanos()).unwrap_or(u64::MAX);
         Seen { time: Time(began.0.saturating_add(since)), direction, what }
     }
@@ -175,13 +168,9 @@ impl Splitter {
     pub fn take(&mut self, seen: Seen, put: &mut dyn FnMut(Frame)) {
         let Seen { time, direction, what } = seen;
         match what {
-            Wire::Can(frame) => put(Frame::of_can(time, direction, &frame)),
+            Wire::Can(frame) => put(Frame::of_can(time, direction.into(), &frame)),
             Wire::Bytes(bytes) => {
-                let way = match direction {
-                    Direction::Sent => captured::Direction::Sent,
-                    Direction::Received => captured::Direction::Received,
-                };
-                self.0.take(time, way, &bytes, |time, way, bytes, piece| {
+                self.0.take(time, direction, &bytes, |time, way, bytes, piece| {
                     put(frame(time, way, bytes, &piece));
                 });
             }
@@ -194,11 +183,7 @@ impl Splitter {
     }
 }
 
-fn frame(stamp: Time, way: captured::Direction, bytes: &[u8], piece: &Piece<'_>) -> Frame {
-    let direction = match way {
-        captured::Direction::Sent => Direction::Sent,
-        captured::Direction::Received => Direction::Received,
-    };
+fn frame(stamp: Time, direction: Direction, bytes: &[u8], piece: &Piece<'_>) -> Frame {
     let result = match piece {
         Piece::Frame(frame) if direction == Direction::Received && frame.header == HEADER_NACK => {
             FrameResult::Nack
@@ -206,7 +191,7 @@ fn frame(stamp: Time, way: captured::Direction, bytes: &[u8], piece: &Piece<'_>)
         Piece::Frame(_) => FrameResult::Frame,
         Piece::Broken(_) => FrameResult::Damaged,
     };
-    Frame { stamp, direction, id: 0, result, data: bytes.to_vec() }
+    Frame { stamp, direction: direction.into(), id: 0, result, data: bytes.to_vec() }
 }
 
 #[cfg(test)]
@@ -221,7 +206,7 @@ mod tests {
         let mut put = |frame: Frame| frames.push((frame.result, frame.data.len()));
         for bytes in received {
             let what = Wire::Bytes((*bytes).into());
-            splitter.take(Seen::new(Time(0), Way::Received, Duration::ZERO, what), &mut put);
+            splitter.take(Seen::new(Time(0), Direction::Received, Duration::ZERO, what), &mut put);
         }
         splitter.end(&mut put);
         frames

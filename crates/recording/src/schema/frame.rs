@@ -1,5 +1,6 @@
 //! The message of a frame on the wire.
 
+use motorlink::port;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::IDENTIFIERS;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,15 @@ named!(Direction as "uint8": Sent = "SENT", Received = "RECEIVED");
 impl From<u8> for Direction {
     fn from(direction: u8) -> Self {
         if direction == 0 { Direction::Sent } else { Direction::Received }
+    }
+}
+
+impl From<port::Direction> for Direction {
+    fn from(direction: port::Direction) -> Self {
+        match direction {
+            port::Direction::Sent => Direction::Sent,
+            port::Direction::Received => Direction::Received,
+        }
     }
 }
 

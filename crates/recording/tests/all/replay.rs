@@ -19,10 +19,7 @@ use motorlink_testbench::{Bench, BenchConfig};
 type Frames = Arc<Mutex<Vec<Frame>>>;
 
 fn keep(frames: &Frames, direction: Direction, at: Duration, id: u32, data: &[u8]) {
-    let direction = match direction {
-        Direction::Sent => schema::Direction::Sent,
-        Direction::Received => schema::Direction::Received,
-    };
+    let direction = direction.into();
     let stamp = Time(at.as_nanos() as u64);
     let data = data.to_vec();
     let frame = Frame { stamp, direction, id, result: FrameResult::Frame, data };

@@ -13,8 +13,7 @@ use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::can::CanFrame;
-use motorlink::port::{Direction as Way, EventBytes, EventCan, TapBytes, TapCan};
-use motorlink_capture::Direction;
+use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
 use motorlink_proto::time::{Instant, Micros};
 
 use frame_ring::Memory;
@@ -40,14 +39,15 @@ impl Tap {
     /// Around a serial line.
     pub fn around_line(&self, link: Box<dyn EventBytes>) -> Box<dyn EventBytes> {
         let (tap, clock) = (self.clone(), self.clock(link.clock()));
-        let keep = move |way, at, bytes: &[u8]| tap.keep(at, way, What::Bytes(bytes));
+        let keep = move |direction, at, bytes: &[u8]| tap.keep(at, direction, What::Bytes(bytes));
         Box::new(TapBytes::by(clock, link, keep))
     }
 
     /// Around a CAN bus.
     pub fn around_bus(&self, link: Box<dyn EventCan>) -> Box<dyn EventCan> {
         let (tap, clock) = (self.clone(), self.clock(link.clock()));
-        let keep = move |way, at, frame: &CanFrame| tap.keep(at, way, What::Can(*frame));
+        let keep =
+            move |direction, at, frame: &CanFrame| tap.keep(at, direction, What::Can(*frame));
         Box::new(TapCan::by(clock, link, keep))
     }
 
@@ -56,11 +56,7 @@ impl Tap {
         self.0.clock.get_or_init(|| of_port.unwrap_or_default()).clone()
     }
 
-    fn keep(&self, at: Duration, way: Way, what: What<'_>) {
-        let direction = match way {
-            Way::Sent => Direction::Sent,
-            Way::Received => Direction::Received,
-        };
+    fn keep(&self, at: Duration, direction: Direction, what: What<'_>) {
         self.memory().keep(Instant(0) + Micros::from(at), direction, what);
     }
 

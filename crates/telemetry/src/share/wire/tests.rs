@@ -47,16 +47,16 @@ impl Line {
     }
 
     fn sent(&self, bytes: &[u8]) -> &Self {
-        self.tap.keep(self.now(), Way::Sent, What::Bytes(bytes));
+        self.tap.keep(self.now(), Direction::Sent, What::Bytes(bytes));
         self
     }
 
     fn came(&self, bytes: &[u8]) -> &Self {
-        self.tap.keep(self.now(), Way::Received, What::Bytes(bytes));
+        self.tap.keep(self.now(), Direction::Received, What::Bytes(bytes));
         self
     }
 
-    fn can(&self, way: Way, motor: u8, data: [u8; 8]) -> &Self {
+    fn can(&self, way: Direction, motor: u8, data: [u8; 8]) -> &Self {
         let id = MotorId::new(motor).unwrap().can_id();
         self.tap.keep(self.now(), way, What::Can(CanFrame::new(id, data)));
         self
@@ -197,11 +197,11 @@ fn motors_of_a_bus_answer_on_their_own() {
     let line = Line::new(DriveProtocol::Rmd);
     let read = [0x9A, 0, 0, 0, 0, 0, 0, 0];
     let status = [0x9A, 25, 0, 240, 0, 0, 0, 0];
-    line.at(0).can(Way::Sent, 1, read).can(Way::Sent, 2, read);
-    line.at(1).can(Way::Received, 2, status);
-    line.at(60).can(Way::Sent, 1, read);
-    line.at(61).can(Way::Received, 1, status).at(120);
-    line.tap.keep(line.now(), Way::Received, What::Can(CanFrame::new(0x7FF, [0; 8])));
+    line.at(0).can(Direction::Sent, 1, read).can(Direction::Sent, 2, read);
+    line.at(1).can(Direction::Received, 2, status);
+    line.at(60).can(Direction::Sent, 1, read);
+    line.at(61).can(Direction::Received, 1, status).at(120);
+    line.tap.keep(line.now(), Direction::Received, What::Can(CanFrame::new(0x7FF, [0; 8])));
     let got = line.read(ALL);
     let told: Vec<_> = got.frames.iter().map(|it| (it.motor, it.unanswered, it.retry)).collect();
     let expected = [
