@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{Direction, PortName, TapBytes, TapCan};
+use motorlink::port::{Direction, PortName, Tap};
 use motorlink::time::{Instant as Moment, Micros};
 use motorlink::{rmd, st};
 use motorlink_proto::rmd::{Code, MotorId, Stop};
@@ -237,7 +237,7 @@ fn bus(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
     let wire = Arc::clone(wire);
     let wrap = move |link| {
         let wire = Arc::clone(&wire);
-        let tap = TapCan::new(link, move |way, _, frame: &motorlink::can::CanFrame| {
+        let tap = Tap::frames(link, move |way, _, frame: &motorlink::can::CanFrame| {
             let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
             lock(&wire).seen(way, code == Some(Code::Stop));
         });
@@ -259,7 +259,7 @@ fn line(address: &str, wire: &Arc<Mutex<Wire>>) -> Result<Opened> {
     let wire = Arc::clone(wire);
     let wrap = move |link| {
         let wire = Arc::clone(&wire);
-        let tap = TapBytes::new(link, move |way, _, bytes: &[u8]| {
+        let tap = Tap::bytes(link, move |way, _, bytes: &[u8]| {
             lock(&wire).seen(way, is_stop(bytes));
         });
         Box::new(tap) as Box<dyn motorlink::port::EventBytes>

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motorlink::port::{
-    ByteLink, CanLink, EventBytes, EventCan, FaultBytes, FaultCan, PortName, TapBytes, TapCan,
+    ByteLink, CanLink, EventBytes, EventCan, FaultBytes, FaultCan, PortName, Tap,
 };
 use motorlink::rmd::IDENTIFIERS;
 use motorlink::st::Profile;
@@ -63,7 +63,7 @@ impl Connection {
             let faulty = |link: Box<dyn ByteLink>, faults: &Faults| -> Box<dyn ByteLink> {
                 Box::new(FaultBytes::new(link, faults))
             };
-            wrap.around(link, faulty, |link| Box::new(TapBytes::new(link, trace::bytes(profile))))
+            wrap.around(link, faulty, |link| Box::new(Tap::bytes(link, trace::bytes(profile))))
         })
     }
 
@@ -78,7 +78,7 @@ impl Connection {
             let faulty = |link: Box<dyn EventBytes>, faults: &Faults| -> Box<dyn EventBytes> {
                 Box::new(FaultBytes::new(link, faults))
             };
-            wrap.around(link, faulty, |link| Box::new(TapBytes::new(link, trace::bytes(profile))))
+            wrap.around(link, faulty, |link| Box::new(Tap::bytes(link, trace::bytes(profile))))
         })
     }
 
@@ -91,7 +91,7 @@ impl Connection {
             let faulty = |link: Box<dyn CanLink>, faults: &Faults| -> Box<dyn CanLink> {
                 Box::new(FaultCan::new(link, faults, IDENTIFIERS))
             };
-            wrap.around(link, faulty, |link| Box::new(TapCan::new(link, trace::frames())))
+            wrap.around(link, faulty, |link| Box::new(Tap::frames(link, trace::frames())))
         })
     }
 
@@ -104,7 +104,7 @@ impl Connection {
             let faulty = |link: Box<dyn EventCan>, faults: &Faults| -> Box<dyn EventCan> {
                 Box::new(FaultCan::new(link, faults, IDENTIFIERS))
             };
-            wrap.around(link, faulty, |link| Box::new(TapCan::new(link, trace::frames())))
+            wrap.around(link, faulty, |link| Box::new(Tap::frames(link, trace::frames())))
         })
     }
 

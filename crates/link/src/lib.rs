@@ -8,7 +8,7 @@
 //! | serve a simulated drive on a pty, a socket or a CAN interface | [`serve::Server`] |
 //! | reopen a port after a failure, with back-off | [`reopening::Reopening`] |
 //! | inject faults into a line | [`fault::Faults`], [`port::FaultBytes`], [`port::FaultCan`] |
-//! | observe the traffic of a port | [`port::TapBytes`], [`port::TapCan`] |
+//! | observe the traffic of a port | [`port::Tap`] |
 //! | run on virtual time | [`clock::Clock`] |
 //!
 //! This crate knows no protocol of a drive.

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use motorlink::port::{CanLink, Direction, Link, PortError, TapBytes, TapCan};
+use motorlink::port::{CanLink, Direction, Link, PortError, Tap};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, MotorId, Stop};
 use motorlink_proto::st;
@@ -82,7 +82,7 @@ fn a_stop_can_come_between_exchanges_that_are_answered_at_once() {
     let seen = Arc::clone(&wire);
     let times = Arc::new(AtomicU32::new(0));
     let link = Answering(bench.can(&spec("")), Arc::clone(&times));
-    let tap = TapCan::new(link, move |way, _, _: &CanFrame| record(&seen, false, way));
+    let tap = Tap::frames(link, move |way, _, _: &CanFrame| record(&seen, false, way));
     let mut engine = Engine::rmd(tap);
     let wanted: Vec<Signal> =
         (1..=4).flat_map(|id| signals(rmd(id), &["speed_dps", "voltage_volts"])).collect();
@@ -106,7 +106,7 @@ fn on_a_serial_line() -> (Engine, Wire) {
     let wire = Wire::default();
     let seen = Arc::clone(&wire);
     // EXECUTE_CMD.
-    let tap = TapBytes::new(bench.bytes(&spec("")), move |way, _, bytes: &[u8]| {
+    let tap = Tap::bytes(bench.bytes(&spec("")), move |way, _, bytes: &[u8]| {
         record(&seen, bytes[0] & 0x1F == 0x03, way);
     });
     (Engine::st(tap, st_options(bench.profile())), wire)
@@ -155,7 +155,7 @@ fn a_stop_goes_out_at_once_on_a_saturated_bus() {
     let bench = bench();
     let wire = Wire::default();
     let seen = Arc::clone(&wire);
-    let tap = TapCan::new(bench.can(&spec("")), move |way, _, frame: &CanFrame| {
+    let tap = Tap::frames(bench.can(&spec("")), move |way, _, frame: &CanFrame| {
         let code = frame.eight_bytes().map(|(_, data)| Code::from(data[0]));
         record(&seen, code == Some(Code::Stop), way);
     });

@@ -46,7 +46,7 @@ pub use scheme::{CanPort, Form, Given, LinePort, Port, PortInfo, PortName, Schem
 pub use schemes::DEFAULT_BAUD;
 pub use slcan::SlcanLink;
 pub use socketcan::SocketCanLink;
-pub use tap::{TapBytes, TapCan};
+pub use tap::Tap;
 
 pub use crate::direction::Direction;
 

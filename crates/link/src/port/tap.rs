@@ -12,50 +12,42 @@ use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 use crate::direction::Direction;
 
-/// Passes every chunk of a byte line to an observer.
+/// Passes every chunk of a byte line, or every frame of a CAN bus, to an observer.
 ///
-/// The observer gets the direction, the time since the tap was made, and the bytes. Sent bytes are
-/// passed after the port accepted them.
+/// The observer gets the direction, the time since the tap was made, and the bytes or the frame. What
+/// is sent is passed after the port accepted it.
 #[derive(Debug)]
-pub struct TapBytes<B, F> {
-    link: B,
+pub struct Tap<L, F> {
+    link: L,
     observer: F,
     time: Stopwatch,
 }
 
-/// Passes every frame of a CAN port to an observer, like [`TapBytes`] for bytes.
-#[derive(Debug)]
-pub struct TapCan<C, F> {
-    link: C,
-    observer: F,
-    time: Stopwatch,
-}
-
-impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> TapBytes<B, F> {
-    /// Wraps `link`.
-    pub fn new(link: B, observer: F) -> Self {
-        TapBytes { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
+impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> Tap<B, F> {
+    /// Wraps a byte line.
+    pub fn bytes(link: B, observer: F) -> Self {
+        Tap { time: Stopwatch::on(&link), link, observer }
     }
 
-    /// Wraps `link`, which has this clock from now on. Times are those since the clock's 0.
-    pub fn by(clock: Clock, link: B, observer: F) -> Self {
-        TapBytes { time: Stopwatch(clock, Instant(0)), link, observer }
+    /// Wraps a byte line, which has this clock from now on. Times are those since the clock's 0.
+    pub fn bytes_by(clock: Clock, link: B, observer: F) -> Self {
+        Tap { time: Stopwatch(clock, Instant(0)), link, observer }
     }
 }
 
-impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
-    /// Wraps `link`.
-    pub fn new(link: C, observer: F) -> Self {
-        TapCan { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
+impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> Tap<C, F> {
+    /// Wraps a CAN bus.
+    pub fn frames(link: C, observer: F) -> Self {
+        Tap { time: Stopwatch::on(&link), link, observer }
     }
 
-    /// Wraps `link`, which has this clock from now on. Times are those since the clock's 0.
-    pub fn by(clock: Clock, link: C, observer: F) -> Self {
-        TapCan { time: Stopwatch(clock, Instant(0)), link, observer }
+    /// Wraps a CAN bus, which has this clock from now on. Times are those since the clock's 0.
+    pub fn frames_by(clock: Clock, link: C, observer: F) -> Self {
+        Tap { time: Stopwatch(clock, Instant(0)), link, observer }
     }
 }
 
-impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> Link for TapBytes<B, F> {
+impl<L: Link, F: Send> Link for Tap<L, F> {
     fn within(&self) -> Option<&dyn Link> {
         Some(&self.link)
     }
@@ -65,7 +57,7 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> Link for TapBytes
     }
 }
 
-impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapBytes<B, F> {
+impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for Tap<B, F> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let at = self.time.elapsed();
         self.link.write(bytes)?;
@@ -82,17 +74,7 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapB
     }
 }
 
-impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> Link for TapCan<C, F> {
-    fn within(&self) -> Option<&dyn Link> {
-        Some(&self.link)
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.time.0.clone())
-    }
-}
-
-impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for TapCan<C, F> {
+impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Tap<C, F> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         let at = self.time.elapsed();
         self.link.send(frame)?;
@@ -109,7 +91,7 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
     }
 }
 
-impl<B: Evented, F> Evented for TapBytes<B, F> {
+impl<L: Evented, F> Evented for Tap<L, F> {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.link.descriptor()
     }
@@ -123,22 +105,13 @@ impl<B: Evented, F> Evented for TapBytes<B, F> {
     }
 }
 
-impl<C: Evented, F> Evented for TapCan<C, F> {
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.link.descriptor()
-    }
-
-    fn flush(&mut self) -> Result<bool, PortError> {
-        self.link.flush()
-    }
-}
-
 /// Time since a tap was made.
 #[derive(Debug)]
 struct Stopwatch(Clock, Instant);
 
 impl Stopwatch {
-    fn on(clock: Clock) -> Self {
+    fn on(link: &impl Link) -> Self {
+        let clock = link.clock().unwrap_or_default();
         let now = clock.now();
         Stopwatch(clock, now)
     }

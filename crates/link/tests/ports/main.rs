@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink_link::port::{
-    ByteLink, CanLink, Direction, FdLink, PortError, PortName, SlcanLink, TapBytes, TapCan,
+    ByteLink, CanLink, Direction, FdLink, PortError, PortName, SlcanLink, Tap,
 };
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Server, Station};
@@ -303,7 +303,7 @@ fn a_tap_sees_what_passes_in_both_directions() -> Outcome {
     let server = Running::bytes("tcp-listen:127.0.0.1:0")?;
     let seen = Arc::new(Mutex::new(Vec::new()));
     let log = seen.clone();
-    let mut line = TapBytes::new(
+    let mut line = Tap::bytes(
         open_line(&format!("tcp:{}", server.served.path))?,
         move |direction, at: Duration, bytes: &[u8]| {
             log.lock().expect("no panic before").push((direction, at, bytes.to_vec()));
@@ -321,7 +321,7 @@ fn a_tap_sees_what_passes_in_both_directions() -> Outcome {
     let place = Place::new("tap");
     let _server = Running::can(&place.as_port("slcan-pty"))?;
     let mut frames = Vec::new();
-    let mut bus = TapCan::new(open_can(&place.as_port("slcan"))?, |direction, _, frame: &_| {
+    let mut bus = Tap::frames(open_can(&place.as_port("slcan"))?, |direction, _, frame: &_| {
         frames.push((direction, *frame));
     });
     bus.send(&request(7))?;

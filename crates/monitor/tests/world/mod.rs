@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::shared::Share;
-use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink::port::{Direction, EventBytes, EventCan, Tap};
 use motorlink_monitor::drive::{Drives, MotionPermit};
 use motorlink_monitor::message::{Answer, Ask, RunResult};
 use motorlink_proto::st::{Frame, Parse, Profile};
@@ -85,7 +85,7 @@ impl World {
                     stream.drain(..size);
                 }
             };
-            Box::new(TapBytes::new(around(link), observer))
+            Box::new(Tap::bytes(around(link), observer))
         };
         let observed_bus = move |link| -> Box<dyn EventCan> {
             let wire = Arc::clone(&rmd_wire);
@@ -95,7 +95,7 @@ impl World {
                     wire.lock().unwrap().push((motor, frame.data().to_vec()));
                 }
             };
-            Box::new(TapCan::new(around_bus(link), observer))
+            Box::new(Tap::frames(around_bus(link), observer))
         };
         let around = (observed, observed_bus);
         let share = Share::of(name, profile, (timeout, timeout), None, around);

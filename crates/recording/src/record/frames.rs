@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, Direction, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink::port::{ByteLink, CanLink, Direction, EventBytes, EventCan, Tap};
 use motorlink_capture::st::{self, Piece};
 use motorlink_proto::st::HEADER_NACK;
 
@@ -62,7 +62,7 @@ impl Taps {
     /// Around a serial line.
     pub fn around_line(&self, link: Box<dyn EventBytes>) -> Box<dyn EventBytes> {
         let (seen, began) = (self.seen.clone(), self.now(link.clock()));
-        Box::new(TapBytes::new(link, move |way, at, bytes: &[u8]| {
+        Box::new(Tap::bytes(link, move |way, at, bytes: &[u8]| {
             seen.push(Seen::new(began, way, at, Wire::Bytes(bytes.into())));
         }))
     }
@@ -70,7 +70,7 @@ impl Taps {
     /// Around a CAN bus.
     pub fn around_bus(&self, link: Box<dyn EventCan>) -> Box<dyn EventCan> {
         let (seen, began) = (self.seen.clone(), self.now(link.clock()));
-        Box::new(TapCan::new(link, move |way, at, frame: &CanFrame| {
+        Box::new(Tap::frames(link, move |way, at, frame: &CanFrame| {
             seen.push(Seen::new(began, way, at, Wire::Can(*frame)));
         }))
     }
@@ -114,7 +114,7 @@ impl Outlet {
     /// Around a serial line.
     pub fn around_line(&self, link: Box<dyn ByteLink>) -> Box<dyn ByteLink> {
         let (outlet, began) = (self.clone(), moment());
-        Box::new(TapBytes::new(link, move |way, at, bytes: &[u8]| {
+        Box::new(Tap::bytes(link, move |way, at, bytes: &[u8]| {
             outlet.see(|| Seen::new(wall_at(began), way, at, Wire::Bytes(bytes.into())));
         }))
     }
@@ -122,7 +122,7 @@ impl Outlet {
     /// Around a CAN bus.
     pub fn around_bus(&self, link: Box<dyn CanLink>) -> Box<dyn CanLink> {
         let (outlet, began) = (self.clone(), moment());
-        Box::new(TapCan::new(link, move |way, at, frame: &CanFrame| {
+        Box::new(Tap::frames(link, move |way, at, frame: &CanFrame| {
             outlet.see(|| Seen::new(wall_at(began), way, at, Wire::Can(*frame)));
         }))
     }

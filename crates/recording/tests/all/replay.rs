@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, Direction, TapBytes, TapCan};
+use motorlink::port::{ByteLink, CanLink, Direction, Tap};
 use motorlink::{Clock, rmd, st};
 use motorlink_link::fault::Faults;
 use motorlink_link::serve::{Station, StationLink};
@@ -29,7 +29,7 @@ fn keep(frames: &Frames, direction: Direction, at: Duration, id: u32, data: &[u8
 fn recorded_bytes(link: Box<dyn ByteLink>) -> (Box<dyn ByteLink>, Frames) {
     let frames = Frames::default();
     let kept = Arc::clone(&frames);
-    let tap = TapBytes::new(link, move |direction, at, bytes: &[u8]| {
+    let tap = Tap::bytes(link, move |direction, at, bytes: &[u8]| {
         keep(&kept, direction, at, 0, bytes);
     });
     (Box::new(tap), frames)
@@ -38,7 +38,7 @@ fn recorded_bytes(link: Box<dyn ByteLink>) -> (Box<dyn ByteLink>, Frames) {
 fn recorded_can(link: Box<dyn CanLink>) -> (Box<dyn CanLink>, Frames) {
     let frames = Frames::default();
     let kept = Arc::clone(&frames);
-    let tap = TapCan::new(link, move |direction, at, frame: &CanFrame| {
+    let tap = Tap::frames(link, move |direction, at, frame: &CanFrame| {
         keep(&kept, direction, at, frame.id(), frame.data());
     });
     (Box::new(tap), frames)

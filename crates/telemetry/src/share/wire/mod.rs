@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::can::CanFrame;
-use motorlink::port::{Direction, EventBytes, EventCan, TapBytes, TapCan};
+use motorlink::port::{self, Direction, EventBytes, EventCan};
 use motorlink_proto::time::{Instant, Micros};
 
 use frame_ring::Memory;
@@ -40,7 +40,7 @@ impl Tap {
     pub fn around_line(&self, link: Box<dyn EventBytes>) -> Box<dyn EventBytes> {
         let (tap, clock) = (self.clone(), self.clock(link.clock()));
         let keep = move |direction, at, bytes: &[u8]| tap.keep(at, direction, What::Bytes(bytes));
-        Box::new(TapBytes::by(clock, link, keep))
+        Box::new(port::Tap::bytes_by(clock, link, keep))
     }
 
     /// Around a CAN bus.
@@ -48,7 +48,7 @@ impl Tap {
         let (tap, clock) = (self.clone(), self.clock(link.clock()));
         let keep =
             move |direction, at, frame: &CanFrame| tap.keep(at, direction, What::Can(*frame));
-        Box::new(TapCan::by(clock, link, keep))
+        Box::new(port::Tap::frames_by(clock, link, keep))
     }
 
     /// That of the line, which takes it from the port. A port that is opened again has the same one.
