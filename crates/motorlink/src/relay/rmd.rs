@@ -8,7 +8,7 @@ use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::MotorId;
+use motorlink_proto::rmd::{MotorId, MotorSet};
 use motorlink_proto::time::{self, Instant};
 
 use super::event::{Event, Halt, Outcome, Part};
@@ -110,17 +110,17 @@ impl Hold for RmdHold {
     }
 
     fn forget(&mut self, _: Instant) -> usize {
-        self.follower.client_left();
+        self.follower.unguarded = MotorSet::EMPTY;
         self.held.forget()
     }
 
     fn owes(&self) -> bool {
-        !self.follower.moving().is_empty()
+        !self.follower.moving.is_empty()
     }
 
     /// Tells the motors first, then waits for answers that can only be to what they are told again.
     fn stop(&mut self) -> Vec<Halt> {
-        let moving = self.follower.moving();
+        let moving = self.follower.moving;
         let request = self.on_loss.request();
         for id in moving {
             // The bus below listens first. If this fails, so does what follows, which says why.
@@ -139,7 +139,7 @@ impl Hold for RmdHold {
         };
         bus.take_over(moving);
         let stopped = bus.stop_on_drop().with(self.on_loss).stop_now();
-        self.follower.left_moving(bus.moving());
+        self.follower.moving = bus.moving();
         let told = |Stopped { id, result }: Stopped| Halt {
             part: Part::Motor(id.number()),
             outcome: match result {

@@ -73,7 +73,7 @@ impl StHold {
     }
 
     fn disable_pfc(&mut self, client: &Client) -> Option<Halt> {
-        let motor = self.follower.pfc()?;
+        let motor = self.follower.pfc?;
         let disable = Request::ExecuteCommand(Command::PfcDisable);
         let outcome = match client.exchange(motor, &disable, |_| Some(())) {
             Ok(()) => Outcome::Acknowledged("PFC_DISABLE".into()),
@@ -81,14 +81,14 @@ impl StHold {
             Err(Error::Refused {
                 code: ErrorCode::WrongCmd | ErrorCode::BadMotorSelected, ..
             }) => {
-                self.follower.forget_pfc();
+                self.follower.pfc = None;
                 return None;
             }
             Err(error) => Outcome::Failed(error.to_string()),
         };
         let halt = Halt { part: Part::Pfc, outcome };
         if halt.is_stopped() {
-            self.follower.forget_pfc();
+            self.follower.pfc = None;
         }
         Some(halt)
     }
@@ -129,14 +129,14 @@ impl Hold for StHold {
     }
 
     fn owes(&self) -> bool {
-        !self.follower.started().is_empty() || self.follower.pfc().is_some()
+        !self.follower.started.is_empty() || self.follower.pfc.is_some()
     }
 
     /// Recovers the line, sends STOP_MOTOR to what was started, and looks whether it stops.
     fn stop(&mut self) -> Vec<Halt> {
         // If the port is gone, so it is for the client below.
         let _ = self.pull();
-        let (owed, pfc) = (self.follower.started(), self.follower.pfc());
+        let (owed, pfc) = (self.follower.started, self.follower.pfc);
         let port = &self.held.port;
         let open = port.opener(|port| Box::new(port) as Box<dyn ByteLink>);
         let halts: Vec<Halt> = match Client::open_with(&port.name(), open, self.options) {
@@ -159,7 +159,7 @@ impl Hold for StHold {
         };
         for halt in halts.iter().filter(|halt| !halt.is_stopped()) {
             if let Part::Motor(number) = halt.part {
-                self.follower.presume(number);
+                self.follower.started.presume(number);
             }
         }
         if self.owes() {

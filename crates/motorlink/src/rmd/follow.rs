@@ -17,11 +17,12 @@ const WAITING: usize = 64;
 /// has acknowledged an 0x80 or 0x81 that was sent after that.
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
-    moving: MotorSet,
+    /// Motors that were set moving and not stopped.
+    pub(crate) moving: MotorSet,
     /// Requests without a reply yet, by motor, oldest first.
     asked: [VecDeque<SeenRequest>; MotorId::COUNT],
-    /// Motors for which commands of other nodes were reported.
-    unguarded: MotorSet,
+    /// Motors for which commands of other nodes were reported to the present client.
+    pub(crate) unguarded: MotorSet,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -43,21 +44,6 @@ pub(crate) struct Heard {
 }
 
 impl Follower {
-    /// Motors that were set moving and not stopped.
-    pub(crate) fn moving(&self) -> MotorSet {
-        self.moving
-    }
-
-    /// Of those that were moving, these are left.
-    pub(crate) fn left_moving(&mut self, moving: MotorSet) {
-        self.moving = moving;
-    }
-
-    /// Commands of other nodes are reported to the next client again.
-    pub(crate) fn client_left(&mut self) {
-        self.unguarded = MotorSet::EMPTY;
-    }
-
     /// The client sends `frame`, its frame of this `number`.
     pub(crate) fn sent(&mut self, now: Instant, frame: &CanFrame, number: u64) {
         let Some((can_id, &[code, ..])) = frame.eight_bytes() else { return };
@@ -123,7 +109,7 @@ mod tests {
     const NONE: [u8; 0] = [];
 
     fn ids(follower: &Follower) -> Vec<u8> {
-        follower.moving().map(MotorId::number).collect()
+        follower.moving.map(MotorId::number).collect()
     }
 
     /// A conversation: `>` is the client's frame, `<` one of the bus; motor, code.
@@ -197,7 +183,7 @@ mod tests {
         assert!(follower.heard(Instant(0), &frame(4, 0xA2)).unguarded.is_some(), "another's");
         assert_eq!(follower.heard(Instant(0), &frame(5, 0x9A)).unguarded, None, "moves nothing");
         assert_eq!(ids(&follower), [4], "it is not guarded either");
-        follower.client_left();
+        follower.unguarded = MotorSet::EMPTY;
         assert!(follower.heard(Instant(0), &frame(3, 0xA2)).unguarded.is_some());
     }
 

@@ -14,9 +14,9 @@ use motorlink_proto::st::{
 /// So it is with PFC_ENABLE and PFC_DISABLE.
 #[derive(Debug, Default)]
 pub(crate) struct Follower {
-    started: Started,
+    pub(crate) started: Started,
     /// The PFC may be enabled; the motor number that this was said with.
-    pfc: Option<u8>,
+    pub(crate) pfc: Option<u8>,
     /// Sent since the last whole reply.
     request: Vec<u8>,
     /// What came for it.
@@ -33,25 +33,6 @@ impl Follower {
     /// On a line where these motors were started before, and the PFC was enabled with this number.
     pub(crate) fn with(started: Started, pfc: Option<u8>) -> Self {
         Follower { started, pfc, ..Follower::default() }
-    }
-
-    pub(crate) fn started(&self) -> Started {
-        self.started
-    }
-
-    /// Takes a motor for started.
-    pub(crate) fn presume(&mut self, number: u8) {
-        self.started.presume(number);
-    }
-
-    /// The motor number with which the PFC was enabled, if it may be.
-    pub(crate) fn pfc(&self) -> Option<u8> {
-        self.pfc
-    }
-
-    /// The PFC is disabled, or there is none.
-    pub(crate) fn forget_pfc(&mut self) {
-        self.pfc = None;
     }
 
     /// The bytes whose reply may still come, or that a drive may take for half a frame; `None` when
@@ -187,7 +168,7 @@ mod tests {
     }
 
     fn motors(follower: &Follower) -> Vec<u8> {
-        follower.started().motors().map(|motor| motor.number()).collect()
+        follower.started.motors().map(|motor| motor.number()).collect()
     }
 
     #[test]
@@ -202,7 +183,7 @@ mod tests {
             follower.sent(&command(2, Command::StopMotor));
             assert_eq!(motors(&follower), [2]);
             follower.heard(&ACK);
-            assert!(follower.started().is_empty());
+            assert!(follower.started.is_empty());
         }
     }
 
@@ -210,16 +191,16 @@ mod tests {
     fn the_pfc_is_enabled_until_its_end_is_acknowledged() {
         let mut follower = Follower::default();
         follower.sent(&command(1, Command::PfcEnable));
-        assert_eq!(follower.pfc(), Some(1));
-        assert!(follower.started().is_empty());
+        assert_eq!(follower.pfc, Some(1));
+        assert!(follower.started.is_empty());
         follower.heard(&ACK);
         follower.sent(&command(1, Command::PfcDisable));
-        assert_eq!(follower.pfc(), Some(1));
+        assert_eq!(follower.pfc, Some(1));
         follower.heard(&ACK);
-        assert_eq!(follower.pfc(), None);
+        assert_eq!(follower.pfc, None);
         // Wherever it stands, as a START.
         follower.sent(&[&[0xFF; 9][..], &command(2, Command::PfcEnable)].concat());
-        assert_eq!(follower.pfc(), Some(2));
+        assert_eq!(follower.pfc, Some(2));
     }
 
     #[test]
