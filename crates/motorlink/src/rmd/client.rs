@@ -45,7 +45,7 @@ pub const SCAN_WIDTH: usize = 8;
 /// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
 /// and [`Stop`](proto::Stop) alone do not wait.
 pub struct Client {
-    turns: Turns<Driven<Box<dyn CanLink>>>,
+    pub(super) turns: Turns<Driven<Box<dyn CanLink>>>,
     sign: LinkSign,
 }
 
@@ -132,46 +132,30 @@ impl Client {
 
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
-        self.turns.take().session.counters()
-    }
-
-    /// Refuses from now on what stops no motor.
-    pub(super) fn refuse_motion(&self) {
-        self.turns.take().session.retire();
+        *self.turns.take().session.host.counters()
     }
 
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
-        self.turns.take().session.moving()
+        self.turns.take().session.moving
     }
 
     /// Takes motors over that somebody else set moving.
     pub(crate) fn take_over(&self, moving: MotorSet) {
-        self.turns.take().session.take_over(moving);
+        let mut driven = self.turns.take();
+        driven.session.moving = driven.session.moving.union(moving);
     }
 
     /// Sets the limits of commands to a motor. They apply to every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
-        self.turns.take().session.set_limits(id, limits);
+        self.turns.take().session.host.set_limits(id, limits);
     }
 
     /// Changes the limits of a motor. `change` gets the present limits and returns the new ones.
     pub fn change_limits(&self, id: MotorId, change: impl FnOnce(Limits) -> Limits) {
         let mut driven = self.turns.take();
-        let limits = change(driven.session.limits(id));
-        driven.session.set_limits(id, limits);
-    }
-
-    /// The motors of [`moving`](Self::moving), and those that only a frame with four torques reached,
-    /// without an expected reply.
-    pub(super) fn moved(&self) -> (MotorSet, MotorSet) {
-        let driven = self.turns.take();
-        (driven.session.moving(), driven.session.unexpected())
-    }
-
-    /// Checks a request against the motor's limits. Nothing is sent.
-    pub(super) fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
-        self.turns.take().session.check_limits(id, request)
+        let limits = change(driven.session.host.limits(id));
+        driven.session.host.set_limits(id, limits);
     }
 
     /// One exchange with one motor. A motor in quarantine is waited for.
@@ -203,9 +187,9 @@ impl Client {
     /// of [`raw`](Self::raw).
     pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
         let mut driven = self.turns.take();
-        let losses = driven.session.losses(id);
+        let losses = driven.session.losses[id.index()];
         driven.ready([])?;
-        let is_lost = driven.session.losses(id) != losses;
+        let is_lost = driven.session.losses[id.index()] != losses;
         let now = driven.port.now();
         driven.session.insist(now, id, Asked::Confirmation)?;
         let port = Arc::clone(&driven.port.name);
@@ -219,12 +203,12 @@ impl Client {
     /// How often a motor's replies could not be confirmed: they were found unconfirmed, or an exchange was
     /// given up. A confirmation says nothing about replies before such a loss.
     pub fn losses(&self, id: MotorId) -> u32 {
-        self.turns.take().session.losses(id)
+        self.turns.take().session.losses[id.index()]
     }
 
     /// When the last frame to a motor was sent.
     pub fn sent(&self, id: MotorId) -> time::Instant {
-        self.turns.take().session.sent(id)
+        self.turns.take().session.sent[id.index()]
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -256,32 +240,12 @@ impl Client {
         self.turns.take().port.end_with(ending);
     }
 
-    /// The next call opens a closed port at once.
-    pub(super) fn retry_now(&self) {
-        self.turns.take().port.retry_now();
-    }
-
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
         self.turns.take().port.only_own(true);
         let result = act();
         self.turns.take().port.only_own(false);
         result
-    }
-
-    /// Whether another program holds the port.
-    pub(super) fn is_held(&self) -> bool {
-        self.turns.take().session.held.is_some()
-    }
-
-    /// The motors that a program that holds the port knows, and of which it had no reply.
-    pub(super) fn missed(&self) -> MotorSet {
-        self.turns.take().session.missed
-    }
-
-    /// Whether this is what a program that holds the port says after it has repeated a stop.
-    pub(super) fn is_given_up(&self, error: &Error) -> bool {
-        self.turns.take().session.is_given_up(error)
     }
 
     /// As [`cycle`](Self::cycle). A motor in quarantine is waited for.

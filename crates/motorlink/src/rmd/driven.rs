@@ -5,7 +5,7 @@ use std::time::{self as machine, Duration};
 use motorlink_link::port::{CanLink, PortError};
 use motorlink_link::reopening::Reopening;
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::MotorId;
+use motorlink_proto::rmd::{MotorId, MotorSet};
 use motorlink_proto::time;
 
 use super::session::{Session, SessionOutput, ends_motion};
@@ -25,7 +25,7 @@ impl<L: CanLink> Driven<L> {
         let port = Port::new(port);
         let mut session = Session::new(port.name.clone(), options);
         if port.open_link().is_some_and(Way::is_fresh) {
-            session.trust();
+            session.host.trust(MotorSet::ALL);
         }
         if let Some(line) = port.open_link().and_then(Way::held) {
             session.set_holder(line);
@@ -64,12 +64,12 @@ impl<L: CanLink> Driven<L> {
     /// pass for a reply to what is sent now.
     pub(super) fn listen(&mut self) -> Result<(), Error> {
         let now = self.port.now();
-        let moved = self.session.moving().union(self.session.unexpected());
+        let moved = self.session.moving.union(self.session.unexpected());
         let (way, reopened) = self.port.ready(moved.map(MotorId::number))?;
         if reopened {
             self.session.reopened(now, way.held());
             if way.is_fresh() {
-                self.session.trust();
+                self.session.host.trust(MotorSet::ALL);
             }
         }
         loop {
@@ -87,7 +87,7 @@ impl<L: CanLink> Driven<L> {
         match self.port.link()?.0 {
             Way::Line(link) => {
                 let Some(frame) = link.receive(wait)? else { return Ok(false) };
-                self.session.receive(self.port.now(), &frame);
+                self.session.host.receive(self.port.now(), &frame);
             }
             Way::Holder(holder) => {
                 let Some(end) = holder.receive(wait)? else { return Ok(false) };
@@ -135,7 +135,8 @@ impl<L: CanLink> Driven<L> {
             let moved = match self.session.poll(now) {
                 SessionOutput::Transmit(frame) => self.send(&frame),
                 SessionOutput::Done(id, result) => {
-                    each(id, result.map_err(|error| self.behind(error)), self.session.sent(id));
+                    let sent = self.session.sent[id.index()];
+                    each(id, result.map_err(|error| self.behind(error)), sent);
                     Ok(())
                 }
                 SessionOutput::Wait(None) => return Ok(true),
@@ -148,7 +149,7 @@ impl<L: CanLink> Driven<L> {
                     let wait = [Some(until.since(now).into()), left].into_iter().flatten().min();
                     let came = self.take(wait);
                     if let Ok(false) = came {
-                        self.session.silent();
+                        self.session.overdue.silent();
                     }
                     came.map(drop)
                 }

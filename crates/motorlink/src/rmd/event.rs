@@ -102,7 +102,7 @@ impl EventClient {
     /// When the last frame to a motor was sent. Behind an exchange that is over, it is that of its
     /// request, not of a question before it.
     pub fn sent(&self, id: MotorId) -> Instant {
-        self.driven.session.sent(id)
+        self.driven.session.sent[id.index()]
     }
 
     /// Why frames may not get to the bus, as far as its adapter tells.
@@ -112,12 +112,12 @@ impl EventClient {
 
     /// How long a reply may take.
     pub fn timeout(&self) -> Duration {
-        self.driven.session.timeout()
+        self.driven.session.timeout
     }
 
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
-        self.driven.session.counters()
+        *self.driven.session.host.counters()
     }
 
     /// See [`Client::end_with`].
@@ -140,7 +140,7 @@ impl EventClient {
 
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
-        self.driven.session.moving()
+        self.driven.session.moving
     }
 
     /// Motors with an exchange under way.
@@ -150,12 +150,12 @@ impl EventClient {
 
     /// Sets the limits of commands to a motor. They apply to every call, raw frames included.
     pub fn set_limits(&mut self, id: MotorId, limits: Limits) {
-        self.driven.session.set_limits(id, limits);
+        self.driven.session.host.set_limits(id, limits);
     }
 
     /// Changes the limits of a motor, as [`Client::change_limits`].
     pub fn change_limits(&mut self, id: MotorId, change: impl FnOnce(Limits) -> Limits) {
-        let limits = change(self.driven.session.limits(id));
+        let limits = change(self.driven.session.host.limits(id));
         self.set_limits(id, limits);
     }
 
@@ -229,7 +229,7 @@ impl EventClient {
 
     /// As [`Client::losses`].
     pub fn losses(&self, id: MotorId) -> u32 {
-        self.driven.session.losses(id)
+        self.driven.session.losses[id.index()]
     }
 
     /// Whether another program holds the port.
@@ -294,7 +294,7 @@ impl EventClient {
                         listens = listens.saturating_sub(1);
                         continue;
                     }
-                    if driven.session.silent() {
+                    if driven.session.overdue.silent() {
                         continue;
                     }
                     let wait = until.map(|until| until.since(now).into());

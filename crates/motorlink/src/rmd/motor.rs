@@ -179,7 +179,7 @@ impl Motor<'_> {
         target: Target,
         max_speed: Option<SpeedLimit>,
     ) -> Result<(), Error> {
-        self.bus.check_limits(self.id, &move_request(target, max_speed))
+        self.bus.turns.take().session.check_limits(self.id, &move_request(target, max_speed))
     }
 }
 

@@ -10,8 +10,8 @@ use std::time::Duration;
 use motorlink_link::port::{HeldLine, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
-    SetTorque, SetTorque4, TORQUE4_ID,
+    self as proto, Code, Command, Host, MotorId, MotorSet, RequestError, SetTorque, SetTorque4,
+    TORQUE4_ID,
 };
 use motorlink_proto::time::{Instant, Micros};
 
@@ -28,13 +28,13 @@ const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 /// motors that it set moving, and its errors in words: sans I/O.
 ///
 /// Begin with [`begin`](Self::begin), [`insist`](Self::insist) or [`set_torque4`](Self::set_torque4). Then
-/// [`poll`](Self::poll) until it waits, and hand in with [`receive`](Self::receive) what comes.
+/// [`poll`](Self::poll) until it waits, and hand to the host what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
     port: Arc<str>,
-    host: Host,
+    pub(super) host: Host,
     /// Motors that were given something to do and not switched off.
-    moving: MotorSet,
+    pub(super) moving: MotorSet,
     /// Those whose last motion command was the first one: nothing turns them if it was not sent.
     begun: MotorSet,
     /// Motors that only a frame with four torques reached, and from which no reply was expected. Such
@@ -56,17 +56,19 @@ pub(super) struct Session {
     unsent: MotorSet,
     unsent_for: Option<RequestError>,
     /// When the last frame to each motor was sent.
-    sent: [Instant; MotorId::COUNT],
-    overdue: Overdue,
-    /// How often the replies of each motor could not be confirmed any more.
-    losses: [u32; MotorId::COUNT],
+    pub(super) sent: [Instant; MotorId::COUNT],
+    pub(super) overdue: Overdue,
+    /// How often the replies of each motor could not be confirmed any more: see
+    /// [`Client::losses`](super::Client::losses).
+    pub(super) losses: [u32; MotorId::COUNT],
     /// Whether nothing is sent any more but what stops motors.
-    is_retired: bool,
+    pub(super) is_retired: bool,
     /// The exchanges with the program that holds the port, in place of those of the host.
     pub(super) held: Option<HeldExchanges>,
     /// Motors of which that program has no reply, and knows that they are there.
     pub(super) missed: MotorSet,
-    timeout: Duration,
+    /// How long a reply may take.
+    pub(super) timeout: Duration,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -132,35 +134,9 @@ impl Session {
         }
     }
 
-    /// How long a reply may take.
-    pub(super) fn timeout(&self) -> Duration {
-        self.timeout
-    }
-
-    pub(super) fn counters(&self) -> Counters {
-        *self.host.counters()
-    }
-
-    pub(super) fn moving(&self) -> MotorSet {
-        self.moving
-    }
-
     /// See [`Session::unexpected`].
     pub(super) fn unexpected(&self) -> MotorSet {
         self.unexpected.without(self.moving)
-    }
-
-    /// Takes motors over that somebody else set moving.
-    pub(super) fn take_over(&mut self, moving: MotorSet) {
-        self.moving = self.moving.union(moving);
-    }
-
-    pub(super) fn set_limits(&mut self, id: MotorId, limits: Limits) {
-        self.host.set_limits(id, limits);
-    }
-
-    pub(super) fn limits(&self, id: MotorId) -> Limits {
-        self.host.limits(id)
     }
 
     pub(super) fn check_limits(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
@@ -193,11 +169,6 @@ impl Session {
         self.host.reopened(now);
     }
 
-    /// A question with another code than what a motor was asked last.
-    pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
-        self.host.confirmation(id)
-    }
-
     /// Whether the motor's replies since the last confirmation went to their own requests.
     pub(super) fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
         match self.host.take_stray(id) {
@@ -209,24 +180,9 @@ impl Session {
         }
     }
 
-    /// When the last frame to a motor was sent.
-    pub(super) fn sent(&self, id: MotorId) -> Instant {
-        self.sent[id.index()]
-    }
-
-    /// See [`Client::losses`](super::Client::losses).
-    pub(super) fn losses(&self, id: MotorId) -> u32 {
-        self.losses[id.index()]
-    }
-
     fn lost(&mut self, id: MotorId) {
         let losses = &mut self.losses[id.index()];
         *losses = losses.wrapping_add(1);
-    }
-
-    /// Declares that no motor still has to reply to an earlier host.
-    pub(super) fn trust(&mut self) {
-        self.host.trust(MotorSet::ALL);
     }
 
     /// Begins an exchange with a motor that is not in quarantine. One that is asked for the first time is
@@ -268,7 +224,7 @@ impl Session {
         match asked {
             asked if self.held.is_some() => self.begin_held(id, asked),
             Asked::Request(request) => self.request(now, id, request),
-            Asked::Confirmation => self.request(now, id, self.question(id)),
+            Asked::Confirmation => self.request(now, id, self.host.confirmation(id)),
         }
     }
 
@@ -277,7 +233,7 @@ impl Session {
         match asked {
             asked if self.held.is_some() => self.begin_held(id, asked),
             Asked::Request(request) => self.ask(now, id, request),
-            Asked::Confirmation => self.ask(now, id, self.question(id)),
+            Asked::Confirmation => self.ask(now, id, self.host.confirmation(id)),
         }
     }
 
@@ -311,16 +267,6 @@ impl Session {
                 Some(PendingTorques { torques, expect, answered: MotorSet::EMPTY, until });
         }
         Ok(())
-    }
-
-    pub(super) fn receive(&mut self, now: Instant, frame: &CanFrame) {
-        self.host.receive(now, frame);
-    }
-
-    /// Nothing was there to read. Whether [`poll`](Self::poll) asked for it because a wait is over: it
-    /// knows more now.
-    pub(super) fn silent(&mut self) -> bool {
-        self.overdue.silent()
     }
 
     pub(super) fn poll(&mut self, now: Instant) -> SessionOutput {
@@ -459,11 +405,6 @@ impl Session {
             self.unsent.remove(id);
         }
         self.host.cancel(now, id);
-    }
-
-    /// Sends nothing any more but what stops motors.
-    pub(super) fn retire(&mut self) {
-        self.is_retired = true;
     }
 
     /// What ends motion goes before torques that are held.

@@ -11,7 +11,7 @@ impl Client {
     /// thread of its own, beside a program that would go on until the handler ends it. Waits for
     /// exchanges that are under way.
     pub fn retire(&self) -> Vec<Stopped> {
-        self.refuse_motion();
+        self.turns.take().session.is_retired = true;
         self.stop_on_drop().stop_now()
     }
 

@@ -91,7 +91,10 @@ impl Client {
     /// Stops the motors that this client moved. A motor that only a frame with four torques reached,
     /// without an expected reply, may be absent.
     pub(super) fn stop_moved(&self, action: StopAction) -> Stopping {
-        let (moving, unexpected) = self.moved();
+        let (moving, unexpected) = {
+            let driven = self.turns.take();
+            (driven.session.moving, driven.session.unexpected())
+        };
         self.stop_repeatedly(moving.union(unexpected), action, moving)
     }
 
@@ -111,13 +114,14 @@ impl Client {
             sent: 0,
             lost: 0,
         };
-        self.retry_now();
+        // A closed port is opened at once.
+        self.turns.take().port.retry_now();
         let clock = self.clock();
         let give_up = clock.now() + STOP_TIME;
         let mut left = ids;
         while !left.is_empty() {
             let port = stopping.attempt(self, left, action, !left.without(expected).is_empty());
-            expected = expected.union(self.missed());
+            expected = expected.union(self.turns.take().session.missed);
             left = self.repeatable(&stopping.failed);
             if stopping.attempts >= STOP_ATTEMPTS && port.is_ok() {
                 stopping.measure(self);
@@ -139,7 +143,8 @@ impl Client {
 
     /// The motors whose stop may be answered otherwise if it is repeated.
     fn repeatable(&self, failed: &[(MotorId, Error)]) -> MotorSet {
-        let is_meant = |error: &Error| is_repeatable(error) && !self.is_given_up(error);
+        let is_meant =
+            |error: &Error| is_repeatable(error) && !self.turns.take().session.is_given_up(error);
         failed.iter().filter(|(_, error)| is_meant(error)).map(id).collect()
     }
 }
@@ -181,7 +186,8 @@ impl Stopping {
             }
         });
         // A program that holds the port repeats them itself, unless the connection to it failed.
-        self.attempts += if bus.is_held() && port.is_ok() { STOP_ATTEMPTS } else { 1 };
+        self.attempts +=
+            if bus.turns.take().session.held.is_some() && port.is_ok() { STOP_ATTEMPTS } else { 1 };
         if let Err(error) = &port {
             self.failed.extend(unheard.map(|id| (id, error.clone())));
         }

@@ -46,7 +46,7 @@ pub struct FirmwareVersion {
 /// as [`MasterConfig::recovery`](proto::MasterConfig::recovery) says. What stops a motor does not wait for that: it is sent at once and
 /// again on the recovered line, and only the second reply counts.
 pub struct Client {
-    turns: Turns<Driven<Box<dyn ByteLink>>>,
+    pub(super) turns: Turns<Driven<Box<dyn ByteLink>>>,
     sign: LinkSign,
     rules: Rules,
     port: Arc<str>,
@@ -97,7 +97,7 @@ impl Client {
     }
 
     pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
-        let (sign, rules) = (driven.port.sign(), driven.session.rules());
+        let (sign, rules) = (driven.port.sign(), driven.session.rules);
         let port = Arc::clone(&driven.port.name);
         Client { turns: Turns::new(driven), sign, rules, port }
     }
@@ -144,7 +144,7 @@ impl Client {
 
     /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
-        self.turns.take().session.sync_state()
+        self.turns.take().session.master.sync_state()
     }
 
     /// Whether the line has been in sync since the port was opened. If not, only questions and stops
@@ -173,11 +173,6 @@ impl Client {
         self.turns.take().port.end_with(ending);
     }
 
-    /// The next call opens a closed port at once.
-    pub(super) fn retry_now(&self) {
-        self.turns.take().port.retry_now();
-    }
-
     /// While `act` stops motors, those that another program has moved since are left as they are.
     pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
         self.turns.take().port.only_own(true);
@@ -188,17 +183,12 @@ impl Client {
 
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
-        self.turns.take().session.counters()
-    }
-
-    /// Refuses from now on what stops no motor.
-    pub(super) fn refuse_motion(&self) {
-        self.turns.take().session.retire();
+        self.turns.take().session.master.counters()
     }
 
     /// Motors that this client started and did not stop.
     pub fn started(&self) -> impl Iterator<Item = MotorNumber> + use<> {
-        self.turns.take().session.started().motors()
+        self.turns.take().session.account.started().motors()
     }
 
     /// Name and version of the SDK (4.7).
@@ -329,24 +319,14 @@ impl Client {
         Ok(sent?)
     }
 
-    /// What a stop ends in when the drive has just failed to answer another.
-    pub(super) fn unanswered(&self, motor: MotorNumber, failure: proto::Failure) -> Error {
-        self.turns.take().session.unanswered(motor, failure)
-    }
-
-    /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn forget_motor(&self, motor: MotorNumber) {
-        self.turns.take().session.forget_motor(motor);
-    }
-
     /// Takes the line over from another master, which started these motors.
     pub(crate) fn take_over(&self, started: Started) {
-        self.turns.take().session.take_over(started);
+        self.turns.take().session.account.take_over(started);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
     pub(crate) fn hand_over(&self) -> Started {
-        self.turns.take().session.started()
+        self.turns.take().session.account.started()
     }
 
     /// Brings the exchange that was begun to its end.

@@ -53,7 +53,7 @@ impl<L: ByteLink> Driven<L> {
         let port = Port::new(port);
         let mut session = Session::new(port.name.clone(), options);
         if port.open_link().is_some_and(Way::is_fresh) {
-            session.trust_line();
+            session.master.trust_line();
         }
         if let Some(line) = port.open_link().and_then(Way::held) {
             session.set_holder(line);
@@ -63,12 +63,12 @@ impl<L: ByteLink> Driven<L> {
 
     /// The open port. One that is opened again belongs to another line.
     pub(super) fn way(&mut self) -> Result<&mut Way<L>, PortError> {
-        let started = self.session.started().motors();
+        let started = self.session.account.started().motors();
         let (way, reopened) = self.port.ready(started.map(MotorNumber::number))?;
         if reopened {
             self.session.reopened(way.held());
             if way.is_fresh() {
-                self.session.trust_line();
+                self.session.master.trust_line();
             }
         }
         Ok(way)
@@ -111,7 +111,7 @@ impl<L: ByteLink> Driven<L> {
         let idle = self.port.now().since(self.ended) > IDLE;
         self.abandon();
         if let Way::Holder(_) = self.way()? {
-            self.session.trust_line();
+            self.session.master.trust_line();
         }
         if idle && let Err(error) = self.take(Some(Duration::ZERO)) {
             self.port.close();
@@ -125,7 +125,7 @@ impl<L: ByteLink> Driven<L> {
         match self.port.link()?.0 {
             Way::Line(link) => {
                 let size = link.read(&mut self.received, wait)?;
-                self.session.receive(self.port.now(), &self.received[..size]);
+                self.session.master.receive(self.port.now(), &self.received[..size]);
                 Ok(size > 0)
             }
             Way::Holder(holder) => {
@@ -203,7 +203,7 @@ impl<L: ByteLink> Driven<L> {
                     }
                     let wait = until.map(|until| until.since(now).into());
                     if !self.take(wait.into_iter().chain(left).min())? {
-                        self.session.silent();
+                        self.session.overdue.silent();
                     }
                 }
                 Output::Done(result) => {

@@ -100,17 +100,17 @@ impl EventClient {
 
     /// The profile that the drive is expected to follow.
     pub fn profile(&self) -> Profile {
-        self.driven.session.rules().profile
+        self.driven.session.rules.profile
     }
 
     /// How long a reply may take.
     pub fn timeout(&self) -> Duration {
-        self.driven.session.timeout()
+        self.driven.session.timeout
     }
 
     /// Whether the last exchange ended in sync.
     pub fn sync_state(&self) -> SyncState {
-        self.driven.session.sync_state()
+        self.driven.session.master.sync_state()
     }
 
     /// See [`Client::end_with`].
@@ -144,12 +144,12 @@ impl EventClient {
 
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
-        self.driven.session.counters()
+        self.driven.session.master.counters()
     }
 
     /// Motors that this client started and did not stop.
     pub fn started(&self) -> impl Iterator<Item = MotorNumber> + use<> {
-        self.driven.session.started().motors()
+        self.driven.session.account.started().motors()
     }
 
     /// Checks a request against the limits, as [`Client::check`].
@@ -157,7 +157,7 @@ impl EventClient {
     /// # Errors
     /// [`Error::Limit`], [`Error::NoSuchMotor`].
     pub fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
-        self.driven.session.rules().check(motor, request)
+        self.driven.session.rules.check(motor, request)
     }
 
     /// Begins an exchange, as [`Client::exchange`]; one that is under way is abandoned.
@@ -165,7 +165,7 @@ impl EventClient {
     /// # Errors
     /// The port, or what forbids the request; no exchange is under way then.
     pub fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
-        self.driven.session.rules().check(motor, request)?;
+        self.driven.session.rules.check(motor, request)?;
         self.driven.begin(motor, request)
     }
 
@@ -174,7 +174,7 @@ impl EventClient {
     /// # Errors
     /// Those of [`begin`](Self::begin).
     pub fn begin_raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
-        let effect = self.driven.session.rules().check_raw(motor, code, payload)?;
+        let effect = self.driven.session.rules.check_raw(motor, code, payload)?;
         self.driven.begin_raw(motor, code, payload, effect)
     }
 
@@ -261,7 +261,7 @@ impl EventClient {
                         listens = is_held;
                         continue;
                     }
-                    if driven.session.silent() {
+                    if driven.session.overdue.silent() {
                         continue;
                     }
                     let wait = until.map(|until| until.since(now).into());

@@ -8,8 +8,7 @@ use motorlink_link::port::{HeldLine, NotDone, PortError};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Account, Command, Confirmation, Counters, Effect, Frame, FrameCode, LastExchange, MAX_PAYLOAD,
-    Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError, Started,
-    SyncState,
+    Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError, SyncState,
 };
 use motorlink_proto::time::Instant;
 
@@ -27,26 +26,26 @@ pub(super) struct Rules {
 
 /// A master with the limits of its caller, the motors that it started, and its errors in words: sans
 /// I/O. [`request`](Self::request) or [`raw`](Self::raw), then [`poll`](Self::poll) until it says
-/// [`Output::Done`], handing in with [`receive`](Self::receive) what comes meanwhile, then
-/// [`conclude`](Self::conclude).
+/// [`Output::Done`], handing to the master what comes meanwhile, then [`conclude`](Self::conclude).
 #[derive(Debug, Clone)]
 pub(super) struct Session {
     port: Arc<str>,
-    rules: Rules,
-    master: Master,
-    account: Account,
+    pub(super) rules: Rules,
+    pub(super) master: Master,
+    pub(super) account: Account,
     pending: PendingRequest,
     last: LastExchange,
     /// What had come unasked before the last exchange.
     before: Counters,
     /// When the last frame or request was sent.
     pub(super) sent: Instant,
-    overdue: Overdue,
-    /// Whether nothing is sent any more but what stops motors.
-    is_retired: bool,
+    pub(super) overdue: Overdue,
+    /// Whether nothing is sent any more but what stops motors, and their confirmations.
+    pub(super) is_retired: bool,
     /// The exchange with the program that holds the port, in place of one of the master.
     pub(super) held: Option<HeldExchange>,
-    timeout: Duration,
+    /// How long a reply may take.
+    pub(super) timeout: Duration,
 }
 
 /// An exchange in the history of its line.
@@ -122,12 +121,7 @@ impl Session {
     }
 
     pub(super) fn exchanged(&self) -> Exchanged {
-        Exchanged { before: self.before, after: self.counters(), sent: self.sent }
-    }
-
-    /// How long a reply may take.
-    pub(super) fn timeout(&self) -> Duration {
-        self.timeout
+        Exchanged { before: self.before, after: self.master.counters(), sent: self.sent }
     }
 
     /// Another program holds the port. It gives a reply or a reason within its patience.
@@ -143,30 +137,14 @@ impl Session {
         move |size| is_held || confirmation.accepts(size)
     }
 
-    pub(super) fn rules(&self) -> Rules {
-        self.rules
-    }
-
-    pub(super) fn sync_state(&self) -> SyncState {
-        self.master.sync_state()
-    }
-
     /// Whether a request is sent at once. Otherwise the line is recovered before.
     pub(super) fn sends_at_once(&self) -> bool {
-        self.held.is_some() || self.sync_state() == SyncState::InSync
-    }
-
-    pub(super) fn counters(&self) -> Counters {
-        self.master.counters()
+        self.held.is_some() || self.master.sync_state() == SyncState::InSync
     }
 
     /// How a lost line is recovered from the next request on; gives how it was until now.
     pub(super) fn set_recovery(&mut self, recovery: Recovery) -> Recovery {
         std::mem::replace(&mut self.master.config_mut().recovery, recovery)
-    }
-
-    pub(super) fn started(&self) -> Started {
-        self.account.started()
     }
 
     /// Begins an exchange with motor number `motor`, where 0 is the drive's current motor.
@@ -229,11 +207,6 @@ impl Session {
         Ok(())
     }
 
-    /// From now on only stops and their confirmations are sent.
-    pub(super) fn retire(&mut self) {
-        self.is_retired = true;
-    }
-
     fn check_retired(&self, effect: Effect) -> Result<(), Error> {
         match self.is_retired && effect != Effect::Stops {
             true => Err(PortError::Retired(self.port.to_string()).into()),
@@ -251,18 +224,8 @@ impl Session {
             return Err(Error::TooLong(what.to_string()));
         }
         self.pending = PendingRequest { motor, what };
-        self.before = self.counters();
+        self.before = self.master.counters();
         Ok(())
-    }
-
-    pub(super) fn receive(&mut self, now: Instant, bytes: &[u8]) {
-        self.master.receive(now, bytes);
-    }
-
-    /// Nothing was there to read. Whether [`poll`](Self::poll) asked for it because a wait is over: it
-    /// knows more now.
-    pub(super) fn silent(&mut self) -> bool {
-        self.overdue.silent()
     }
 
     pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
@@ -386,11 +349,6 @@ impl Session {
         self.master.reopened();
     }
 
-    /// Tells that nothing is left in the line from before.
-    pub(super) fn trust_line(&mut self) {
-        self.master.trust_line();
-    }
-
     /// What a stop ends in when the drive has just failed to answer another.
     pub(super) fn unanswered(&self, motor: MotorNumber, failure: proto::Failure) -> Error {
         Error::Failed {
@@ -400,16 +358,6 @@ impl Session {
             failure,
             hint: advice(failure),
         }
-    }
-
-    /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn forget_motor(&mut self, motor: MotorNumber) {
-        self.account.forget_motor(motor);
-    }
-
-    /// Takes the line over from another master, which started these motors.
-    pub(super) fn take_over(&mut self, started: Started) {
-        self.account.take_over(started);
     }
 }
 

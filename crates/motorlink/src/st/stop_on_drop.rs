@@ -12,7 +12,7 @@ impl Client {
     /// thread of its own, beside a program that would go on until the handler ends it. Waits for an
     /// exchange that is under way.
     pub fn retire(&self) -> Vec<Stopped> {
-        self.refuse_motion();
+        self.turns.take().session.is_retired = true;
         self.stop_on_drop().stop_now()
     }
 
@@ -24,7 +24,8 @@ impl Client {
     /// Stops these motors, each with at most [`STOP_ATTEMPTS`] commands whose reply is waited for. The
     /// first one is sent without padding: padded questions do not detect an echo.
     fn stop_motors(&self, motors: Vec<MotorNumber>) -> Vec<Stopped> {
-        self.retry_now();
+        // A closed port is opened at once.
+        self.turns.take().port.retry_now();
         let (mut failed, mut stopped) = divided(self.stop_once(&motors));
         let echo = failed.iter().find_map(echo_of);
         for _ in 1..STOP_ATTEMPTS {
@@ -41,7 +42,7 @@ impl Client {
             // The padding may have completed a write. If this fails, so did the last attempt.
             let _ = self.stop_unheard(*motor);
             if let Some(echo) = echo {
-                *result = Err(self.unanswered(*motor, echo));
+                *result = Err(self.turns.take().session.unanswered(*motor, echo));
             }
         }
         stopped.extend(failed);
@@ -63,7 +64,7 @@ impl Client {
                 }
             }
             let result = match silent {
-                Some(failure) => Err(self.unanswered(motor, failure)),
+                Some(failure) => Err(self.turns.take().session.unanswered(motor, failure)),
                 None => self.stop_and_confirm(motor),
             };
             if let Err(Error::Failed { failure, .. }) = &result
@@ -181,13 +182,13 @@ impl StopOnDrop<'_> {
         stopped.retain_mut(|Stopped { motor, result }| match result {
             // A motor that does not exist does not turn.
             Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
-                self.client.forget_motor(*motor);
+                self.client.turns.take().session.account.forget_motor(*motor);
                 *result = Ok(());
                 true
             }
             // The other program stops it.
             Err(Error::Port(error)) if error.is_of_another() => {
-                self.client.forget_motor(*motor);
+                self.client.turns.take().session.account.forget_motor(*motor);
                 false
             }
             _ => true,

@@ -67,7 +67,7 @@ impl Session {
     }
 
     fn give(&mut self, id: MotorId, asked: Asked, is_awaited: bool) {
-        let request = asked.request().unwrap_or_else(|| self.question(id));
+        let request = asked.request().unwrap_or_else(|| self.host.confirmation(id));
         self.pending[id.index()].request = request;
         if let Some(held) = &mut self.held {
             held.begin(id, asked, is_awaited);
