@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::served::Served;
 use crate::wire::Fresh;
 use motorlink::port::{EventBytes, FdLink, PortError, PortName};
-use motorlink::rmd::{self, Code, MotorId, SpeedLimit};
+use motorlink::rmd::{self, Asked, Code, MotorId, SpeedLimit};
 use motorlink::st::{self, Command, LimitError, Limits, Progress, RegisterId, Request};
 use motorlink::{BackOff, LinkState};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -163,8 +163,8 @@ fn id(number: u8) -> MotorId {
     MotorId::new(number).unwrap()
 }
 
-const STATUS1: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
-const STATUS2: [u8; 8] = [0x9C, 0, 0, 0, 0, 0, 0, 0];
+const STATUS1: Asked = Asked::Request([0x9A, 0, 0, 0, 0, 0, 0, 0]);
+const STATUS2: Asked = Asked::Request([0x9C, 0, 0, 0, 0, 0, 0, 0]);
 type Outcome = (MotorId, Result<[u8; 8], rmd::Error>);
 
 fn gather(bus: &mut rmd::EventClient) -> Vec<Outcome> {
@@ -204,12 +204,12 @@ fn a_motor_whose_exchange_was_given_up_is_waited_for() {
         rmd::Options { timeout: Duration::from_secs(5), limits, ..rmd::Options::default() };
     let mut bus = rmd::EventClient::open(&name(&drives.rmd), options).unwrap();
     // 0xA2, 360.01 °/s.
-    let fast = [0xA2, 0, 0, 0, 0xA1, 0x8C, 0, 0];
+    let fast = Asked::Request([0xA2, 0, 0, 0, 0xA1, 0x8C, 0, 0]);
     assert!(matches!(bus.ask(id(1), fast), Err(rmd::Error::Limit { .. })));
     bus.ask(id(1), STATUS2).unwrap();
     bus.advance(|_, _| {}).unwrap();
     bus.cancel(id(1));
-    assert!(matches!(bus.request(id(1), STATUS1), Ok(()) | Err(rmd::Error::Quarantined { .. })));
+    assert!(matches!(bus.begin(id(1), STATUS1), Ok(()) | Err(rmd::Error::Quarantined { .. })));
     bus.cancel(id(1));
     bus.ask(id(1), STATUS1).unwrap();
     bus.ask(id(2), STATUS2).unwrap();

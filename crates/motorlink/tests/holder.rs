@@ -12,7 +12,7 @@ use motorlink::port::{
     RequestEnd,
 };
 use motorlink::rmd::{
-    self, CentiDps, Code, IqCommand, MotorId, MotorSet, Quantity, ReadStatus, SetTorque4,
+    self, Asked, CentiDps, Code, IqCommand, MotorId, MotorSet, Quantity, ReadStatus, SetTorque4,
 };
 use motorlink::st::{self, Command, MotorNumber, Profile, Request};
 
@@ -223,7 +223,7 @@ fn torques_that_were_not_sent_are_not_sent_later() {
     let mut bus = rmd::EventClient::open(&script.name(), rmd::Options::default()).unwrap();
     bus.set_torque4(torques(), id(1).into()).unwrap();
     bus.cancel(id(1));
-    bus.ask(id(5), rmd::Command::encode(&ReadStatus)).unwrap();
+    bus.ask(id(5), Asked::Request(rmd::Command::encode(&ReadStatus))).unwrap();
     while !bus.busy().is_empty() {
         bus.advance(|_, result| assert!(result.is_ok())).unwrap();
     }

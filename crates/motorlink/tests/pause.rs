@@ -179,7 +179,8 @@ fn a_client_of_an_event_loop(at: At) {
     let mut bus =
         rmd::EventClient::open_with("bench", Box::new(open), rmd::Options::default()).unwrap();
     asks_twice(&stands, || {
-        motors().into_iter().for_each(|id| bus.request(id, [0x9A, 0, 0, 0, 0, 0, 0, 0]).unwrap());
+        let asked = rmd::Asked::Request([0x9A, 0, 0, 0, 0, 0, 0, 0]);
+        motors().into_iter().for_each(|id| bus.begin(id, asked).unwrap());
         let mut replies = vec![];
         while replies.len() < 4 {
             let wait = bus.advance(|_, reply| replies.push(reply.map(drop))).unwrap();

@@ -132,8 +132,8 @@ impl RmdEventClient {
     fn ask(&self, py: Python<'_>, id: i64, request: &RmdRequest, patient: bool) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
-            let data = request.data();
-            if patient { motors.bus.ask(id, data) } else { motors.bus.request(id, data) }?;
+            let asked = Asked::Request(request.data());
+            if patient { motors.bus.ask(id, asked) } else { motors.bus.begin(id, asked) }?;
             motors.expect(id, ReplyKind::Value(request.clone()));
             Ok(())
         })?;
@@ -144,7 +144,7 @@ impl RmdEventClient {
     fn begin_confirmation(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
-            motors.bus.begin_confirmation(id)?;
+            motors.bus.ask(id, Asked::Confirmation)?;
             motors.expect(id, ReplyKind::Nothing);
             Ok(())
         })?;
@@ -195,7 +195,7 @@ impl RmdEventClient {
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
-            motors.bus.ask(id, ReadStatus.encode())?;
+            motors.bus.ask(id, Asked::Request(ReadStatus.encode()))?;
             motors.expect(id, ReplyKind::ScanResult);
             Ok(())
         })?;

@@ -15,7 +15,6 @@ use motorlink_proto::time;
 
 use super::asked::Asked;
 use super::driven::Driven;
-use super::session::Session;
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
 use crate::way::Way;
@@ -168,7 +167,7 @@ impl Client {
         let mut driven = self.turns.take();
         driven.ready([request])?;
         let now = driven.port.now();
-        driven.session.insist(now, id, Asked::Request(request))?;
+        driven.session.begin(now, id, Asked::Request(request), true)?;
         self.conclude(driven)
     }
 
@@ -191,7 +190,7 @@ impl Client {
         driven.ready([])?;
         let is_lost = driven.session.losses[id.index()] != losses;
         let now = driven.port.now();
-        driven.session.insist(now, id, Asked::Confirmation)?;
+        driven.session.begin(now, id, Asked::Confirmation, true)?;
         let port = Arc::clone(&driven.port.name);
         self.conclude(driven)?;
         if is_lost {
@@ -228,7 +227,7 @@ impl Client {
             driven.session.check_limits(*id, &exchange.request())?;
         }
         let requests = requests.iter().map(|(id, it)| (*id, Asked::Request(it.request())));
-        self.begin_all(driven, requests, Session::begin, |id, result, _| {
+        self.begin_all(driven, requests, false, |id, result, _| {
             each(id, result.map(|reply| X::reply(&reply)));
         })
     }
@@ -256,7 +255,7 @@ impl Client {
     ) -> Result<(), Error> {
         let each = |id, result, _| each(id, result);
         let requests = requests.map(|(id, request)| (id, Asked::Request(request)));
-        self.begin_all(self.turns.take(), requests, Session::insist, each)
+        self.begin_all(self.turns.take(), requests, true, each)
     }
 
     /// As [`cycle`](Self::cycle), with confirmations among the exchanges. The reply of a confirmation says
@@ -270,7 +269,7 @@ impl Client {
         asked: &[(MotorId, Asked)],
         each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
-        self.begin_all(self.turns.take(), asked.iter().copied(), Session::begin, each)
+        self.begin_all(self.turns.take(), asked.iter().copied(), false, each)
     }
 
     /// Whether a motor's replies went to their own requests, behind a confirmation of
@@ -282,18 +281,19 @@ impl Client {
         self.turns.take().session.confirmed(id)
     }
 
-    /// Begins these exchanges with `begin` and runs them to their end.
+    /// Begins these exchanges and runs them to their end. Motors in quarantine are waited for if the
+    /// exchanges wait.
     fn begin_all(
         &self,
         mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
         asked: impl Iterator<Item = (MotorId, Asked)> + Clone,
-        begin: fn(&mut Session, time::Instant, MotorId, Asked) -> Result<(), Error>,
+        waits: bool,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>, time::Instant),
     ) -> Result<(), Error> {
         driven.ready(asked.clone().filter_map(|(_, asked)| asked.request()))?;
         for (id, asked) in asked {
             let now = driven.port.now();
-            if let Err(error) = begin(&mut driven.session, now, id, asked) {
+            if let Err(error) = driven.session.begin(now, id, asked, waits) {
                 each(id, Err(error), now);
             }
         }

@@ -167,34 +167,28 @@ impl EventClient {
         self.driven.session.check_limits(id, request)
     }
 
-    /// Begins an exchange, as [`Client::raw`]: a motor in quarantine is waited for.
+    /// Begins an exchange, as [`Client::raw`]: a motor in quarantine is waited for. Or a confirmation, as
+    /// [`Client::confirm`]: [`confirmed`](Self::confirmed) gives the result after the exchange.
     ///
     /// # Errors
     /// The port, or what forbids the request; nothing is sent then.
-    pub fn ask(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen_for([request])?;
-        let now = self.driven.port.now();
-        self.driven.session.insist(now, id, Asked::Request(request))
+    pub fn ask(&mut self, id: MotorId, asked: Asked) -> Result<(), Error> {
+        self.begin_exchange(id, asked, true)
     }
 
-    /// Begins an exchange, as one of those of [`Client::cycle`]: a motor in quarantine is an error.
-    ///
-    /// # Errors
-    /// Those of [`ask`](Self::ask).
-    pub fn request(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen_for([request])?;
-        let now = self.driven.port.now();
-        self.driven.session.begin(now, id, Asked::Request(request))
-    }
-
-    /// Begins an exchange, as one of those of [`Client::ask_each`]: a motor in quarantine is an error.
+    /// Begins an exchange, as one of those of [`Client::cycle`] and [`Client::ask_each`]: a motor in
+    /// quarantine is an error.
     ///
     /// # Errors
     /// Those of [`ask`](Self::ask).
     pub fn begin(&mut self, id: MotorId, asked: Asked) -> Result<(), Error> {
+        self.begin_exchange(id, asked, false)
+    }
+
+    fn begin_exchange(&mut self, id: MotorId, asked: Asked, waits: bool) -> Result<(), Error> {
         self.driven.listen_for(asked.request())?;
         let now = self.driven.port.now();
-        self.driven.session.begin(now, id, asked)
+        self.driven.session.begin(now, id, asked, waits)
     }
 
     /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Client::set_torque4`].
@@ -207,19 +201,7 @@ impl EventClient {
         self.driven.session.set_torque4(now, torques, expect)
     }
 
-    /// Begins a confirmation ([`Client::confirm`]). After the exchange [`confirmed`](Self::confirmed)
-    /// gives the result.
-    ///
-    /// # Errors
-    /// Those of [`ask`](Self::ask).
-    pub fn begin_confirmation(&mut self, id: MotorId) -> Result<(), Error> {
-        self.driven.listen()?;
-        let now = self.driven.port.now();
-        self.driven.session.insist(now, id, Asked::Confirmation)
-    }
-
-    /// Whether the motor's replies went to their own requests, after
-    /// [`begin_confirmation`](Self::begin_confirmation).
+    /// Whether the motor's replies went to their own requests, after the exchange of a confirmation.
     ///
     /// # Errors
     /// [`Error::Unconfirmed`].

@@ -27,7 +27,7 @@ const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the
 /// motors that it set moving, and its errors in words: sans I/O.
 ///
-/// Begin with [`begin`](Self::begin), [`insist`](Self::insist) or [`set_torque4`](Self::set_torque4). Then
+/// Begin with [`begin`](Self::begin) or [`set_torque4`](Self::set_torque4). Then
 /// [`poll`](Self::poll) until it waits, and hand to the host what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
@@ -185,63 +185,41 @@ impl Session {
         *losses = losses.wrapping_add(1);
     }
 
-    /// Begins an exchange with a motor that is not in quarantine. One that is asked for the first time is
-    /// waited for.
+    /// Begins an exchange with a motor. One that is asked for the first time is waited for; one in
+    /// quarantine, too, if the exchange `waits`.
     ///
     /// # Errors
     /// Nothing is sent then.
-    fn request(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.make_way(&request);
-        self.free(id, &request)?;
-        let begun = self.host.request(now, id, request);
-        begun.map_err(|refused| self.refused(refused))?;
-        self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
-        if self.host.is_unknown(id) {
-            self.insisting.insert(id);
+    pub(super) fn begin(
+        &mut self,
+        now: Instant,
+        id: MotorId,
+        asked: Asked,
+        waits: bool,
+    ) -> Result<(), Error> {
+        if self.held.is_some() {
+            return self.begin_held(id, asked);
         }
-        Ok(())
-    }
-
-    /// Begins an exchange that waits for a motor in quarantine.
-    ///
-    /// # Errors
-    /// As [`request`](Self::request).
-    fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        let request = asked.request().unwrap_or_else(|| self.host.confirmation(id));
         self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
             Ok(()) => {}
-            Err(RequestError::Quarantined { .. }) => self.waiting.insert(id),
+            Err(RequestError::Quarantined { .. }) if waits => self.waiting.insert(id),
             Err(refused) => return Err(self.refused(refused)),
         }
-        self.insisting.insert(id);
         self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
+        if waits || self.host.is_unknown(id) {
+            self.insisting.insert(id);
+        }
         Ok(())
-    }
-
-    /// As [`request`](Self::request), also for a confirmation.
-    pub(super) fn begin(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
-        match asked {
-            asked if self.held.is_some() => self.begin_held(id, asked),
-            Asked::Request(request) => self.request(now, id, request),
-            Asked::Confirmation => self.request(now, id, self.host.confirmation(id)),
-        }
-    }
-
-    /// As [`ask`](Self::ask), also for a confirmation.
-    pub(super) fn insist(&mut self, now: Instant, id: MotorId, asked: Asked) -> Result<(), Error> {
-        match asked {
-            asked if self.held.is_some() => self.begin_held(id, asked),
-            Asked::Request(request) => self.ask(now, id, request),
-            Asked::Confirmation => self.ask(now, id, self.host.confirmation(id)),
-        }
     }
 
     /// Begins an exchange with those of motors 1 to 4 that are expected to answer. Those that are asked
     /// for the first time are waited for.
     ///
     /// # Errors
-    /// As [`request`](Self::request).
+    /// As [`begin`](Self::begin).
     pub(super) fn set_torque4(
         &mut self,
         now: Instant,

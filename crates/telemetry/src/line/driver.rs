@@ -224,10 +224,7 @@ impl RmdDriver for DirectRmd {
     }
 
     fn begin(&mut self, id: MotorId, asked: rmd::Asked) -> Result<(), rmd::Error> {
-        match asked {
-            rmd::Asked::Request(request) => self.client.ask(id, request),
-            rmd::Asked::Confirmation => self.client.begin_confirmation(id),
-        }
+        self.client.ask(id, asked)
     }
 
     fn advance(&mut self, each: &mut RmdEnded<'_>) -> Result<Option<Duration>, rmd::Error> {
