@@ -2,7 +2,7 @@
 //! simulated drives.
 
 use motorlink::port::PortName;
-use motorlink::settings::{Comparison, Permissions, RestoreError, SettingsFile, Tunable, dump};
+use motorlink::settings::{Comparison, Dump, Permissions, RestoreError, SettingsFile, Tunable};
 use motorlink::slcan::{self, Answer, Device, HostCodec};
 use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
 use motorlink_link::fault::Faults;
@@ -117,21 +117,23 @@ fn restored<M: Tunable<Error: std::fmt::Debug + std::fmt::Display>>(text: &str, 
         }
     };
     // The drive may not have a register of the file.
-    let Ok(comparison) = Comparison::read(motor, &file) else { return };
-    let before = dump(motor).expect("the line is good").text();
-    match comparison.restore(motor, Permissions { rom: true, running: true }, || false) {
+    let Ok(comparison) = Comparison::reading(motor.tuning(), &file).run(motor) else { return };
+    let before = Dump::reading(motor.tuning()).run(motor).expect("the line is good").text();
+    let permissions = Permissions { rom: true, running: true };
+    match comparison.restoring(permissions, || false).run(motor) {
         Ok(()) => {
-            let after = Comparison::read(motor, &file).expect("it was read before");
+            let after =
+                Comparison::reading(motor.tuning(), &file).run(motor).expect("it was read before");
             assert_eq!(after.differences().count(), 0);
         }
         Err(RestoreError::Undone(undone)) => assert!(undone.is_complete(), "{undone}"),
         Err(_) => {}
     }
     let own = SettingsFile::parse(&before, &motor.tuning()).expect("it is the text of a motor");
-    let back = Comparison::read(motor, &own).expect("the motor has its settings");
-    back.restore(motor, Permissions { rom: true, running: true }, || false)
-        .expect("they were its own");
-    assert_eq!(dump(motor).expect("the line is good").text(), before);
+    let back =
+        Comparison::reading(motor.tuning(), &own).run(motor).expect("the motor has its settings");
+    back.restoring(permissions, || false).run(motor).expect("they were its own");
+    assert_eq!(Dump::reading(motor.tuning()).run(motor).expect("the line is good").text(), before);
 }
 
 /// Any text as a configuration. Drives of an accepted one start and turn with finite numbers.

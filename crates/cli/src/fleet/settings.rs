@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::thread;
 
-use motorlink::settings::{Dump, Tunable, dump, fact};
+use motorlink::settings::{Dump, Tunable, fact};
 use motorlink::{rmd, st};
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::Network;
@@ -146,7 +146,7 @@ fn read_line(node: &Name, network: Network, line: &Line, motors: &[(String, u8)]
 }
 
 fn values<M: Tunable<Error: std::fmt::Display>>(motor: M) -> Result<Values, String> {
-    let dump: Dump = dump(&motor).map_err(text)?;
+    let dump = Dump::reading(motor.tuning()).run(&motor).map_err(text)?;
     let mut values: Values = dump
         .values()
         .map(|(setting, digits)| (setting.name.clone(), setting.shown(digits)))

@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use motorlink::settings::{
-    self, Cause, Comparison, Difference, Id, Kind, NotASetting, Permissions, Problem, RestoreError,
+    Cause, Comparison, Difference, Dump, Id, Kind, NotASetting, Permissions, Problem, RestoreError,
     Setting, SettingsFile, StepError, Tunable, Tuning, Undone, Unread,
 };
 use motorlink_link::printable;
@@ -91,7 +91,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         if !args.overwrite {
             file.check_free("--overwrite")?;
         }
-        let dump = settings::dump(&self.motor).map_err(Into::into)?;
+        let dump = Dump::reading(self.motor.tuning()).run(&self.motor).map_err(Into::into)?;
         let rows: Vec<Row> = dump.values().map(|(setting, digits)| row(setting, digits)).collect();
         if file == Output::Stdout {
             return self.output.result(dump.text().trim_end(), self.line.values(&rows));
@@ -127,7 +127,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         let motor = Interruptible::new(&self.motor);
         let failed = |error| self.not_restored(error, &args.file);
         if args.dry_run {
-            comparison.check(&motor, permissions).map_err(failed)?;
+            comparison.checking(permissions).run(&motor).map_err(failed)?;
             if !self.output.json {
                 note("nothing was written");
             }
@@ -135,7 +135,8 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         }
         let mixed = format!("interrupted; the roll-back did not end; {}", self.advice(&args.file));
         motor.take_over(pasteable::complete(&mixed, None));
-        comparison.restore(&motor, permissions, interrupt::interrupted).map_err(failed)?;
+        let restoring = comparison.restoring(permissions, interrupt::interrupted);
+        restoring.run(&motor).map_err(failed)?;
         if interrupt::interrupted() {
             note("interrupted too late: all settings are written");
         }
@@ -188,7 +189,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
                 _ => failure,
             }
         })?;
-        Comparison::read(&self.motor, &file).map_err(|unread| {
+        Comparison::reading(self.motor.tuning(), &file).run(&self.motor).map_err(|unread| {
             let names = unread.settings.join(", ");
             let is_refusal = unread.error.is_refusal();
             let count = unread.settings.len();

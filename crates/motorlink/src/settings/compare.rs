@@ -1,7 +1,7 @@
 //! Compares the settings of a motor with those of a file.
 
 use super::procedure::{Line, Procedure};
-use super::{Setting, SettingsFile, StepError, Tunable, Tuning, Writing, list};
+use super::{Setting, SettingsFile, StepError, Tuning, Writing, list};
 
 /// The settings of a motor that a file has, too.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,14 +58,6 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
     ///
     /// # Errors
     /// Those of an exchange. The motor does not have settings of the file: the error has all of them.
-    pub fn read<M>(motor: &M, file: &SettingsFile) -> Result<Self, Unread<M::Error>>
-    where
-        M: Tunable<Tuning: Tuning<Id = Id>>,
-    {
-        Self::reading(motor.tuning(), file).run(motor)
-    }
-
-    /// As [`read`](Self::read), in steps.
     pub fn reading<'a, T, E>(
         tuning: T,
         file: &SettingsFile,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::file::{BEGIN, END, MOTOR, PROFILE, SETTINGS};
 use super::procedure::{Line, Procedure};
-use super::{Block, Kind, Setting, StepError, Tunable, Tuning};
+use super::{Block, Kind, Setting, StepError, Tuning};
 
 /// The column of comments behind values.
 const COMMENTS: usize = 30;
@@ -20,14 +20,6 @@ pub struct Dump {
     blocks: Vec<(&'static str, Vec<(Setting, i64)>)>,
     /// Names of settings that the motor refused to read.
     absent: Vec<String>,
-}
-
-/// Reads all settings that a motor has.
-///
-/// # Errors
-/// Those of an exchange. A setting that the motor refuses to read is left out.
-pub fn dump<M: Tunable>(motor: &M) -> Result<Dump, M::Error> {
-    Dump::reading(motor.tuning()).run(motor)
 }
 
 /// Reads what is known of the drive, in steps: the lines of [`Dump::identity`]. The motor itself must answer,
@@ -67,8 +59,10 @@ async fn identity<T: Tuning, E: StepError>(
 }
 
 impl Dump {
-    /// Reads all settings that a motor has, in steps. A setting that the motor refuses to read is left
-    /// out.
+    /// Reads all settings that a motor has. A setting that the motor refuses to read is left out.
+    ///
+    /// # Errors
+    /// Those of an exchange.
     pub fn reading<'a, T, E>(tuning: T) -> Procedure<'a, T::Id, E, Result<Self, E>>
     where
         T: Tuning + Send + Sync + 'a,

@@ -1,19 +1,19 @@
 //! Settings of motors as text: written to a file, compared with a motor, restored. For both protocols.
 //!
 //! ```no_run
-//! use motorlink::settings::{self, Comparison, Permissions, SettingsFile, Tunable};
+//! use motorlink::settings::{Comparison, Dump, Permissions, SettingsFile, Tunable};
 //! use motorlink::st::{Client, Options};
 //!
 //! let client = Client::open(&"/dev/ttyACM0".parse()?, Options::default())?;
 //! let motor = client.motor(1)?;
-//! let text = settings::dump(&motor)?.text();
+//! let text = Dump::reading(motor.tuning()).run(&motor)?.text();
 //!
 //! let file = SettingsFile::parse(&text, &motor.tuning())?;
-//! let comparison = Comparison::read(&motor, &file)?;
+//! let comparison = Comparison::reading(motor.tuning(), &file).run(&motor)?;
 //! for difference in comparison.differences() {
 //!     println!("{}: {} becomes {}", difference.setting.name, difference.now, difference.file);
 //! }
-//! comparison.restore(&motor, Permissions::default(), || false)?;
+//! comparison.restoring(Permissions::default(), || false).run(&motor)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -29,7 +29,7 @@ pub use motorlink_proto::st::NotASetting;
 use motorlink_proto::units::Scale;
 
 pub use compare::{Comparison, Difference, Unread};
-pub use dump::{Dump, dump, fact, identify};
+pub use dump::{Dump, fact, identify};
 pub use file::{FileError, Problem, SettingsFile};
 pub use procedure::{Next, Procedure, Step};
 pub use restore::{Cause, Permissions, RestoreError, Undone};

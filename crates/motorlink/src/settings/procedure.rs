@@ -63,7 +63,7 @@ impl<'a, Id: Clone, E, T> Procedure<'a, Id, E, T> {
     }
 
     /// Takes all steps, and waits for them.
-    pub(super) fn run<M: Tunable<Error = E>>(mut self, motor: &M) -> T
+    pub fn run<M: Tunable<Error = E>>(mut self, motor: &M) -> T
     where
         M::Tuning: Tuning<Id = Id>,
     {

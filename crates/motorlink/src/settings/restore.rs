@@ -6,7 +6,7 @@ use motorlink_proto::st::VERIFY_ATTEMPTS;
 
 use super::compare::Compared;
 use super::procedure::{Line, Procedure};
-use super::{Comparison, StepError, Tunable, Tuning, Writing, list};
+use super::{Comparison, StepError, Writing, list};
 
 /// What a restore may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -107,26 +107,13 @@ enum Failed<E> {
 }
 
 impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
-    /// Writes the settings that differ, reads each back, and returns when the motor has all of them. With
+    /// Writes the settings that differ, and reads each back. It is over when the motor has all of them. With
     /// [`Permissions::rom`] gains are made permanent at the end, also if they did not differ: the values in
     /// ROM cannot be read. `is_interrupted` is asked before each write, and after the last read-back. It
     /// ends the restore, and the old values are written again.
     ///
     /// # Errors
     /// Nothing was written, or the old values were written again, as far as the line allowed.
-    pub fn restore<M>(
-        &self,
-        motor: &M,
-        permissions: Permissions,
-        is_interrupted: impl FnMut() -> bool + Send,
-    ) -> Result<(), RestoreError<M::Error>>
-    where
-        M: Tunable<Tuning: Tuning<Id = Id>>,
-    {
-        self.restoring(permissions, is_interrupted).run(motor)
-    }
-
-    /// As [`restore`](Self::restore), in steps.
     pub fn restoring<'a, E: StepError + Send + 'a>(
         &self,
         permissions: Permissions,
@@ -143,7 +130,7 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
         })
     }
 
-    /// The names of the settings that [`restore`](Self::restore) makes permanent by a request of its own,
+    /// The names of the settings that [`restoring`](Self::restoring) makes permanent by a request of its own,
     /// also if they do not differ.
     pub fn permanent(&self, permissions: Permissions) -> Vec<&str> {
         let settings = self.to_keep(permissions).flat_map(|block| &block.settings);
@@ -157,22 +144,10 @@ impl<Id: Copy + PartialEq + Send + Sync> Comparison<Id> {
         self.blocks.iter().filter(is_kept)
     }
 
-    /// Checks whether [`restore`](Self::restore) would be refused before its first write. Writes nothing.
+    /// Checks whether [`restoring`](Self::restoring) would be refused before its first write. Writes nothing.
     ///
     /// # Errors
-    /// Those of `restore`, except [`RestoreError::Undone`].
-    pub fn check<M>(
-        &self,
-        motor: &M,
-        permissions: Permissions,
-    ) -> Result<(), RestoreError<M::Error>>
-    where
-        M: Tunable<Tuning: Tuning<Id = Id>>,
-    {
-        self.checking(permissions).run(motor)
-    }
-
-    /// As [`check`](Self::check), in steps.
+    /// Those of `restoring`, except [`RestoreError::Undone`].
     pub fn checking<'a, E: Send + 'a>(
         &self,
         permissions: Permissions,

@@ -12,7 +12,7 @@ use std::time::Duration;
 use cut::{Cut, CutLink};
 use motorlink::rmd;
 use motorlink::settings::{
-    Cause, Comparison, Dump, Permissions, RestoreError, SettingsFile, Tunable, Undone, dump,
+    Cause, Comparison, Dump, Permissions, RestoreError, SettingsFile, Tunable, Undone,
 };
 use motorlink::st::{self, Profile};
 use motorlink::time;
@@ -41,7 +41,7 @@ fn rmd(bench: &Bench, cut: Cut) -> (rmd::Client, Arc<AtomicU32>) {
 
 /// The text of a motor's settings.
 fn text<M: Tunable<Error: Debug>>(motor: &M) -> String {
-    dump(motor).unwrap().text()
+    Dump::reading(motor.tuning()).run(motor).unwrap().text()
 }
 
 /// The text with other values: `NAME = OLD` becomes `NAME = NEW`.
@@ -68,7 +68,7 @@ fn of(dump: &Dump, name: &str) -> i64 {
 }
 
 fn value<M: Tunable<Error: Debug>>(motor: &M, name: &str) -> i64 {
-    of(&dump(motor).unwrap(), name)
+    of(&Dump::reading(motor.tuning()).run(motor).unwrap(), name)
 }
 
 fn restore<M>(motor: &M, text: &str, permissions: Permissions) -> Result<(), RestoreError<M::Error>>
@@ -76,7 +76,11 @@ where
     M: Tunable<Error: Debug>,
 {
     let file = SettingsFile::parse(text, &motor.tuning()).unwrap();
-    Comparison::read(motor, &file).unwrap().restore(motor, permissions, || false)
+    Comparison::reading(motor.tuning(), &file)
+        .run(motor)
+        .unwrap()
+        .restoring(permissions, || false)
+        .run(motor)
 }
 
 fn undone<E: Debug>(result: Result<(), RestoreError<E>>) -> Undone<E> {
@@ -129,20 +133,20 @@ fn only_what_differs_is_written() {
     let (client, sent) = st(&bench, Cut::Never);
     let motor = client.motor(1).unwrap();
     let file = SettingsFile::parse(&text(&motor), &motor.tuning()).unwrap();
-    let comparison = Comparison::read(&motor, &file).unwrap();
+    let comparison = Comparison::reading(motor.tuning(), &file).run(&motor).unwrap();
     assert_eq!(comparison.differences().count(), 0);
     let before = sent.load(Ordering::Relaxed);
-    comparison.restore(&motor, RAM, || panic!("nothing is written")).unwrap();
+    comparison.restoring(RAM, || panic!("nothing is written")).run(&motor).unwrap();
     assert_eq!(sent.load(Ordering::Relaxed), before);
 
     let other = changed(&text(&motor), &[("SPEED_KP", 5)]);
     let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
-    let comparison = Comparison::read(&motor, &file).unwrap();
+    let comparison = Comparison::reading(motor.tuning(), &file).run(&motor).unwrap();
     let names: Vec<_> =
         comparison.differences().map(|one| (&*one.setting.name, one.file)).collect();
     assert_eq!(names, [("SPEED_KP", 5)]);
     let before = sent.load(Ordering::Relaxed);
-    comparison.restore(&motor, RAM, || false).unwrap();
+    comparison.restoring(RAM, || false).run(&motor).unwrap();
     // The state of the motor and a confirmation; the write, the read and a confirmation.
     assert_eq!(sent.load(Ordering::Relaxed) - before, 5);
 }
@@ -221,12 +225,12 @@ fn a_file_of_another_drive_is_not_restored() {
     let said = refused.to_string();
     assert!(said.starts_with("SPEED_KI_DIV is 512 in the file and 256 in the motor"), "{said}");
     // Motor 2 lacks some registers of motor 1. One error has the names of all.
-    let had = dump(&motor).unwrap();
+    let had = Dump::reading(motor.tuning()).run(&motor).unwrap();
     let motor = client.motor(2).unwrap();
     let text = before.replace("motor = 1", "motor = 2");
     let file = SettingsFile::parse(&text, &motor.tuning()).unwrap();
-    let unread = Comparison::read(&motor, &file).unwrap_err();
-    let lacks = dump(&motor).unwrap();
+    let unread = Comparison::reading(motor.tuning(), &file).run(&motor).unwrap_err();
+    let lacks = Dump::reading(motor.tuning()).run(&motor).unwrap();
     let lacks = lacks.absent().iter().filter(|name| !had.absent().contains(name));
     assert_eq!(unread.settings, lacks.cloned().collect::<Vec<_>>());
     assert!(unread.settings.len() > 1, "{unread}");
@@ -256,13 +260,13 @@ fn an_interrupted_restore_puts_the_old_values_back() {
     let other = changed(&before, &[("SPEED_KP", 5), ("SPEED_KI", 6), ("FF_2", 7)]);
     let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
     for writes in 0..=3 {
-        let comparison = Comparison::read(&motor, &file).unwrap();
+        let comparison = Comparison::reading(motor.tuning(), &file).run(&motor).unwrap();
         let mut asked = 0;
-        let result = comparison.restore(&motor, RAM, || {
+        let is_interrupted = || {
             asked += 1;
             asked > writes
-        });
-        let undone = undone(result);
+        };
+        let undone = undone(comparison.restoring(RAM, is_interrupted).run(&motor));
         assert!(matches!(undone.cause, Cause::Interrupted));
         assert_eq!(undone.rolled_back, ["SPEED_KP", "SPEED_KI", "FF_2"][..writes]);
         assert!(undone.is_complete());
@@ -279,9 +283,9 @@ fn a_value_that_the_motor_does_not_take_is_rolled_back() {
     // More counts than the encoder has.
     let other = changed(&before, &[("speed_kp", 9), ("encoder_offset", 60_000)]);
     let file = SettingsFile::parse(&other, &motor.tuning()).unwrap();
-    let comparison = Comparison::read(&motor, &file).unwrap();
+    let comparison = Comparison::reading(motor.tuning(), &file).run(&motor).unwrap();
     let requests = sent.load(Ordering::Relaxed);
-    let undone = undone(comparison.restore(&motor, ROM, || false));
+    let undone = undone(comparison.restoring(ROM, || false).run(&motor));
     let said = undone.to_string();
     assert!(said.starts_with("the motor did not take encoder_offset 60000 (it has "), "{said}");
     assert!(said.ends_with("rolled back to the old values: speed_kp, encoder_offset"), "{said}");
@@ -331,13 +335,15 @@ where
     M: Tunable<Error: Debug>,
     N: Tunable<Error: Debug + std::fmt::Display>,
 {
-    let before = dump(motor).unwrap();
+    let before = Dump::reading(motor.tuning()).run(motor).unwrap();
     let old = |name: &str| of(&before, name);
     let settings = SettingsFile::parse(&only(&before.text(), file), &bad.tuning()).unwrap();
-    let Ok(comparison) = Comparison::read(bad, &settings) else { return End::NotBegun };
-    let result = comparison.restore(bad, ROM, || false);
+    let Ok(comparison) = Comparison::reading(bad.tuning(), &settings).run(bad) else {
+        return End::NotBegun;
+    };
+    let result = comparison.restoring(ROM, || false).run(bad);
     wait();
-    let after = dump(motor).unwrap();
+    let after = Dump::reading(motor.tuning()).run(motor).unwrap();
     let real = |name: &str| of(&after, name);
     match result {
         Ok(()) => {
