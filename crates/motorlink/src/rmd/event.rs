@@ -6,7 +6,7 @@ use std::time::Duration;
 use motorlink_link::Clock;
 use motorlink_link::port::{CanLink, Carries, Ending, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
+use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
 
 use super::driven::Driven;
@@ -105,19 +105,9 @@ impl EventClient {
         self.driven.session.sent[id.index()]
     }
 
-    /// Why frames may not get to the bus, as far as its adapter tells.
-    pub fn trouble(&self) -> Option<&'static str> {
-        self.driven.port.open_link().and_then(Way::trouble)
-    }
-
     /// How long a reply may take.
     pub fn timeout(&self) -> Duration {
         self.driven.session.timeout
-    }
-
-    /// Frames that belonged to no exchange.
-    pub fn counters(&self) -> Counters {
-        *self.driven.session.host.counters()
     }
 
     /// See [`Client::end_with`].

@@ -23,7 +23,8 @@ impl Client {
 
 /// Stops the motors that a [`Client`] was used to move when it is dropped: at the end of a scope, on
 /// an early return, on a panic. The stop is sent to all motors before a reply is awaited, and repeated
-/// until it is confirmed ([`Client::stop_until_confirmed`]).
+/// until it is confirmed ([`Client::stop_until_confirmed`]). [`std::mem::forget`] leaves the motors as they
+/// are.
 pub struct StopOnDrop<'a> {
     bus: &'a Client,
     action: StopAction,
@@ -51,11 +52,6 @@ impl StopOnDrop<'_> {
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
         self
-    }
-
-    /// Leaves the motors as they are.
-    pub fn disarm(mut self) {
-        self.armed = false;
     }
 
     /// Stops the motors now; gives what was done to each.

@@ -6,9 +6,7 @@ use std::time::Duration;
 use motorlink_link::Clock;
 use motorlink_link::port::{ByteLink, Ending, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::st::{
-    Confirmation, Counters, MotorNumber, Output, Profile, Request, SyncState,
-};
+use motorlink_proto::st::{Confirmation, MotorNumber, Output, Profile, Request};
 use motorlink_proto::time::Instant;
 
 use super::driven::{Driven, opener};
@@ -108,11 +106,6 @@ impl EventClient {
         self.driven.session.timeout
     }
 
-    /// Whether the last exchange ended in sync.
-    pub fn sync_state(&self) -> SyncState {
-        self.driven.session.master.sync_state()
-    }
-
     /// See [`Client::end_with`].
     pub fn end_with(&mut self, ending: Ending) {
         self.driven.port.end_with(ending);
@@ -140,11 +133,6 @@ impl EventClient {
     /// The last exchange.
     pub fn exchanged(&self) -> Exchanged {
         self.driven.session.exchanged()
-    }
-
-    /// What came without being asked for.
-    pub fn counters(&self) -> Counters {
-        self.driven.session.master.counters()
     }
 
     /// Motors that this client started and did not stop.

@@ -140,7 +140,7 @@ impl Motor<'_> {
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
 /// early return, on a panic. Each motor is stopped as by [`Motor::stop_until_confirmed`]. If the drive
 /// does not answer, it may still receive: STOP_MOTOR is sent to all motors before the next wait for an
-/// answer.
+/// answer. [`std::mem::forget`] leaves the motors as they are.
 pub struct StopOnDrop<'a> {
     client: &'a Client,
     armed: bool,
@@ -161,11 +161,6 @@ impl StopOnDrop<'_> {
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
         self
-    }
-
-    /// Leaves the motors as they are.
-    pub fn disarm(mut self) {
-        self.armed = false;
     }
 
     /// Stops the motors now. Returns the result for each motor. A motor that did not acknowledge the stop

@@ -16,8 +16,6 @@ pub(super) struct Group {
     pub(super) position: usize,
     /// This instant.
     pub(super) due: Instant,
-    /// Instants that were skipped.
-    pub(super) skipped: u64,
 }
 
 impl Group {
@@ -30,7 +28,6 @@ impl Group {
     pub(super) fn finish_instant(&mut self, now: Instant, stretch: f64, anchor: Instant) {
         let period = self.rhythm.at(stretch);
         let periods = (now.since(self.due).0 / period.0).max(1);
-        self.skipped += periods - 1;
         self.due += Micros(periods.saturating_mul(period.0));
         if period == self.rhythm.period {
             // An instant of a slowed line is between two of the grid.

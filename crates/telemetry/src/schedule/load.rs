@@ -16,7 +16,7 @@ const WINDOW: Micros = Micros::from_millis(1_000);
 const STEADY: f64 = 0.02;
 /// The weight of a new duration in the mean.
 const WEIGHT: f64 = 1.0 / 8.0;
-/// The durations and delays that statistics are made from.
+/// The durations that statistics are made from.
 const KEPT: usize = 1024;
 
 /// Durations of exchanges, in microseconds.
@@ -26,8 +26,6 @@ pub struct Durations {
     pub median: Micros,
     /// One in a hundred is longer.
     pub p99: Micros,
-    /// One in a hundred polls begins later than this after its instant.
-    pub jitter: Micros,
 }
 
 /// How often a group of polls begins.
@@ -70,7 +68,6 @@ pub struct Load {
     /// A duration that is longer is not that of an exchange.
     longest: Micros,
     stretch: f64,
-    demand: f64,
     is_decided: bool,
     window: Option<Instant>,
     under_way: u32,
@@ -82,7 +79,6 @@ pub struct Load {
     overlap: f64,
     commands: f64,
     durations: Recent,
-    delays: Recent,
 }
 
 impl Load {
@@ -92,7 +88,6 @@ impl Load {
             costs: Map::new(),
             longest,
             stretch: 1.0,
-            demand: 0.0,
             is_decided: false,
             window: None,
             under_way: 0,
@@ -103,7 +98,6 @@ impl Load {
             overlap: 1.0,
             commands: 0.0,
             durations: Recent::default(),
-            delays: Recent::default(),
         }
     }
 
@@ -112,18 +106,11 @@ impl Load {
         self.stretch
     }
 
-    /// The part of the line's time that the polls would take at the rates that are asked. More than 1
-    /// is too much.
-    pub fn demand(&self) -> f64 {
-        self.demand
-    }
-
     /// The durations of the last exchanges; `None` before the first one.
     pub fn durations(&self) -> Option<Durations> {
         Some(Durations {
             median: self.durations.quantile(0.5)?,
             p99: self.durations.quantile(0.99)?,
-            jitter: self.delays.quantile(0.99).unwrap_or_default(),
         })
     }
 
@@ -159,10 +146,6 @@ impl Load {
             self.busy_since = now;
         }
         self.under_way += 1;
-    }
-
-    pub(super) fn waited(&mut self, delay: Micros) {
-        self.delays.push(delay);
     }
 
     pub(super) fn ended(&mut self, now: Instant, exchange: &UnderWay, outcome: Outcome) {
@@ -224,8 +207,7 @@ impl Load {
             parts.sum::<f64>() / self.overlap()
         };
         let room = (FULL - self.commands).max(LEAST);
-        let (asked, needed) = (demand(1.0), factor(room, demand));
-        self.demand = asked;
+        let needed = factor(room, demand);
         if needed == 1.0 || (needed / self.stretch - 1.0).abs() > STEADY {
             self.stretch = needed;
         }

@@ -158,7 +158,6 @@ impl<C: Clone> Schedule<C> {
                 polls: Vec::new(),
                 position: 0,
                 due: now,
-                skipped: 0,
             });
             group.polls.push(poll);
             self.lanes.entry(lane).or_default();
@@ -178,7 +177,7 @@ impl<C: Clone> Schedule<C> {
             };
             match self.groups.iter().find(same) {
                 Some(old) => {
-                    (group.due, group.skipped) = (old.due, old.skipped);
+                    group.due = old.due;
                     group.position = old.position.min(group.polls.len().saturating_sub(1));
                 }
                 None => group.due = last_on_grid(anchor, group.rhythm.period, now),
@@ -379,7 +378,6 @@ impl<C: Clone> Schedule<C> {
         state.begin(now, ExchangeKind::Poll(poll));
         self.under_way += 1;
         self.load.began(now);
-        self.load.waited(now.since(instant));
         Some((lane, Job::Poll(poll, instant)))
     }
 
@@ -473,11 +471,6 @@ impl<C: Clone> Schedule<C> {
     /// The period of a poll that the line carries, predicted from measured exchanges.
     pub fn predicted_period(&self, period: Micros) -> Micros {
         stretched(period, self.load.stretch())
-    }
-
-    /// Instants that were skipped because the line was too slow.
-    pub fn skipped(&self) -> u64 {
-        self.groups.iter().map(|group| group.skipped).sum()
     }
 
     fn new_id(&mut self) -> CommandId {

@@ -130,9 +130,4 @@ impl Reader {
         self.bytes.drain(..HEADER + size);
         Ok(Some(Frame { kind, payload }))
     }
-
-    /// Whether bytes of an unfinished payload wait.
-    pub fn is_amid(&self) -> bool {
-        !self.bytes.is_empty()
-    }
 }
