@@ -78,7 +78,7 @@ pub enum Trouble {
 ///
 /// The items are in the order of time. A row waits until a confirmation behind it. If a motor falls
 /// silent or the port fails before that, the row is left out, and the gap counts it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Rows {
     signals: Vec<Signal>,
     partial: Option<Partial>,
@@ -101,14 +101,7 @@ struct Partial {
 impl Rows {
     /// Rows of these signals.
     pub fn new(signals: Vec<Signal>) -> Self {
-        Rows {
-            signals,
-            partial: None,
-            last: None,
-            refused: Map::new(),
-            confirmed: Map::new(),
-            items: VecDeque::new(),
-        }
+        Rows { signals, ..Rows::default() }
     }
 
     /// Takes the next record of the subscription.

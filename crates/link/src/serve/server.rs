@@ -35,6 +35,7 @@ pub struct Turn {
 }
 
 /// Serves ports until it is dropped.
+#[derive(Default)]
 pub struct Server {
     clock: Clock,
     endpoints: Vec<Endpoint>,
@@ -43,27 +44,15 @@ pub struct Server {
     scratch: Scratch,
 }
 
-impl Default for Server {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Server {
     /// A server without ports. Its time starts now.
     pub fn new() -> Self {
-        Self::by(Clock::running())
+        Self::default()
     }
 
     /// A server without ports, on `clock`.
     pub fn by(clock: Clock) -> Self {
-        Server {
-            clock,
-            endpoints: Vec::new(),
-            nodes: Vec::new(),
-            ready: Vec::new(),
-            scratch: Scratch::default(),
-        }
+        Server { clock, ..Self::default() }
     }
 
     /// Serves a serial line with `station`.

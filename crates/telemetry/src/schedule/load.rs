@@ -62,7 +62,7 @@ struct Cost {
 /// exchanges at a time. The demand is the sum of these times over all polls, each by its rate. If the
 /// demand exceeds what commands leave of the line, all periods are multiplied by the same factor,
 /// [`stretch`](Self::stretch).
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Load {
     costs: Map<PollId, Cost>,
     /// A duration that is longer is not that of an exchange.
@@ -84,21 +84,7 @@ pub struct Load {
 impl Load {
     /// Of exchanges that take at most this time.
     pub(super) fn new(longest: Micros) -> Self {
-        Load {
-            costs: Map::new(),
-            longest,
-            stretch: 1.0,
-            is_decided: false,
-            window: None,
-            under_way: 0,
-            busy_since: Instant(0),
-            busy: 0,
-            filled: 0,
-            of_commands: 0,
-            overlap: 1.0,
-            commands: 0.0,
-            durations: Recent::default(),
-        }
+        Load { longest, stretch: 1.0, overlap: 1.0, ..Load::default() }
     }
 
     /// The factor by which all periods are longer than asked; 1 if the line carries them.
