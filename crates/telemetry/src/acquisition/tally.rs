@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use serde::{Deserialize, Serialize};
+
 use crate::line::LineError;
 
 /// The counts of a line since it was opened. Clones are the same counts.
@@ -18,18 +20,24 @@ struct Counted {
     lost: AtomicU64,
 }
 
-/// The counts at a moment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// What the exchanges of a line came to since it was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "LineCounts"))]
 pub struct Counts {
     /// Exchanges that are over.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub exchanges: u64,
-    /// Those that the drive answered with a refusal, or that it answered in a way that was not expected.
+    /// Those in which a drive refused, or answered in a way that was not expected.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub refused: u64,
     /// Those without a reply.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub silent: u64,
     /// Those that failed otherwise: damaged replies, echoes, a port that failed.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub failed: u64,
     /// How often the port was lost.
+    #[cfg_attr(feature = "typescript", ts(type = "number"))]
     pub lost: u64,
 }
 

@@ -214,7 +214,7 @@ impl SharedLine {
         let profile = self.speaks.profile().map(|profile| profile.name().to_owned());
         let (line, port) = (self.name.clone(), self.port.to_string());
         let timeout = self.timeout.as_secs_f64();
-        let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts().into()));
+        let (t, wall, counts) = (seconds(now), self.wall(now), Some(self.tally.counts()));
         let has_answered =
             |(_, state): &(&Motor, &MotorState)| state.presence == Presence::Answered;
         let heard =

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::json::word;
-use crate::acquisition::Counts;
+pub use crate::acquisition::Counts as LineCounts;
 
 /// How long a share may take for an answer, besides the waiting for replies.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -41,34 +41,6 @@ pub struct Line {
     /// under way. They may still be turning.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unstopped: Vec<u8>,
-}
-
-/// What the exchanges of a line came to since it was opened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct LineCounts {
-    /// Exchanges that are over.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub exchanges: u64,
-    /// Those in which a drive refused, or answered in a way that was not expected.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub refused: u64,
-    /// Those without a reply.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub silent: u64,
-    /// Those that failed otherwise: damaged replies, echoes, a port that failed.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub failed: u64,
-    /// How often the port was lost.
-    #[cfg_attr(feature = "typescript", ts(type = "number"))]
-    pub lost: u64,
-}
-
-impl From<Counts> for LineCounts {
-    fn from(counts: Counts) -> Self {
-        let Counts { exchanges, refused, silent, failed, lost } = counts;
-        LineCounts { exchanges, refused, silent, failed, lost }
-    }
 }
 
 impl Line {
