@@ -6,7 +6,7 @@ use motorlink::port::PortName;
 use motorlink::st::Profile;
 use motorlink_telemetry::share::hub::SharedLine;
 use motorlink_telemetry::share::message::{Line, Protocol};
-use motorlink_telemetry::share::port_config::{Limits, OpenError, PortConfig, protocols_of};
+use motorlink_telemetry::share::port_config::{Limits, PortConfig, protocols_of};
 
 use crate::connection::missing_port;
 use crate::failure::Failure;
@@ -69,19 +69,11 @@ impl Lines {
                     Protocol::Rmd => &mut rmd,
                 };
                 let name = format!("{}{number}", protocol.word());
-                held.push(SharedLine::start(&name, wish.open(protocol)?)?);
+                let opened = wish.open(protocol).map_err(|error| Failure::from(&error))?;
+                held.push(SharedLine::start(&name, opened)?);
                 *number += 1;
             }
         }
         Ok(held)
-    }
-}
-
-impl From<OpenError> for Failure {
-    fn from(error: OpenError) -> Self {
-        match error {
-            OpenError::St(error) => error.into(),
-            OpenError::Rmd(error) => error.into(),
-        }
     }
 }

@@ -39,7 +39,8 @@ pub fn run(
             bar.set_message(format!("{rate} baud"));
         }
         let at_rate = port.at_baud(rate).unwrap_or_else(|| port.clone());
-        let found = scan(&at_rate, Protocol::St, Some(patience))?;
+        let found = scan(&at_rate, Protocol::St, Some(patience));
+        let found = found.map_err(|error| Failure::from(&error))?;
         bar.inc(1);
         echoes |= found.finding == Finding::Echo;
         is_found |= matches!(found.finding, Finding::Drive | Finding::Refuses);

@@ -5,16 +5,13 @@ use std::time::Duration;
 
 use motorlink::port::{Carries, PortName};
 use motorlink::rmd::MotorSet;
-use motorlink::{rmd, st};
 use motorlink_proto::st::{FullScale, MotorNumber, Profile};
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{LineError, RmdLine, StLine};
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::search;
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::Protocol;
 use motorlink_telemetry::share::port::place_of;
-use motorlink_telemetry::share::port_config::protocols_of;
+use motorlink_telemetry::share::port_config::{Limits, PortConfig, protocols_of};
 use motorlink_telemetry::signal::Motor;
 
 use super::abort::Abort;
@@ -121,25 +118,11 @@ pub(super) fn unsearched(
     protocol: Protocol,
 ) -> Result<Opened, RecordError> {
     let taps = Taps::default();
-    let around = taps.clone();
-    let (acquisition, speaks) = match protocol {
-        Protocol::St => {
-            let mut options = st::Options { profile: port.profile, ..Default::default() };
-            options.timeout = port.timeout.unwrap_or(options.timeout);
-            let wrap = move |link| around.around_line(link);
-            let client = st::EventClient::open_wrapped(&port.name, wrap, options);
-            let line = StLine::new(client.map_err(LineError::from)?);
-            (Acquisition::new(Box::new(line)), DriveProtocol::St(port.profile))
-        }
-        Protocol::Rmd => {
-            let mut options = rmd::Options::default();
-            options.timeout = port.timeout.unwrap_or(options.timeout);
-            let wrap = move |link| around.around_bus(link);
-            let client = rmd::EventClient::open_wrapped(&port.name, wrap, options);
-            let line = RmdLine::new(client.map_err(LineError::from)?);
-            (Acquisition::new(Box::new(line)), DriveProtocol::Rmd)
-        }
-    };
+    let (line, bus) = (taps.clone(), taps.clone());
+    let around = (move |link| line.around_line(link), move |link| bus.around_bus(link));
+    let (name, profile, timeout) = (port.name.clone(), port.profile, port.timeout);
+    let config = PortConfig { port: name, profile, timeout, limits: Limits::default() };
+    let (speaks, acquisition) = config.open_around(protocol, around)?;
     let anchor = Anchor::now(acquisition.clock());
     let full_scale = port.full_scale.filter(|_| protocol == Protocol::St);
     let (share, port) = (place_of(&port.name), port.name.to_string());

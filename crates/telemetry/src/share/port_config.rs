@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::{Carries, PortName};
+use motorlink::port::{Carries, EventBytes, EventCan, PortName};
 use motorlink::st::Profile;
 use motorlink::{rmd, st};
 
@@ -10,7 +10,7 @@ use super::drive_protocol::DriveProtocol;
 use super::message::Protocol;
 use super::wire::Tap;
 use crate::acquisition::Acquisition;
-use crate::line::{RmdLine, StLine};
+use crate::line::{LineError, RmdLine, StLine};
 
 /// A port that a share opens, and how its drives are spoken to.
 #[derive(Debug, Clone)]
@@ -46,17 +46,6 @@ pub struct Opened {
     pub tap: Tap,
 }
 
-/// Why a port is not open.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// That of an ST drive.
-    #[error(transparent)]
-    St(#[from] st::Error),
-    /// That of RMD motors.
-    #[error(transparent)]
-    Rmd(#[from] rmd::Error),
-}
-
 /// The protocols that a port can have.
 pub fn protocols_of(port: &PortName) -> impl Iterator<Item = Protocol> {
     let kinds = [(Carries::Bytes, Protocol::St), (Carries::Frames, Protocol::Rmd)];
@@ -69,17 +58,33 @@ impl PortConfig {
     ///
     /// # Errors
     /// What keeps it from being opened.
-    pub fn open(&self, protocol: Protocol) -> Result<Opened, OpenError> {
+    pub fn open(&self, protocol: Protocol) -> Result<Opened, LineError> {
         let tap = Tap::default();
-        let around = tap.clone();
-        let (speaks, engine) = match protocol {
+        let (line, bus) = (tap.clone(), tap.clone());
+        let around = (move |link| line.around_line(link), move |link| bus.around_bus(link));
+        let (speaks, engine) = self.open_around(protocol, around)?;
+        Ok(Opened { port: self.port.clone(), speaks, engine, tap })
+    }
+
+    /// As [`open`](Self::open), with this around a serial line or around a bus.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn open_around(
+        &self,
+        protocol: Protocol,
+        (around_line, around_bus): (
+            impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
+            impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
+        ),
+    ) -> Result<(DriveProtocol, Acquisition), LineError> {
+        Ok(match protocol {
             Protocol::St => {
                 let defaults = st::Options::default();
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
                 let (profile, limits) = (self.profile, self.limits.st);
                 let options = st::Options { profile, timeout, limits, ..defaults };
-                let wrap = move |link| around.around_line(link);
-                let client = st::EventClient::open_wrapped(&self.port, wrap, options)?;
+                let client = st::EventClient::open_wrapped(&self.port, around_line, options)?;
                 (DriveProtocol::St(self.profile), Acquisition::new(Box::new(StLine::new(client))))
             }
             Protocol::Rmd => {
@@ -87,11 +92,9 @@ impl PortConfig {
                 let timeout = self.timeout.unwrap_or(defaults.timeout);
                 let limits = self.limits.rmd;
                 let options = rmd::Options { timeout, limits, ..defaults };
-                let wrap = move |link| around.around_bus(link);
-                let client = rmd::EventClient::open_wrapped(&self.port, wrap, options)?;
+                let client = rmd::EventClient::open_wrapped(&self.port, around_bus, options)?;
                 (DriveProtocol::Rmd, Acquisition::new(Box::new(RmdLine::new(client))))
             }
-        };
-        Ok(Opened { port: self.port.clone(), speaks, engine, tap })
+        })
     }
 }

@@ -7,7 +7,7 @@ use motorlink::rmd::{self, MotorSet};
 use motorlink::st::{self, BAUD_RATES, SCAN_TIMEOUT};
 
 use super::message::{Finding, Protocol};
-use super::port_config::OpenError;
+use crate::line::LineError;
 
 /// The rates that a port can choose, the most frequent of such drives first.
 pub fn rates(port: &PortName, protocol: Protocol) -> Vec<u32> {
@@ -72,14 +72,14 @@ pub fn scan(
     port: &PortName,
     protocol: Protocol,
     timeout: Option<Duration>,
-) -> Result<Found, OpenError> {
+) -> Result<Found, LineError> {
     match protocol {
         Protocol::St => scan_st(port, timeout.unwrap_or(SCAN_TIMEOUT)),
         Protocol::Rmd => scan_rmd(port, timeout),
     }
 }
 
-fn scan_st(port: &PortName, timeout: Duration) -> Result<Found, OpenError> {
+fn scan_st(port: &PortName, timeout: Duration) -> Result<Found, LineError> {
     match st::scan(port, timeout) {
         Ok(result) => Ok(Found::new((&result).into(), &result)),
         Err(st::Error::Port(error @ PortError::BaudRefused { .. })) => {
@@ -89,7 +89,7 @@ fn scan_st(port: &PortName, timeout: Duration) -> Result<Found, OpenError> {
     }
 }
 
-fn scan_rmd(port: &PortName, timeout: Option<Duration>) -> Result<Found, OpenError> {
+fn scan_rmd(port: &PortName, timeout: Option<Duration>) -> Result<Found, LineError> {
     let defaults = rmd::Options::default();
     let options = rmd::Options { timeout: timeout.unwrap_or(defaults.timeout), ..defaults };
     let bus = rmd::Client::open(port, options)?;

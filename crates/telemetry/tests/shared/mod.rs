@@ -8,14 +8,12 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{EventBytes, EventCan, PortName};
-use motorlink::st::{EventClient, Options};
+use motorlink::port::{EventBytes, EventCan};
 use motorlink_proto::st::Profile;
-use motorlink_telemetry::acquisition::Acquisition;
-use motorlink_telemetry::line::{RmdLine, StLine, Stopped};
-use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::line::Stopped;
 use motorlink_telemetry::share::hub::SharedLine;
-use motorlink_telemetry::share::port_config::Opened;
+use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::port_config::{Limits, Opened, PortConfig};
 use motorlink_telemetry::share::server::Server;
 use motorlink_telemetry::share::wire::Tap;
 use motorlink_testbench::{Bench, BenchConfig, Serving};
@@ -77,27 +75,23 @@ impl Share {
         let config = BenchConfig { profile, ..BenchConfig::default() };
         let (bench, serving, st, rmd) = served_by(&format!("share-{name}"), &config);
         let tap = Tap::default();
-        let wrap = {
-            let tap = tap.clone();
-            move |link| tap.around_line(around(link))
+        let (line, bus) = (tap.clone(), Tap::default());
+        let config = |port: &str, timeout| PortConfig {
+            port: port.parse().unwrap(),
+            profile,
+            timeout: Some(timeout),
+            limits: Limits::default(),
         };
-        let options = Options { profile, timeout: st_timeout, ..Options::default() };
-        let client = EventClient::open_wrapped(&st.parse().unwrap(), wrap, options);
-        let engine = Acquisition::new(Box::new(StLine::new(client.unwrap())));
-        let (port, speaks) = (st.parse().unwrap(), DriveProtocol::St(profile));
-        let st = SharedLine::start("st0", Opened { port, speaks, engine, tap }).unwrap();
-        let tap = Tap::default();
-        let wrap = {
-            let tap = tap.clone();
-            move |link| tap.around_bus(around_bus(link))
-        };
-        let options = motorlink::rmd::Options { timeout: rmd_timeout, ..Default::default() };
-        let port: PortName = format!("slcan:{rmd}").parse().unwrap();
-        let client = motorlink::rmd::EventClient::open_wrapped(&port, wrap, options);
-        let engine = Acquisition::new(Box::new(RmdLine::new(client.unwrap())));
-        let rmd =
-            SharedLine::start("rmd0", Opened { port, speaks: DriveProtocol::Rmd, engine, tap })
-                .unwrap();
+        let on_line = config(&st, st_timeout);
+        let wraps = (move |link| line.around_line(around(link)), |bus| bus);
+        let (speaks, engine) = on_line.open_around(Protocol::St, wraps).unwrap();
+        let opened = Opened { port: on_line.port, speaks, engine, tap };
+        let st = SharedLine::start("st0", opened).unwrap();
+        let (on_bus, tap) = (config(&format!("slcan:{rmd}"), rmd_timeout), bus.clone());
+        let wraps = (|line| line, move |link| bus.around_bus(around_bus(link)));
+        let (speaks, engine) = on_bus.open_around(Protocol::Rmd, wraps).unwrap();
+        let opened = Opened { port: on_bus.port, speaks, engine, tap };
+        let rmd = SharedLine::start("rmd0", opened).unwrap();
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         if let Some(lease) = lease {

@@ -10,9 +10,9 @@ use motorlink::port::{Carries, Place, PortName};
 use motorlink_link::list;
 
 use super::session_id::SessionId;
-use crate::line::Stopped;
+use crate::line::{LineError, Stopped};
 use crate::share::message::{FoundPort, Protocol};
-use crate::share::port_config::{OpenError, Opened};
+use crate::share::port_config::Opened;
 use crate::share::scan::Found;
 
 /// Jobs at the same time, besides ports that are closed: that stops motors, and is always possible.
@@ -58,7 +58,7 @@ pub(super) enum PortOperation {
 pub(super) enum JobResult {
     Listed(Vec<(FoundPort, Option<Place>)>),
     Scanned(Scanned),
-    Opened(Box<Result<Opened, OpenError>>),
+    Opened(Box<Result<Opened, LineError>>),
     Closed(Closed),
 }
 
@@ -76,7 +76,7 @@ pub(super) struct Scanned {
     pub(super) port: PortName,
     pub(super) rate: Option<u32>,
     pub(super) rates: Vec<u32>,
-    pub(super) found: Result<Found, OpenError>,
+    pub(super) found: Result<Found, LineError>,
 }
 
 /// Says that the thread of a job ends, also if it panics.

@@ -16,12 +16,12 @@ use super::completion_types::Completion;
 use super::line::SharedLine;
 use super::requests::{Refused, usage};
 use super::session_id::SessionId;
-use crate::line::Stopped;
+use crate::line::{LineError, Stopped};
 use crate::share::message::{
     ANY_MOTOR, Answer, EventKind, FoundPort, LONGEST_PORT, LONGEST_TIMEOUT, MOST_OPENED, MotorName,
     Protocol, Reason, StoppedMotor,
 };
-use crate::share::port_config::{OpenError, Opened, PortConfig, protocols_of};
+use crate::share::port_config::{Opened, PortConfig, protocols_of};
 use crate::share::scan::{self, Found};
 
 /// The shortest time for a reply, in seconds.
@@ -242,7 +242,7 @@ impl Hub {
     fn opened(
         &mut self,
         by: &Arc<str>,
-        opened: Result<Opened, OpenError>,
+        opened: Result<Opened, LineError>,
     ) -> Result<Answer, Refused> {
         let opened = opened.map_err(|error| (Reason::Line, error.to_string()))?;
         let port = opened.port.to_string();
