@@ -158,7 +158,7 @@ impl Port {
                 *wire = Wire { told: Some(Instant::now()), last: wire.last, ..Wire::default() };
             }
             for stop in stops {
-                engine.stop(&"bench".into(), stop, &mut |_, _| {});
+                engine.stop(&"bench".into(), stop, None, &mut |_, _| {});
             }
         })?;
         let mut confirmed = 0;

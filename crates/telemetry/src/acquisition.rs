@@ -242,37 +242,37 @@ impl Acquisition {
 
     /// Stops a motor with this request, ahead of all commands and polls, and repeats it until the
     /// motor confirms it. Commands of the motor that wait and would move it are not sent any more.
-    pub fn stop(&mut self, by: &Arc<str>, request: Request, ended: &mut Ended<'_>) -> CommandId {
+    ///
+    /// A `quiet` one gives way to those that somebody asks for now. Events tell of it only if the motor
+    /// confirms it. It withdraws no commands.
+    pub fn stop(
+        &mut self,
+        by: &Arc<str>,
+        request: Request,
+        quiet: Option<Quiet>,
+        ended: &mut Ended<'_>,
+    ) -> CommandId {
         let now = self.clock.now();
         let lane = self.line.lane(&request);
-        let (by_whom, again) = (Arc::clone(by), request.clone());
-        let command = Command { by: by_whom, request: again, is_stop: true, deadline: None };
+        let told = (Arc::clone(by), request.clone());
         let motor = request.motor();
         let is_other = |other: Option<Motor>| other.is_some() && motor.is_some() && other != motor;
         let keep = |queued: &Arc<Command>| {
             !queued.request.motion().may_move() || is_other(queued.request.motor())
         };
-        let is_same = |queued: &Arc<Command>| queued.request == request;
-        let (id, overtaken) = self.schedule.stop(now, lane, Arc::new(command), is_same, keep);
+        let is_same = |queued: &Arc<Command>| queued.request == told.1;
+        let command = Command { by: Arc::clone(by), request, is_stop: true, deadline: None };
+        let (id, overtaken) =
+            self.schedule.stop(now, lane, Arc::new(command), is_same, keep, quiet);
         for (id, _) in overtaken {
             ended(id, Err(CommandError::Overtaken));
         }
-        let what = What::Stopping(id, Arc::clone(by), request);
-        self.untold.push(Arc::new(Event { time: now, what }));
-        id
-    }
-
-    /// Queues a stop that gives way to those that somebody asks for now. Events tell of it only if the motor
-    /// confirms it. It withdraws no commands.
-    pub fn stop_quietly(&mut self, by: &Arc<str>, request: Request, quiet: Quiet) -> CommandId {
-        let lane = self.line.lane(&request);
-        let told = (Arc::clone(by), request.clone());
-        let is_same = |queued: &Arc<Command>| queued.request == told.1;
-        let by = Arc::clone(by);
-        let command = Arc::new(Command { by, request, is_stop: true, deadline: None });
-        let now = self.clock.now();
-        let id = self.schedule.stop_quietly(now, lane, command, is_same, quiet);
-        self.untold_stops.insert(id, told);
+        if quiet.is_some() {
+            self.untold_stops.insert(id, told);
+        } else {
+            let what = What::Stopping(id, told.0, told.1);
+            self.untold.push(Arc::new(Event { time: now, what }));
+        }
         id
     }
 

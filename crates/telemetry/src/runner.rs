@@ -297,10 +297,12 @@ impl Remote {
     /// # Errors
     /// See [`CommandError`]. The motor may still be turning.
     pub fn stop(&self, by: &Arc<str>, request: Request) -> CommandResult {
-        self.wait(|ended| self.stop_then(by, request, ended)).unwrap_or(Err(CommandError::Ended))
+        self.wait(|ended| self.stop_then(by, request, None, ended))
+            .unwrap_or(Err(CommandError::Ended))
     }
 
-    /// As [`stop`](Self::stop), without waiting: `ended` receives the result in the engine's thread.
+    /// As [`stop`](Self::stop), or as a quiet one ([`Acquisition::stop`]), without waiting: `ended`
+    /// receives the result in the engine's thread.
     ///
     /// # Errors
     /// The engine has ended. If it ends later, `ended` receives that it has.
@@ -308,31 +310,15 @@ impl Remote {
         &self,
         by: &Arc<str>,
         request: Request,
+        quiet: Option<Quiet>,
         ended: impl FnOnce(CommandResult) + Send + 'static,
     ) -> Result<(), Ended> {
         let by = Arc::clone(by);
         self.send(move |engine| {
             let Engine { acquisition, waiting } = engine;
-            let id = acquisition.stop(&by, request, &mut |id, result| tell(waiting, id, result));
+            let overtaken = &mut |id, result| tell(waiting, id, result);
+            let id = acquisition.stop(&by, request, quiet, overtaken);
             engine.waiting.insert(id, Box::new(ended));
-        })
-    }
-
-    /// As [`stop_then`](Self::stop_then), with [`Acquisition::stop_quietly`].
-    ///
-    /// # Errors
-    /// The engine has ended. If it ends later, `ended` receives that it has.
-    pub fn stop_quietly_then(
-        &self,
-        by: &Arc<str>,
-        request: Request,
-        quiet: Quiet,
-        ended: impl FnOnce(CommandResult) + Send + 'static,
-    ) -> Result<(), Ended> {
-        let by = Arc::clone(by);
-        self.send(move |Engine { acquisition, waiting }| {
-            let id = acquisition.stop_quietly(&by, request, quiet);
-            waiting.insert(id, Box::new(ended));
         })
     }
 

@@ -32,7 +32,7 @@ fn stopped_on_a_saturated_line(engine: &mut Engine, wire: &Wire, stop: &Request)
         let asked = engine.clock.now();
         let ended = &mut engine.ended;
         let push = &mut |id, result| ended.push((id, result));
-        let id = engine.acquisition.stop(&"test".into(), stop.clone(), push);
+        let id = engine.acquisition.stop(&"test".into(), stop.clone(), None, push);
         while !wire.lock().unwrap().contains(&true) {
             engine.run(engine.step);
         }
@@ -136,7 +136,7 @@ fn a_stop_goes_out_before_anybody_is_told_of_the_exchange_ahead() {
         }
         while subscription.take().is_some() {}
         let stop = Request::st(1, st::Request::ExecuteCommand(st::Command::StopMotor));
-        engine.acquisition.stop(&"test".into(), stop, &mut |_, _| {});
+        engine.acquisition.stop(&"test".into(), stop, None, &mut |_, _| {});
         let is_told = || {
             let records = std::iter::from_fn(|| subscription.take());
             records.filter(|record| matches!(record, Record::Values(_))).count() > 0

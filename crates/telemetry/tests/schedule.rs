@@ -303,7 +303,7 @@ fn a_stop_overtakes_commands_and_waits_for_one_exchange() {
         line.events.clear();
         let asked = line.now;
         let keep = |name: &&str| *name == "gain";
-        let (id, overtaken) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), keep);
+        let (id, overtaken) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), keep, None);
         assert_eq!(overtaken.iter().map(|(_, name)| *name).collect::<Vec<_>>(), ["start"]);
         line.run(50 * MILLISECOND);
         let begun = line.at(&Event::Stop(None)).unwrap();
@@ -325,7 +325,7 @@ fn a_stop_on_a_bus_replaces_the_exchange_of_its_motor() {
     line.command(2, "start", SECOND);
     line.run(1_000);
     for lane in [0, 2] {
-        line.schedule.stop(line.now, Lane(lane), "stop", is("stop"), |_| false);
+        line.schedule.stop(line.now, Lane(lane), "stop", is("stop"), |_| false, None);
     }
     line.run(1_000);
     let stops: Vec<_> = line
@@ -352,10 +352,7 @@ fn a_stop_is_repeated_until_it_is_confirmed_or_refused() {
             (Micros(1_000), if asked > lost { outcome } else { Outcome::Failed })
         });
         let (now, lane, stop) = (Instant(0), Lane(0), "stop");
-        let id = match quiet {
-            Some(quiet) => line.schedule.stop_quietly(now, lane, stop, is(stop), quiet),
-            None => line.schedule.stop(now, lane, stop, is(stop), |_| false).0,
-        };
+        let (id, _) = line.schedule.stop(now, lane, stop, is(stop), |_| false, quiet);
         line.run(10 * SECOND);
         let sent = line.events.iter().filter(|(_, _, event)| *event == Event::Stop(None)).count();
         let confirmed = line.at(&Event::Over(Verdict::Stopped(vec![id])));
@@ -411,9 +408,9 @@ fn stops_go_ahead_of_precautions_on_every_lane() {
         let lanes = if rules.window == 1 { [0, 0, 0] } else { [1, 2, 3] };
         for (lane, name) in lanes.into_iter().zip(["first", "second"]) {
             let (lane, quiet) = (Lane(lane), Quiet::Precaution);
-            line.schedule.stop_quietly(line.now, lane, name, is(name), quiet);
+            line.schedule.stop(line.now, lane, name, is(name), |_| true, Some(quiet));
         }
-        line.schedule.stop(line.now, Lane(lanes[2]), "known", is("known"), |_| true);
+        line.schedule.stop(line.now, Lane(lanes[2]), "known", is("known"), |_| true, None);
         line.run(SECOND);
         drop(line);
         let names: Vec<_> = sent.borrow().iter().map(|(_, name)| *name).collect();
@@ -428,12 +425,12 @@ fn quiet_stops_on_a_silent_line_give_way_to_others_and_have_their_turns() {
         for pressed in (SECOND..12 * SECOND).step_by(300_000) {
             let sent = RefCell::default();
             let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
-            line.schedule.stop(line.now, Lane(0), "known", is("known"), |_| true);
+            line.schedule.stop(line.now, Lane(0), "known", is("known"), |_| true, None);
             for name in QUIET {
-                line.schedule.stop_quietly(line.now, Lane(0), name, is(name), quiet);
+                line.schedule.stop(line.now, Lane(0), name, is(name), |_| true, Some(quiet));
             }
             line.run(pressed);
-            line.schedule.stop(line.now, Lane(0), "new", is("new"), |_| true);
+            line.schedule.stop(line.now, Lane(0), "new", is("new"), |_| true, None);
             line.run(30 * SECOND);
             assert_eq!(line.schedule.next(line.now), Next::Wait(None), "{pressed}");
             drop(line);
@@ -460,15 +457,11 @@ fn a_stop_that_is_pressed_without_an_end_leaves_others_their_turns_and_ends_for_
         let sent = RefCell::default();
         let mut line = Line::new(SERIAL, stops(&sent, |_| (Micros(SECOND), Outcome::Failed)));
         let (now, owed) = (line.now, "owed");
-        match quiet {
-            Some(quiet) => {
-                line.schedule.stop_quietly(now, Lane(0), owed, is(owed), quiet);
-            }
-            None => drop(line.schedule.stop(now, Lane(0), owed, is(owed), |_| true)),
-        }
+        line.schedule.stop(now, Lane(0), owed, is(owed), |_| true, quiet);
         let mut pressed = Vec::new();
         for _ in 0..60 {
-            let stop = line.schedule.stop(line.now, Lane(0), "pressed", is("pressed"), |_| true);
+            let stop =
+                line.schedule.stop(line.now, Lane(0), "pressed", is("pressed"), |_| true, None);
             pressed.push((line.now, stop.0));
             line.run(SECOND / 2);
         }
@@ -553,7 +546,7 @@ fn a_line_that_goes_away_and_comes_back_keeps_its_instants() {
     line.under_way.clear();
     line.events.clear();
     line.command(0, "set", 100 * MILLISECOND);
-    let (_, _) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), |_| true);
+    let (_, _) = line.schedule.stop(line.now, Lane(0), "stop", is("stop"), |_| true, None);
     line.run(5 * SECOND);
     assert_eq!(line.events.len(), 2, "{:?}", line.events);
     assert_eq!(line.at(&Event::Expired("set")), Some(Instant(SECOND + 100_501)));
@@ -568,7 +561,7 @@ fn a_line_that_goes_away_and_comes_back_keeps_its_instants() {
 #[test]
 fn a_stop_survives_a_short_interruption() {
     let mut line = Line::new(SERIAL, taking(1_000));
-    line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| true);
+    line.schedule.stop(Instant(0), Lane(0), "stop", is("stop"), |_| true, None);
     line.run(500);
     let lost = line.schedule.closed(line.now);
     assert!(matches!(lost[..], [(Lane(0), Verdict::StopAgain)]), "{lost:?}");
@@ -630,7 +623,7 @@ proptest! {
                     schedule.set_polls(now, &polls, BTreeMap::new());
                 }
                 1 => drop(schedule.command(lane, "set", now + Micros(number))),
-                2 => drop(schedule.stop(now, lane, "stop", is("stop"), |_| number % 2 == 0)),
+                2 => drop(schedule.stop(now, lane, "stop", is("stop"), |_| number % 2 == 0, None)),
                 3 => {
                     under_way.clear();
                     schedule.closed(now);
@@ -638,7 +631,7 @@ proptest! {
                 4 => schedule.reopened(now),
                 8 => {
                     let quiet = [Quiet::Again, Quiet::Precaution][number as usize % 2];
-                    schedule.stop_quietly(now, lane, "quiet", is("quiet"), quiet);
+                    schedule.stop(now, lane, "quiet", is("quiet"), |_| true, Some(quiet));
                 }
                 5 => {
                     let outcome = [Outcome::Answered, Outcome::Refused, Outcome::Failed][number as usize % 3];

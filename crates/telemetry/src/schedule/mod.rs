@@ -218,6 +218,9 @@ impl<C: Clone> Schedule<C> {
     /// Queues a stop ahead of all commands and polls, unless the same one waits already. It is repeated
     /// until [`Outcome::Answered`], or until it has failed for good. Gives the commands of the lane that
     /// wait and do not pass `keep`: they are not sent any more.
+    ///
+    /// A `quiet` one gives way to others, and leaves all commands. It is repeated for
+    /// [`STOP_TIME`](motorlink::STOP_TIME), or sent once if it comes later.
     pub fn stop(
         &mut self,
         now: Instant,
@@ -225,27 +228,13 @@ impl<C: Clone> Schedule<C> {
         command: C,
         is_same: impl Fn(&C) -> bool,
         keep: impl Fn(&C) -> bool,
+        quiet: Option<Quiet>,
     ) -> (CommandId, Vec<(CommandId, C)>) {
         let id = self.new_id();
         let state = self.lanes.entry(lane).or_default();
-        let overtaken = state.overtake(keep);
-        state.stops.add(now, (id, None), command, is_same);
+        let overtaken = if quiet.is_some() { Vec::new() } else { state.overtake(keep) };
+        state.stops.add(now, (id, quiet), command, is_same);
         (id, overtaken)
-    }
-
-    /// Queues a stop that gives way to others, ahead of all commands and polls. It is repeated for
-    /// [`STOP_TIME`](motorlink::STOP_TIME), or sent once if it comes later.
-    pub fn stop_quietly(
-        &mut self,
-        now: Instant,
-        lane: Lane,
-        command: C,
-        is_same: impl Fn(&C) -> bool,
-        quiet: Quiet,
-    ) -> CommandId {
-        let id = self.new_id();
-        self.lanes.entry(lane).or_default().stops.add(now, (id, Some(quiet)), command, is_same);
-        id
     }
 
     /// Takes out the commands that wait and do not pass `keep`: they are not sent any more.

@@ -109,7 +109,8 @@ impl Engine {
 
     pub fn stop(&mut self, request: Request) -> CommandId {
         let ended = &mut self.ended;
-        self.acquisition.stop(&"test".into(), request, &mut |id, result| ended.push((id, result)))
+        let push = &mut |id, result| ended.push((id, result));
+        self.acquisition.stop(&"test".into(), request, None, push)
     }
 
     /// How a command or a stop ended, if it has.

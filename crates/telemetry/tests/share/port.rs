@@ -484,7 +484,7 @@ fn an_engine_does_not_repeat_a_stop_that_the_share_has_repeated() {
         (Acquisition::new(Box::new(rmd)), line::Request::rmd(id(9), &Stop)),
     ];
     for (mut engine, request) in engines {
-        engine.stop(&Arc::from("operator"), request, &mut |_, _| {});
+        engine.stop(&Arc::from("operator"), request, None, &mut |_, _| {});
         let until = Instant::now() + LIMIT;
         let mut ends: Vec<Result<_, CommandError>> = Vec::new();
         while ends.is_empty() {

@@ -349,7 +349,7 @@ impl SharedLine {
             let ended = ended.clone();
             let tell = move |result| drop(ended.send((motor, result)));
             // An engine that has ended has stopped its motors.
-            let _ = self.remote().stop_then(by, Request::stop(motor), tell);
+            let _ = self.remote().stop_then(by, Request::stop(motor), None, tell);
         }
         drop(ended);
         let pending = std::iter::from_fn(|| self.remote().next(&results)).collect::<Vec<_>>();

@@ -325,7 +325,7 @@ impl Hub {
         let sent = Sent { motor, motion, configures, made: made(self.now, age), leases };
         let ended_with = move |result| tell(WorkResult::Command(sent, result));
         let begun = match motion.stops() {
-            true => held.remote().stop_then(name, request, ended_with),
+            true => held.remote().stop_then(name, request, None, ended_with),
             false => held.remote().command_then(name, request, time_to_live, ended_with),
         };
         begun.map_err(ended)

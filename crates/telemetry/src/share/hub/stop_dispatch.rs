@@ -172,11 +172,7 @@ impl Hub {
         let ended = move |result| {
             tell(WorkResult::Stop { part, motor, by: asker, motion, is_precaution, result });
         };
-        let begun = match quiet {
-            None => held.remote().stop_then(by, request, ended),
-            Some(quiet) => held.remote().stop_quietly_then(by, request, quiet, ended),
-        };
-        if begun.is_err() {
+        if held.remote().stop_then(by, request, quiet, ended).is_err() {
             let (by, result) = (Arc::clone(by), Err(CommandError::Ended));
             let name = held.name.as_str().into();
             let what = WorkResult::Stop { part, motor, by, motion, is_precaution, result };
