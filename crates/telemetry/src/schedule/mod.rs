@@ -239,22 +239,15 @@ impl<C: Clone> Schedule<C> {
 
     /// Takes out the commands that wait and do not pass `keep`: they are not sent any more.
     pub fn withdraw(&mut self, keep: impl Fn(&C) -> bool) -> Vec<(CommandId, C)> {
-        self.lanes
-            .iter_mut()
-            .map(|(_, value)| value)
-            .flat_map(|lane| lane.overtake(&keep))
-            .collect()
+        self.lanes.iter_mut().flat_map(|(_, lane)| lane.overtake(&keep)).collect()
     }
 
     /// What to do now. Call again until it is [`Next::Wait`].
     pub fn next(&mut self, now: Instant) -> Next<C> {
         self.update_load(now);
         let is_open = self.is_open;
-        let expired = self
-            .lanes
-            .iter_mut()
-            .map(|(_, value)| value)
-            .find_map(|lane| lane.take_expired(now, is_open));
+        let mut lanes = self.lanes.iter_mut();
+        let expired = lanes.find_map(|(_, lane)| lane.take_expired(now, is_open));
         if let Some((id, command)) = expired {
             return Next::Expired(id, command);
         }

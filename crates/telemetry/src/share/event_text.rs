@@ -40,20 +40,6 @@ pub struct EventText {
 }
 
 impl EventText {
-    /// The motors, among these, whose stop should be tried again after an event.
-    pub(super) fn retries(
-        &self,
-        what: &What,
-        motors: impl Iterator<Item = Motor>,
-        retry: &mut Vec<Motor>,
-    ) {
-        match what {
-            What::Back => retry.extend(motors),
-            What::Heard(motor) => retry.extend(motors.filter(|it| it == motor)),
-            _ => {}
-        }
-    }
-
     /// The event of the next stop of a motor by the share has this reason. `by` is from [`after`].
     pub(super) fn explain(&mut self, motor: Motor, by: &Arc<str>, why: &str) {
         self.reasons.insert((motor, Arc::clone(by)), why.to_owned());

@@ -91,13 +91,9 @@ impl<F: FnMut()> Drop for DropGuard<F> {
 impl Jobs {
     /// Waits for the lines that are being closed, and gives their motors.
     pub(super) fn end(self) -> Vec<(String, Vec<Stopped>)> {
-        let closing = self
-            .under_way
-            .into_iter()
-            .map(|(_, value)| value)
-            .filter(|job| job.does(PortOperation::Closes));
-        closing
-            .filter_map(|job| match job.thread.join() {
+        let jobs = self.under_way.into_iter();
+        jobs.filter(|(_, job)| job.does(PortOperation::Closes))
+            .filter_map(|(_, job)| match job.thread.join() {
                 Ok(JobResult::Closed(Closed { name, stopped, .. })) => Some((name, stopped)),
                 _ => None,
             })

@@ -237,6 +237,11 @@ impl SharedLine {
         wire::read(&self.tap, self.speaks, self.timeout.into(), self.clock.now(), part)
     }
 
+    /// The motors of programs, and those that have not confirmed a stop.
+    fn owed(&self) -> impl Iterator<Item = Motor> {
+        self.owners.motors().chain(self.pending_stops().map(|(motor, _)| motor))
+    }
+
     /// What happened since the last call; `None` after the end of the engine. `retry` receives the
     /// motors whose stop should be tried again, because they or their port are back. `doubts` receives
     /// those whose answers may be those to other commands.
@@ -248,8 +253,6 @@ impl SharedLine {
         let mut events = Vec::new();
         while let Some(record) = self.events.take() {
             let Record::Event(event) = record else { continue };
-            let motors = self.owners.motors().chain(self.pending_stops().map(|(motor, _)| motor));
-            self.words.retries(&event.what, motors, retry);
             match &event.what {
                 What::Lost(_) => {
                     doubts.push(None);
@@ -263,7 +266,11 @@ impl SharedLine {
                 What::Unanswered(motor, _) | What::Silent(motor, _) | What::Doubtful(motor, _) => {
                     doubts.push(self.lane(*motor));
                 }
-                What::Heard(motor) => self.motor_state(*motor).answered(),
+                What::Back => retry.extend(self.owed()),
+                What::Heard(motor) => {
+                    retry.extend(self.owed().filter(|it| it == motor));
+                    self.motor_state(*motor).answered();
+                }
                 _ => {}
             }
             let told = self.words.of(self.speaks, &event.what);

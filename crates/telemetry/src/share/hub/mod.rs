@@ -294,8 +294,7 @@ impl Hub {
         // All lines stop at the same time.
         let ends: Vec<_> = lines
             .into_iter()
-            .map(|(_, value)| value)
-            .map(|held| (held.name.clone(), std::thread::spawn(move || held.end())))
+            .map(|(_, held)| (held.name.clone(), std::thread::spawn(move || held.end())))
             .collect();
         let stopped = ends.into_iter().map(|(name, end)| (name, end.join().unwrap_or_default()));
         stopped

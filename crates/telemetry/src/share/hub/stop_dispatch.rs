@@ -27,12 +27,8 @@ impl Hub {
         let (awaited, others): (Vec<(usize, Motor)>, Vec<_>) = match motor {
             Some(motor) => (vec![self.motor(motor)?], Vec::new()),
             None => {
-                for held in self
-                    .lines
-                    .iter_mut()
-                    .map(|(_, value)| value)
-                    .filter(|held| !held.has_answered())
-                {
+                let lines = self.lines.iter_mut();
+                for (_, held) in lines.filter(|(_, held)| !held.has_answered()) {
                     held.begin_line_stop(name, AGAIN);
                 }
                 let lines = self.lines.iter();
