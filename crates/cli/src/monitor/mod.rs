@@ -149,7 +149,7 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
     let server = Server::open(&path, PROGRAM, args.lines.open(Limits::default())?)?;
     let at = format!("unix:{}", path.display());
     let monitor = start(args, Arc::new(Local(path)), false, web)?;
-    let ready = ready(args, &monitor, ("share", &at), &server.lines(), is_simulated);
+    let ready = ready(args, &monitor, ("share", &at), &server.hub.lines(), is_simulated);
     // The motors stop first, then the pages are closed.
     let outcome = share::serve(server, args.json, ready);
     drop(monitor);

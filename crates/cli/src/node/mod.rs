@@ -110,8 +110,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         output::note("the file has [ros2], which is used with --ros2 only");
     }
     let mut server = Server::open(&path, PROGRAM, args.lines.open(limits)?)?;
-    server.lease(config.lease()?.unwrap_or(LEASE));
-    server.limit(limits);
+    server.hub.lease(config.lease()?.unwrap_or(LEASE));
+    server.hub.limit(limits);
     let options = Options {
         name: name.clone(),
         share: path.clone(),
@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let (node, outcome) = match start(&mut server, options) {
         Ok(Some(node)) => {
-            let ready = ready(args, &node, &name, &path, &server.lines());
+            let ready = ready(args, &node, &name, &path, &server.hub.lines());
             (Some(node), ready)
         }
         Ok(None) => (None, Ok(())),

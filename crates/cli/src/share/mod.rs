@@ -178,7 +178,7 @@ pub fn path(at: &str) -> Result<PathBuf, Failure> {
 pub const UNCONFIRMED: &str = "motors may still turn: not all confirmed that they stop";
 
 fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
-    let lines = server.lines();
+    let lines = server.hub.lines();
     if args.json {
         let lines = lines_in_json(&lines);
         return output::print_line(&json!({"event": "ready", "at": args.at, "lines": lines}));

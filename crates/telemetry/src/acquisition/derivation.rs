@@ -10,10 +10,10 @@ use crate::signal::{Derived, Motor, Signal};
 /// A derived signal that somebody wants.
 #[derive(Debug)]
 pub(super) struct Derivation {
-    id: PollId,
+    pub(super) id: PollId,
     derived: Derived,
     /// Sends nothing: it names the motor and the signal of the values.
-    poll: Arc<Poll>,
+    pub(super) poll: Arc<Poll>,
     sources: [Signal; 2],
     /// The reply with one of the sources, while the other one is missing.
     half: Option<Arc<Values>>,
@@ -24,14 +24,6 @@ impl Derivation {
         let Read::Derived(derived) = poll.read else { return None };
         let sources = poll.signals.first()?.derived_from()?;
         Some(Derivation { id, derived, poll: Arc::new(poll), sources, half: None })
-    }
-
-    pub(super) fn id(&self) -> PollId {
-        self.id
-    }
-
-    pub(super) fn poll(&self) -> &Poll {
-        &self.poll
     }
 
     /// Whether it is computed from one of these.

@@ -65,7 +65,7 @@ impl Acquisition {
                     // What is computed from them comes first: then they complete their row.
                     for derivation in &mut self.derivations {
                         if let Some(computed) = derivation.take(&values) {
-                            pass(&mut self.consumers, anchor, derivation.id(), &computed);
+                            pass(&mut self.consumers, anchor, derivation.id, &computed);
                         }
                     }
                     pass(&mut self.consumers, anchor, id, &values);
@@ -93,7 +93,7 @@ impl Acquisition {
     fn refuse(&mut self, id: PollId, mut signals: Vec<Signal>, why: LineError) {
         if self.refused.insert(id, signals.clone()).is_none() {
             let derived = self.derivations.iter().filter(|it| it.needs(&signals));
-            let derived: Vec<_> = derived.flat_map(|it| it.poll().signals.clone()).collect();
+            let derived: Vec<_> = derived.flat_map(|it| it.poll.signals.clone()).collect();
             signals.extend(derived);
             self.tell(What::Refused(signals, Arc::new(why)));
         }
@@ -166,7 +166,7 @@ impl Acquisition {
     fn derive(&mut self, wants: &Wants, polls: &[Poll]) {
         let mut old = std::mem::take(&mut self.derivations);
         for poll in derived_polls(wants, polls) {
-            let same = old.iter().position(|derivation| *derivation.poll() == poll);
+            let same = old.iter().position(|derivation| *derivation.poll == poll);
             let derivation = same.map(|at| old.swap_remove(at)).or_else(|| {
                 self.last_poll += 1;
                 Derivation::new(PollId(self.last_poll), poll)

@@ -40,7 +40,7 @@ impl Acquisition {
                 sources.map(move |source| achieved(id, source))
             });
             let slower = sources.fold(f64::INFINITY, f64::min);
-            let poll = derivation.poll();
+            let poll = &derivation.poll;
             poll.signals.iter().map(move |&signal| rate(signal, poll.period, slower))
         });
         read.chain(computed)

@@ -32,7 +32,7 @@ pub(super) struct LaneState<C> {
     failures: u32,
     /// When the first of them began.
     silent_since: Instant,
-    quiet_until: Instant,
+    pub(super) quiet_until: Instant,
 }
 
 impl<C> Default for LaneState<C> {
@@ -125,10 +125,6 @@ impl<C: Clone> LaneState<C> {
 
     pub(super) fn may_poll(&self, now: Instant) -> bool {
         self.is_free() && self.quiet_until <= now
-    }
-
-    pub(super) fn quiet_until(&self) -> Instant {
-        self.quiet_until
     }
 
     /// Whether the lane has failed to answer more than once.

@@ -373,7 +373,7 @@ impl<C: Clone> Schedule<C> {
         let has_room = self.under_way < self.rules.window;
         let of_groups = self.groups.iter().filter_map(|group| {
             let lane = self.lanes.get(&group.lane).filter(|lane| has_room && lane.is_free())?;
-            Some(group.due.max(lane.quiet_until()))
+            Some(group.due.max(lane.quiet_until))
         });
         self.first_deadline()
             .into_iter()

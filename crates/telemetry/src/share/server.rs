@@ -18,8 +18,7 @@ use rustix::io::Errno;
 
 use super::frame::{self, LONGEST_REQUEST, Reader};
 use super::hub::{Hub, LineEnded, SessionId, SharedLine};
-use super::message::{self, Event, Line, Text};
-use super::port_config::Limits;
+use super::message::{self, Event, Text};
 use crate::line::Stopped;
 
 /// How often samples and events are sent.
@@ -42,7 +41,8 @@ const LAST: Duration = Duration::from_millis(500);
 /// A share at a Unix socket. Nothing happens between two calls of [`turn`](Self::turn), except that
 /// the engines read, and carry out the commands that they have.
 pub struct Server {
-    hub: Hub,
+    /// The lines and the sessions of programs.
+    pub hub: Hub,
     socket: UnixServer,
     clients: Vec<Client>,
     woken: UnixStream,
@@ -100,21 +100,6 @@ impl Server {
         let (clock, due) = (Clock::running(), Instant::now());
         let accepted = clock.now();
         Ok(Server { hub, socket, clients: Vec::new(), woken, due, clock, accepted })
-    }
-
-    /// One program at a time changes a motor: [`Hub::lease`].
-    pub fn lease(&mut self, length: Duration) {
-        self.hub.lease(length);
-    }
-
-    /// Lines that programs open have these limits: [`Hub::limit`].
-    pub fn limit(&mut self, limits: Limits) {
-        self.hub.limit(limits);
-    }
-
-    /// The lines.
-    pub fn lines(&self) -> Vec<Line> {
-        self.hub.lines()
     }
 
     /// Moves what can be moved, and waits for more, for a moment. Gives what happened.

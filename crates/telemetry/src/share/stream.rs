@@ -92,7 +92,7 @@ impl Stream {
     }
 
     fn has_subscribed(&self) -> bool {
-        let has_all = |it: &Connection| it.subscriptions() == self.followed.wanted.len();
+        let has_all = |it: &Connection| it.subscriptions.len() == self.followed.wanted.len();
         self.connection.as_ref().is_some_and(has_all)
     }
 
@@ -179,7 +179,7 @@ impl Stream {
 fn wait(streams: &[Stream]) {
     let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
     let connections = streams.iter().filter_map(|stream| stream.connection.as_ref());
-    let mut fds: Vec<_> = connections.map(|it| PollFd::new(it.socket(), PollFlags::IN)).collect();
+    let mut fds: Vec<_> = connections.map(|it| PollFd::new(&it.socket, PollFlags::IN)).collect();
     // A signal ends the wait early, which does no harm.
     let _ = poll(&mut fds, Some(&wait));
 }

@@ -95,7 +95,7 @@ impl Share {
         let socket = path(&format!("share-{name}"), "socket");
         let mut server = Server::open(&socket, "test", vec![st, rmd]).unwrap();
         if let Some(lease) = lease {
-            server.lease(lease);
+            server.hub.lease(lease);
         }
         let ends = Arc::new(AtomicBool::new(false));
         let (holds, held) = channel::<Receiver<()>>();

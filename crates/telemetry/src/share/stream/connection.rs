@@ -26,7 +26,7 @@ const WORTH_TELLING: f64 = 0.005;
 
 #[derive(Debug)]
 pub(super) struct Connection {
-    socket: UnixStream,
+    pub(super) socket: UnixStream,
     codec: ClientCodec,
     /// Requests without an answer, and when they were sent.
     pending: Map<u32, (Asked, u64)>,
@@ -40,7 +40,7 @@ pub(super) struct Connection {
     /// When it fell silent, until what waited has come.
     silent: Option<u64>,
     /// Which of the wanted signals each subscription has.
-    subscriptions: Map<u32, usize>,
+    pub(super) subscriptions: Map<u32, usize>,
     groups: Map<u32, Columns>,
     /// Why the share closes it.
     closing: Option<String>,
@@ -124,15 +124,6 @@ impl Connection {
     /// Whether [`ask_last`](Self::ask_last) has no answer.
     pub(super) fn awaits_last(&self) -> bool {
         self.pending.values().any(|(asked, _)| *asked == Asked::Last)
-    }
-
-    /// How many of the wanted signals have a subscription.
-    pub(super) fn subscriptions(&self) -> usize {
-        self.subscriptions.len()
-    }
-
-    pub(super) fn socket(&self) -> &UnixStream {
-        &self.socket
     }
 
     fn ask(&mut self, asked: Asked, ask: Ask, now: u64) -> Result<(), String> {
