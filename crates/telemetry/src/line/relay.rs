@@ -126,18 +126,18 @@ impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
 }
 
 /// A port that has other users, and stays theirs.
-pub(super) struct Relayed<R> {
+pub(super) struct Relayed<K, S, E, X> {
     port: Arc<str>,
     clock: Clock,
-    exchanges: R,
+    relay: Relay<K, S, E>,
+    seen: X,
 }
 
-pub(super) type RelayedSt = Relayed<Drive>;
-pub(super) type RelayedRmd = Relayed<Motors>;
+pub(super) type RelayedSt = Relayed<(), StStep, StOver, Drive>;
+pub(super) type RelayedRmd = Relayed<MotorId, rmd::Asked, RmdOver, Map<MotorId, Seen>>;
 
-/// The exchanges with an ST drive.
+/// What was seen of an ST drive.
 pub(super) struct Drive {
-    relay: StRelay,
     profile: Profile,
     is_confirming: bool,
     exchanged: Exchanged,
@@ -145,40 +145,16 @@ pub(super) struct Drive {
     losses: Option<u32>,
 }
 
-/// The exchanges with RMD motors.
-pub(super) struct Motors {
-    relay: RmdRelay,
-    seen: Map<MotorId, Seen>,
-}
-
 /// The last exchange with a motor.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+pub(super) struct Seen {
     sent: Instant,
     losses: Option<u32>,
     /// The losses when the motor's replies were judged last.
     judged: Option<u32>,
 }
 
-/// The exchanges of an owner.
-pub(super) trait Owned: Send {
-    /// Whether the owner has closed its client.
-    fn is_closed(&self) -> bool;
-}
-
-impl Owned for Drive {
-    fn is_closed(&self) -> bool {
-        self.relay.is_closed()
-    }
-}
-
-impl Owned for Motors {
-    fn is_closed(&self) -> bool {
-        self.relay.is_closed()
-    }
-}
-
-impl<R: Owned> Driver for Relayed<R> {
+impl<K: Ord + Copy + Send, S: Clone + Send, E: Send, X: Send> Driver for Relayed<K, S, E, X> {
     fn clock(&self) -> Clock {
         self.clock.clone()
     }
@@ -191,14 +167,14 @@ impl<R: Owned> Driver for Relayed<R> {
     /// An exchange opens the port again, if it is closed. A client that its owner has closed stays
     /// closed.
     fn link_state(&self) -> LinkState {
-        match self.exchanges.is_closed() {
+        match self.relay.is_closed() {
             true => LinkState::Closed { retry_in: Duration::MAX },
             false => LinkState::Open,
         }
     }
 
     fn reopen(&mut self) -> Result<(), LineError> {
-        match self.exchanges.is_closed() {
+        match self.relay.is_closed() {
             true => Err(LineError::Closed),
             false => Ok(()),
         }
@@ -219,16 +195,16 @@ impl<R: Owned> Driver for Relayed<R> {
 
 impl RelayedSt {
     pub(super) fn new(relay: StRelay, port: Arc<str>, clock: Clock, profile: Profile) -> Self {
-        let seen = Counters::default();
-        let exchanged = Exchanged { before: seen, after: seen, sent: Instant(0) };
-        let exchanges = Drive { relay, profile, is_confirming: false, exchanged, losses: None };
-        Relayed { port, clock, exchanges }
+        let before = Counters::default();
+        let exchanged = Exchanged { before, after: before, sent: Instant(0) };
+        let seen = Drive { profile, is_confirming: false, exchanged, losses: None };
+        Relayed { port, clock, relay, seen }
     }
 }
 
 impl StDriver for RelayedSt {
     fn profile(&self) -> Profile {
-        self.exchanges.profile
+        self.seen.profile
     }
 
     /// The owner brings the line in sync.
@@ -237,14 +213,14 @@ impl StDriver for RelayedSt {
     }
 
     fn begin(&mut self, step: StStep) -> Result<(), st::Error> {
-        self.exchanges.is_confirming = step == StStep::Confirm;
-        self.exchanges.relay.begin((), step);
+        self.seen.is_confirming = step == StStep::Confirm;
+        self.relay.begin((), step);
         Ok(())
     }
 
     fn advance(&mut self) -> Result<Progress<Vec<u8>>, st::Error> {
-        let drive = &mut self.exchanges;
-        let Some(StOver { result, exchanged }) = drive.relay.take_over().remove(&()) else {
+        let drive = &mut self.seen;
+        let Some(StOver { result, exchanged }) = self.relay.take_over().remove(&()) else {
             return Ok(Progress::Wait(None));
         };
         drive.exchanged = exchanged.unwrap_or(drive.exchanged);
@@ -265,17 +241,17 @@ impl StDriver for RelayedSt {
     }
 
     fn abandon(&mut self) {
-        self.exchanges.relay.cancel(());
+        self.relay.cancel(());
     }
 
     fn exchanged(&self) -> Exchanged {
-        self.exchanges.exchanged
+        self.seen.exchanged
     }
 }
 
 impl RelayedRmd {
     pub(super) fn new(relay: RmdRelay, port: Arc<str>, clock: Clock) -> Self {
-        Relayed { port, clock, exchanges: Motors { relay, seen: Map::new() } }
+        Relayed { port, clock, relay, seen: Map::new() }
     }
 }
 
@@ -286,26 +262,25 @@ impl RmdDriver for RelayedRmd {
     }
 
     fn begin(&mut self, id: MotorId, asked: rmd::Asked) -> Result<(), rmd::Error> {
-        self.exchanges.relay.begin(id, asked);
+        self.relay.begin(id, asked);
         Ok(())
     }
 
     fn advance(&mut self, each: &mut RmdEnded<'_>) -> Result<Option<Duration>, rmd::Error> {
-        let Motors { relay, seen } = &mut self.exchanges;
-        for (id, RmdOver { result, losses, sent }) in relay.take_over() {
-            let judged = seen.get(&id).map_or(losses, |motor| motor.judged);
-            seen.insert(id, Seen { sent, losses, judged });
+        for (id, RmdOver { result, losses, sent }) in self.relay.take_over() {
+            let judged = self.seen.get(&id).map_or(losses, |motor| motor.judged);
+            self.seen.insert(id, Seen { sent, losses, judged });
             each(id, result);
         }
         Ok(None)
     }
 
     fn cancel(&mut self, id: MotorId) {
-        self.exchanges.relay.cancel(id);
+        self.relay.cancel(id);
     }
 
     fn confirmed(&mut self, id: MotorId) -> Result<(), rmd::Error> {
-        let Some(seen) = self.exchanges.seen.get_mut(&id) else { return Ok(()) };
+        let Some(seen) = self.seen.get_mut(&id) else { return Ok(()) };
         let before = std::mem::replace(&mut seen.judged, seen.losses);
         match before.is_some() && before == seen.losses {
             true => Ok(()),
@@ -326,6 +301,6 @@ impl RmdDriver for RelayedRmd {
     }
 
     fn sent(&self, id: MotorId) -> Instant {
-        self.exchanges.seen.get(&id).map_or(Instant(0), |seen| seen.sent)
+        self.seen.get(&id).map_or(Instant(0), |seen| seen.sent)
     }
 }
