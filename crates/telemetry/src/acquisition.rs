@@ -105,7 +105,7 @@ struct StopsAtEnd(Option<Box<dyn Line>>);
 
 impl StopsAtEnd {
     fn stop_started(&mut self) -> Vec<Stopped> {
-        self.0.take().map_or_else(Vec::new, Line::stop_started)
+        self.0.take().map_or_else(Vec::new, |line| line.into_port().stop_started())
     }
 }
 
@@ -140,7 +140,7 @@ impl Acquisition {
     /// The engine of an open line.
     pub fn new(line: Box<dyn Line>) -> Self {
         Acquisition {
-            clock: line.clock(),
+            clock: line.port().clock(),
             schedule: Schedule::new(line.rules()),
             line: StopsAtEnd(Some(line)),
             polls: Map::new(),
@@ -188,7 +188,7 @@ impl Acquisition {
 
     /// What is readable when there is something to receive.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.line.descriptor()
+        self.line.port().descriptor()
     }
 
     /// The measured load of the line.
@@ -346,7 +346,7 @@ impl Acquisition {
         finished.drain(..).for_each(|one| self.pass_on(one, ended));
         self.finished = finished;
         let wait = match moved {
-            Ok(wait) if self.line.link_state() == LinkState::Open => wait,
+            Ok(wait) if self.line.port().link_state() == LinkState::Open => wait,
             Ok(_) if !self.is_open => None,
             Ok(_) => self.closed(LineError::Closed, ended),
             Err(error) => self.closed(error, ended),
@@ -383,7 +383,7 @@ impl Acquisition {
     }
 
     fn retry_in(&self) -> Option<Duration> {
-        match self.line.link_state() {
+        match self.line.port().link_state() {
             LinkState::Closed { retry_in } if !self.is_open => Some(retry_in),
             _ => None,
         }
@@ -428,7 +428,7 @@ impl Acquisition {
                     let by = Arc::clone(&command.by);
                     self.tell(What::Commanded(id, by, command.request.clone()));
                     if let Some(deadline) = command.deadline {
-                        self.line.expire_next(deadline.since(self.clock.now()).into());
+                        self.line.port_mut().expire_next(deadline.since(self.clock.now()).into());
                     }
                     self.line.begin(lane, &command.request)
                 } else {

@@ -1,19 +1,17 @@
 //! Values that are computed from two others, against simulated motors on virtual time.
 
 use std::collections::BTreeMap;
-use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::rmd::EventClient;
-use motorlink::{Clock, LinkState};
 use motorlink_proto::rmd::{Code, MotorId, SetSpeed};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::CentiDps;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::event::What;
 use motorlink_telemetry::line::{
-    Done, Line, LineError, Over, Reply, Request, RmdLine, Shows, Stopped,
+    Done, Driver, Line, LineError, Over, Reply, Request, RmdLine, Shows,
 };
 use motorlink_telemetry::plan::{Poll, Wants};
 use motorlink_telemetry::rows::{Item, Rows};
@@ -46,20 +44,16 @@ impl Line for Changed {
         self.line.lane(request)
     }
 
-    fn clock(&self) -> Clock {
-        self.line.clock()
+    fn port(&self) -> &dyn Driver {
+        self.line.port()
     }
 
-    fn link_state(&self) -> LinkState {
-        self.line.link_state()
+    fn port_mut(&mut self) -> &mut dyn Driver {
+        self.line.port_mut()
     }
 
-    fn reopen(&mut self) -> Result<(), LineError> {
-        self.line.reopen()
-    }
-
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.line.descriptor()
+    fn into_port(self: Box<Self>) -> Box<dyn Driver> {
+        Box::new(self.line).into_port()
     }
 
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
@@ -68,10 +62,6 @@ impl Line for Changed {
 
     fn sends_at_once(&self, lane: Lane) -> bool {
         self.line.sends_at_once(lane)
-    }
-
-    fn expire_next(&mut self, time_to_live: Duration) {
-        self.line.expire_next(time_to_live);
     }
 
     fn is_given_up(&self, error: &LineError) -> bool {
@@ -88,10 +78,6 @@ impl Line for Changed {
             change(&mut over);
             done(over);
         })
-    }
-
-    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        Box::new(self.line).stop_started()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {

@@ -9,19 +9,8 @@ use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st::{OwnedRequest, Profile, RegisterId, Request, segment_values};
 use motorlink_proto::time::Instant;
 
-use super::{LineError, Stopped};
+use super::{Driver, LineError, Stopped};
 use crate::signal::Motor;
-
-/// The port of a line.
-pub(super) trait Driver: Send {
-    fn clock(&self) -> Clock;
-    fn timeout(&self) -> Duration;
-    fn link_state(&self) -> LinkState;
-    fn reopen(&mut self) -> Result<(), LineError>;
-    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
-    fn expire_next(&mut self, time_to_live: Duration);
-    fn stop_started(self: Box<Self>) -> Vec<Stopped>;
-}
 
 /// The port of an ST drive, with one exchange at a time.
 pub(super) trait StDriver: Driver {

@@ -169,6 +169,33 @@ pub enum Shows {
 /// What an exchange that is over calls.
 pub type Done<'a> = dyn FnMut(Over) + 'a;
 
+/// The port of a line.
+pub trait Driver: Send {
+    /// Its clock.
+    fn clock(&self) -> Clock;
+
+    /// How long a reply may take.
+    fn timeout(&self) -> Duration;
+
+    /// Whether it is open.
+    fn link_state(&self) -> LinkState;
+
+    /// Opens it if it is closed and its back-off is over. May wait.
+    ///
+    /// # Errors
+    /// What keeps it from being opened.
+    fn reopen(&mut self) -> Result<(), LineError>;
+
+    /// What is readable when there is something to receive.
+    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+
+    /// The next request must not be sent later than this, if another program holds the port.
+    fn expire_next(&mut self, time_to_live: Duration);
+
+    /// Stops the motors that were started through it, and waits until they confirm it.
+    fn stop_started(self: Box<Self>) -> Vec<Stopped>;
+}
+
 /// A client of one port, driven in steps.
 pub trait Line: Send {
     /// How many exchanges there may be, whether a stop cancels one, and how long a reply may take.
@@ -177,27 +204,26 @@ pub trait Line: Send {
     /// The lane of a request.
     fn lane(&self, request: &Request) -> Lane;
 
-    /// The clock of the port.
-    fn clock(&self) -> Clock;
+    /// Its port.
+    fn port(&self) -> &dyn Driver;
 
-    /// Whether the port is open.
-    fn link_state(&self) -> LinkState;
+    /// As [`port`](Self::port), to change it.
+    fn port_mut(&mut self) -> &mut dyn Driver;
 
-    /// Opens the port if it is closed and its back-off is over. May wait.
+    /// The port alone, to stop what was started through it.
+    fn into_port(self: Box<Self>) -> Box<dyn Driver>;
+
+    /// As [`Driver::reopen`].
     ///
     /// # Errors
-    /// What keeps the port from being opened.
-    fn reopen(&mut self) -> Result<(), LineError>;
-
-    /// What is readable when there is something to receive.
-    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+    /// Those of [`Driver::reopen`].
+    fn reopen(&mut self) -> Result<(), LineError> {
+        self.port_mut().reopen()
+    }
 
     /// Whether what begins in this lane is sent at once. Otherwise the lane is brought in sync before.
     /// While an exchange is under way: whether its request was sent.
     fn sends_at_once(&self, lane: Lane) -> bool;
-
-    /// The next request must not be sent later than this. It is for ports that another program holds.
-    fn expire_next(&mut self, time_to_live: Duration);
 
     /// Begins an exchange in a lane that has none.
     ///
@@ -217,9 +243,6 @@ pub trait Line: Send {
     /// # Errors
     /// The port's. It is closed, and the exchanges under way are given up.
     fn advance(&mut self, done: &mut Done<'_>) -> Result<Option<Duration>, LineError>;
-
-    /// Stops the motors that were started through this line, and waits until they confirm it.
-    fn stop_started(self: Box<Self>) -> Vec<Stopped>;
 
     /// The fewest exchanges that read these signals. They change when the drive has refused to
     /// configure a data segment.

@@ -13,8 +13,8 @@ use motorlink::{Clock, LinkState, rmd, st};
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
 
-use super::driver::{Driver, RmdDriver, RmdEnded, StDriver, StStep};
-use super::{LineError, Stopped};
+use super::driver::{RmdDriver, RmdEnded, StDriver, StStep};
+use super::{Driver, LineError, Stopped};
 
 /// The exchanges of a relayed line, for the owner of its client. Clones share them.
 ///

@@ -1,16 +1,15 @@
 //! A CAN bus with RMD motors: each motor is a lane.
 
-use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::rmd::{Asked, Error, EventClient, Options};
-use motorlink::{Clock, LinkState, port::PortName};
+use motorlink::{Clock, port::PortName};
 use motorlink_proto::rmd::{Command, MotorId, MotorSet};
 
 use super::driver::{DirectRmd, RmdDriver};
 use super::relay::{RelayedRmd, RmdRelay};
-use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
+use super::{Done, Driver, Line, LineError, Over, Reply, Request, Shows};
 use crate::plan::{Poll, Read, Wants, rmd_polls};
 use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
@@ -65,28 +64,20 @@ impl Line for RmdLine {
         }
     }
 
-    fn clock(&self) -> Clock {
-        self.driver.clock()
+    fn port(&self) -> &dyn Driver {
+        &*self.driver
     }
 
-    fn link_state(&self) -> LinkState {
-        self.driver.link_state()
+    fn port_mut(&mut self) -> &mut dyn Driver {
+        &mut *self.driver
     }
 
-    fn reopen(&mut self) -> Result<(), LineError> {
-        self.driver.reopen()
-    }
-
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driver.descriptor()
+    fn into_port(self: Box<Self>) -> Box<dyn Driver> {
+        self.driver
     }
 
     fn sends_at_once(&self, lane: Lane) -> bool {
         MotorId::new(lane.0).is_none_or(|id| self.driver.sends_at_once(id))
-    }
-
-    fn expire_next(&mut self, time_to_live: Duration) {
-        self.driver.expire_next(time_to_live);
     }
 
     fn begin(&mut self, lane: Lane, request: &Request) -> Result<(), LineError> {
@@ -153,10 +144,6 @@ impl Line for RmdLine {
             self.confirming = MotorSet::EMPTY;
         }
         Ok(wait?)
-    }
-
-    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        self.driver.stop_started()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {

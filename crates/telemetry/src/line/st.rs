@@ -1,12 +1,11 @@
 //! The line to an ST drive: one lane.
 
 use std::collections::BTreeSet;
-use std::os::fd::BorrowedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink::st::{Error, EventClient, Exchanged, LimitError, Options, Progress};
-use motorlink::{Clock, LinkState, port::PortName};
+use motorlink::{Clock, port::PortName};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
     Counters, OwnedRequest, Profile, Reading, RegisterId, SEGMENTS, segment_values,
@@ -14,7 +13,7 @@ use motorlink_proto::st::{
 
 use super::driver::{DirectSt, StDriver, StStep};
 use super::relay::{RelayedSt, StRelay};
-use super::{Done, Line, LineError, Over, Reply, Request, Shows, Stopped};
+use super::{Done, Driver, Line, LineError, Over, Reply, Request, Shows};
 use crate::plan::{Poll, Read, Wants, st_polls};
 use crate::sample::{Sample, Samples};
 use crate::schedule::{Lane, LineRules};
@@ -209,12 +208,16 @@ impl Line for StLine {
         LANE
     }
 
-    fn clock(&self) -> Clock {
-        self.driver.clock()
+    fn port(&self) -> &dyn Driver {
+        &*self.driver
     }
 
-    fn link_state(&self) -> LinkState {
-        self.driver.link_state()
+    fn port_mut(&mut self) -> &mut dyn Driver {
+        &mut *self.driver
+    }
+
+    fn into_port(self: Box<Self>) -> Box<dyn Driver> {
+        self.driver
     }
 
     fn reopen(&mut self) -> Result<(), LineError> {
@@ -226,16 +229,8 @@ impl Line for StLine {
         Ok(())
     }
 
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driver.descriptor()
-    }
-
     fn sends_at_once(&self, _: Lane) -> bool {
         self.driver.sends_at_once()
-    }
-
-    fn expire_next(&mut self, time_to_live: Duration) {
-        self.driver.expire_next(time_to_live);
     }
 
     fn begin(&mut self, _: Lane, request: &Request) -> Result<(), LineError> {
@@ -292,10 +287,6 @@ impl Line for StLine {
             };
             done(self.judge(over));
         }
-    }
-
-    fn stop_started(self: Box<Self>) -> Vec<Stopped> {
-        self.driver.stop_started()
     }
 
     fn polls(&self, wants: &Wants) -> Vec<Poll> {
