@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod arrival;
+mod client;
 mod held;
 mod overdue;
 pub mod ownership;

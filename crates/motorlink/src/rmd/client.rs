@@ -5,7 +5,7 @@ use std::error;
 use std::sync::Arc;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Carries, Ending, PortError, PortName};
+use motorlink_link::port::{CanLink, Ending, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
@@ -14,8 +14,9 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time;
 
 use super::asked::Asked;
-use super::driven::Driven;
+use super::driven::{Driven, opener};
 use super::{Error, Options};
+use crate::client::{opening, waiting};
 use crate::turn::{Turn, Turns};
 use crate::way::Way;
 
@@ -49,79 +50,12 @@ pub struct Client {
 }
 
 impl Client {
-    /// Opens a port. No motor is asked anything.
-    ///
-    /// # Errors
-    /// What keeps the port from being opened.
-    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
-        Self::open_wrapped(port, |link| link, options)
-    }
-
-    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
-    /// tap, or faults.
-    pub fn open_wrapped(
-        port: &PortName,
-        mut wrap: impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let name = port.clone();
-        let open = move || Way::open(&name, Carries::Frames, |port| Ok(wrap(port.open_can()?)));
-        let opened = Reopening::open(&port.to_string(), Box::new(open), options.back_off)?;
-        Ok(Self::on(opened, options))
-    }
-
-    /// As [`open`](Self::open), through a link of the caller's making.
-    pub fn open_with(
-        name: &str,
-        mut open: Opener<Box<dyn CanLink>>,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let open = Box::new(move || open().map(Way::Line));
-        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
-    }
-
-    /// Speaks through a link that is open already. It is not opened again when it closes.
-    pub fn over(name: &str, link: Box<dyn CanLink>, options: Options) -> Self {
-        Self::on(Reopening::over(name, Way::Line(link)), options)
-    }
-
-    fn on(port: Reopening<Way<Box<dyn CanLink>>>, options: Options) -> Self {
-        Self::driving(Driven::new(port, &options))
-    }
+    opening!(dyn CanLink, open_can);
+    waiting!(dyn CanLink);
 
     pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
         let sign = driven.port.sign();
         Client { turns: Turns::new(driven), sign }
-    }
-
-    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
-    /// error from it ends the exchange with an interruption.
-    ///
-    /// `look` may use this bus, as a signal's handler does. The call that waits then ends with
-    /// [`PortError::Overtaken`]. If `look` does not use the bus, that call continues. Other threads
-    /// wait until the bus is free.
-    pub fn with_interrupt_hook(
-        mut self,
-        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
-    ) -> Self {
-        self.turns.set_look(Box::new(look));
-        self
-    }
-
-    /// Gives up the exchanges that this thread has under way while it [looks](Self::with_interrupt_hook); replies
-    /// may still come. Waits for exchanges of other threads.
-    pub fn abandon(&self) {
-        self.turns.take().abandon();
-    }
-
-    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
-    pub fn clock(&self) -> Clock {
-        self.turns.take().port.clock()
-    }
-
-    /// Whether the port is open. Never waits, not even while another thread opens it.
-    pub fn link_state(&self) -> LinkState {
-        self.sign.state()
     }
 
     /// Why frames may not get to the bus, as far as its adapter tells.
@@ -230,21 +164,6 @@ impl Client {
         self.begin_all(driven, requests, false, |id, result, _| {
             each(id, result.map(|reply| X::reply(&reply)));
         })
-    }
-
-    /// Declares what a program that holds the port, such as a share, does with the motors of this client
-    /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
-    /// ports do nothing then.
-    pub fn end_with(&self, ending: Ending) {
-        self.turns.take().port.end_with(ending);
-    }
-
-    /// While `act` stops motors, those that another program has moved since are left as they are.
-    pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().port.only_own(true);
-        let result = act();
-        self.turns.take().port.only_own(false);
-        result
     }
 
     /// As [`cycle`](Self::cycle). A motor in quarantine is waited for.

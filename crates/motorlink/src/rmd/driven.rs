@@ -2,8 +2,8 @@
 
 use std::time::{self as machine, Duration};
 
-use motorlink_link::port::{CanLink, PortError};
-use motorlink_link::reopening::Reopening;
+use motorlink_link::port::{CanLink, Carries, PortError, PortName};
+use motorlink_link::reopening::{Opener, Reopening};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{MotorId, MotorSet};
 use motorlink_proto::time;
@@ -18,6 +18,16 @@ pub(super) struct Driven<L> {
     pub(super) session: Session,
     /// Exchanges and cycles so far: another number says that the one before it was given up.
     pub(super) exchanges: u64,
+}
+
+/// Opens a port, unless another program holds it.
+pub(super) fn opener<L: 'static>(
+    port: &PortName,
+    _: &Options,
+    mut open: impl FnMut(&PortName) -> Result<L, PortError> + Send + 'static,
+) -> Opener<Way<L>> {
+    let port = port.clone();
+    Box::new(move || Way::open(&port, Carries::Frames, &mut open))
 }
 
 impl<L: CanLink> Driven<L> {

@@ -4,14 +4,15 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, Carries, Ending, EventCan, PortError, PortName};
+use motorlink_link::port::{CanLink, Ending, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
 use motorlink_proto::time::Instant;
 
-use super::driven::Driven;
+use super::driven::{Driven, opener};
 use super::session::SessionOutput;
 use super::{Asked, Client, Error, Options};
+use crate::client::{evented, opening};
 use crate::way::Way;
 
 /// Frames that are taken from the bus in one step: the loop has others to serve.
@@ -20,6 +21,9 @@ const STEP: usize = 64;
 /// A CAN bus with RMD motors, driven in steps: an event loop calls [`advance`](Self::advance) when
 /// the descriptor is readable and when the time that it said has passed.
 ///
+/// Opening may wait. So may [`reopen`](Self::reopen), and what begins an exchange while the port is
+/// closed; nothing else does.
+///
 /// What holds for a [`Client`] holds here: limits, quarantine, what is moving, errors. Exchanges with
 /// different motors overlap; a motor has one at a time.
 pub struct EventClient {
@@ -27,57 +31,16 @@ pub struct EventClient {
 }
 
 impl EventClient {
-    /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
-    /// the port is closed; nothing else does.
-    ///
-    /// # Errors
-    /// What keeps the port from being opened. No motor is asked anything.
-    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
-        Self::open_wrapped(port, |link| link, options)
-    }
-
-    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
-    /// tap, or faults.
-    pub fn open_wrapped(
-        port: &PortName,
-        mut wrap: impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let name = port.clone();
-        let open =
-            move || Way::open(&name, Carries::Frames, |port| Ok(wrap(port.open_event_can()?)));
-        Self::opened(&port.to_string(), Box::new(open), &options)
-    }
-
-    /// As [`open`](Self::open), through a link of the caller's making.
-    pub fn open_with(
-        name: &str,
-        mut open: Opener<Box<dyn EventCan>>,
-        options: Options,
-    ) -> Result<Self, Error> {
-        Self::opened(name, Box::new(move || open().map(Way::Line)), &options)
-    }
-
-    fn opened(
-        name: &str,
-        open: Opener<Way<Box<dyn EventCan>>>,
-        options: &Options,
-    ) -> Result<Self, Error> {
-        Ok(Self::driving(Reopening::open(name, open, options.back_off)?, options))
-    }
+    opening!(dyn EventCan, open_event_can);
+    evented!();
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn EventCan>, options: Options) -> Self {
-        Self::driving(Reopening::over(name, Way::Line(link)), &options)
+        Self::driving(Driven::new(Reopening::over(name, Way::Line(link)), &options))
     }
 
-    fn driving(port: Reopening<Way<Box<dyn EventCan>>>, options: &Options) -> Self {
-        EventClient { driven: Driven::new(port, options) }
-    }
-
-    /// Whether the port is open.
-    pub fn link_state(&self) -> LinkState {
-        self.driven.port.sign().state()
+    fn driving(driven: Driven<Box<dyn EventCan>>) -> Self {
+        EventClient { driven }
     }
 
     /// Opens the port if it is closed and its back-off is over. May wait.
@@ -88,38 +51,10 @@ impl EventClient {
         self.driven.listen()
     }
 
-    /// What is readable when there is something to receive; `None` while the port is closed, or
-    /// where it has its answers at once.
-    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driven.port.open_link().and_then(Way::descriptor)
-    }
-
-    /// The clock of the port.
-    pub fn clock(&self) -> Clock {
-        self.driven.port.clock()
-    }
-
     /// When the last frame to a motor was sent. Behind an exchange that is over, it is that of its
     /// request, not of a question before it.
     pub fn sent(&self, id: MotorId) -> Instant {
         self.driven.session.sent[id.index()]
-    }
-
-    /// How long a reply may take.
-    pub fn timeout(&self) -> Duration {
-        self.driven.session.timeout
-    }
-
-    /// See [`Client::end_with`].
-    pub fn end_with(&mut self, ending: Ending) {
-        self.driven.port.end_with(ending);
-    }
-
-    /// The next request to any motor must not be sent later than this, if another program holds the port.
-    pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(held) = &mut self.driven.session.held {
-            held.requests.expire_next(time_to_live);
-        }
     }
 
     /// Whether a request to a motor is sent at once. Otherwise late replies of the motor are awaited

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use motorlink_link::port::PortName;
 use motorlink_link::reopening::BackOff;
 use motorlink_proto::rmd::{self as proto, Limits};
 
@@ -16,6 +17,13 @@ pub struct Options {
     pub back_off: BackOff,
     /// What no request to any motor may exceed.
     pub limits: Limits,
+}
+
+impl Options {
+    /// They are the same at each port.
+    pub(super) fn on(self, _: &PortName) -> Self {
+        self
+    }
 }
 
 impl Default for Options {

@@ -15,6 +15,7 @@ use motorlink_proto::st::{
 use super::driven::{Driven, opener};
 use super::session::{Exchanged, Rules};
 use super::{Error, Options};
+use crate::client::{opening, waiting};
 use crate::turn::{Turn, Turns};
 use crate::way::Way;
 use proto::Started;
@@ -56,70 +57,13 @@ pub struct Client {
 pub type Seen<T> = (Result<T, Error>, Option<Exchanged>);
 
 impl Client {
-    /// Opens a port and speaks to the drive behind it.
-    ///
-    /// # Errors
-    /// What keeps the port from being opened. The drive is not asked anything.
-    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
-        Self::open_wrapped(port, |link| link, options)
-    }
-
-    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
-    /// tap, or faults.
-    pub fn open_wrapped(
-        port: &PortName,
-        mut wrap: impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let open = move |port: &PortName| Ok(wrap(port.open_bytes()?));
-        let open = opener(port, options.profile, open);
-        let opened = Reopening::open(&port.to_string(), open, options.back_off)?;
-        Ok(Self::on(opened, options.on(port)))
-    }
-
-    /// As [`open`](Self::open), through a link of the caller's making.
-    pub fn open_with(
-        name: &str,
-        mut open: Opener<Box<dyn ByteLink>>,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let open = Box::new(move || open().map(Way::Line));
-        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
-    }
-
-    /// Speaks through a link that is open already. It is not opened again when it closes.
-    pub fn over(name: &str, link: Box<dyn ByteLink>, options: Options) -> Self {
-        Self::on(Reopening::over(name, Way::Line(link)), options)
-    }
-
-    fn on(port: Reopening<Way<Box<dyn ByteLink>>>, options: Options) -> Self {
-        Self::driving(Driven::new(port, &options))
-    }
+    opening!(dyn ByteLink, open_bytes);
+    waiting!(dyn ByteLink);
 
     pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
         let (sign, rules) = (driven.port.sign(), driven.session.rules);
         let port = Arc::clone(&driven.port.name);
         Client { turns: Turns::new(driven), sign, rules, port }
-    }
-
-    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
-    /// error from it ends the exchange with an interruption.
-    ///
-    /// `look` may use this client, as a signal's handler does. The exchange that waits is given up
-    /// then and ends with [`PortError::Overtaken`]. If `look` does not use the client, the exchange goes
-    /// on. Other threads wait for their turn.
-    pub fn with_interrupt_hook(
-        mut self,
-        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
-    ) -> Self {
-        self.turns.set_look(Box::new(look));
-        self
-    }
-
-    /// Gives up the exchange that this thread has under way while it
-    /// [looks](Self::with_interrupt_hook); its reply may still come. Waits for exchanges of other threads.
-    pub fn abandon(&self) {
-        self.turns.take().abandon();
     }
 
     /// The port's name.
@@ -130,16 +74,6 @@ impl Client {
     /// The profile that the drive is expected to follow.
     pub fn profile(&self) -> Profile {
         self.rules.profile
-    }
-
-    /// Whether the port is open. Never waits, not even while another thread opens it.
-    pub fn link_state(&self) -> LinkState {
-        self.sign.state()
-    }
-
-    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
-    pub fn clock(&self) -> Clock {
-        self.turns.take().port.clock()
     }
 
     /// Whether the last exchange ended in sync.
@@ -163,21 +97,6 @@ impl Client {
         }
         let result = act();
         self.turns.take().session.set_recovery(before);
-        result
-    }
-
-    /// Declares what a program that holds the port, such as a share, does with the motors of this client
-    /// when it leaves, also if it is killed. It holds for motors that are moved after this call. Other
-    /// ports do nothing then.
-    pub fn end_with(&self, ending: Ending) {
-        self.turns.take().port.end_with(ending);
-    }
-
-    /// While `act` stops motors, those that another program has moved since are left as they are.
-    pub(super) fn for_own<T>(&self, act: impl FnOnce() -> T) -> T {
-        self.turns.take().port.only_own(true);
-        let result = act();
-        self.turns.take().port.only_own(false);
         result
     }
 

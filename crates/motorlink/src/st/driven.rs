@@ -6,7 +6,7 @@ use motorlink_link::port::{ByteLink, Carries, PortError, PortName};
 use motorlink_link::reopening::{Opener, Reopening};
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Command, Confirmation, Effect, Frame, MAX_FRAME, MotorNumber, Output, Profile, Request,
+    Command, Confirmation, Effect, Frame, MAX_FRAME, MotorNumber, Output, Request,
 };
 use motorlink_proto::time::{self, Instant};
 
@@ -33,10 +33,10 @@ pub(super) struct Driven<L> {
 /// the same bytes may be other values in the other profile.
 pub(super) fn opener<L: 'static>(
     port: &PortName,
-    profile: Profile,
+    options: &Options,
     mut open: impl FnMut(&PortName) -> Result<L, PortError> + Send + 'static,
 ) -> Opener<Way<L>> {
-    let port = port.clone();
+    let (port, profile) = (port.clone(), options.profile);
     Box::new(move || {
         let way = Way::open(&port, Carries::Bytes, &mut open)?;
         match way.held().and_then(|line| line.profile) {

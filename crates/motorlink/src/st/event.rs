@@ -11,10 +11,14 @@ use motorlink_proto::time::Instant;
 
 use super::driven::{Driven, opener};
 use super::{Client, Error, Exchanged, Options};
+use crate::client::{evented, opening};
 use crate::way::Way;
 
 /// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when
 /// the descriptor is readable and when the time that it said has passed.
+///
+/// Opening may wait. So may [`reopen`](Self::reopen), and what begins an exchange while the port is
+/// closed; nothing else does.
 ///
 /// What holds for a [`Client`] holds here: limits, recovery, what was started, errors. An exchange
 /// that is abandoned loses the line, and the next one recovers it.
@@ -33,48 +37,11 @@ pub enum Progress<T> {
 }
 
 impl EventClient {
-    /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
-    /// the port is closed; nothing else does.
-    ///
-    /// # Errors
-    /// What keeps the port from being opened. The drive is not asked anything.
-    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
-        Self::open_wrapped(port, |link| link, options)
-    }
+    opening!(dyn EventBytes, open_event_bytes);
+    evented!();
 
-    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
-    /// tap, or faults.
-    pub fn open_wrapped(
-        port: &PortName,
-        mut wrap: impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let open = move |port: &PortName| Ok(wrap(port.open_event_bytes()?));
-        let open = opener(port, options.profile, open);
-        Self::opened(&port.to_string(), open, &options.on(port))
-    }
-
-    /// As [`open`](Self::open), through a link of the caller's making.
-    pub fn open_with(
-        name: &str,
-        mut open: Opener<Box<dyn EventBytes>>,
-        options: Options,
-    ) -> Result<Self, Error> {
-        Self::opened(name, Box::new(move || open().map(Way::Line)), &options)
-    }
-
-    fn opened(
-        name: &str,
-        open: Opener<Way<Box<dyn EventBytes>>>,
-        options: &Options,
-    ) -> Result<Self, Error> {
-        let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventClient { driven: Driven::new(port, options) })
-    }
-
-    /// Whether the port is open.
-    pub fn link_state(&self) -> LinkState {
-        self.driven.port.sign().state()
+    fn driving(driven: Driven<Box<dyn EventBytes>>) -> Self {
+        EventClient { driven }
     }
 
     /// Opens the port if it is closed and its back-off is over. May wait.
@@ -85,37 +52,9 @@ impl EventClient {
         Ok(self.driven.ready()?)
     }
 
-    /// What is readable when there is something to receive; `None` while the port is closed, or
-    /// where it has its answers at once.
-    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        self.driven.port.open_link().and_then(Way::descriptor)
-    }
-
-    /// The clock of the port.
-    pub fn clock(&self) -> Clock {
-        self.driven.port.clock()
-    }
-
     /// The profile that the drive is expected to follow.
     pub fn profile(&self) -> Profile {
         self.driven.session.rules.profile
-    }
-
-    /// How long a reply may take.
-    pub fn timeout(&self) -> Duration {
-        self.driven.session.timeout
-    }
-
-    /// See [`Client::end_with`].
-    pub fn end_with(&mut self, ending: Ending) {
-        self.driven.port.end_with(ending);
-    }
-
-    /// The next request must not be sent later than this, if another program holds the port.
-    pub fn expire_next(&mut self, time_to_live: Duration) {
-        if let Some(held) = &mut self.driven.session.held {
-            held.requests.expire_next(time_to_live);
-        }
     }
 
     /// Whether a request is sent at once. Otherwise the line is recovered first. While an exchange is
