@@ -11,7 +11,6 @@ mod service;
 mod staleness;
 mod state_messages;
 mod trigger_type;
-mod type_hash;
 mod value_cache;
 
 use std::io;
@@ -27,10 +26,8 @@ use zenoh::{Session as Zenoh, Wait};
 use crate::clock::Clock;
 use bridge::{Machine, NAME, Shared};
 use command_arbiter::{CommandArbiter, Rules};
-use motorlink_recording::schema::{DiagnosticArray, JointState, Message};
-use rmw_zenoh::{Endpoint, EndpointKind, Graph};
+use rmw_zenoh::{DIAGNOSTIC_ARRAY, Endpoint, EndpointKind, Graph, JOINT_STATE, TRIGGER};
 use service::Service;
-use trigger_type::{TRIGGER, trigger};
 use value_cache::ValueCache;
 
 pub use joint::Settings;
@@ -113,14 +110,14 @@ impl Ros2 {
         let base = settings.namespace.clone().unwrap_or_else(|| legal.clone());
         let graph = Graph::new(settings.domain, zenoh.zid().to_string(), legal);
         let mut numbers = 1..;
-        let mut endpoint = |kind, name: String, (of, definition): (&str, String), depth| {
+        let mut endpoint = |kind, name: String, ty, depth| {
             let number = numbers.next().unwrap_or_default();
-            graph.endpoint(number, kind, &name, (of, &definition), depth)
+            graph.endpoint(number, kind, &name, ty, depth)
         };
         let (kind, name) = (EndpointKind::Publisher, format!("/{base}/joint_states"));
-        let states = endpoint(kind, name, message::<JointState>(), DEPTH);
+        let states = endpoint(kind, name, JOINT_STATE, DEPTH);
         let diagnostics =
-            endpoint(kind, "/diagnostics".to_owned(), message::<DiagnosticArray>(), DEPTH);
+            endpoint(kind, "/diagnostics".to_owned(), DIAGNOSTIC_ARRAY, DEPTH);
         let period = Duration::from_secs_f64(settings.rate_hz.recip());
         tokio::spawn(Arc::clone(&shared).tell_states(states.clone(), period));
         tokio::spawn(Arc::clone(&shared).tell_diagnostics(diagnostics.clone(), period));
@@ -129,7 +126,7 @@ impl Ros2 {
         let mut obeys = Vec::new();
         if has_commands {
             let (kind, name) = (EndpointKind::Subscription, format!("/{base}/joint_commands"));
-            let commands = endpoint(kind, name, message::<JointState>(), COMMAND_DEPTH);
+            let commands = endpoint(kind, name, JOINT_STATE, COMMAND_DEPTH);
             let shared = Arc::clone(&shared);
             let taken = move |sample| shared.receive(&sample);
             let declared = zenoh.declare_subscriber(&commands.key).callback(taken).background();
@@ -139,7 +136,7 @@ impl Ros2 {
         let mut services = Vec::new();
         for service in Service::ALL {
             let name = format!("/{base}/{}", service.name());
-            let endpoint = endpoint(EndpointKind::Service, name, (TRIGGER, trigger()), DEPTH);
+            let endpoint = endpoint(EndpointKind::Service, name, TRIGGER, DEPTH);
             service.open(&shared, zenoh, &endpoint).map_err(io::Error::other)?;
             services.push(endpoint);
         }
@@ -157,9 +154,4 @@ impl Ros2 {
             _tokens: tokens,
         })
     }
-}
-
-/// The name and the definition of a message type.
-fn message<M: Message>() -> (&'static str, String) {
-    (M::TYPE, M::definition())
 }

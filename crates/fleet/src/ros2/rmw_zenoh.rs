@@ -1,8 +1,7 @@
 //! Names, keys and attachments of `rmw_zenoh`, from version 0.2.4 on.
 
+use motorlink_recording::schema::{DiagnosticArray, JointState, Message as _};
 use ring::digest::{SHA256, digest};
-
-use super::type_hash::{dds_name, hash};
 
 /// Who sent a sample.
 pub type Gid = [u8; 16];
@@ -58,6 +57,38 @@ pub fn legal(text: &str) -> String {
 /// Whether a text is a ROS name: parts that are [`legal`], with `/` between them.
 pub fn is_name(text: &str) -> bool {
     text.split('/').all(|part| !part.is_empty() && legal(part) == part)
+}
+
+/// A type as keys name it, with the hash that ROS publishes for it (REP-2016, `RIHS01`): two programs exchange
+/// messages only if their hashes are the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RosType {
+    name: &'static str,
+    hash: &'static str,
+}
+
+/// `sensor_msgs/msg/JointState`
+pub const JOINT_STATE: RosType = RosType {
+    name: JointState::TYPE,
+    hash: "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
+};
+/// `diagnostic_msgs/msg/DiagnosticArray`
+pub const DIAGNOSTIC_ARRAY: RosType = RosType {
+    name: DiagnosticArray::TYPE,
+    hash: "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
+};
+/// `std_srvs/srv/Trigger`. Its hash is over the request, the response and the event of both.
+pub const TRIGGER: RosType = RosType {
+    name: "std_srvs/srv/Trigger",
+    hash: "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+};
+
+impl RosType {
+    /// The name and the hash in keys: `sensor_msgs::msg::dds_::JointState_/RIHS01_...`.
+    fn in_key(self) -> String {
+        let (package, name) = self.name.rsplit_once('/').unwrap_or_default();
+        format!("{}::dds_::{name}_/{}", package.replace('/', "::"), self.hash)
+    }
 }
 
 /// What a ROS node has.
@@ -123,17 +154,17 @@ impl Graph {
         number: usize,
         kind: EndpointKind,
         name: &str,
-        (type_name, definition): (&str, &str),
+        ty: RosType,
         depth: u32,
     ) -> Endpoint {
         let Graph { domain, session, node } = self;
-        let (hash, dds) = (hash(type_name, definition), dds_name(type_name));
-        let key = format!("{domain}{name}/{dds}/{hash}");
+        let ty = ty.in_key();
+        let key = format!("{domain}{name}/{ty}");
         let (word, mangled) = (kind.word(), name.replace('/', "%"));
         // Reliable, volatile, the last `depth`: what is not written is as usual.
         let qos = format!("::,{depth}:,:,:,,");
         let token = format!(
-            "@ros2_lv/{domain}/{session}/{NODE}/{number}/{word}/%/%/{node}/{mangled}/{dds}/{hash}/{qos}"
+            "@ros2_lv/{domain}/{session}/{NODE}/{number}/{word}/%/%/{node}/{mangled}/{ty}/{qos}"
         );
         let mut gid = Gid::default();
         gid.copy_from_slice(&digest(&SHA256, token.as_bytes()).as_ref()[..size_of::<Gid>()]);
@@ -144,7 +175,6 @@ impl Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use motorlink_recording::schema::{JointState, Message as _};
 
     #[test]
     fn names_of_nodes_become_legal() {
@@ -176,9 +206,8 @@ mod tests {
     fn keys_and_tokens_are_those_of_rmw_zenoh() {
         let graph = Graph::new(3, "ab12".to_owned(), "arm1".to_owned());
         assert_eq!(graph.token(), "@ros2_lv/3/ab12/0/0/NN/%/%/arm1");
-        let definition = JointState::definition();
-        let message = (JointState::TYPE, definition.as_str());
-        let states = graph.endpoint(1, EndpointKind::Publisher, "/arm1/joint_states", message, 10);
+        let states =
+            graph.endpoint(1, EndpointKind::Publisher, "/arm1/joint_states", JOINT_STATE, 10);
         let kind = "sensor_msgs::msg::dds_::JointState_/\
                     RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e";
         assert_eq!(states.key, format!("3/arm1/joint_states/{kind}"));
@@ -186,5 +215,6 @@ mod tests {
             states.token,
             format!("@ros2_lv/3/ab12/0/1/MP/%/%/arm1/%arm1%joint_states/{kind}/::,10:,:,:,,")
         );
+        assert!(TRIGGER.in_key().starts_with("std_srvs::srv::dds_::Trigger_/RIHS01_eeff2cd6"));
     }
 }

@@ -76,7 +76,7 @@ impl From<(i32, u32)> for Time {
 
 impl Time {
     /// The fields in the language of `.msg` files.
-    pub const DEPENDENCY: (&'static str, &'static str) =
+    pub(super) const DEPENDENCY: (&'static str, &'static str) =
         ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
 
     /// The time of the day in the form of RFC 3339, to the millisecond: `2026-11-23T14:05:09.250Z`.
@@ -126,7 +126,7 @@ fn pairs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(String, String)>, D:
 }
 
 /// A definition with those of the types that it uses, each behind a line of 80 `=`.
-pub fn with_dependencies(fields: &str, dependencies: &[(&str, &str)]) -> String {
+pub(super) fn with_dependencies(fields: &str, dependencies: &[(&str, &str)]) -> String {
     let rule = "=".repeat(80);
     let used = dependencies.iter().map(|(name, text)| format!("{rule}\nMSG: {name}\n{text}"));
     std::iter::once(fields.to_owned()).chain(used).collect()

@@ -14,7 +14,6 @@ pub use frame::{Direction, Frame, FrameResult};
 pub use loss::Loss;
 pub use message::{
     DiagnosticArray, DiagnosticStatus, JointState, Level, Log, Message, Severity, Time,
-    with_dependencies,
 };
 pub use name::snake_case;
 pub use signals::{PACKAGE, SignalField, SignalsRow, SignalsType};
