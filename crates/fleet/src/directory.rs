@@ -58,7 +58,7 @@ pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
             nodes.insert(node, None);
         }
     }
-    let infos = ask_all(&zenoh, key::all_info(), ANSWER).wait();
+    let infos = ask_all(&zenoh, key::info(&Name::any(), &Name::any()), ANSWER).wait();
     for reply in infos.map_err(failed)? {
         let Ok(sample) = reply.into_result() else { continue };
         let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();

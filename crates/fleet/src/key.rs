@@ -139,12 +139,12 @@ pub fn alive(node: &Name, boot: &Name) -> String {
 
 /// Those of all nodes with a name. There should be one.
 pub fn alive_of(node: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/alive/*")
+    alive(node, &Name::any())
 }
 
 /// Those of all nodes.
 pub fn all_alive() -> String {
-    format!("{ROOT}/*/{WHOLE}/alive/*")
+    alive_of(&Name::any())
 }
 
 /// That a run of a node ends, with its motors stopped.
@@ -155,11 +155,6 @@ pub fn ended(node: &Name, boot: &Name) -> String {
 /// What a node says of itself: a query.
 pub fn info(node: &Name, boot: &Name) -> String {
     format!("{ROOT}/{node}/{WHOLE}/info/{boot}")
-}
-
-/// That of all nodes.
-pub fn all_info() -> String {
-    format!("{ROOT}/*/{WHOLE}/info/*")
 }
 
 /// The requests of a program: queries.
@@ -177,11 +172,6 @@ pub fn session_token(node: &Name, boot: &Name, who: &Name, session: &Name) -> St
     format!("{ROOT}/{node}/{WHOLE}/here/{boot}/{who}/{session}")
 }
 
-/// Those of all programs.
-pub fn all_here(node: &Name, boot: &Name) -> String {
-    format!("{ROOT}/{node}/{WHOLE}/here/{boot}/*/*")
-}
-
 /// Events of the node, or of a line.
 pub fn events(node: &Name, line: Option<&str>) -> String {
     format!("{ROOT}/{node}/{}/events", line.unwrap_or(WHOLE))
@@ -193,24 +183,9 @@ pub fn state(node: &Name) -> String {
 }
 
 /// The samples of a motor.
-pub fn samples(node: &Name, line: &str, motor: u8) -> String {
-    format!("{ROOT}/{node}/{line}/{motor}/samples")
-}
-
-/// Those of all motors of a node.
-pub(crate) fn all_samples(node: &Name) -> String {
-    format!("{ROOT}/{node}/*/*/samples")
-}
-
+pub const SAMPLES: &str = "samples";
 /// The columns of the samples of a motor: a query.
-pub fn columns(node: &Name, line: &str, motor: u8) -> String {
-    format!("{ROOT}/{node}/{line}/{motor}/columns")
-}
-
-/// Those of all motors of a node.
-pub(crate) fn all_columns(node: &Name) -> String {
-    format!("{ROOT}/{node}/*/*/columns")
-}
+pub const COLUMNS: &str = "columns";
 
 /// What programs ask of a motor without a session: queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -228,7 +203,7 @@ impl MotorQuery {
     pub const ALL: [Self; 3] = [MotorQuery::Identity, MotorQuery::Registers, MotorQuery::Settings];
 
     /// The part of keys behind the motor.
-    const fn words(self) -> &'static str {
+    pub const fn words(self) -> &'static str {
         match self {
             MotorQuery::Identity => "identity",
             MotorQuery::Registers => "registers/*",
@@ -237,19 +212,20 @@ impl MotorQuery {
     }
 }
 
-/// What is asked of a motor: a query. That of registers is about all that can be read.
-pub fn about(node: &Name, line: &str, motor: u8, about: MotorQuery) -> String {
-    format!("{ROOT}/{node}/{line}/{motor}/{}", about.words())
+/// A key of a motor: [`SAMPLES`], [`COLUMNS`], or the words of a query. That of registers is about all that can
+/// be read.
+pub fn of_motor(node: &Name, line: &str, motor: u8, words: &str) -> String {
+    format!("{ROOT}/{node}/{line}/{motor}/{words}")
+}
+
+/// Those of all motors of a node.
+pub(crate) fn of_all_motors(node: &Name, words: &str) -> String {
+    format!("{ROOT}/{node}/*/*/{words}")
 }
 
 /// A register of a motor: a query. It has this key in the answer to a query about all of them, too.
 pub fn register(node: &Name, line: &str, motor: u8, name: &str) -> String {
-    format!("{ROOT}/{node}/{line}/{motor}/registers/{name}")
-}
-
-/// What is asked of all motors of a node.
-pub(crate) fn all_about(node: &Name, about: MotorQuery) -> String {
-    format!("{ROOT}/{node}/*/*/{}", about.words())
+    of_motor(node, line, motor, &format!("registers/{name}"))
 }
 
 /// The line and the motor in the key of a query, if it names one motor of one node.
@@ -271,7 +247,7 @@ pub fn node_of(key: &str) -> Option<Name> {
     key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?.parse().ok()
 }
 
-/// The node, the line and the motor in a key that [`samples`] or [`columns`] made.
+/// The node, the line and the motor in a key that [`of_motor`] made.
 pub fn motor_of(key: &str) -> Option<(Name, &str, u8)> {
     let [line, motor, _] = key.strip_prefix(ROOT)?.split('/').skip(2).collect::<Vec<_>>()[..]
     else {
@@ -308,7 +284,7 @@ pub fn run_of(key: &str) -> Option<(Name, Name)> {
     Some((node_of(key)?, boot.parse().ok()?))
 }
 
-/// Who is there, and in which session, in a key that [`here`] made.
+/// Who is there, and in which session, in a key that [`session_token`] made.
 pub fn parse_session_token(key: &str) -> Option<(Name, Name)> {
     let [_, _, who, session] = behind_node(key)?[..] else { return None };
     Some((who.parse().ok()?, session.parse().ok()?))
@@ -359,12 +335,17 @@ mod tests {
     fn a_query_names_one_motor_or_several() {
         let node = name("arm1");
         for it in MotorQuery::ALL {
-            assert_eq!(one_motor(&about(&node, "st0", 1, it)), Some(("st0", "1")), "{it:?}");
-            assert_eq!(one_motor(&all_about(&node, it)), None, "{it:?}");
+            assert_eq!(
+                one_motor(&of_motor(&node, "st0", 1, it.words())),
+                Some(("st0", "1")),
+                "{it:?}"
+            );
+            assert_eq!(one_motor(&of_all_motors(&node, it.words())), None, "{it:?}");
         }
+        let of_all = of_motor(&node, "st0", 1, MotorQuery::Registers.words());
         let key = register(&node, "st0", 1, "SPEED_MEAS");
         assert_eq!((one_motor(&key), one_register(&key)), (Some(("st0", "1")), Some("SPEED_MEAS")));
-        assert_eq!(one_register(&about(&node, "st0", 1, MotorQuery::Registers)), None);
+        assert_eq!(one_register(&of_all), None);
         for key in [
             "motorlink/v1/*/st0/1/identity",
             "motorlink/v1/arm1/s$*/1/identity",

@@ -337,7 +337,7 @@ fn a_node_without_a_reader_says_that_it_cannot_read_drives() {
     let network = Network::Connect(vec![format!("tcp/{}", world.address)]);
     let (zenoh, _) = network.open().unwrap();
     for about in MotorQuery::ALL {
-        let key = key::about(&"unread".parse().unwrap(), "st0", 1, about);
+        let key = key::of_motor(&"unread".parse().unwrap(), "st0", 1, about.words());
         let replies = zenoh.get(&key).wait().unwrap();
         let error = replies.recv().unwrap().into_result().unwrap_err();
         let why: NoAnswer = serde_json::from_slice(&error.payload().to_bytes()).unwrap();

@@ -51,7 +51,7 @@ pub(super) async fn open(common: &Arc<Common>, reader: Option<Arc<dyn Reader>>) 
     for about in MotorQuery::ALL {
         let (queries, handle) = (Arc::clone(&queries), Handle::current());
         let take = move |query: Query| queries.take(about, query, &handle);
-        let key = key::all_about(&common.name, about);
+        let key = key::of_all_motors(&common.name, about.words());
         let declared = common.zenoh.declare_queryable(key).callback(take).background();
         declared.wait().map_err(io::Error::other)?;
     }
@@ -105,7 +105,8 @@ impl Queries {
             return Ok(vec![drive(line, motor)]);
         }
         let all = lines.iter().flat_map(|line| line.heard.iter().map(move |motor| (line, *motor)));
-        let key = |line: &Line, motor| key::about(&self.common.name, &line.line, motor, about);
+        let key =
+            |line: &Line, motor| key::of_motor(&self.common.name, &line.line, motor, about.words());
         let meant = all.filter(|(line, motor)| covers(asked, &key(line, *motor)));
         Ok(meant.map(|(line, motor)| drive(line, motor)).collect())
     }
@@ -120,7 +121,7 @@ impl Queries {
             let why = self.lost(&line).filter(|_| is_old).unwrap_or(why);
             let key = match key::one_motor(asked) {
                 Some(_) => asked.to_string(),
-                None => key::about(&self.common.name, &line, motor, about),
+                None => key::of_motor(&self.common.name, &line, motor, about.words()),
             };
             vec![(key, Err(why))]
         })
@@ -136,7 +137,7 @@ impl Queries {
             Refusal::usage("this node cannot read drives: its program was built without `monitor`")
         })?;
         let (line, motor) = (drive.line.clone(), drive.motor);
-        let key = key::about(&self.common.name, &line.line, motor, about);
+        let key = key::of_motor(&self.common.name, &line.line, motor, about.words());
         let of = |name: &String| key::register(&self.common.name, &line.line, motor, name);
         let mut names = match about {
             MotorQuery::Registers => reader.registers(&line),

@@ -60,7 +60,7 @@ pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<
         // A program that does not read may hold up its answer.
         handle.spawn(async move { block_in_place(|| columns.say_columns(&query)) });
     };
-    let key = key::all_columns(&common.name);
+    let key = key::of_all_motors(&common.name, key::COLUMNS);
     let declared = common.zenoh.declare_queryable(key).callback(asked).background();
     declared.wait().map_err(io::Error::other)?;
     let own = common.own.get_or_init(|| program);
@@ -80,7 +80,7 @@ impl Common {
                         self.publish_event(&event);
                     }
                     Ok(Text::Group(group)) => {
-                        let key = key::columns(&self.name, &group.line, group.motor);
+                        let key = key::of_motor(&self.name, &group.line, group.motor, key::COLUMNS);
                         self.put(&key, &group);
                         groups.insert(group.group, (group.line.clone(), group.motor));
                         self.columns_of(group);
@@ -92,7 +92,7 @@ impl Common {
                 FrameKind::Data => {
                     let of = Data::decode(&payload).ok().and_then(|data| groups.get(&data.group));
                     let Some((line, motor)) = of else { continue };
-                    let key = key::samples(&self.name, line, *motor);
+                    let key = key::of_motor(&self.name, line, *motor, key::SAMPLES);
                     // A network that is slow loses samples. Nothing waits for it.
                     let _ = self
                         .zenoh
@@ -247,7 +247,8 @@ impl Common {
 
     fn columns_of(&self, group: Group) {
         let mut state = self.state_mut();
-        state.columns.insert(key::columns(&self.name, &group.line, group.motor), group);
+        let key = key::of_motor(&self.name, &group.line, group.motor, key::COLUMNS);
+        state.columns.insert(key, group);
     }
 
     fn say_columns(&self, query: &Query) {

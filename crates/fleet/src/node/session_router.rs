@@ -58,7 +58,7 @@ pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<Liv
             router.gone(&who, &session, &handle);
         }
     };
-    let all = key::all_here(&common.name, &common.boot);
+    let all = key::session_token(&common.name, &common.boot, &Name::any(), &Name::any());
     zenoh.liveliness().declare_subscriber(all).callback(here).background().wait()?;
     zenoh.liveliness().declare_token(key::alive(&common.name, &common.boot)).wait()
 }

@@ -40,8 +40,8 @@ fn seeing() -> Vec<Value> {
     let published = [
         key::state(&any),
         key::events(&any, Some("*")),
-        key::all_samples(&any),
-        key::all_columns(&any),
+        key::of_all_motors(&any, key::SAMPLES),
+        key::of_all_motors(&any, key::COLUMNS),
     ];
     let asked = asked_of_all();
     vec![
@@ -57,8 +57,8 @@ fn seeing() -> Vec<Value> {
 /// What all programs may ask of all nodes.
 fn asked_of_all() -> Vec<String> {
     let any = Name::any();
-    let about = MotorQuery::ALL.map(|about| key::all_about(&any, about));
-    [&[key::all_info(), key::all_columns(&any)][..], &about].concat()
+    let about = MotorQuery::ALL.map(|about| key::of_all_motors(&any, about.words()));
+    [&[key::info(&any, &any), key::of_all_motors(&any, key::COLUMNS)][..], &about].concat()
 }
 
 /// What all nodes are asked. Whether a program may ask it was decided before.
@@ -84,8 +84,9 @@ fn meeting() -> Vec<Value> {
 
 /// What a node says in its own name.
 fn of_node(name: &Name) -> Vec<Value> {
+    let any = Name::any();
     let alive = [key::alive_of(name)];
-    let here = [key::all_here(name, &Name::any())];
+    let here = [key::session_token(name, &any, &any, &any)];
     let says = ["put", "reply", "declare_queryable"];
     vec![
         coming(&format!("says {name}"), &says, &[key::all_of(name)]),

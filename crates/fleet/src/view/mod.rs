@@ -56,8 +56,8 @@ impl View {
         let mut subscribers = Vec::new();
         let heard: [(String, Hear); 3] = [
             (key::state(&Name::any()), Shared::state),
-            (key::all_columns(&Name::any()), Shared::columns),
-            (key::all_samples(&Name::any()), Shared::samples),
+            (key::of_all_motors(&Name::any(), key::COLUMNS), Shared::columns),
+            (key::of_all_motors(&Name::any(), key::SAMPLES), Shared::samples),
         ];
         for (key, hear) in heard {
             let shared = Arc::clone(&shared);
@@ -163,7 +163,8 @@ impl Shared {
         }
         *asked = now;
         let shared = Arc::clone(self);
-        let question = directory::ask_all(&self.zenoh, key::all_columns(&Name::any()), ANSWER);
+        let columns = key::of_all_motors(&Name::any(), key::COLUMNS);
+        let question = directory::ask_all(&self.zenoh, columns, ANSWER);
         let question = question.callback(move |reply| {
             if let Ok(sample) = reply.into_result() {
                 shared.columns(&sample);

@@ -143,7 +143,7 @@ impl FleetSession {
                 serving.saw(&sample);
             }
         }
-        let infos = directory::ask_all(&zenoh, key::all_info(), FIRST).await;
+        let infos = directory::ask_all(&zenoh, key::info(&Name::any(), &Name::any()), FIRST).await;
         let infos = infos.map_err(io::Error::other)?;
         while let Ok(reply) = infos.recv_async().await {
             if let Ok(sample) = reply.into_result() {
