@@ -61,24 +61,7 @@ impl fmt::Display for Name {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    known: BTreeMap<String, (Version, Contents)>,
-}
-
-/// A file changes when one of these does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Version {
-    bytes: u64,
-    modified: f64,
-}
-
-#[derive(Debug, Clone)]
-struct Contents {
-    began: Option<f64>,
-    seconds: Option<f64>,
-    motors: Vec<String>,
-    gaps: Vec<Gap>,
-    condition: Condition,
-    message: Option<String>,
+    known: BTreeMap<String, RecordingFile>,
 }
 
 impl Folder {
@@ -108,39 +91,21 @@ impl Folder {
                 let modified = found.modified().ok();
                 let modified = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
                 let modified = modified.unwrap_or_default().as_secs_f64();
-                files.push((Version { bytes: found.len(), modified }, name));
+                files.push((name, found.len(), modified));
             }
         }
-        files.sort_by(|(one, a), (other, b)| {
-            other.modified.total_cmp(&one.modified).then_with(|| b.0.cmp(&a.0))
-        });
+        files
+            .sort_by(|(a, _, one), (b, _, other)| other.total_cmp(one).then_with(|| b.0.cmp(&a.0)));
         let older = files.len().saturating_sub(LISTED);
         files.truncate(LISTED);
-        let mut known = BTreeMap::new();
         let mut listed = Vec::new();
-        for (version, name) in files {
-            let before = self.known.remove(&name.0).filter(|(known, _)| *known == version);
-            let contents = match before {
-                Some((_, contents)) => contents,
-                None => Contents::read(&self.path, &name),
-            };
-            known.insert(name.0.clone(), (version, contents.clone()));
-            let Contents { began, seconds, motors, gaps, condition, message } = contents;
-            let Version { bytes, modified } = version;
-            let name = name.0;
-            listed.push(RecordingFile {
-                name,
-                bytes,
-                modified,
-                began,
-                seconds,
-                motors,
-                gaps,
-                condition,
-                message,
-            });
+        for (name, bytes, modified) in files {
+            // A file changes when one of these does.
+            let is_same = |it: &RecordingFile| it.bytes == bytes && it.modified == modified;
+            let known = self.known.remove(&name.0).filter(is_same);
+            listed.push(known.unwrap_or_else(|| read(&self.path, &name, bytes, modified)));
         }
-        self.known = known;
+        self.known = listed.iter().map(|file| (file.name.clone(), file.clone())).collect();
         Ok((listed, older))
     }
 }
@@ -160,37 +125,35 @@ pub fn open(folder: &Path, name: &Name) -> io::Result<File> {
     }
 }
 
-impl Contents {
-    fn read(folder: &Path, name: &Name) -> Self {
-        let read = open(folder, name).map_err(ReadError::from).and_then(Recording::new);
-        let recording = match read {
-            Ok(recording) => recording,
-            Err(error) => {
-                return Contents {
-                    began: None,
-                    seconds: None,
-                    motors: Vec::new(),
-                    gaps: Vec::new(),
-                    condition: Condition::Unreadable,
-                    message: Some(error.to_string()),
-                };
-            }
-        };
-        let times = recording.times();
-        let message = lost(recording.losses());
-        let gaps = recording.metadata().iter().filter(|it| it.name == schema::gaps::NAME);
-        let gaps = gaps.flat_map(|it| &it.values).filter_map(|(motor, seconds)| {
-            Some(Gap { motor: motor.clone(), seconds: seconds.parse().ok()? })
-        });
-        Contents {
-            began: times.map(|[first, _]| first as f64 / 1e9),
-            seconds: times.map(|[first, last]| last.saturating_sub(first) as f64 / 1e9),
-            motors: recording.drives().map(|drive| drive.name).collect(),
-            gaps: gaps.collect(),
-            condition: if message.is_some() { Condition::Cut } else { Condition::Whole },
-            message,
-        }
-    }
+/// What is in a recording of this size, which was written last at `modified`.
+fn read(folder: &Path, name: &Name, bytes: u64, modified: f64) -> RecordingFile {
+    let mut file = RecordingFile {
+        name: name.0.clone(),
+        bytes,
+        modified,
+        began: None,
+        seconds: None,
+        motors: Vec::new(),
+        gaps: Vec::new(),
+        condition: Condition::Unreadable,
+        message: None,
+    };
+    let recording = match open(folder, name).map_err(ReadError::from).and_then(Recording::new) {
+        Ok(recording) => recording,
+        Err(error) => return RecordingFile { message: Some(error.to_string()), ..file },
+    };
+    let times = recording.times();
+    let gaps = recording.metadata().iter().filter(|it| it.name == schema::gaps::NAME);
+    let gaps = gaps.flat_map(|it| &it.values).filter_map(|(motor, seconds)| {
+        Some(Gap { motor: motor.clone(), seconds: seconds.parse().ok()? })
+    });
+    file.began = times.map(|[first, _]| first as f64 / 1e9);
+    file.seconds = times.map(|[first, last]| last.saturating_sub(first) as f64 / 1e9);
+    file.motors = recording.drives().map(|drive| drive.name).collect();
+    file.gaps = gaps.collect();
+    file.message = lost(recording.losses());
+    file.condition = if file.message.is_some() { Condition::Cut } else { Condition::Whole };
+    file
 }
 
 #[cfg(test)]
