@@ -137,7 +137,7 @@ impl Answer {
 }
 
 /// What a node says of itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Info {
     /// The name of the node.
     pub node: String,

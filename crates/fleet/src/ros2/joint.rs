@@ -308,20 +308,7 @@ pub(super) mod tests {
 
     fn line(name: &str, protocol: Protocol) -> Line {
         let profile = (protocol == Protocol::St).then(|| "spec".to_owned());
-        let (line, port) = (name.to_owned(), "sim:".to_owned());
-        let (heard, unstopped) = (vec![1], Vec::new());
-        Line {
-            line,
-            protocol,
-            port,
-            profile,
-            timeout: 1.0,
-            t: 0.0,
-            wall: 0.0,
-            counts: None,
-            heard,
-            unstopped,
-        }
+        Line { line: name.to_owned(), protocol, profile, heard: vec![1], ..Line::default() }
     }
 
     pub(in super::super) fn lines() -> Vec<Line> {

@@ -167,26 +167,14 @@ mod tests {
         let line = Line {
             line: "rmd0".to_owned(),
             protocol: Protocol::Rmd,
-            port: "sim:".to_owned(),
-            profile: None,
-            timeout: 1.0,
-            t: 0.0,
-            wall: 0.0,
-            counts: None,
             heard: heard.to_vec(),
-            unstopped: Vec::new(),
+            ..Line::default()
         };
         Info {
             node: "arm1".to_owned(),
-            protocol: crate::VERSION,
-            program: "test".to_owned(),
             boot: boot.to_owned(),
-            t: 0.0,
-            wall: 0.0,
             lines: vec![line],
-            searching: Vec::new(),
-            latched_by: None,
-            away: Vec::new(),
+            ..Info::default()
         }
     }
 

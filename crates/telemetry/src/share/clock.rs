@@ -58,24 +58,12 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::share::message::Protocol;
 
     const S: u64 = 1_000_000_000;
     const MS: u64 = 1_000_000;
 
     fn line(t: f64, wall: f64) -> Line {
-        Line {
-            line: "rmd0".to_owned(),
-            protocol: Protocol::Rmd,
-            port: String::new(),
-            profile: None,
-            timeout: 1.0,
-            t,
-            wall,
-            counts: None,
-            heard: Vec::new(),
-            unstopped: Vec::new(),
-        }
+        Line { t, wall, ..Line::default() }
     }
 
     #[test]

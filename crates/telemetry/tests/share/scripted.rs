@@ -57,12 +57,7 @@ pub fn line(name: &str, protocol: Protocol) -> Line {
         line: name.to_owned(),
         protocol,
         port: "test".to_owned(),
-        profile: None,
         timeout: 1.0,
-        t: 0.0,
-        wall: 0.0,
-        counts: None,
-        heard: Vec::new(),
-        unstopped: Vec::new(),
+        ..Line::default()
     }
 }

@@ -1,7 +1,6 @@
 use super::super::joint::tests::joint;
 use super::super::value_cache::tests::readings;
 use super::*;
-use motorlink_recording::schema::Time;
 
 const LIVE: f64 = 0.2;
 /// When the values of the motors came.
@@ -60,19 +59,11 @@ fn outputs(commands: &mut CommandArbiter) -> Vec<Output> {
 }
 
 fn wheel(velocity: f64) -> JointState {
-    let (position, effort) = (Vec::new(), Vec::new());
-    JointState {
-        stamp: Time::default(),
-        name: vec!["wheel".to_owned()],
-        position,
-        velocity: vec![velocity],
-        effort,
-    }
+    JointState { name: vec!["wheel".to_owned()], velocity: vec![velocity], ..JointState::default() }
 }
 
 fn arm(position: f64) -> JointState {
-    let (stamp, velocity, effort) = (Time::default(), Vec::new(), Vec::new());
-    JointState { stamp, name: vec!["arm".to_owned()], position: vec![position], velocity, effort }
+    JointState { name: vec!["arm".to_owned()], position: vec![position], ..JointState::default() }
 }
 
 fn sends(output: &Output) -> bool {

@@ -15,14 +15,10 @@ fn line(text: &str, heard: &[u8]) -> Line {
     Line {
         line: text.to_owned(),
         protocol: Protocol::Rmd,
-        port: "sim:".to_owned(),
-        profile: None,
-        timeout: 1.0,
         t: 5.0,
         wall: WALL,
-        counts: None,
         heard: heard.to_vec(),
-        unstopped: Vec::new(),
+        ..Line::default()
     }
 }
 

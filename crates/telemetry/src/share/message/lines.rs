@@ -13,7 +13,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const REPLIES: u32 = 12;
 
 /// A line of a share.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Line {
     /// Its name.
@@ -52,11 +52,12 @@ impl Line {
 }
 
 /// What the drives of a line speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Protocol {
     /// ST's Motor Control Protocol.
+    #[default]
     St,
     /// The RMD protocol.
     Rmd,
