@@ -1,19 +1,19 @@
 //! Recordings by HTTP: their files, and parts of them for plots.
 
-use std::fs::File;
-use std::io;
 use std::sync::Arc;
 
 use axum::Extension;
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::extract::{Path, Query, State as Shared};
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
-use futures_util::stream::{Stream, unfold};
+use futures_util::StreamExt;
 use motorlink_telemetry::share::client::Refusal;
 use serde::Deserialize;
-use tokio::io::{AsyncReadExt, Take};
+use tokio::fs::File;
+use tokio::io::AsyncReadExt;
+use tokio_util::io::ReaderStream;
 
 use super::connections::Deadline;
 use super::state::State;
@@ -41,32 +41,11 @@ pub async fn download(
         (CONTENT_LENGTH, size.to_string()),
         (CONTENT_DISPOSITION, format!("attachment; filename*=UTF-8''{}", encoded(&name))),
     ];
-    (headers, Body::from_stream(pieces(file, size, deadline))).into_response()
-}
-
-/// The bytes of a file. The connection may last as long as somebody takes them.
-fn pieces(
-    file: File,
-    size: u64,
-    deadline: Deadline,
-) -> impl Stream<Item = io::Result<Bytes>> + Send + 'static {
-    let file = tokio::fs::File::from_std(file).take(size);
-    unfold((file, deadline), |(mut file, deadline): (Take<tokio::fs::File>, _)| async {
-        deadline.extend();
-        let mut piece = vec![0; PIECE];
-        match file.read(&mut piece).await {
-            // A file that became shorter ends the connection, so that nobody takes it for whole.
-            Ok(0) if file.limit() > 0 => {
-                Some((Err(io::ErrorKind::UnexpectedEof.into()), (file, deadline)))
-            }
-            Ok(0) => None,
-            Ok(length) => {
-                piece.truncate(length);
-                Some((Ok(piece.into()), (file, deadline)))
-            }
-            Err(error) => Some((Err(error), (file, deadline))),
-        }
-    })
+    // A file that became shorter ends the connection, so that nobody takes it for whole.
+    let pieces = ReaderStream::with_capacity(File::from_std(file).take(size), PIECE);
+    // The connection may last as long as somebody takes them.
+    let pieces = pieces.inspect(move |_| deadline.extend());
+    (headers, Body::from_stream(pieces)).into_response()
 }
 
 #[derive(Deserialize)]
