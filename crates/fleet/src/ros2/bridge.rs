@@ -10,7 +10,7 @@ use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{
-    Answer, Ask, DropRule, Event, EventKind, Line, SignalName, Text, decode,
+    Answer, Ask, DropRule, Event, EventKind, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::motor_exchange::Target;
 use tokio::runtime::Handle;
@@ -20,13 +20,12 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::Sample;
 use zenoh::{Session as Zenoh, Wait};
 
-use super::command_arbiter::{CommandArbiter, Order, Output};
+use super::command_arbiter::{Order, Output};
 use super::joint::Joint;
+use super::machine::Machine;
 use super::motion_executor::{Failed, MotionExecutor};
 use super::motor_client::MotorClient;
 use super::rmw_zenoh::{Attachment, Endpoint};
-use super::state_messages::{self, Known};
-use super::value_cache::ValueCache;
 use crate::clock::Clock;
 
 /// How often diagnostics are published.
@@ -35,24 +34,6 @@ const DIAGNOSTICS: Duration = Duration::from_secs(1);
 const IDLE: Duration = Duration::from_secs(60);
 /// Rows of a motor that wait.
 const QUEUE: u32 = 100;
-
-/// What is known of the motors, and what they are asked for.
-pub struct Machine {
-    /// The joints that are published.
-    pub joints: Vec<Joint>,
-    /// Whether each motor that answers becomes a joint.
-    pub takes_all: bool,
-    /// Older values are none, in seconds.
-    pub fresh: f64,
-    /// The commands.
-    pub commands: CommandArbiter,
-    /// The last values.
-    pub readings: ValueCache,
-    /// The lines of the share.
-    pub lines: Vec<Line>,
-    /// Who refuses motion.
-    pub latched_by: Option<String>,
-}
 
 /// What all tasks have.
 pub struct Shared {
@@ -200,9 +181,7 @@ impl Shared {
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             ticks.tick().await;
-            let state = self.with(|machine, now| {
-                state_messages::joint_state(&machine.joints, &machine.readings, now, machine.fresh)
-            });
+            let state = self.with(|machine, now| machine.joint_state(now));
             // Programs complain about a state that comes twice.
             if let Some(state) = state.filter(|it| it.stamp != last) {
                 last = state.stamp;
@@ -233,12 +212,7 @@ impl Shared {
                 }
             }
             let wall = self.clock.wall();
-            let diagnostics = self.with(|machine, now| {
-                let Machine { joints, lines, latched_by, readings, commands, fresh, .. } = machine;
-                let (node, age, latched_by) = (self.node.as_str(), *fresh, latched_by.as_deref());
-                let known = Known { node, joints, lines, latched_by, readings, commands, now, age };
-                known.diagnostics(wall)
-            });
+            let diagnostics = self.with(|machine, now| machine.diagnostics(&self.node, now, wall));
             publisher.put(&diagnostics, wall);
         }
     }
@@ -258,46 +232,6 @@ impl Shared {
         // Diagnostics say that there are no values.
         let _ =
             self.program.ask(Ask::Subscribe { signals, period, queue, drop, rows: false }).await;
-    }
-}
-
-impl Machine {
-    fn learn(&mut self, lines: Vec<Line>, latched_by: Option<String>) {
-        self.readings.learn(&lines);
-        for line in lines.iter().filter(|_| self.takes_all) {
-            let heard = line.heard.iter().filter_map(|motor| Joint::of_motor(line, *motor));
-            for joint in heard {
-                if self.joints.iter().all(|it| it.name != joint.name) {
-                    self.joints.push(joint);
-                }
-            }
-            self.joints.sort_by(|one, two| one.name.cmp(&two.name));
-        }
-        (self.lines, self.latched_by) = (lines, latched_by);
-    }
-
-    /// The joint of a motor, if it can have commands.
-    fn commanded(&self, line: &str, motor: u8) -> Option<(usize, &Joint)> {
-        let is_of = |joint: &Joint| joint.line == line && joint.motor.number() == motor;
-        self.commands.joints().enumerate().find(|(_, joint)| is_of(joint))
-    }
-
-    /// Another program stops a motor.
-    fn stopped_by(&mut self, now: f64, line: &str, motor: u8, by: &str) {
-        if let Some((number, _)) = self.commanded(line, motor) {
-            self.commands.block(now, number, &format!("{by} has stopped it"));
-        }
-    }
-
-    /// Takes samples. A fault ends the motion of its joint.
-    fn take(&mut self, now: f64, data: &Data) {
-        let Some((line, motor)) = self.readings.take(now, data) else { return };
-        let (line, motor) = (line.clone(), *motor);
-        let Some((number, joint)) = self.commanded(&line, motor) else { return };
-        let fault = self.readings.of(joint).and_then(|it| it.faults(joint.motor));
-        if let Some((words, _)) = fault {
-            self.commands.end_motion(now, number, &words);
-        }
     }
 }
 

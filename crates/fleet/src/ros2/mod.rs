@@ -4,6 +4,7 @@
 mod bridge;
 mod command_arbiter;
 mod joint;
+mod machine;
 mod motion_executor;
 mod motor_client;
 mod rmw_zenoh;
@@ -24,8 +25,9 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::{Session as Zenoh, Wait};
 
 use crate::clock::Clock;
-use bridge::{Machine, NAME, Shared};
+use bridge::{NAME, Shared};
 use command_arbiter::{CommandArbiter, Rules};
+use machine::Machine;
 use rmw_zenoh::{DIAGNOSTIC_ARRAY, Endpoint, EndpointKind, Graph, JOINT_STATE, TRIGGER};
 use service::Service;
 use value_cache::ValueCache;
@@ -116,8 +118,7 @@ impl Ros2 {
         };
         let (kind, name) = (EndpointKind::Publisher, format!("/{base}/joint_states"));
         let states = endpoint(kind, name, JOINT_STATE, DEPTH);
-        let diagnostics =
-            endpoint(kind, "/diagnostics".to_owned(), DIAGNOSTIC_ARRAY, DEPTH);
+        let diagnostics = endpoint(kind, "/diagnostics".to_owned(), DIAGNOSTIC_ARRAY, DEPTH);
         let period = Duration::from_secs_f64(settings.rate_hz.recip());
         tokio::spawn(Arc::clone(&shared).tell_states(states.clone(), period));
         tokio::spawn(Arc::clone(&shared).tell_diagnostics(diagnostics.clone(), period));
