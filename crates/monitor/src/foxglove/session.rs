@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::extract::ws::Message;
 use serde::Deserialize;
 use tokio::time::Instant;
 
@@ -40,15 +41,6 @@ struct Waiting {
     data: Arc<[u8]>,
 }
 
-/// What is sent next.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Out {
-    /// A text.
-    Text(String),
-    /// A message of a channel.
-    Message(Vec<u8>),
-}
-
 impl Session {
     /// A text for the viewer.
     pub fn tell(&mut self, text: String) {
@@ -81,20 +73,20 @@ impl Session {
     }
 
     /// What is sent next.
-    pub fn take(&mut self, now: Instant) -> Option<Out> {
+    pub fn take(&mut self, now: Instant) -> Option<Message> {
         if let Some(text) = self.texts.pop_front() {
-            return Some(Out::Text(text));
+            return Some(Message::Text(text.into()));
         }
         let may_say = self.said_at.is_none_or(|said| now.duration_since(said) >= SAID);
         if self.lost > 0 && may_say {
             self.said_at = Some(now);
             let lost = std::mem::take(&mut self.lost);
             let text = format!("{lost} messages are lost here: this viewer is too slow");
-            return Some(Out::Text(status(Level::Warning, &text)));
+            return Some(Message::Text(status(Level::Warning, &text).into()));
         }
         let Waiting { subscription, time, data } = self.messages.pop_front()?;
         self.bytes -= data.len();
-        Some(Out::Message(protocol::message(subscription, time, &data)))
+        Some(Message::Binary(protocol::message(subscription, time, &data).into()))
     }
 
     /// A text of the viewer. There are `channels` channels, numbered from 0.

@@ -8,7 +8,6 @@ use futures_util::{SinkExt, StreamExt};
 use tokio::time::{Instant, timeout};
 
 use super::protocol::{Level, status};
-use super::session::Out;
 use super::viewers::{Viewer, Viewers};
 use crate::websocket_limits::{Budget, PATIENCE, Sink, close};
 
@@ -64,20 +63,16 @@ async fn read(
 async fn write(viewer: &Viewer, sink: &mut Sink) {
     loop {
         let out = viewer.session().take(Instant::now());
+        let is_idle = out.is_none();
         let sent = async {
             match out {
-                Some(Out::Text(text)) => sink.feed(Message::Text(text.into())).await?,
-                Some(Out::Message(bytes)) => sink.feed(Message::Binary(bytes.into())).await?,
-                None => {
-                    sink.flush().await?;
-                    return Ok(true);
-                }
+                Some(message) => sink.feed(message).await,
+                None => sink.flush().await,
             }
-            Ok::<bool, axum::Error>(false)
         };
         match timeout(PATIENCE, sent).await {
-            Ok(Ok(true)) => viewer.news.notified().await,
-            Ok(Ok(false)) => {}
+            Ok(Ok(())) if is_idle => viewer.news.notified().await,
+            Ok(Ok(())) => {}
             Ok(Err(_)) | Err(_) => return,
         }
     }

@@ -10,7 +10,7 @@ fn data(size: usize) -> Arc<[u8]> {
 
 /// The next status for the viewer: level and text.
 fn told(session: &mut Session) -> (u64, String) {
-    let Some(Out::Text(text)) = session.take(Instant::now()) else { panic!("a text") };
+    let Some(Message::Text(text)) = session.take(Instant::now()) else { panic!("a text") };
     let status: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(status["op"], "status", "{status}");
     (status["level"].as_u64().unwrap(), status["message"].as_str().unwrap().to_owned())
@@ -35,7 +35,7 @@ fn a_message_has_the_number_that_the_viewer_gave_and_the_time() {
     session.offer(3, 0x1122_3344_5566_7788, &data(2));
     let expected =
         [[1].as_slice(), &[4, 3, 2, 1], &[0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11], &[7, 7]];
-    assert_eq!(session.take(Instant::now()), Some(Out::Message(expected.concat())));
+    assert_eq!(session.take(Instant::now()), Some(Message::Binary(expected.concat().into())));
     assert_eq!(session.take(Instant::now()), None);
 }
 
@@ -50,15 +50,15 @@ fn a_slow_viewer_loses_the_oldest_messages_and_is_told_how_many() {
         told(&mut session),
         (1, "5 messages are lost here: this viewer is too slow".to_owned())
     );
-    let Some(Out::Message(message)) = session.take(Instant::now()) else { panic!("a message") };
+    let Some(Message::Binary(message)) = session.take(Instant::now()) else { panic!("a message") };
     assert_eq!(message[5..13], 5u64.to_le_bytes());
     // At most one such text comes in a second.
     for time in 0..3 {
         session.offer(0, time, &data(1024));
     }
     let now = Instant::now();
-    assert!(matches!(session.take(now), Some(Out::Message(_))));
-    let Some(Out::Text(text)) = session.take(now + SAID) else { panic!("a text") };
+    assert!(matches!(session.take(now), Some(Message::Binary(_))));
+    let Some(Message::Text(text)) = session.take(now + SAID) else { panic!("a text") };
     assert!(text.contains("2 messages are lost"), "{text}");
     while session.take(now + SAID).is_some() {}
     assert_eq!((session.bytes, session.messages.len()), (0, 0));
@@ -79,7 +79,7 @@ fn nothing_of_a_subscription_comes_after_its_end() {
     session.receive(r#"{"op":"unsubscribe","subscriptionIds":[1]}"#, 10);
     assert_eq!(session.bytes, 20);
     session.offer(0, 3, &data(10));
-    let Some(Out::Message(message)) = session.take(Instant::now()) else { panic!("a message") };
+    let Some(Message::Binary(message)) = session.take(Instant::now()) else { panic!("a message") };
     assert_eq!(message[1], 2);
     assert_eq!(session.take(Instant::now()), None);
     session.receive(r#"{"op":"unsubscribe","subscriptionIds":[1]}"#, 10);
