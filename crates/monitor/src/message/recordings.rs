@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A recording that is made, or was made by this server.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Recorded {
     /// The name of its file; empty until there is one.
@@ -67,11 +67,12 @@ pub struct Gap {
 }
 
 /// How far a recording is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Phase {
     /// Motors are searched and their settings are read.
+    #[default]
     Starting,
     /// It records.
     Recording,

@@ -224,25 +224,7 @@ impl Order {
 impl Recorded {
     fn starting(by: &str) -> Self {
         let began = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Recorded {
-            name: String::new(),
-            phase: Phase::Starting,
-            by: by.to_owned(),
-            began: began.as_secs_f64(),
-            seconds: 0.0,
-            bytes: 0,
-            values: 0,
-            lost: 0,
-            unconfirmed: 0,
-            rates: None,
-            slowest: None,
-            gaps: Vec::new(),
-            motors: Vec::new(),
-            silent: Vec::new(),
-            refused: Vec::new(),
-            left_out: Vec::new(),
-            message: None,
-        }
+        Recorded { by: by.to_owned(), began: began.as_secs_f64(), ..Recorded::default() }
     }
 
     /// Whether it is not over.
