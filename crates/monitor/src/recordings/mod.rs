@@ -12,7 +12,6 @@ use std::fs::File;
 use std::io;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -187,12 +186,13 @@ impl Recordings {
         moves: impl Fn() + Send + 'static,
     ) -> Result<Vec<u8>, Refusal> {
         let file = self.open(name)?;
-        let wants = Wants(Arc::new(AtomicBool::new(true)));
-        let is_wanted = Arc::clone(&wants.0);
+        // The reader asks whether somebody waits: this is dropped with the future.
+        let waits = Arc::new(());
+        let is_awaited = Arc::downgrade(&waits);
         let read = self.reading(move |_| {
             excerpt::read(file, &wanted, &|| {
                 moves();
-                is_wanted.load(Ordering::Relaxed)
+                is_awaited.strong_count() > 0
             })
         });
         read.await?.map(Option::unwrap_or_default).map_err(Refusal::usage)
@@ -210,14 +210,5 @@ impl Recordings {
 
     fn making(&self) -> MutexGuard<'_, Option<Making>> {
         self.making.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Somebody waits for what is read, until this is dropped.
-struct Wants(Arc<AtomicBool>);
-
-impl Drop for Wants {
-    fn drop(&mut self) {
-        self.0.store(false, Ordering::Relaxed);
     }
 }
