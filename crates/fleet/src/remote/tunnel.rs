@@ -2,8 +2,7 @@
 
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Unreachable;
@@ -43,27 +42,12 @@ const LEAVING: Duration = Duration::from_millis(300);
 /// The longest request of a program.
 const LONGEST: usize = frame::LONGEST_REQUEST;
 
-static OPEN: AtomicUsize = AtomicUsize::new(0);
+/// Each open tunnel has a clone.
+static OPEN: LazyLock<Arc<()>> = LazyLock::new(Arc::default);
 
 /// How many programs of this process have not left yet.
 pub(super) fn open_tunnels() -> usize {
-    OPEN.load(Ordering::SeqCst)
-}
-
-/// Counts an open tunnel.
-struct Counted;
-
-impl Counted {
-    fn new() -> Self {
-        OPEN.fetch_add(1, Ordering::SeqCst);
-        Counted
-    }
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        OPEN.fetch_sub(1, Ordering::SeqCst);
-    }
+    Arc::strong_count(&OPEN) - 1
 }
 
 /// The node, and the values of `join`.
@@ -134,7 +118,7 @@ pub(super) struct Tunnel {
     /// Whether the node has begun again, or another one has its name.
     has_successor: bool,
     _here: LivelinessToken,
-    _counted: Counted,
+    _open: Arc<()>,
 }
 
 impl Tunnel {
@@ -205,7 +189,7 @@ impl Tunnel {
             runs,
             has_successor: false,
             _here: here,
-            _counted: Counted::new(),
+            _open: Arc::clone(&OPEN),
         };
         tokio::spawn(tunnel.serve());
         Ok(())
