@@ -75,14 +75,22 @@ pub struct Post {
     pub request: share::Request,
 }
 
-/// The answer of a node. `t` is its clock, in seconds.
+/// The answer of a node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// What it is.
+    #[serde(flatten)]
+    pub kind: AnswerKind,
+    /// The clock of the node, in seconds.
+    pub t: f64,
+}
+
+/// What a node answers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Answer {
+pub enum AnswerKind {
     /// To join.
     Joined {
-        /// The clock.
-        t: f64,
         /// The deadline that holds, in seconds.
         deadline: f64,
         /// That of motion.
@@ -93,15 +101,11 @@ pub enum Answer {
     },
     /// To all others but pull: the node has it.
     Taken {
-        /// The clock.
-        t: f64,
         /// The next post that the node takes.
         next: u32,
     },
     /// To pull. As attachment: the payload is a part of the stream of the share.
     Pulled {
-        /// The clock.
-        t: f64,
         /// The number of the first message.
         first: u64,
         /// How many there are.
@@ -109,31 +113,14 @@ pub enum Answer {
     },
     /// The session has ended.
     Over {
-        /// The clock.
-        t: f64,
         /// Why.
         why: String,
     },
     /// The node did not understand the request, or the session may not ask for it.
     Refused {
-        /// The clock.
-        t: f64,
         /// Why.
         why: String,
     },
-}
-
-impl Answer {
-    /// The clock of the node.
-    pub fn t(&self) -> f64 {
-        match self {
-            Answer::Joined { t, .. }
-            | Answer::Taken { t, .. }
-            | Answer::Pulled { t, .. }
-            | Answer::Over { t, .. }
-            | Answer::Refused { t, .. } => *t,
-        }
-    }
 }
 
 /// What a node says of itself.

@@ -16,7 +16,7 @@ use super::sessions::Sessions;
 use crate::clock::Clock;
 use crate::key::Name;
 use crate::membership::Membership;
-use crate::message::{Answer, NoAnswer};
+use crate::message::{Answer, AnswerKind, NoAnswer};
 use crate::request_permission::Lines;
 
 /// What all tasks of a node have.
@@ -62,9 +62,9 @@ pub(super) fn covers(asked: &keyexpr, key: &str) -> bool {
     keyexpr::new(key).is_ok_and(|key| asked.intersects(key))
 }
 
-/// Answers a query of a program.
-pub(super) fn answer(query: &Query, answer: &Answer) {
-    reply(query, query.key_expr().as_str(), answer);
+/// Answers a query of a program at this time.
+pub(super) fn answer(query: &Query, t: f64, kind: AnswerKind) {
+    reply(query, query.key_expr().as_str(), &Answer { kind, t });
 }
 
 /// Answers a query with a text for this key. The program asks again if the answer does not come.

@@ -19,7 +19,7 @@ use super::send_buffer::SendBuffer;
 use super::sessions::{Asked, Asking};
 use crate::clock::span;
 use crate::key::Scope;
-use crate::message::{Answer, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
+use crate::message::{Answer, AnswerKind, Ask, LONGEST_WAIT, LONGEST_WHY, Post};
 use crate::request_permission;
 
 /// Requests without an answer. A share that has 256 answers for a program takes no more of its requests.
@@ -101,7 +101,7 @@ impl Session {
         let refusal = Refusal::new(Reason::Lapsed, &why);
         self.program.close_because(refusal);
         if let Some(Pull { query, .. }) = self.pull.take() {
-            answer(&query, &Answer::Over { t: self.now(), why: why.clone() });
+            answer(&query, self.now(), AnswerKind::Over { why: why.clone() });
         }
         why
     }
@@ -130,7 +130,7 @@ impl Session {
             Ask::Join { .. } => {
                 let (deadline, motion) = (self.deadline, self.motion);
                 let lines = self.common.known_lines();
-                answer(&query, &Answer::Joined { t: now, deadline, motion, lines });
+                answer(&query, now, AnswerKind::Joined { deadline, motion, lines });
             }
             Ask::Alive { sent, .. } => {
                 let age = Some(age(now, sent));
@@ -154,7 +154,7 @@ impl Session {
             Ask::Post(post) => {
                 let kind = self.common.lines().kind(&post.request.ask);
                 if let Some(why) = forbidden(&post, kind, scope) {
-                    answer(&query, &Answer::Refused { t: now, why });
+                    answer(&query, now, AnswerKind::Refused { why });
                 } else {
                     let verdict = self.order.post(now, post, kind);
                     self.taken(&query, now);
@@ -167,7 +167,7 @@ impl Session {
                     let why =
                         "an urgent request is a stop or a latch, with a key of `stop` or `act`"
                             .to_owned();
-                    answer(&query, &Answer::Refused { t: now, why });
+                    answer(&query, now, AnswerKind::Refused { why });
                 } else {
                     let verdict = self.order.urgent(now, after, post);
                     self.taken(&query, now);
@@ -179,7 +179,7 @@ impl Session {
     }
 
     fn taken(&self, query: &Query, now: f64) {
-        answer(query, &Answer::Taken { t: now, next: self.order.next() });
+        answer(query, now, AnswerKind::Taken { next: self.order.next() });
     }
 
     /// Gives the end of the session, if this is it.
@@ -239,7 +239,7 @@ impl Session {
         }
         let Some(Pull { query, .. }) = self.pull.take() else { return };
         let (first, count, bytes) = self.outbox.next();
-        let head = Answer::Pulled { t: now, first, count };
+        let head = Answer { kind: AnswerKind::Pulled { first, count }, t: now };
         answer_with(&query, bytes, &head);
     }
 }

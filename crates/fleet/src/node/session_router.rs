@@ -20,7 +20,7 @@ use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
 use crate::key::{self, Asker, Name, Scope};
-use crate::message::{Answer, Ask, LONGEST_ASK, LONGEST_DEADLINE, SHORTEST_DEADLINE};
+use crate::message::{AnswerKind, Ask, LONGEST_ASK, LONGEST_DEADLINE, SHORTEST_DEADLINE};
 
 /// Sessions at one time: a share has 64 programs.
 const MOST_SESSIONS: usize = 48;
@@ -70,7 +70,7 @@ impl Common {
 
     fn asked(self: &Arc<Self>, query: Query, handle: &Handle) {
         let t = self.clock.now();
-        let refuse = |why: String| answer(&query, &Answer::Refused { t, why });
+        let refuse = |why: String| answer(&query, t, AnswerKind::Refused { why });
         let Some(asker) = Asker::of(query.key_expr().as_str()) else {
             return refuse("the key does not say who asks for what".to_owned());
         };
@@ -113,7 +113,7 @@ impl Common {
             (None, _) => {
                 let over = sessions.over.iter().find(|(it, _)| *it == session);
                 let why = over.map_or("no such session at this node", |(_, why)| why);
-                return answer(&query, &Answer::Over { t, why: why.to_owned() });
+                return answer(&query, t, AnswerKind::Over { why: why.to_owned() });
             }
         };
         drop(sessions);
@@ -122,7 +122,7 @@ impl Common {
         {
             let query = asking.query;
             let why = "too many requests of this session wait".to_owned();
-            answer(&query, &Answer::Refused { t, why });
+            answer(&query, t, AnswerKind::Refused { why });
         }
     }
 

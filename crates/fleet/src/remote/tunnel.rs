@@ -26,7 +26,7 @@ use super::outgoing::Outgoing;
 use crate::VERSION;
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
-use crate::message::{Answer, Ask};
+use crate::message::{Answer, AnswerKind, Ask};
 use crate::request_permission::{self, Lines};
 
 /// How long a node keeps a pull, in seconds.
@@ -157,9 +157,10 @@ impl Tunnel {
             }
         };
         let now = Boot.now();
-        let (t, lines) = match answer {
-            Answer::Joined { t, lines, .. } => (t, lines),
-            Answer::Over { why, .. } | Answer::Refused { why, .. } => return Err(failed(why)),
+        let Answer { kind, t } = answer;
+        let lines = match kind {
+            AnswerKind::Joined { lines, .. } => lines,
+            AnswerKind::Over { why } | AnswerKind::Refused { why } => return Err(failed(why)),
             _ => return Err(failed("the node gives another answer".to_owned())),
         };
         let socket = UnixStream::from_std(socket).map_err(|error| failed(error.to_string()))?;
@@ -355,22 +356,24 @@ impl Tunnel {
             self.is_pulling = false;
             self.pull_from = now;
         }
-        let Some((answer, stream)) = answer else {
+        let Some((Answer { kind, t }, stream)) = answer else {
             self.pull_from = self.pull_from.max(if is_pull { now + 0.05 } else { 0.0 });
             return None;
         };
         self.heard = now;
-        self.outgoing.heard(asked, now, answer.t());
-        match (answer, of) {
-            (Answer::Over { why, .. } | Answer::Refused { why, .. }, _) => return Some(why),
-            (Answer::Taken { .. }, QueryKind::Urgent(number)) => self.outgoing.taken_urgent(number),
-            (Answer::Taken { next, .. }, of) => {
+        self.outgoing.heard(asked, now, t);
+        match (kind, of) {
+            (AnswerKind::Over { why } | AnswerKind::Refused { why }, _) => return Some(why),
+            (AnswerKind::Taken { .. }, QueryKind::Urgent(number)) => {
+                self.outgoing.taken_urgent(number)
+            }
+            (AnswerKind::Taken { next }, of) => {
                 self.outgoing.taken(next);
                 if matches!(of, QueryKind::Post(number) if number > next) {
                     self.outgoing.missed(now);
                 }
             }
-            (Answer::Pulled { first, count, .. }, QueryKind::Pull) if first == self.after + 1 => {
+            (AnswerKind::Pulled { first, count }, QueryKind::Pull) if first == self.after + 1 => {
                 self.after += count;
                 self.coming.extend(stream);
             }
