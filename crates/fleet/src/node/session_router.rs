@@ -100,14 +100,16 @@ impl Common {
                 return refuse(format!("the node has {MOST_SESSIONS} programs, its most"));
             }
             (None, Ask::Join { protocol, program, deadline, motion }) => {
-                let new = match JoinRequest::of(*protocol, program, *deadline, *motion) {
-                    Ok(new) => new,
-                    Err(why) => return refuse(why),
-                };
+                let (deadline, motion) = (*deadline, *motion);
+                if let Err(why) = check_join(*protocol, program, deadline, motion) {
+                    return refuse(why);
+                }
                 let (sender, asked) = channel(QUERIES);
                 let open = Open { who: who.clone(), asked: sender.clone(), heard: t };
                 sessions.open.insert(session.clone(), open);
-                handle.spawn(Arc::clone(self).serve(session, who, new, asked));
+                let name = format!("{who} ({program})");
+                let serving = Arc::clone(self).serve(session, name, deadline, motion, asked);
+                handle.spawn(serving);
                 sender
             }
             (None, _) => {
@@ -137,16 +139,15 @@ impl Common {
         }
     }
 
-    /// Serves one session.
+    /// Serves one session of a program with this name.
     async fn serve(
         self: Arc<Self>,
         session: Name,
-        who: Name,
-        new: JoinRequest,
+        name: String,
+        deadline: f64,
+        motion: Option<f64>,
         asked: Receiver<Asked>,
     ) {
-        let JoinRequest { program, deadline, motion } = new;
-        let name = format!("{who} ({program})");
         let why = match Program::connect(&self.share, &name).await {
             Err(error) => format!("the share of the node: {error}"),
             Ok((program, listener, _)) => {
@@ -188,33 +189,25 @@ fn session_limit(scope: Scope) -> usize {
     }
 }
 
-/// A session that may begin.
-struct JoinRequest {
-    program: String,
+/// Checks the values of a session that may begin.
+fn check_join(
+    protocol: u32,
+    program: &str,
     deadline: f64,
     motion: Option<f64>,
-}
-
-impl JoinRequest {
-    fn of(
-        protocol: u32,
-        program: &str,
-        deadline: f64,
-        motion: Option<f64>,
-    ) -> Result<Self, String> {
-        if protocol != VERSION {
-            return Err(format!("this node speaks version {VERSION}, the program {protocol}"));
-        }
-        let is_name = (1..=LONGEST_PROGRAM).contains(&program.len());
-        if !is_name || !program.chars().all(motorlink_link::is_printable) {
-            return Err(format!(
-                "the name of a program has 1 to {LONGEST_PROGRAM} bytes that can be printed"
-            ));
-        }
-        let possible = SHORTEST_DEADLINE..=LONGEST_DEADLINE;
-        if !possible.contains(&deadline) || motion.is_some_and(|it| !possible.contains(&it)) {
-            return Err(format!("a deadline is {SHORTEST_DEADLINE} to {LONGEST_DEADLINE} s"));
-        }
-        Ok(JoinRequest { program: program.to_owned(), deadline, motion })
+) -> Result<(), String> {
+    if protocol != VERSION {
+        return Err(format!("this node speaks version {VERSION}, the program {protocol}"));
     }
+    let is_name = (1..=LONGEST_PROGRAM).contains(&program.len());
+    if !is_name || !program.chars().all(motorlink_link::is_printable) {
+        return Err(format!(
+            "the name of a program has 1 to {LONGEST_PROGRAM} bytes that can be printed"
+        ));
+    }
+    let possible = SHORTEST_DEADLINE..=LONGEST_DEADLINE;
+    if !possible.contains(&deadline) || motion.is_some_and(|it| !possible.contains(&it)) {
+        return Err(format!("a deadline is {SHORTEST_DEADLINE} to {LONGEST_DEADLINE} s"));
+    }
+    Ok(())
 }
