@@ -49,17 +49,16 @@ impl Directory {
 /// The network.
 pub fn nodes(network: &Network) -> Result<Directory, NetworkError> {
     let zenoh = remote::zenoh_of(network)?;
-    let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
     let tokens = zenoh.liveliness().get(key::all_alive()).timeout(ANSWER).wait();
     let mut nodes = BTreeMap::new();
-    for reply in tokens.map_err(failed)? {
+    for reply in tokens? {
         let Ok(sample) = reply.into_result() else { continue };
         if let Some(node) = key::run_of(sample.key_expr().as_str()) {
             nodes.insert(node, None);
         }
     }
     let infos = ask_all(&zenoh, key::info(&Name::any(), &Name::any()), ANSWER).wait();
-    for reply in infos.map_err(failed)? {
+    for reply in infos? {
         let Ok(sample) = reply.into_result() else { continue };
         let info: Option<Info> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
         if let Some(node) = key::run_of(sample.key_expr().as_str()) {

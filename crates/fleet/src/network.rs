@@ -107,7 +107,7 @@ impl Network {
         match self {
             Network::Connect(addresses) => {
                 let nobody = || NetworkError::Nobody(addresses.join(", "));
-                let config = configured("client", &[], addresses).map_err(failed)?;
+                let config = configured("client", &[], addresses)?;
                 let session = zenoh::open(config).wait().map_err(|_| nobody())?;
                 Ok((session, addresses.clone()))
             }
@@ -115,12 +115,12 @@ impl Network {
                 let mut attempts = 1;
                 loop {
                     let addresses: Vec<_> = listen.iter().map(|it| with_port(it)).collect();
-                    let config = configured("router", &addresses, connect).map_err(failed)?;
+                    let config = configured("router", &addresses, connect)?;
                     match zenoh::open(config).wait() {
                         Ok(session) => return Ok((session, addresses)),
                         // Another program may have taken the free port.
                         Err(_) if addresses != *listen && attempts < ATTEMPTS => attempts += 1,
-                        Err(error) => return Err(failed(error)),
+                        Err(error) => return Err(error.into()),
                     }
                 }
             }
@@ -157,9 +157,10 @@ fn configured(mode: &str, listen: &[String], connect: &[String]) -> zenoh::Resul
     Config::from_json5(&config.to_string())
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-fn failed(error: zenoh::Error) -> NetworkError {
-    NetworkError::Failed(without_source(&error))
+impl From<zenoh::Error> for NetworkError {
+    fn from(error: zenoh::Error) -> Self {
+        NetworkError::Failed(without_source(&error))
+    }
 }
 
 /// What Zenoh says, without the lines of its source.

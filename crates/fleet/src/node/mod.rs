@@ -99,7 +99,8 @@ impl Node {
             .enable_all()
             .build()?;
         let (zenoh, addresses) = network.open()?;
-        if zenoh.liveliness().get(key::alive_of(&name)).wait().map_err(failed)?.recv().is_ok() {
+        let twin = zenoh.liveliness().get(key::alive_of(&name)).wait();
+        if twin.map_err(NetworkError::from)?.recv().is_ok() {
             return Err(NodeError::NameTaken(name));
         }
         let boot = Name::run(computer::fingerprint())?;
@@ -117,10 +118,10 @@ impl Node {
             sessions,
             members,
         });
-        peer_watch::follow(&common).map_err(failed)?;
+        peer_watch::follow(&common).map_err(NetworkError::from)?;
         runtime.block_on(publisher::start(&common, period))?;
         runtime.block_on(motor_queries::open(&common, reader))?;
-        let alive = session_router::open(&common, &runtime).map_err(failed)?;
+        let alive = session_router::open(&common, &runtime).map_err(NetworkError::from)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {
             return Err(NodeError::Unknown(common.name.clone()));
@@ -168,12 +169,12 @@ impl Drop for Node {
 }
 
 /// Whether another session sees the node.
-fn is_seen(network: &Network, common: &Common) -> Result<bool, NodeError> {
+fn is_seen(network: &Network, common: &Common) -> Result<bool, NetworkError> {
     let (other, _) = network.open()?;
     let own = key::alive(&common.name, &common.boot);
     let end = Instant::now() + SEEN;
     loop {
-        if other.liveliness().get(&own).wait().map_err(failed)?.recv().is_ok() {
+        if other.liveliness().get(&own).wait()?.recv().is_ok() {
             return Ok(true);
         }
         if Instant::now() > end {
@@ -181,8 +182,4 @@ fn is_seen(network: &Network, common: &Common) -> Result<bool, NodeError> {
         }
         thread::sleep(PAUSE);
     }
-}
-
-fn failed(error: zenoh::Error) -> NetworkError {
-    NetworkError::Failed(error.to_string())
 }

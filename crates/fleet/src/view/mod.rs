@@ -49,7 +49,6 @@ impl View {
     /// # Errors
     /// The network.
     pub fn open(network: &Network) -> Result<Self, NetworkError> {
-        let failed = |error: zenoh::Error| NetworkError::Failed(error.to_string());
         let zenoh = remote::zenoh_of(network)?;
         let (picture, asked) = (Mutex::default(), Mutex::new(f64::NEG_INFINITY));
         let shared = Arc::new(Shared { zenoh: Arc::clone(&zenoh), picture, asked });
@@ -63,12 +62,12 @@ impl View {
             let shared = Arc::clone(&shared);
             let heard = move |sample: Sample| hear(&shared, &sample);
             let subscriber = zenoh.declare_subscriber(key).callback(heard).wait();
-            subscribers.push(subscriber.map_err(failed)?);
+            subscribers.push(subscriber?);
         }
         let follower = Arc::clone(&shared);
         let seen = move |sample: Sample| follower.saw(&sample);
         let seen = zenoh.liveliness().declare_subscriber(key::all_alive()).callback(seen).wait();
-        subscribers.push(seen.map_err(failed)?);
+        subscribers.push(seen?);
         let now = Boot.now();
         let mut silent = Vec::new();
         let nodes = directory::nodes(network)?.nodes;
