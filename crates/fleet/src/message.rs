@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 
 use motorlink_telemetry::share::message::{self as share, Line, Protocol, Reason};
-pub use motorlink_telemetry::share::message::{LONGEST_DEADLINE, SHORTEST_DEADLINE};
+pub use motorlink_telemetry::share::message::{LONGEST_DEADLINE, LONGEST_WHY, SHORTEST_DEADLINE};
 use serde::{Deserialize, Serialize};
 
-/// The longest reason of a program that leaves, in bytes.
-pub const LONGEST_WHY: usize = 200;
+/// The longest name of a program in the log of a node, in bytes.
+pub const LONGEST_PROGRAM: usize = 20;
 /// The longest request, in bytes.
 pub const LONGEST_ASK: usize = 1 << 17;
 /// The longest time that a node keeps a query until it has something to say, in seconds.

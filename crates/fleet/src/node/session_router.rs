@@ -20,7 +20,9 @@ use super::session::Session;
 use super::sessions::{Asked, Asking, Open, Sessions};
 use crate::VERSION;
 use crate::key::{self, Asker, Name, Scope};
-use crate::message::{AnswerKind, Ask, LONGEST_ASK, LONGEST_DEADLINE, SHORTEST_DEADLINE};
+use crate::message::{
+    AnswerKind, Ask, LONGEST_ASK, LONGEST_DEADLINE, LONGEST_PROGRAM, SHORTEST_DEADLINE,
+};
 
 /// Sessions at one time: a share has 64 programs.
 const MOST_SESSIONS: usize = 48;
@@ -30,8 +32,6 @@ const WITH_STOPS: usize = 60;
 const QUERIES: usize = 256;
 /// Sessions that are over and whose reason is remembered.
 const REASONS: usize = 256;
-/// The longest name of a program in the log, in bytes.
-const LONGEST_PROGRAM: usize = 20;
 
 /// Takes queries from now on.
 pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<LivelinessToken> {

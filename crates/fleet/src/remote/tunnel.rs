@@ -11,6 +11,7 @@ use motorlink_telemetry::share::frame::{self, FrameKind, Reader};
 use motorlink_telemetry::share::message::{
     Answer as ShareAnswer, Ask as ShareAsk, Request, Text, decode, encode,
 };
+use motorlink_telemetry::share::port::own_name;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
@@ -26,7 +27,7 @@ use super::outgoing::Outgoing;
 use crate::VERSION;
 use crate::clock::{Boot, Clock, NodeClock, span};
 use crate::key::{self, Name, Scope};
-use crate::message::{Answer, AnswerKind, Ask};
+use crate::message::{Answer, AnswerKind, Ask, LONGEST_PROGRAM};
 use crate::request_permission::{self, Lines};
 
 /// How long a node keeps a pull, in seconds.
@@ -143,7 +144,8 @@ impl Tunnel {
         let (deadline, motion) = (deadline.as_secs_f64(), motion.map(|it| it.as_secs_f64()));
         let runs = link.zenoh.liveliness().declare_subscriber(key::alive_of(&link.node)).await;
         let runs = runs.map_err(|error| failed(error.to_string()))?;
-        let join = Ask::Join { protocol: VERSION, program: own_program(), deadline, motion };
+        let join =
+            Ask::Join { protocol: VERSION, program: own_name(LONGEST_PROGRAM), deadline, motion };
         let begun = Boot.now();
         let (asked, answer) = loop {
             let asked = Boot.now();
@@ -428,14 +430,6 @@ impl Tunnel {
         // The node notices it otherwise, later.
         let _ = timeout(LEAVING, left).await;
     }
-}
-
-/// The name of this program in the log of the node.
-fn own_program() -> String {
-    let program = std::env::current_exe().ok();
-    let name = program.as_ref().and_then(|path| path.file_stem()?.to_str()).unwrap_or("program");
-    let short: String = name.chars().filter(char::is_ascii_alphanumeric).take(12).collect();
-    format!("{short} {}", std::process::id() % 1_000_000)
 }
 
 type Runs = zenoh::pubsub::Subscriber<zenoh::handlers::FifoChannelHandler<Sample>>;

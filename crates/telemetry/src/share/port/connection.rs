@@ -61,7 +61,7 @@ impl Connection {
             taken: BTreeSet::new(),
             closing: None,
         };
-        opened.opening(Ask::Hello { protocol: VERSION, name: own_name() })?;
+        opened.opening(Ask::Hello { protocol: VERSION, name: own_name(LONGEST_NAME) })?;
         let Answer::Lines { lines, .. } = opened.opening(Ask::Lines)? else {
             return Err(opened.no_share());
         };
@@ -268,14 +268,14 @@ fn not_done(reason: Reason) -> NotDone {
     }
 }
 
-/// The name of this program in the log of the share.
-fn own_name() -> String {
+/// The name of this program in the log of a share or a node, of at most so many bytes.
+pub fn own_name(most: usize) -> String {
     let program = std::env::current_exe().ok();
     let name = program.as_ref().and_then(|path| path.file_stem()?.to_str()).unwrap_or("program");
     let id = format!(" {}", std::process::id());
     let mut own = String::new();
     for character in name.chars().filter(|it| motorlink_link::is_printable(*it)) {
-        if own.len() + character.len_utf8() + id.len() > LONGEST_NAME {
+        if own.len() + character.len_utf8() + id.len() > most {
             break;
         }
         own.push(character);

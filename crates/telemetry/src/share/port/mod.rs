@@ -18,6 +18,7 @@ use motorlink::port::{
 use super::address::{Address, Local};
 use super::message::{LONGEST_DEADLINE, Protocol, SHORTEST_DEADLINE};
 use connection::Connection;
+pub use connection::own_name;
 use line_address::{Deadlines, LineAddress};
 
 /// Registers the port `share:` in this process.
