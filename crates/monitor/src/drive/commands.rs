@@ -300,22 +300,15 @@ fn rmd_described(field: &RmdField) -> Field {
 }
 
 fn rmd_digits(field: &RmdField, name: &str, wanted: f64) -> Result<i64, Refusal> {
-    if let Meaning::Words(words) = field.meaning {
-        let digits = exactly(&field.scale, name, wanted)?;
-        if words.iter().all(|(number, _)| i64::from(*number) != digits) {
-            let all: Vec<_> =
-                words.iter().map(|(number, word)| format!("{number} ({word})")).collect();
-            let all = all.join(", ");
-            return Err(Refusal::usage(format!(
-                "{name}: {wanted} is none of {all}; nothing was sent"
-            )));
-        }
-        return Ok(digits);
+    let digits = exactly(&field.scale, name, wanted)?;
+    if let Meaning::Words(words) = field.meaning
+        && words.iter().all(|(number, _)| i64::from(*number) != digits)
+    {
+        let all: Vec<_> = words.iter().map(|(number, word)| format!("{number} ({word})")).collect();
+        let all = all.join(", ");
+        return Err(Refusal::usage(format!("{name}: {wanted} is none of {all}; nothing was sent")));
     }
-    field
-        .scale
-        .wanted(wanted)
-        .map_err(|why| Refusal::usage(format!("{name}: {why}; nothing was sent")))
+    Ok(digits)
 }
 
 /// The digits of a value in its range.
