@@ -91,11 +91,11 @@ impl Run {
         let begun = Begun { run: &self, control, permitted };
         let (from, streams) = match (self.target.motor, self.target.speaks, self.mode) {
             (Motor::Rmd(id), _, Mode::Speed) => {
-                let measured = begun.motion_status().await?.speed.dps();
+                let measured = begun.motion_status(id).await?.speed.dps();
                 (begun.stream(Stream::Speed(id), measured).await?, true)
             }
             (Motor::Rmd(id), _, Mode::Torque) => {
-                let measured = begun.motion_status().await?.iq.amps();
+                let measured = begun.motion_status(id).await?.iq.amps();
                 (begun.stream(Stream::Torque(id), measured).await?, true)
             }
             (Motor::Rmd(id), _, Mode::Position) => (begun.position(id).await?, false),
@@ -180,14 +180,10 @@ impl<M: MotionPermit> Begun<'_, M> {
         send(self.control, &exchanges, request).await.map(drop)
     }
 
-    async fn motion_status(&self) -> Result<MotionStatus, Refusal> {
-        let request = Request::Rmd(self.id()?, ReadMotionStatus.encode());
+    async fn motion_status(&self, id: MotorId) -> Result<MotionStatus, Refusal> {
+        let request = Request::Rmd(id, ReadMotionStatus.encode());
         let reply = self.measure(&[request]).await?;
         Ok(MotionStatus::decode(&self.eight(&reply)?))
-    }
-
-    fn id(&self) -> Result<MotorId, Refusal> {
-        self.reads().of_rmd().ok_or_else(|| Refusal::usage("not an RMD motor"))
     }
 
     fn eight(&self, replies: &[Vec<u8>]) -> Result<[u8; 8], Refusal> {
