@@ -6,7 +6,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use motorlink_proto::st::Profile;
 use motorlink_proto::time::Micros;
 use motorlink_recording::record::{Abort, Config, Port, Progress, Recorder};
 use motorlink_recording::schema::name;
@@ -14,6 +13,7 @@ use motorlink_recording::write::Output;
 use motorlink_recording::{RecordError, WriteError};
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::client::Refusal;
+use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, Reason};
 use tokio::sync::{oneshot, watch};
 
@@ -197,8 +197,7 @@ impl Order {
     fn config(&self) -> Result<Config, Refusal> {
         let port = |line: &Line| {
             let name = self.share.port(&line.line);
-            let profile = Profile::ALL.into_iter();
-            let profile = profile.into_iter().find(|it| Some(it.name()) == line.profile.as_deref());
+            let profile = DriveProtocol::of(line).and_then(DriveProtocol::profile);
             Ok(Port {
                 name: name.parse().map_err(|error| Refusal::usage(format!("{error}")))?,
                 profile: profile.unwrap_or_default(),
