@@ -15,7 +15,7 @@ use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{
     Answer, Ask, DropRule, Event, EventKind, Group, Line, SignalName, Text, decode,
 };
-use motorlink_telemetry::signal::Motor;
+use motorlink_telemetry::signal::{Motor, Signal};
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::task::block_in_place;
@@ -293,13 +293,8 @@ async fn subscribe(program: &Program, line: &Line, motor: u8, period: Duration) 
     };
     let main = Overview::of(motor);
     let sources = main.fast().chain(main.slow()).chain(main.angle);
-    let signals = sources
-        .map(|source| SignalName {
-            line: line.line.clone(),
-            motor: motor.number(),
-            name: source.to_string(),
-        })
-        .collect();
+    let signals = sources.map(|source| SignalName::of(&line.line, Signal { motor, source }));
+    let signals = signals.collect();
     let period = period.as_secs_f64();
     let (queue, drop) = (QUEUE, DropRule::Oldest);
     program.ask(Ask::Subscribe { signals, period, queue, drop, rows: true }).await.is_ok()

@@ -13,6 +13,7 @@ use motorlink_telemetry::share::message::{
     Answer, Ask, DropRule, Event, EventKind, SignalName, Text, decode,
 };
 use motorlink_telemetry::share::motor_exchange::Target;
+use motorlink_telemetry::signal::Signal;
 use tokio::runtime::Handle;
 use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
@@ -219,15 +220,11 @@ impl Shared {
 
     /// Subscribes to the main values of the motor of a joint.
     async fn subscribe(&self, joint: &Joint, period: Duration) {
-        let main = Overview::of(joint.motor);
+        let motor = joint.motor;
+        let main = Overview::of(motor);
         let sources = main.fast().chain(main.angle);
-        let signals = sources
-            .map(|source| SignalName {
-                line: joint.line.clone(),
-                motor: joint.motor.number(),
-                name: source.to_string(),
-            })
-            .collect();
+        let signals = sources.map(|source| SignalName::of(&joint.line, Signal { motor, source }));
+        let signals = signals.collect();
         let (queue, drop, period) = (QUEUE, DropRule::Oldest, period.as_secs_f64());
         // Diagnostics say that there are no values.
         let _ =

@@ -89,11 +89,7 @@ impl Hub {
             WorkResult::Rates(part, rates) => {
                 let Some(session) = self.sessions.get_mut(&session) else { return };
                 let named = |rate: Rate| SignalRate {
-                    signal: SignalName {
-                        line: name.to_string(),
-                        motor: rate.signal.motor.number(),
-                        name: rate.signal.source.to_string(),
-                    },
+                    signal: SignalName::of(&name, rate.signal),
                     asked: rate.asked.0 as f64 / 1e6,
                     predicted: rate.predicted.0 as f64 / 1e6,
                     achieved: rate.achieved,

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::json::is_false;
+use crate::signal::Signal;
 
 /// In the answer to a stop: any motor of a line on which nothing has answered since it was opened.
 pub const ANY_MOTOR: u8 = 0;
@@ -27,6 +28,13 @@ pub struct SignalName {
     pub motor: u8,
     /// The name of the register or the quantity.
     pub name: String,
+}
+
+impl SignalName {
+    /// The signal of a line with this name.
+    pub fn of(line: &str, Signal { motor, source }: Signal) -> Self {
+        SignalName { line: line.to_owned(), motor: motor.number(), name: source.to_string() }
+    }
 }
 
 /// What becomes of the motors of a program that leaves.

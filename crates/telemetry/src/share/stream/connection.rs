@@ -87,11 +87,7 @@ impl Connection {
         begun.ask(Asked::Hello, hello, now)?;
         begun.ask(Asked::Lines, Ask::Lines, now)?;
         for (number, Wanted { signals, period }) in followed.wanted.iter().enumerate() {
-            let name = |signal: &Signal| SignalName {
-                line: followed.line.clone(),
-                motor: signal.motor.number(),
-                name: signal.source.to_string(),
-            };
+            let name = |signal: &Signal| SignalName::of(&followed.line, *signal);
             let ask = Ask::Subscribe {
                 signals: signals.iter().map(name).collect(),
                 period: *period,
