@@ -1321,13 +1321,17 @@ export type Value = {
  */
 name: string, 
 /**
- * In its unit; `null`: there is none.
+ * In its unit; `null`: there is none, or the drive gives one that is not possible, and `text` says why.
  */
 value: number | null, 
 /**
  * As text: a state, faults, a version, or the value with its decimals. Without a value: why.
  */
-text: string, };
+text: string, 
+/**
+ * The symbol of the unit; empty without one.
+ */
+unit: string, };
 
 export type Welcome = { 
 /**

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+pub use motorlink_telemetry::share::drive_values::Value;
 use motorlink_telemetry::share::message::{self as share, Line, Protocol, Reason};
 pub use motorlink_telemetry::share::message::{LONGEST_DEADLINE, LONGEST_WHY, SHORTEST_DEADLINE};
 use serde::{Deserialize, Serialize};
@@ -178,19 +179,6 @@ pub struct Identity {
     pub profile: Option<String>,
     /// What the drive says of itself: an ST drive its `board` and its `firmware`, an RMD motor nothing.
     pub drive: BTreeMap<String, String>,
-}
-
-/// A register that was read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Value {
-    /// Its name.
-    pub name: String,
-    /// In its unit; `null`: the drive gives a value that cannot be one, and `text` says why.
-    pub value: Option<f64>,
-    /// As text: a state, faults, a version, or the value with its decimals.
-    pub text: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
 }
 
 /// Why a query about a motor gets no answer: the payload of an error reply.

@@ -1,8 +1,6 @@
 //! `motorlink node`: a share whose drives are used from other computers, too.
 
 mod config;
-#[cfg(feature = "monitor")]
-mod reader;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +10,7 @@ use std::time::Duration;
 use motorlink_fleet::clock::Boot;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::network::{Network, NetworkError};
-use motorlink_fleet::node::{Node, NodeError, Options, Reader};
+use motorlink_fleet::node::{Node, NodeError, Options};
 use motorlink_fleet::ros2::{Ros2, StartError};
 use motorlink_fleet::site::Role;
 use motorlink_telemetry::share::message::Line;
@@ -120,7 +118,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         clock: Arc::new(Boot),
         period: args.period,
         ros2,
-        reader: reader(),
     };
     let (node, outcome) = match start(&mut server, options) {
         Ok(Some(node)) => {
@@ -157,14 +154,6 @@ fn name(given: Option<&Name>, network: &Network) -> Result<Name, Failure> {
         (None, Some(name)) => Ok(name),
         (None, None) => Ok(motorlink_fleet::computer::name()),
     }
-}
-
-/// What reads drives for queries.
-fn reader() -> Option<Arc<dyn Reader>> {
-    #[cfg(feature = "monitor")]
-    return Some(Arc::new(reader::Drives));
-    #[cfg(not(feature = "monitor"))]
-    None
 }
 
 /// Starts the node beside its share. `None`: a signal came.

@@ -1,6 +1,5 @@
 //! The side of a node: a share whose programs come over Zenoh, too.
 
-mod drive_reader;
 mod motor_queries;
 mod node_state;
 mod peer_watch;
@@ -28,8 +27,6 @@ use crate::network::{Network, NetworkError};
 use crate::ros2::{Ros2, Settings, StartError};
 use node_state::Common;
 
-pub use drive_reader::{Drive, Reader, Reading};
-
 /// The longest time until others see a node.
 const SEEN: Duration = Duration::from_secs(2);
 /// The pause until it is asked again.
@@ -51,8 +48,6 @@ pub struct Options {
     pub period: Duration,
     /// What it does for ROS 2 machines.
     pub ros2: Option<Settings>,
-    /// Reads its drives for queries. Without it they are refused.
-    pub reader: Option<Arc<dyn Reader>>,
 }
 
 /// A node that runs. When it is dropped, all its sessions end, and others remember that it went away
@@ -92,7 +87,7 @@ impl Node {
     /// # Errors
     /// The network, or the name is taken.
     pub fn start(options: Options) -> Result<Self, NodeError> {
-        let Options { name, share, program, network, clock, period, ros2, reader } = options;
+        let Options { name, share, program, network, clock, period, ros2 } = options;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("node")
@@ -120,7 +115,7 @@ impl Node {
         });
         peer_watch::follow(&common).map_err(NetworkError::from)?;
         runtime.block_on(publisher::start(&common, period))?;
-        runtime.block_on(motor_queries::open(&common, reader))?;
+        runtime.block_on(motor_queries::open(&common))?;
         let alive = session_router::open(&common, &runtime).map_err(NetworkError::from)?;
         // The router of a site denies without a word.
         if network.role().is_some() && !is_seen(&network, &common)? {

@@ -3,10 +3,13 @@
 use std::io;
 use std::sync::Arc;
 
+use motorlink::settings::fact;
 use motorlink_proto::st::ErrorCode;
 use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
-use motorlink_telemetry::share::message::{Line, Reason};
+use motorlink_telemetry::share::message::{Line, MotorName, Reason};
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
+use motorlink_telemetry::share::{drive_settings, drive_values};
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
@@ -16,7 +19,6 @@ use zenoh::bytes::Encoding;
 use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
-use super::drive_reader::{Drive, Reader};
 use super::node_state::{Common, covers, refuse, reply_with};
 use crate::key::{self, MotorQuery};
 use crate::message::{Identity, NoAnswer};
@@ -31,23 +33,24 @@ const TOML: &str = "application/toml";
 /// What answers queries about motors.
 struct Queries {
     common: Arc<Common>,
-    reader: Option<Arc<dyn Reader>>,
     /// All queries are one program at the share, so that they take no more of a line than one.
     program: Program,
     places: Arc<Semaphore>,
 }
 
+/// A motor, and its line.
+type Drive = (Line, Target);
 /// The content of a reply.
 type Content = (Vec<u8>, Encoding);
 /// A reply with its key, or why there is none.
 type Reply = (String, Result<Content, Refusal>);
 
 /// Takes queries from now on.
-pub(super) async fn open(common: &Arc<Common>, reader: Option<Arc<dyn Reader>>) -> io::Result<()> {
+pub(super) async fn open(common: &Arc<Common>) -> io::Result<()> {
     let (program, mut listener, _) = Program::connect(&common.share, "queries").await?;
     tokio::spawn(async move { while listener.next().await.is_ok() {} });
     let places = Arc::new(Semaphore::new(MOST));
-    let queries = Arc::new(Queries { common: Arc::clone(common), reader, program, places });
+    let queries = Arc::new(Queries { common: Arc::clone(common), program, places });
     for about in MotorQuery::ALL {
         let (queries, handle) = (Arc::clone(&queries), Handle::current());
         let take = move |query: Query| queries.take(about, query, &handle);
@@ -91,29 +94,31 @@ impl Queries {
     fn drives(&self, about: MotorQuery, asked: &keyexpr) -> Result<Vec<Drive>, Refusal> {
         let lines = self.common.known_lines();
         let drive = |line: &Line, motor| {
-            let (program, line) = (self.program.clone(), line.clone());
-            Drive { program, line, motor }
+            let speaks = DriveProtocol::of(line)?;
+            Some((line.clone(), Target::of(&line.line, speaks.motor(motor)?, speaks)))
         };
         if let Some((name, number)) = key::one_motor(asked) {
             let line = lines.iter().find(|line| line.line == name).ok_or_else(|| {
                 let known: Vec<_> = lines.iter().map(|line| line.line.as_str()).collect();
                 Refusal::usage(format!("no line `{name}`; the lines are {}", known.join(", ")))
             })?;
-            let motor = motor(line, number).ok_or_else(|| {
+            // Replies have the number as it is written elsewhere: not `01`.
+            let motor = number.parse().ok().filter(|it: &u8| it.to_string() == number);
+            let drive = motor.and_then(|motor| drive(line, motor)).ok_or_else(|| {
                 Refusal::usage(format!("{name}: no motor can have the number `{number}`"))
             })?;
-            return Ok(vec![drive(line, motor)]);
+            return Ok(vec![drive]);
         }
         let all = lines.iter().flat_map(|line| line.heard.iter().map(move |motor| (line, *motor)));
         let key =
             |line: &Line, motor| key::of_motor(&self.common.name, &line.line, motor, about.words());
         let meant = all.filter(|(line, motor)| covers(asked, &key(line, *motor)));
-        Ok(meant.map(|(line, motor)| drive(line, motor)).collect())
+        Ok(meant.filter_map(|(line, motor)| drive(line, motor)).collect())
     }
 
     /// The answers about a motor.
     async fn read(&self, about: MotorQuery, drive: Drive, asked: &keyexpr) -> Vec<Reply> {
-        let (line, motor) = (drive.line.line.clone(), drive.motor);
+        let MotorName { line, motor } = drive.1.name.clone();
         let answers = self.try_read(about, drive, asked).await;
         answers.unwrap_or_else(|why| {
             // What waited for a port that is lost has expired.
@@ -130,22 +135,20 @@ impl Queries {
     async fn try_read(
         &self,
         about: MotorQuery,
-        drive: Drive,
+        (line, target): Drive,
         asked: &keyexpr,
     ) -> Result<Vec<Reply>, Refusal> {
-        let reader = self.reader.as_ref().ok_or_else(|| {
-            Refusal::usage("this node cannot read drives: its program was built without `monitor`")
-        })?;
-        let (line, motor) = (drive.line.clone(), drive.motor);
+        let motor = target.name.motor;
         let key = key::of_motor(&self.common.name, &line.line, motor, about.words());
         let of = |name: &String| key::register(&self.common.name, &line.line, motor, name);
-        let mut names = match about {
-            MotorQuery::Registers => reader.registers(&line),
+        let mut registers = match about {
+            MotorQuery::Registers => drive_values::all(target.speaks),
             MotorQuery::Identity | MotorQuery::Settings => Vec::new(),
         };
-        names.retain(|name| covers(asked, &of(name)));
+        registers.retain(|it| it.readable && covers(asked, &of(&it.name)));
+        let mut names: Vec<_> = registers.into_iter().map(|it| it.name).collect();
         if about == MotorQuery::Registers && names.is_empty() {
-            // A number, or a name that the reader refuses with those that are alike.
+            // A number, or a name that is refused with those that are alike.
             let Some(name) = key::one_register(asked) else { return Ok(vec![]) };
             if name.len() > LONGEST {
                 return Err(Refusal::usage(format!(
@@ -157,19 +160,22 @@ impl Queries {
         if let Some(why) = self.lost(&line.line) {
             return Err(why);
         }
+        let exchanges = Exchanges::new(&self.program, &target);
         Ok(match about {
             MotorQuery::Identity => {
-                let drive = reader.identity(drive).await?;
+                let facts = drive_settings::identity(&exchanges).await?;
+                let facts = facts.iter().map(|line| fact(line));
+                let drive = facts.map(|(what, is)| (what.to_owned(), is.to_owned())).collect();
                 let Line { line, protocol, profile, .. } = line;
                 vec![(key, Ok(json(&Identity { line, motor, protocol, profile, drive })))]
             }
             MotorQuery::Settings => {
-                let text = reader.settings(drive).await?;
+                let text = drive_settings::dump(&exchanges).await?.text();
                 vec![(key, Ok((text.into_bytes(), Encoding::from(TOML))))]
             }
             MotorQuery::Registers => {
                 let keys: Vec<_> = names.iter().map(of).collect();
-                let values = reader.read(drive, names).await?.into_iter();
+                let values = drive_values::read_each(&exchanges, &names).await?.into_iter();
                 keys.into_iter().zip(values.map(|value| value.map(|it| json(&it)))).collect()
             }
         })
@@ -189,13 +195,6 @@ fn say(query: &Query, answers: Vec<Reply>) {
             Err(why) => refuse(query, &no_answer(&key, why)),
         }
     }
-}
-
-/// The motor of a line with this number.
-fn motor(line: &Line, number: &str) -> Option<u8> {
-    // Replies have the number as it is written elsewhere: not `01`.
-    let number = number.parse().ok().filter(|it: &u8| it.to_string() == number)?;
-    DriveProtocol::of(line)?.motor(number).map(|_| number)
 }
 
 fn json(value: &impl Serialize) -> Content {

@@ -93,7 +93,6 @@ fn start(
         clock,
         period: Duration::from_millis(50),
         ros2: None,
-        reader: None,
     })
 }
 

@@ -13,10 +13,10 @@ use motorlink_spec::st_messages::{self, Content, Value as StField};
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::drive_values::range;
 use motorlink_telemetry::share::motor_exchange::Target;
 use motorlink_telemetry::signal::Motor;
 
-use super::value_format;
 use crate::message::{self, Field, Value};
 
 /// A command of a protocol.
@@ -171,7 +171,7 @@ impl Command {
                 // The reply to these repeats the request.
                 let fields = row.reply.iter().filter(|_| !row.echo);
                 let value = |field: &RmdField| {
-                    value_format::of_field(field.name_with_unit().to_string(), field, data)
+                    Value::of_field(field.name_with_unit().to_string(), field, data)
                 };
                 Some(fields.map(value).collect())
             }
@@ -182,14 +182,13 @@ impl Command {
                         let board = BoardInfo::decode(reply)?;
                         let [major, minor, patch] = board.version;
                         Some(vec![
-                            value_format::text("name", motorlink_link::printable(board.name)),
-                            value_format::text("version", format!("{major}.{minor}.{patch}")),
+                            Value::text("name", motorlink_link::printable(board.name)),
+                            Value::text("version", format!("{major}.{minor}.{patch}")),
                         ])
                     }
                     Content::FirmwareVersion => {
                         let firmware = FirmwareVersion::decode(reply);
-                        let text =
-                            |name, text| value_format::text(name, motorlink_link::printable(text));
+                        let text = |name, text| Value::text(name, motorlink_link::printable(text));
                         Some(vec![text("name", firmware.name), text("version", firmware.version)])
                     }
                     _ => content
@@ -247,7 +246,7 @@ fn st_fields(code: FrameCode, profile: Profile) -> Vec<StNumber> {
 fn described(field: &StNumber) -> Field {
     let range = match field.value.ty {
         Type::F32 => [f32::MIN.into(), f32::MAX.into(), 0.0],
-        _ => value_format::range(&field.scale),
+        _ => range(&field.scale),
     };
     let (name, doc) = (field.value.name.to_owned(), field.value.label.to_owned());
     Field { name, doc, unit: field.scale.symbol.to_owned(), range, words: Vec::new() }
@@ -278,7 +277,12 @@ fn st_value(field: &StField, bytes: &[u8]) -> Option<Value> {
         Type::F32 => f64::from(f32::from_le_bytes(bytes.try_into().ok()?)),
         _ => i64::from_le_bytes(word) as f64,
     };
-    Some(Value { name: field.name.to_owned(), value: Some(number), text: number.to_string() })
+    Some(Value {
+        name: field.name.to_owned(),
+        value: Some(number),
+        text: number.to_string(),
+        unit: field.unit.quantity().to_owned(),
+    })
 }
 
 fn rmd_described(field: &RmdField) -> Field {
@@ -286,7 +290,7 @@ fn rmd_described(field: &RmdField) -> Field {
         Meaning::Words(words) => words.iter().map(|(_, word)| (*word).to_owned()).collect(),
         Meaning::Number | Meaning::Bits(_) => Vec::new(),
     };
-    let mut range = value_format::range(&field.scale);
+    let mut range = range(&field.scale);
     if let Some(most) = words.len().checked_sub(1) {
         range[1] = most as f64;
     }

@@ -5,10 +5,10 @@ use motorlink_proto::st::{Flags, Ramp, Status};
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, Quantity as _};
 use motorlink_telemetry::overview;
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::drive_values;
 use motorlink_telemetry::signal::{Motor, Source};
 
 use super::commands::Command;
-use super::registers;
 use crate::message::{Controlled, Description, Fault, Mode, Overview, State};
 
 pub(super) fn describe(line: &str, speaks: DriveProtocol) -> Description {
@@ -27,7 +27,7 @@ pub(super) fn describe(line: &str, speaks: DriveProtocol) -> Description {
             voltage: name(main.voltage),
             angle: main.angle.map(name),
         },
-        registers: registers::all(speaks),
+        registers: drive_values::all(speaks),
         commands: Command::all(speaks).iter().map(|command| command.described(motor)).collect(),
         modes: modes(motor, &main),
         states: states(motor),

@@ -1,7 +1,7 @@
 //! What pages ask of drives: registers, commands, motion, limits and settings.
 //!
-//! - `description` says what the drives of a line have. `commands` and `registers` are its parts that are also
-//!   used to carry out requests.
+//! - `description` says what the drives of a line have. `commands` is its part that is also used to carry
+//!   out requests.
 //! - `limits` has what all pages may ask of a motor at most.
 
 mod command_execution;
@@ -11,21 +11,19 @@ mod limits;
 mod motion_control;
 mod motor_scan;
 mod register_write;
-mod registers;
 mod setpoint_ramp;
 mod settings;
-mod value_format;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use motorlink::settings::Dump;
 use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::drive_protocol::DriveProtocol;
 use motorlink_telemetry::share::message::{Line, MotorName};
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
+use motorlink_telemetry::share::{drive_settings, drive_values};
 
-use crate::message::{Answer, Ask, Description, Limit, Mode, Value};
+use crate::message::{Answer, Ask, Limit, Mode};
 use motion_control::Control;
 
 pub use motion_control::MotionPermit;
@@ -84,10 +82,13 @@ impl Drives {
                 let speaks = self.speaks(&line)?;
                 Ok(Answer::Motors { motors: motor_scan::motors(view, &line, speaks).await? })
             }
-            Ask::Describe { line } => Ok(Answer::Describe(Box::new(self.describe(&line)?))),
+            Ask::Describe { line } => {
+                let description = description::describe(&line, self.speaks(&line)?);
+                Ok(Answer::Describe(Box::new(description)))
+            }
             Ask::Read { motor, names } => {
                 let target = self.target(motor)?;
-                let values = registers::read(&Exchanges::new(view, &target), &names).await?;
+                let values = drive_values::read(&Exchanges::new(view, &target), &names).await?;
                 Ok(Answer::Read { values })
             }
             Ask::Act { motor, command, values, hold, to_rom } => {
@@ -107,7 +108,11 @@ impl Drives {
                 let write = register_write::Write { target, name, value, to_rom };
                 Ok(Answer::Write { values: write.carry_out(&self.control, view, drive).await? })
             }
-            Ask::Dump { motor } => Ok(settings::as_file(&motor, &self.dump(&motor, view).await?)),
+            Ask::Dump { motor } => {
+                let target = self.target(motor)?;
+                let dump = drive_settings::dump(&Exchanges::new(view, &target)).await?;
+                Ok(settings::as_file(&target.name, &dump))
+            }
             Ask::Diff { motor, text } => {
                 let target = self.target(motor)?;
                 settings::diff(&self.control, &Exchanges::new(view, &target), &text).await
@@ -120,50 +125,6 @@ impl Drives {
                 run.carry_out(&self.control, drive).await
             }
         }
-    }
-
-    /// What the drives of a line have.
-    ///
-    /// # Errors
-    /// The line is unknown.
-    pub fn describe(&self, line: &str) -> Result<Description, Refusal> {
-        Ok(description::describe(line, self.speaks(line)?))
-    }
-
-    /// Reads registers, in the order of their names. One that the drive refuses does not hide the others.
-    ///
-    /// # Errors
-    /// A name is unknown: nothing is sent. The line fails. The motor is unknown or silent.
-    pub async fn read(
-        &self,
-        motor: &MotorName,
-        names: &[String],
-        view: &Program,
-    ) -> Result<Vec<Result<Value, Refusal>>, Refusal> {
-        let target = self.target(motor.clone())?;
-        registers::read_each(&Exchanges::new(view, &target), names).await
-    }
-
-    /// What is known of a drive: [`Dump::identity`], without the settings.
-    ///
-    /// # Errors
-    /// The line fails. The motor is unknown or silent.
-    pub async fn identity(
-        &self,
-        motor: &MotorName,
-        view: &Program,
-    ) -> Result<Vec<String>, Refusal> {
-        let target = self.target(motor.clone())?;
-        settings::identity(&self.control, &Exchanges::new(view, &target)).await
-    }
-
-    /// Reads all settings of a motor.
-    ///
-    /// # Errors
-    /// The line fails. The motor is unknown or silent.
-    pub async fn dump(&self, motor: &MotorName, view: &Program) -> Result<Dump, Refusal> {
-        let target = self.target(motor.clone())?;
-        settings::dump(&self.control, &Exchanges::new(view, &target)).await
     }
 
     fn limits(&self) -> Result<Vec<Limit>, Refusal> {

@@ -6,13 +6,12 @@ use motorlink_proto::st::{
 };
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::client::{Program, Refusal};
+use motorlink_telemetry::share::drive_values::{self, Place, PlaceKind};
 use motorlink_telemetry::share::message::Reason;
 use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
 
 use super::motion_control::{Control, MotionPermit, MotionSession, send};
-use super::registers::{self, ValueSource};
 use super::settings;
-use super::value_format;
 use crate::message::Value;
 
 /// A write of a page.
@@ -32,12 +31,12 @@ impl Write {
         drive: &impl MotionPermit,
     ) -> Result<Vec<Value>, Refusal> {
         let exchanges = Exchanges::new(view, &self.target);
-        let place = ValueSource::named(&self.target, &self.name)?;
-        let register = match (place, exchanges.of_st()) {
-            (ValueSource::Register(register), Some((_, profile))) => {
+        let place = Place::named(&self.target, &self.name)?;
+        let register = match (place.kind, exchanges.of_st()) {
+            (PlaceKind::Register(register), Some((_, profile))) => {
                 register.not_a_setting(profile).map(|why| (register, profile, why))
             }
-            (ValueSource::Measured(..), _) => {
+            (PlaceKind::Measured, _) => {
                 return Err(Refusal::usage(format!(
                     "{} is measured and cannot be written",
                     self.name
@@ -48,7 +47,7 @@ impl Write {
         let Some((register, profile, why)) = register else {
             let (name, to_rom) = (&self.name, self.to_rom);
             let names = settings::write(control, &exchanges, name, self.value, to_rom).await?;
-            return registers::read(&exchanges, &names).await;
+            return drive_values::read(&exchanges, &names).await;
         };
         let bits = digits(register, self.value, profile)?;
         let bytes = bits.to_le_bytes();
@@ -80,7 +79,7 @@ async fn written(
 ) -> Result<Vec<Value>, Refusal> {
     let values = match VerifiedWrite::new::<()>(profile, register, bits) {
         Err(Unverified::NotReadable) => {
-            vec![value_format::text(&register.to_string(), "written; it cannot be read back")]
+            vec![Value::text(&register.to_string(), "written; it cannot be read back")]
         }
         write => {
             let read = exchanges.register(register).await?;
@@ -93,14 +92,15 @@ async fn written(
                 return Err(Refusal::new(Reason::Refused, message));
             }
             let reading = motorlink_proto::st::Reading { register, bits: read, profile };
-            vec![value_format::of_register(&register.to_string(), reading)]
+            vec![Value::of_register(reading)]
         }
     };
     exchanges.carried_out().await.map(|()| values)
 }
 
 fn digits(register: RegisterId, value: f64, profile: Profile) -> Result<i32, Refusal> {
-    let is_writable = register.shape().is_some_and(|shape| registers::is_writable(&shape, profile));
+    let is_writable =
+        register.shape().is_some_and(|shape| drive_values::is_writable(&shape, profile));
     if !is_writable {
         return Err(Refusal::usage(format!("{register} cannot be written; nothing was sent")));
     }

@@ -1,136 +1,32 @@
 //! Settings of motors: dump, diff and restore of files, and single values.
 
-use std::fmt;
 use std::sync::Arc;
 
 use motorlink::settings::{
-    Ask, Cause, Comparison, Difference, Dump, FileError, Next, Permissions, Procedure,
-    RestoreError, RmdTuning, SettingsFile, StTuning, Step, StepError, Tuning, Unread, Writing,
-    identify,
+    Cause, Comparison, Difference, Dump, FileError, Permissions, Procedure, RestoreError,
+    SettingsFile, Tuning as _, Unread, Writing,
 };
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::client::{Program, Refusal};
-use motorlink_telemetry::share::drive_protocol::DriveProtocol;
+use motorlink_telemetry::share::drive_settings::{self, Failed, Tuned};
 use motorlink_telemetry::share::message::{MotorName, Reason};
-use motorlink_telemetry::share::motor_exchange::{Exchanges, Target, is_refused_by_motor};
-use motorlink_telemetry::signal::Motor;
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
+use motorlink_telemetry::tuned;
 
 use super::motion_control::Control;
 use crate::message::{self, Answer};
 
-/// The settings of a motor of either protocol.
-pub(super) trait Tuned: Tuning<Id: 'static> + Copy + Send + Sync + 'static {
-    /// The request that asks this.
-    fn line_request(&self, ask: &Ask<Self::Id>) -> Request;
-}
-
-impl Tuned for StTuning {
-    fn line_request(&self, ask: &Ask<Self::Id>) -> Request {
-        let (motor, request) = self.request(ask);
-        Request::St(motor, request)
-    }
-}
-
-impl Tuned for RmdTuning {
-    fn line_request(&self, ask: &Ask<Self::Id>) -> Request {
-        Request::Rmd(self.motor, self.request(ask))
-    }
-}
-
-/// Evaluates an expression with the tuning of a motor.
-macro_rules! tuned {
-    ($target:expr, |$tuning:ident| $then:expr) => {
-        match ($target.motor, $target.speaks) {
-            (Motor::St(motor), DriveProtocol::St(profile)) => {
-                let $tuning = StTuning { motor, profile };
-                $then
-            }
-            (Motor::Rmd(motor), _) => {
-                let $tuning = RmdTuning { motor };
-                $then
-            }
-            (Motor::St(_), DriveProtocol::Rmd) => {
-                Err(Refusal::usage("the line has drives of another protocol"))
-            }
-        }
-    };
-}
-
-/// An exchange that failed.
-#[derive(Debug, Clone, PartialEq)]
-struct Failed {
-    refusal: Refusal,
-    /// Whether the session has ended, so that nothing more can be sent.
-    is_end: bool,
-}
-
-impl fmt::Display for Failed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.refusal.message)
-    }
-}
-
-impl StepError for Failed {
-    fn is_refusal(&self) -> bool {
-        is_refused_by_motor(&self.refusal)
-    }
-
-    fn is_line_failure(&self) -> bool {
-        use Reason::{Displaced, Line, Silent, Unconfirmed};
-        !self.is_end && matches!(self.refusal.reason, Silent | Line | Unconfirmed | Displaced)
-    }
-
-    fn is_interruption(&self) -> bool {
-        self.is_end
-    }
-}
-
-/// Takes the steps of a procedure.
+/// Takes the steps of a procedure, within the limits of the motor.
 async fn run<T: Tuned, R>(
     control: &Control,
     exchanges: &Exchanges<'_>,
     tuning: &T,
-    mut procedure: Procedure<'_, T::Id, Failed, R>,
+    procedure: Procedure<'_, T::Id, Failed, R>,
 ) -> R {
-    loop {
-        let outcome = match procedure.next() {
-            Next::Done(result) => return result,
-            Next::Step(Step::Ask(ask)) => {
-                let reply = exchanges.request(&tuning.line_request(&ask)).await;
-                reply.and_then(|reply| tuning.answer(&ask, &reply).ok_or_else(|| exchanges.unfit()))
-            }
-            Next::Step(Step::Check(ask)) => {
-                let request = tuning.line_request(&ask);
-                control
-                    .limited(exchanges.target, |limited| limited.check(&request))
-                    .map(|_| Default::default())
-            }
-            Next::Step(Step::Confirm) => exchanges.confirm().await.map(|()| Default::default()),
-        };
-        let is_end = exchanges.program.has_ended();
-        procedure.answered(outcome.map_err(|refusal| Failed { refusal, is_end }));
-    }
-}
-
-/// What is known of a drive, in lines.
-pub(super) async fn identity(
-    control: &Control,
-    exchanges: &Exchanges<'_>,
-) -> Result<Vec<String>, Refusal> {
-    let _lane = exchanges.lane().await;
-    tuned!(exchanges.target, |tuning| {
-        let lines = run(control, exchanges, &tuning, identify(tuning)).await;
-        lines.map_err(|failed| failed.refusal)
-    })
-}
-
-/// Reads all settings of a motor.
-pub(super) async fn dump(control: &Control, exchanges: &Exchanges<'_>) -> Result<Dump, Refusal> {
-    let _lane = exchanges.lane().await;
-    tuned!(exchanges.target, |tuning| {
-        let dump = run(control, exchanges, &tuning, Dump::reading(tuning)).await;
-        dump.map_err(|failed| failed.refusal)
-    })
+    let check = |request: &Request| {
+        control.limited(exchanges.target, |limited| limited.check(request)).map(drop)
+    };
+    drive_settings::run(check, exchanges, tuning, procedure).await
 }
 
 /// A dump as the answer to a page.

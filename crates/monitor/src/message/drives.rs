@@ -3,6 +3,8 @@
 use motorlink_telemetry::share::message::Protocol;
 use serde::{Deserialize, Serialize};
 
+pub use motorlink_telemetry::share::drive_values::{Register, Value};
+
 /// What the drives of a line have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -43,31 +45,6 @@ pub struct Overview {
     pub voltage: String,
     /// The angle of an RMD motor.
     pub angle: Option<String>,
-}
-
-/// A register, or a setting of an RMD motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Register {
-    /// Its name.
-    pub name: String,
-    /// What it belongs to, for headings.
-    pub group: String,
-    /// Its meaning.
-    pub doc: String,
-    /// The symbol of the unit; empty without one.
-    pub unit: String,
-    /// Whether it can be read.
-    pub readable: bool,
-    /// Whether it can be written.
-    pub writable: bool,
-    /// Whether a write wears the ROM of the motor.
-    pub wears_rom: bool,
-    /// Whether a write with `to_rom` makes the value permanent, and wears the ROM. Without it the value holds
-    /// until the motor loses its supply.
-    pub can_keep: bool,
-    /// The least and the most value, and the step between values.
-    pub range: Option<[f64; 3]>,
 }
 
 /// A command of the protocol.
@@ -142,18 +119,6 @@ pub struct Fault {
     pub advice: String,
     /// Whether the cause is present. Otherwise it has occurred and is not acknowledged.
     pub present: bool,
-}
-
-/// A value that was read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Value {
-    /// The register or the field.
-    pub name: String,
-    /// In its unit; `null`: there is none.
-    pub value: Option<f64>,
-    /// As text: a state, faults, a version, or the value with its decimals. Without a value: why.
-    pub text: String,
 }
 
 /// A setting that differs between a motor and a file.

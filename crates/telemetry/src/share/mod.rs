@@ -4,8 +4,8 @@
 //! (binary columns), [`frame`] puts both on a stream of bytes. [`hub`] is the share without a socket,
 //! [`server`] connects programs to it through a Unix socket. [`client_codec`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port, [`address`] the
-//! way to a share. With the feature `tokio` `client` is a program that does not block, and `motor_exchange`
-//! its requests to a motor. [`command_kind`] reads the bytes of a command. [`port_config`] opens the ports
+//! way to a share. With the feature `tokio` `client` is a program that does not block, `motor_exchange` its
+//! requests to a motor, and `drive_values` and `drive_settings` read drives with them. [`command_kind`] reads the bytes of a command. [`port_config`] opens the ports
 //! of lines, [`scan`] asks what answers on others. [`event_text`] makes sentences of the events of an
 //! engine. [`wire`] keeps the frames of a line.
 
@@ -17,6 +17,10 @@ pub mod clock;
 pub mod command_kind;
 pub mod data;
 pub mod drive_protocol;
+#[cfg(feature = "tokio")]
+pub mod drive_settings;
+#[cfg(feature = "tokio")]
+pub mod drive_values;
 pub mod event_text;
 pub mod frame;
 pub mod hub;
