@@ -1122,7 +1122,7 @@ id: number,
  */
 reason: Reason, 
 /**
- * The reason in words.
+ * The reason as a sentence.
  */
 message: string, 
 /**

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 pub use motorlink_telemetry::share::drive_values::Value;
-use motorlink_telemetry::share::message::{self as share, Line, Protocol, Reason};
+use motorlink_telemetry::share::message::{self as share, Line, Protocol, Refusal};
 pub use motorlink_telemetry::share::message::{LONGEST_DEADLINE, LONGEST_WHY, SHORTEST_DEADLINE};
 use serde::{Deserialize, Serialize};
 
@@ -186,11 +186,7 @@ pub struct Identity {
 pub struct NoAnswer {
     /// What it is about.
     pub key: String,
-    /// The kind of error.
-    pub reason: Reason,
-    /// The same as a sentence.
-    pub message: String,
-    /// The error code in the reply of an ST drive.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub code: Option<u8>,
+    /// The error.
+    #[serde(flatten)]
+    pub why: Refusal,
 }

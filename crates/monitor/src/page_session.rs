@@ -364,9 +364,8 @@ impl Page {
         }
     }
 
-    async fn refuse(&self, id: u32, Refusal { reason, message, code }: Refusal) {
-        let text = share::Text::Refusal { id, reason, message, code };
-        let _ = self.out.send(encode(&text)).await;
+    async fn refuse(&self, id: u32, refusal: Refusal) {
+        let _ = self.out.send(encode(&share::Text::Refusal { id, refusal })).await;
     }
 
     fn view(&self) -> Result<Program, Refusal> {

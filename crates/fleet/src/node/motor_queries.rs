@@ -201,10 +201,10 @@ fn json(value: &impl Serialize) -> Content {
     (serde_json::to_vec(value).unwrap_or_default(), Encoding::APPLICATION_JSON)
 }
 
-fn no_answer(key: &str, why: Refusal) -> NoAnswer {
-    let Refusal { reason, message, code } = why;
+fn no_answer(key: &str, mut why: Refusal) -> NoAnswer {
     // The drive itself says that it has no such motor.
-    let is_absent = code.map(ErrorCode::from) == Some(ErrorCode::BadMotorSelected);
-    let reason = if is_absent { Reason::Unheard } else { reason };
-    NoAnswer { key: key.to_owned(), reason, message, code }
+    if why.code.map(ErrorCode::from) == Some(ErrorCode::BadMotorSelected) {
+        why.reason = Reason::Unheard;
+    }
+    NoAnswer { key: key.to_owned(), why }
 }

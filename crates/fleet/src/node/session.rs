@@ -214,7 +214,7 @@ impl Session {
     }
 
     fn refuse(&mut self, id: u32, reason: Reason, message: String) {
-        let text = Text::Refusal { id, reason, message, code: None };
+        let text = Text::Refusal { id, refusal: Refusal::new(reason, message) };
         self.outbox.push(&Frame::text(encode(&text)));
     }
 

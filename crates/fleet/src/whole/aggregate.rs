@@ -190,7 +190,7 @@ impl Aggregate {
             if let Ask::Command { time_to_live, .. } = &mut ask {
                 *time_to_live -= self.now - since;
                 if *time_to_live <= 0.0 {
-                    self.refuse(id, expired(node));
+                    self.end(id, Err(expired(node)));
                     continue;
                 }
             }
@@ -244,12 +244,12 @@ impl Aggregate {
         match &ask {
             Ask::Hello { protocol, .. } if *protocol != VERSION => {
                 let message = format!("the fleet speaks version {VERSION}");
-                self.refuse(id, Refusal::usage(message));
+                self.end(id, Err(Refusal::usage(message)));
             }
             Ask::Hello { .. } => {
                 let share = "fleet".to_owned();
                 let name = self.who.clone();
-                self.answer(id, Answer::Hello { protocol: VERSION, share, name });
+                self.end(id, Ok(Answer::Hello { protocol: VERSION, share, name }));
                 self.tell_away();
             }
             Ask::Lines => self.all(id, RoundKind::Lines),
@@ -281,11 +281,11 @@ impl Aggregate {
             Ask::Alive => {}
             Ask::Ports | Ask::Scan { .. } | Ask::Open { .. } => {
                 let why = "ports of a node are opened at the node: `motorlink node -p PORT`";
-                self.refuse(id, Refusal::usage(why));
+                self.end(id, Err(Refusal::usage(why)));
             }
             _ => match names::line_of(&mut ask).map(std::mem::take) {
                 Some(line) => self.one(id, ask, &line),
-                None => self.refuse(id, Refusal::usage("the fleet does not know this request")),
+                None => self.end(id, Err(Refusal::usage("the fleet does not know this request"))),
             },
         }
         true
@@ -300,9 +300,7 @@ impl Aggregate {
         let Ok(text) = decode(&payload) else { return };
         match text {
             Text::Answer { id, answer } => self.answered(node, id, Ok(answer)),
-            Text::Refusal { id, reason, message, code } => {
-                self.answered(node, id, Err(Refusal { reason, message, code }));
-            }
+            Text::Refusal { id, refusal } => self.answered(node, id, Err(refusal)),
             Text::Event(event) => {
                 // A busy line tells late of a release that came before a newer latch: the node knows.
                 if event.event == EventKind::Released
@@ -365,12 +363,12 @@ impl Aggregate {
     fn one(&mut self, id: u32, mut ask: Ask, line: &str) {
         let (node, there) = match self.known(line) {
             Ok(place) => place,
-            Err(why) => return self.refuse(id, why),
+            Err(why) => return self.end(id, Err(why)),
         };
         match self.members.get(&node).map(|it| &it.state) {
             Some(State::Away(why)) => {
                 let why = away(&node, why);
-                self.refuse(id, why);
+                self.end(id, Err(why));
             }
             Some(State::Here) => {
                 if let Some(line) = names::line_of(&mut ask) {
@@ -408,18 +406,7 @@ impl Aggregate {
     }
 
     fn end(&mut self, id: u32, result: Result<Answer, Refusal>) {
-        match result {
-            Ok(answer) => self.answer(id, answer),
-            Err(why) => self.refuse(id, why),
-        }
-    }
-
-    fn answer(&mut self, id: u32, answer: Answer) {
-        self.say(&Text::Answer { id, answer });
-    }
-
-    fn refuse(&mut self, id: u32, Refusal { reason, message, code }: Refusal) {
-        self.say(&Text::Refusal { id, reason, message, code });
+        self.say(&Text::end(id, result));
     }
 
     /// Something happened to a line of a node.

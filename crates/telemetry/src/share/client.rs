@@ -100,9 +100,8 @@ impl Program {
             Text::Answer { answer: Answer::Hello { name, .. }, .. } => {
                 Ok((program, listener, name))
             }
-            Text::Refusal { message, .. } | Text::Closing { message } => {
-                Err(io::Error::other(message))
-            }
+            Text::Refusal { refusal, .. } => Err(io::Error::other(refusal.message)),
+            Text::Closing { message } => Err(io::Error::other(message)),
             _ => Err(io::Error::other("this is no share")),
         }
     }
@@ -299,9 +298,7 @@ impl Shared {
         let sender = self.pending().answers.remove(&id)?;
         let result = match message::decode(&frame.payload) {
             Ok(Text::Answer { answer, .. }) => Ok(answer),
-            Ok(Text::Refusal { reason, message, code, .. }) => {
-                Err(Refusal { reason, message, code })
-            }
+            Ok(Text::Refusal { refusal, .. }) => Err(refusal),
             _ => Err(ended()),
         };
         // Nobody waits any more.

@@ -2,7 +2,8 @@
 
 use super::data::{Data, DataError};
 use super::frame::{self, FrameError, FrameKind, Reader};
-use super::message::{self, Answer, Ask, MessageError, Reason, Request, Text};
+pub use super::message::Refusal;
+use super::message::{self, Answer, Ask, MessageError, Request, Text};
 
 /// The requests of a program, and what it receives.
 #[derive(Debug, Default)]
@@ -29,30 +30,6 @@ pub struct Ended {
     pub id: u32,
     /// The answer, or why the request was not carried out.
     pub result: Result<Answer, Refusal>,
-}
-
-/// Why a share did not carry a request out.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{message}")]
-pub struct Refusal {
-    /// The reason, for programs.
-    pub reason: Reason,
-    /// The reason as a sentence.
-    pub message: String,
-    /// The error code of a drive.
-    pub code: Option<u8>,
-}
-
-impl Refusal {
-    /// A refusal that is not the answer of a drive.
-    pub fn new(reason: Reason, message: impl Into<String>) -> Self {
-        Self { reason, message: message.into(), code: None }
-    }
-
-    /// The request is not possible. Nothing was sent.
-    pub fn usage(message: impl Into<String>) -> Self {
-        Self::new(Reason::Usage, message)
-    }
 }
 
 /// The bytes are not those of a share.
@@ -97,9 +74,7 @@ impl ClientCodec {
             FrameKind::Data => Heard::Data(Data::decode(&frame.payload)?),
             FrameKind::Text => match message::decode(&frame.payload)? {
                 Text::Answer { id, answer } => Heard::Ended(Ended { id, result: Ok(answer) }),
-                Text::Refusal { id, reason, message, code } => {
-                    Heard::Ended(Ended { id, result: Err(Refusal { reason, message, code }) })
-                }
+                Text::Refusal { id, refusal } => Heard::Ended(Ended { id, result: Err(refusal) }),
                 text => Heard::Text(text),
             },
         }))

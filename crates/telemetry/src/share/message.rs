@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use json::is_false;
 
-pub use events::{Event, EventKind, Reason};
+pub use events::{Event, EventKind, Reason, Refusal};
 pub use frames::{WireFrame, WireLoad, WireResult, WireWay};
 pub use json::{MessageError, decode, encode};
 pub use lines::{Finding, FoundPort, Line, LineCounts, Protocol};
@@ -247,13 +247,9 @@ pub enum Text {
     Refusal {
         /// That of the request.
         id: u32,
-        /// The reason, for programs.
-        reason: Reason,
-        /// The reason in words.
-        message: String,
-        /// The error code of an ST drive that refused.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        code: Option<u8>,
+        /// Why.
+        #[serde(flatten)]
+        refusal: Refusal,
     },
     /// The columns of a group. It comes before its first data.
     Group(Group),
@@ -285,6 +281,16 @@ pub enum Text {
     /// A text of a later version.
     #[serde(other)]
     Later,
+}
+
+impl Text {
+    /// The end of the request with this id.
+    pub fn end(id: u32, result: Result<Answer, Refusal>) -> Self {
+        match result {
+            Ok(answer) => Text::Answer { id, answer },
+            Err(refusal) => Text::Refusal { id, refusal },
+        }
+    }
 }
 
 /// The answer to each [`Ask`].

@@ -278,7 +278,7 @@ impl World {
             while let Some(message) = hub.next(session) {
                 match decode(&message.payload) {
                     Ok(Text::Answer { id, answer }) if id == wanted => return Ok(answer),
-                    Ok(Text::Refusal { id, reason, .. }) if id == wanted => return Err(reason),
+                    Ok(Text::Refusal { id, refusal }) if id == wanted => return Err(refusal.reason),
                     _ => {}
                 }
             }

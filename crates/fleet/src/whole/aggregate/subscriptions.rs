@@ -12,7 +12,7 @@ impl Aggregate {
                     signal.line = line;
                     of_nodes.entry(node).or_default().push(signal);
                 }
-                Err(why) => return self.refuse(id, why),
+                Err(why) => return self.end(id, Err(why)),
             }
         }
         self.last_subscription += 1;

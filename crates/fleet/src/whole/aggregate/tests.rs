@@ -96,7 +96,7 @@ impl Fleet {
     }
 
     fn refuses(&mut self, node: &str, id: u32, reason: Reason, message: &str) {
-        self.says(node, &Text::Refusal { id, reason, message: message.to_owned(), code: None });
+        self.says(node, &Text::Refusal { id, refusal: Refusal::new(reason, message) });
     }
 
     /// Whether a node that comes is latched before all else.
@@ -138,7 +138,9 @@ fn rows(group: u32) -> Vec<u8> {
 
 fn refused(texts: &[Text], wanted: u32) -> (Reason, String) {
     match texts {
-        [Text::Refusal { id, reason, message, .. }] if *id == wanted => (*reason, message.clone()),
+        [Text::Refusal { id, refusal }] if *id == wanted => {
+            (refusal.reason, refusal.message.clone())
+        }
         other => panic!("{other:?}"),
     }
 }

@@ -11,7 +11,8 @@ use super::signs_of_life::SignsOfLife;
 use super::subscription_encoder::Feed;
 use crate::share::frame::Frame;
 use crate::share::message::{
-    self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, SignalRate, StoppedMotor, Text,
+    self, ANY_MOTOR, Answer, Ending, Event, MotorName, Reason, Refusal, SignalRate, StoppedMotor,
+    Text,
 };
 use crate::signal::Motor;
 
@@ -106,7 +107,8 @@ impl Session {
         message: impl Into<String>,
         code: Option<u8>,
     ) {
-        self.answers.push_back(Text::Refusal { id, reason, message: message.into(), code });
+        let refusal = Refusal { reason, message: message.into(), code };
+        self.answers.push_back(Text::Refusal { id, refusal });
     }
 
     /// A motor has answered. The answer is not confirmed yet.

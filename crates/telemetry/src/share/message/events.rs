@@ -128,3 +128,29 @@ pub enum Reason {
     #[serde(other)]
     Later,
 }
+
+/// Why a share did not carry a request out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+#[error("{message}")]
+pub struct Refusal {
+    /// The reason, for programs.
+    pub reason: Reason,
+    /// The reason as a sentence.
+    pub message: String,
+    /// The error code of an ST drive that refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<u8>,
+}
+
+impl Refusal {
+    /// A refusal that is not the answer of a drive.
+    pub fn new(reason: Reason, message: impl Into<String>) -> Self {
+        Self { reason, message: message.into(), code: None }
+    }
+
+    /// The request is not possible. Nothing was sent.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::new(Reason::Usage, message)
+    }
+}
