@@ -405,7 +405,7 @@ motor: number, };
 
 export type Overview = { 
 /**
- * The state. RMD motors report none.
+ * The state of an ST motor. RMD motors report none.
  */
 state: string | null, 
 /**
@@ -421,7 +421,7 @@ speed: string,
  */
 current: string, 
 /**
- * The temperature.
+ * The temperature of the power stage or of the motor.
  */
 temperature: string, 
 /**
@@ -429,7 +429,7 @@ temperature: string,
  */
 voltage: string, 
 /**
- * The angle of an RMD motor.
+ * The angle over all turns of an RMD motor.
  */
 angle: string | null, };
 

@@ -116,7 +116,7 @@ async fn a_description_has_the_tables_of_the_protocol() {
     assert_eq!(direction.range, [0.0, 1.0, 1.0]);
     assert_eq!(motors.faults.iter().map(|it| it.bit).collect::<Vec<_>>(), [0, 3]);
     assert_eq!(motors.modes.len(), 3);
-    assert_eq!(motors.overview.angle.as_deref(), Some("multi_turn_angle_degrees"));
+    assert_eq!(motors.overview.angle.unwrap().to_string(), "multi_turn_angle_degrees");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

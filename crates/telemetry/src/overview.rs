@@ -2,26 +2,35 @@
 
 use motorlink_proto::rmd::Errors;
 use motorlink_proto::st::{Flags, RegisterId, Status};
+use serde::Serialize;
 
 use crate::sample::Sample;
 use crate::signal::{Motor, Quantity, Source};
 
 /// The signals that say most about a motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Overview {
     /// The state of an ST motor. RMD motors report none.
+    #[cfg_attr(feature = "typescript", ts(type = "string | null"))]
     pub state: Option<Source>,
     /// The faults.
+    #[cfg_attr(feature = "typescript", ts(type = "string"))]
     pub faults: Source,
     /// The speed.
+    #[cfg_attr(feature = "typescript", ts(type = "string"))]
     pub speed: Source,
     /// The current that makes torque.
+    #[cfg_attr(feature = "typescript", ts(type = "string"))]
     pub current: Source,
     /// The temperature of the power stage or of the motor.
+    #[cfg_attr(feature = "typescript", ts(type = "string"))]
     pub temperature: Source,
     /// The supply.
+    #[cfg_attr(feature = "typescript", ts(type = "string"))]
     pub voltage: Source,
     /// The angle over all turns of an RMD motor.
+    #[cfg_attr(feature = "typescript", ts(type = "string | null"))]
     pub angle: Option<Source>,
 }
 

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use motorlink_proto::rmd::{COMMANDS, Code, CommandInfo, Field, MotorId};
 use motorlink_proto::st::register::Access;
 use motorlink_proto::st::{MotorNumber, RegisterId, UnknownRegister, find_register};
+use serde::{Serialize, Serializer};
 
 /// A motor of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -142,6 +143,12 @@ impl fmt::Display for Source {
             Source::Quantity(quantity) => f.write_str(&quantity.name()),
             Source::Derived(derived) => derived.fmt(f),
         }
+    }
+}
+
+impl Serialize for Source {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

@@ -9,24 +9,15 @@ use motorlink_telemetry::share::drive_values;
 use motorlink_telemetry::signal::{Motor, Source};
 
 use super::commands::Command;
-use crate::message::{Controlled, Description, Fault, Mode, Overview, State};
+use crate::message::{Controlled, Description, Fault, Mode, State};
 
 pub(super) fn describe(line: &str, speaks: DriveProtocol) -> Description {
     let motor = speaks.motor(1).expect("a line can have motor 1");
     let main = overview::Overview::of(motor);
-    let name = |source: Source| source.to_string();
     Description {
         line: line.to_owned(),
         protocol: speaks.protocol(),
-        overview: Overview {
-            state: main.state.map(name),
-            faults: name(main.faults),
-            speed: name(main.speed),
-            current: name(main.current),
-            temperature: name(main.temperature),
-            voltage: name(main.voltage),
-            angle: main.angle.map(name),
-        },
+        overview: main,
         registers: drive_values::all(speaks),
         commands: Command::all(speaks).iter().map(|command| command.described(motor)).collect(),
         modes: modes(motor, &main),

@@ -3,10 +3,11 @@
 use motorlink_telemetry::share::message::Protocol;
 use serde::{Deserialize, Serialize};
 
+pub use motorlink_telemetry::overview::Overview;
 pub use motorlink_telemetry::share::drive_values::{Register, Value};
 
 /// What the drives of a line have.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Description {
     /// The line.
@@ -27,28 +28,8 @@ pub struct Description {
     pub faults: Vec<Fault>,
 }
 
-/// The names of the signals that say most about a motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
-pub struct Overview {
-    /// The state. RMD motors report none.
-    pub state: Option<String>,
-    /// The faults.
-    pub faults: String,
-    /// The speed.
-    pub speed: String,
-    /// The current that makes torque.
-    pub current: String,
-    /// The temperature.
-    pub temperature: String,
-    /// The supply.
-    pub voltage: String,
-    /// The angle of an RMD motor.
-    pub angle: Option<String>,
-}
-
 /// A command of the protocol.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Command {
     /// Its name in the table.
@@ -64,7 +45,7 @@ pub struct Command {
 }
 
 /// A value of a command.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Field {
     /// Its name.
@@ -80,7 +61,7 @@ pub struct Field {
 }
 
 /// What can be controlled of a motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Controlled {
     /// What.
@@ -94,7 +75,7 @@ pub struct Controlled {
 }
 
 /// A state of an ST motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct State {
     /// The value of the signal.
@@ -106,7 +87,7 @@ pub struct State {
 }
 
 /// A bit of the faults.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Fault {
     /// The bit of the signal, from 0.
@@ -122,7 +103,7 @@ pub struct Fault {
 }
 
 /// A setting that differs between a motor and a file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Difference {
     /// Its name.

@@ -21,7 +21,7 @@ use crate::signal::{Motor, Quantity};
 const MEASURED: &str = "Measured values";
 
 /// A register, or a setting of an RMD motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Register {
     /// Its name.
