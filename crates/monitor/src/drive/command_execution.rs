@@ -31,9 +31,7 @@ impl Act {
     ) -> Result<Vec<Value>, Refusal> {
         let request = self.command.request(&self.target, &self.values)?;
         if self.command.wears_rom() && !self.to_rom {
-            return Err(Refusal::usage(
-                "this command wears the ROM of the motor; nothing was sent",
-            ));
+            return Err(Refusal::unsent("this command wears the ROM of the motor"));
         }
         if request.motion().may_move() {
             return self.move_motor(control, drive, &request).await;

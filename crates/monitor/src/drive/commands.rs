@@ -116,17 +116,13 @@ impl Command {
                 false => format!("its values are {}", names.join(", ")),
             };
             let command = self.name();
-            return Err(Refusal::usage(format!(
-                "{command} has no value `{name}`; {has}; nothing was sent"
-            )));
+            return Err(Refusal::unsent(format!("{command} has no value `{name}`; {has}")));
         }
         let wanted = |name: &str| {
-            values.get(name).copied().ok_or_else(|| {
-                Refusal::usage(format!(
-                    "{} needs the value `{name}`; nothing was sent",
-                    self.name()
-                ))
-            })
+            values
+                .get(name)
+                .copied()
+                .ok_or_else(|| Refusal::unsent(format!("{} needs the value `{name}`", self.name())))
         };
         match self {
             Command::Message(code, profile) => {
@@ -259,9 +255,7 @@ fn st_bytes(field: &StNumber, wanted: f64) -> Result<Vec<u8>, Refusal> {
         // A negative duration or angle beyond all bounds is checked with the whole request.
         return match value.is_finite() {
             true => Ok(value.to_le_bytes().to_vec()),
-            false => {
-                Err(Refusal::usage(format!("{name}: {wanted} is not a number; nothing was sent")))
-            }
+            false => Err(Refusal::unsent(format!("{name}: {wanted} is not a number"))),
         };
     }
     let digits = exactly(&field.scale, name, wanted)?;
@@ -310,14 +304,14 @@ fn rmd_digits(field: &RmdField, name: &str, wanted: f64) -> Result<i64, Refusal>
     {
         let all: Vec<_> = words.iter().map(|(number, word)| format!("{number} ({word})")).collect();
         let all = all.join(", ");
-        return Err(Refusal::usage(format!("{name}: {wanted} is none of {all}; nothing was sent")));
+        return Err(Refusal::unsent(format!("{name}: {wanted} is none of {all}")));
     }
     Ok(digits)
 }
 
 /// The digits of a value in its range.
 fn exactly(scale: &Scale, name: &str, wanted: f64) -> Result<i64, Refusal> {
-    scale.wanted(wanted).map_err(|why| Refusal::usage(format!("{name}: {why}; nothing was sent")))
+    scale.wanted(wanted).map_err(|why| Refusal::unsent(format!("{name}: {why}")))
 }
 
 #[cfg(test)]

@@ -88,10 +88,9 @@ impl Limited {
                 let request = request.request();
                 self.account.check(seen, *motor, &request).map_err(|why| Refusal::usage(words(why)))
             }
-            Request::Rmd(_, data) => match self.rmd.check(data) {
-                Ok(()) => Ok(Effect::None),
-                Err(why) => Err(Refusal::usage(format!("{why}; nothing was sent"))),
-            },
+            Request::Rmd(_, data) => {
+                self.rmd.check(data).map(|()| Effect::None).map_err(Refusal::unsent)
+            }
             _ => Ok(Effect::None),
         }
     }

@@ -102,15 +102,14 @@ fn digits(register: RegisterId, value: f64, profile: Profile) -> Result<i32, Ref
     let is_writable =
         register.shape().is_some_and(|shape| drive_values::is_writable(&shape, profile));
     if !is_writable {
-        return Err(Refusal::usage(format!("{register} cannot be written; nothing was sent")));
+        return Err(Refusal::unsent(format!("{register} cannot be written")));
     }
-    let bits = parse_value(register, &value.to_string(), profile, false)
-        .map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))?;
+    let bits = parse_value(register, &value.to_string(), profile, false);
+    let bits = bits.map_err(Refusal::unsent)?;
     let ramp = Ramp { speed_rpm: bits, duration_ms: 0 };
     if register == RegisterId::RAMP_FINAL_SPEED && !ramp.is_possible() {
         let most = Ramp::MAX_SPEED_RPM;
-        let message = format!("{register}: {value} rpm is beyond ±{most} rpm; nothing was sent");
-        return Err(Refusal::usage(message));
+        return Err(Refusal::unsent(format!("{register}: {value} rpm is beyond ±{most} rpm")));
     }
     Ok(bits)
 }

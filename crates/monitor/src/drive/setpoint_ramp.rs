@@ -79,9 +79,8 @@ impl Run {
         drive: &impl MotionPermit,
     ) -> Result<Answer, Refusal> {
         if !(self.rate.is_finite() && self.rate > 0.0) {
-            let message =
-                format!("the rate {} is not a positive number; nothing was sent", self.rate);
-            return Err(Refusal::usage(message));
+            let message = format!("the rate {} is not a positive number", self.rate);
+            return Err(Refusal::unsent(message));
         }
         self.check(control)?;
         let stops = control.stops(&self.target);
@@ -125,9 +124,9 @@ impl Run {
                 if let Some(limit) = control
                     .limited(&self.target, |limited| limited.most(self.target.motor, Mode::Speed))
                 {
-                    return Err(Refusal::usage(format!(
+                    return Err(Refusal::unsent(format!(
                         "the motor of a torque command turns as fast as its load allows, and its speed is \
-                         limited to {limit} rpm; nothing was sent"
+                         limited to {limit} rpm"
                     )));
                 }
                 Stream::Current(motor, 0).request(self.to)?
@@ -150,8 +149,8 @@ impl Run {
         let most = f64::from(u16::MAX);
         if duration > most {
             let least = 1000.0 * way / most;
-            return Err(Refusal::usage(format!(
-                "a ramp of the drive lasts up to {} s: the rate is {least:.1} or more; nothing was sent",
+            return Err(Refusal::unsent(format!(
+                "a ramp of the drive lasts up to {} s: the rate is {least:.1} or more",
                 most / 1000.0
             )));
         }
@@ -282,9 +281,8 @@ impl<M: MotionPermit> Begun<'_, M> {
         let (status, read) = self.state(&[RegisterId::SPEED_MEAS]).await?;
         if status == Status::Idle && self.run.to == 0.0 {
             let place = self.reads().place();
-            return Err(Refusal::usage(format!(
-                "{place}: it is at rest, and the target is 0; nothing was sent"
-            )));
+            let message = format!("{place}: it is at rest, and the target is 0");
+            return Err(Refusal::unsent(message));
         }
         let from = f64::from(read[0]);
         let ramp = Ramp { speed_rpm: speed(self.run.to)?, duration_ms: self.run.duration(from)? };
@@ -421,7 +419,7 @@ fn is_ended_by_others(why: &Refusal) -> bool {
 }
 
 fn wanted<Q: Quantity>(value: f64) -> Result<Q, Refusal> {
-    Q::wanted(value).map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))
+    Q::wanted(value).map_err(Refusal::unsent)
 }
 
 /// A speed of an ST motor, rpm.
@@ -436,9 +434,9 @@ fn current(value: f64) -> Result<i16, Refusal> {
 }
 
 fn whole(value: f64, scale: Scale) -> Result<i64, Refusal> {
-    scale.wanted(value).map_err(|why| Refusal::usage(format!("{why}; nothing was sent")))
+    scale.wanted(value).map_err(Refusal::unsent)
 }
 
 fn no_position() -> Refusal {
-    Refusal::usage("the position of an ST motor cannot be controlled like this; nothing was sent")
+    Refusal::unsent("the position of an ST motor cannot be controlled like this")
 }

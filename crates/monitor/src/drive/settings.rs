@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use motorlink::settings::{
-    Cause, Comparison, Difference, Dump, FileError, Permissions, Procedure, RestoreError,
-    SettingsFile, Tuning as _, Unread, Writing,
+    Cause, Comparison, Difference, Dump, Permissions, Procedure, RestoreError, SettingsFile,
+    Tuning as _, Unread, Writing,
 };
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::client::{Program, Refusal};
@@ -45,7 +45,7 @@ pub(super) async fn diff(
 ) -> Result<Answer, Refusal> {
     let _lane = exchanges.lane().await;
     let differences = tuned!(exchanges.target, |tuning| {
-        let file = SettingsFile::parse(text, &tuning).map_err(not_a_file)?;
+        let file = SettingsFile::parse(text, &tuning).map_err(Refusal::unsent)?;
         let comparison = compare(control, exchanges, tuning, &file).await?;
         Ok(comparison.differences().map(|one| described(&one)).collect())
     })?;
@@ -63,14 +63,16 @@ pub(super) async fn restore(
 ) -> Result<Answer, Refusal> {
     let control = Arc::clone(control);
     // Nothing is sent for a file that is not one.
-    tuned!(target, |tuning| SettingsFile::parse(&text, &tuning).map(drop).map_err(not_a_file))?;
+    tuned!(target, |tuning| SettingsFile::parse(&text, &tuning)
+        .map(drop)
+        .map_err(Refusal::unsent))?;
     let (program, mut listener) = view.again("settings").await?;
     let restoring = tokio::spawn(async move {
         let work = async {
             let exchanges = Exchanges::new(&program, &target);
             let permissions = Permissions { rom: to_rom, running: false };
             tuned!(target, |tuning| {
-                let file = SettingsFile::parse(&text, &tuning).map_err(not_a_file)?;
+                let file = SettingsFile::parse(&text, &tuning).map_err(Refusal::unsent)?;
                 let written = set(&control, &exchanges, tuning, &file, permissions).await?;
                 Ok(Answer::Restore { written })
             })
@@ -102,8 +104,7 @@ pub(super) async fn write(
     let _lane = exchanges.lane().await;
     let permissions = Permissions { rom: to_rom, running: true };
     tuned!(exchanges.target, |tuning| {
-        let file = SettingsFile::one(&tuning, name, value)
-            .map_err(|problem| Refusal::usage(format!("{problem}; nothing was sent")))?;
+        let file = SettingsFile::one(&tuning, name, value).map_err(Refusal::unsent)?;
         set(control, exchanges, tuning, &file, permissions).await?;
         let has = |names: &Vec<String>| names.iter().any(|one| one == name);
         let blocks = tuning.blocks().into_iter();
@@ -137,10 +138,6 @@ async fn compare<T: Tuned>(
         let message = unread.to_string();
         Refusal { message, ..unread.error.refusal }
     })
-}
-
-fn not_a_file(error: FileError) -> Refusal {
-    Refusal::usage(format!("{error}; nothing was sent"))
 }
 
 fn not_restored(error: RestoreError<Failed>) -> Refusal {

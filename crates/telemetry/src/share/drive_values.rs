@@ -151,7 +151,7 @@ impl Place {
             }
             _ => (None, format!("there is no register `{name}`")),
         };
-        place.ok_or_else(|| Refusal::usage(format!("{why}; nothing was sent")))
+        place.ok_or_else(|| Refusal::unsent(why))
     }
 
     fn of_register(motor: MotorNumber, register: RegisterId, profile: Profile) -> Self {

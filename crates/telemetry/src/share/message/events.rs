@@ -1,5 +1,7 @@
 //! What happened, and why a request was not carried out.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::json::word;
@@ -152,5 +154,10 @@ impl Refusal {
     /// The request is not possible. Nothing was sent.
     pub fn usage(message: impl Into<String>) -> Self {
         Self::new(Reason::Usage, message)
+    }
+
+    /// As [`usage`](Self::usage), and the message says that nothing was sent.
+    pub fn unsent(why: impl fmt::Display) -> Self {
+        Self::usage(format!("{why}; nothing was sent"))
     }
 }
