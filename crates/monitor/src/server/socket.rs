@@ -1,5 +1,6 @@
 //! The WebSocket of a page: texts of the page, and what the share and the server send to it.
 
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,7 +12,7 @@ use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message as share;
 use tokio::sync::{mpsc, watch};
-use tokio::task::{AbortHandle, JoinHandle, JoinSet};
+use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 use super::share_link::{AGAIN, ShareLink};
@@ -176,29 +177,21 @@ struct View {
 
 enum LinkState {
     Up(Listener),
-    Down(ReconnectTask),
+    Down(Reconnecting),
 }
 
-/// Connects again and again, until it is dropped.
-struct ReconnectTask(JoinHandle<(Program, Listener)>);
+/// Connects again and again. It goes on where it was whenever somebody waits for it.
+type Reconnecting = Pin<Box<dyn Future<Output = (Program, Listener)> + Send>>;
 
-impl Drop for ReconnectTask {
-    fn drop(&mut self) {
-        self.0.abort();
-    }
-}
-
-impl ReconnectTask {
-    fn new(link: Arc<ShareLink>, name: String) -> Self {
-        ReconnectTask(tokio::spawn(async move {
-            loop {
-                if let Ok((program, listener, _)) = link.connect(&name).await {
-                    return (program, listener);
-                }
-                sleep(AGAIN).await;
+fn reconnecting(link: Arc<ShareLink>, name: String) -> Reconnecting {
+    Box::pin(async move {
+        loop {
+            if let Ok((program, listener, _)) = link.connect(&name).await {
+                return (program, listener);
             }
-        }))
-    }
+            sleep(AGAIN).await;
+        }
+    })
 }
 
 impl View {
@@ -206,7 +199,7 @@ impl View {
     fn new(link: Arc<ShareLink>, name: String, listener: Option<Listener>) -> Self {
         let state = match listener {
             Some(listener) => LinkState::Up(listener),
-            None => LinkState::Down(ReconnectTask::new(Arc::clone(&link), name.clone())),
+            None => LinkState::Down(reconnecting(Arc::clone(&link), name.clone())),
         };
         View { link, name, state }
     }
@@ -225,22 +218,20 @@ impl View {
         let lost = match &mut self.state {
             LinkState::Up(listener) => match listener.next().await {
                 Ok(frame) => return message(page, frame),
-                Err(error) => Some(error.to_string()),
-            },
-            LinkState::Down(coming) => match (&mut coming.0).await {
-                Ok((program, listener)) => {
-                    page.set_view(Some(program));
-                    self.state = LinkState::Up(listener);
-                    None
+                Err(error) => {
+                    page.set_view(None);
+                    let (link, name) = (Arc::clone(&self.link), self.name.clone());
+                    self.state = LinkState::Down(reconnecting(link, name));
+                    Some(error.to_string())
                 }
-                Err(error) => Some(error.to_string()),
             },
+            LinkState::Down(coming) => {
+                let (program, listener) = coming.as_mut().await;
+                page.set_view(Some(program));
+                self.state = LinkState::Up(listener);
+                None
+            }
         };
-        if lost.is_some() {
-            page.set_view(None);
-            self.state =
-                LinkState::Down(ReconnectTask::new(Arc::clone(&self.link), self.name.clone()));
-        }
         Message::Text(encode(&Text::Share { lost }).into())
     }
 }
