@@ -5,8 +5,6 @@ use std::io;
 use std::sync::{Arc, PoisonError, RwLockWriteGuard};
 use std::time::Duration;
 
-use motorlink_proto::rmd::{Command, ReadStatus};
-use motorlink_proto::st::{FrameCode, RegisterId};
 use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::share::client::{Listener, Program};
 use motorlink_telemetry::share::data::Data;
@@ -15,7 +13,8 @@ use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{
     Answer, Ask, DropRule, Event, EventKind, Group, Line, SignalName, Text, decode,
 };
-use motorlink_telemetry::signal::{Motor, Signal};
+use motorlink_telemetry::share::motor_exchange::{Exchanges, Target};
+use motorlink_telemetry::signal::Signal;
 use serde::Serialize;
 use tokio::runtime::Handle;
 use tokio::task::block_in_place;
@@ -161,16 +160,9 @@ impl Common {
             loop {
                 let Ok(heard) = self.heard(&program, &name).await else { return };
                 for motor in motors.iter().filter(|motor| !heard.contains(&motor.number())) {
-                    let ask = Ask::Command {
-                        line: name.clone(),
-                        motor: motor.number(),
-                        bytes: question(*motor),
-                        time_to_live: SEARCH,
-                        continues: false,
-                        own: false,
-                    };
+                    let target = Target::of(&name, *motor, speaks);
                     // Those that are there answer.
-                    let _ = program.ask(ask).await;
+                    let _ = Exchanges::new(&program, &target).within(SEARCH).touch().await;
                 }
                 self.state_mut().searching.remove(&name);
                 match self.heard(&program, &name).await {
@@ -275,14 +267,6 @@ impl Common {
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::DataHigh)
             .wait();
-    }
-}
-
-/// The bytes of a command that only shows that a motor is there.
-fn question(motor: Motor) -> Vec<u8> {
-    match motor {
-        Motor::St(_) => vec![FrameCode::GetReg.number(), RegisterId::STATUS.0],
-        Motor::Rmd(_) => ReadStatus.encode().to_vec(),
     }
 }
 
