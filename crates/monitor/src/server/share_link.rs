@@ -136,17 +136,18 @@ impl ShareLink {
 
     /// Connects again and again.
     pub async fn keep(&self) {
-        let mut known: Option<(Vec<Line>, Drives)> = None;
+        let mut known: Option<Drives> = None;
         loop {
             let why = match self.join().await {
-                Ok((program, mut lines, mut listener)) => {
+                Ok((program, lines, mut listener)) => {
+                    let new = Drives::new(lines);
                     // The limits that pages have set stay.
-                    let mut drives = match &known {
-                        Some((before, drives)) if is_same(before, &lines) => {
-                            drives.reconnected();
-                            drives.clone()
+                    let mut drives = match known.filter(|known| known.lines() == new.lines()) {
+                        Some(before) => {
+                            before.reconnected();
+                            before
                         }
-                        _ => Drives::new(lines.clone()),
+                        None => new,
                     };
                     let lost = loop {
                         let joined = Joined { program: program.clone(), drives: drives.clone() };
@@ -154,11 +155,11 @@ impl ShareLink {
                         // A stop may have been asked for just before. If this fails, the share is lost again.
                         let _ = self.send_pending().await;
                         match self.next_lines(&program, &mut listener).await {
-                            Ok(next) => (lines, drives) = (next.clone(), drives.with_lines(next)),
+                            Ok(next) => drives = drives.with_lines(next),
                             Err(error) => break error,
                         }
                     };
-                    known = Some((lines, drives));
+                    known = Some(drives);
                     self.pending().latch |= self.is_latched.load(Ordering::SeqCst);
                     lost
                 }
@@ -276,12 +277,6 @@ async fn lines(program: &Program, listener: &mut Listener) -> io::Result<(Vec<Li
     let told = timeout(HELLO, program.lines(listener)).await;
     let (lines, latched_by) = told.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
     Ok((lines, latched_by.is_some()))
-}
-
-/// Whether the lines are the same, besides their clocks.
-fn is_same(before: &[Line], now: &[Line]) -> bool {
-    let key = |line: &Line| (line.line.clone(), line.protocol, line.profile.clone());
-    before.iter().map(key).eq(now.iter().map(key))
 }
 
 /// Latches the share, then stops all motors.
