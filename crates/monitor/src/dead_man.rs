@@ -7,11 +7,12 @@
 //! stores what it sends.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_telemetry::share::client::Refusal;
 use motorlink_telemetry::share::message::{MotorName, Reason};
+use parking_lot::Mutex;
 
 use crate::message::{Alive, Beat};
 
@@ -180,7 +181,7 @@ impl DeadMan {
     /// The page stops a motor, or all: earlier commands of any page move them no more. Call this before
     /// the share learns of it.
     pub fn stop(&mut self, motor: Option<&MotorName>) {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner).count(motor);
+        self.shared.lock().count(motor);
     }
 
     /// Another program stopped a motor, or all: earlier commands of the page move them no more.
@@ -200,7 +201,7 @@ impl DeadMan {
     }
 
     fn stops_of(&self, motor: Option<&MotorName>) -> u64 {
-        let shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared = self.shared.lock();
         self.stops.of(motor) + shared.of(motor)
     }
 }

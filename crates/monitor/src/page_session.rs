@@ -4,7 +4,7 @@
 //! command that may move a motor. The share stops what a session turned when it ends, so the dead-man
 //! closes the second session, and the server has no list of motors of its own.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
@@ -13,6 +13,7 @@ use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::client::{Listener, OWN_IDS, Program, Refusal, UNAWAITED};
 use motorlink_telemetry::share::frame::{Frame, FrameKind};
 use motorlink_telemetry::share::message::{self as share, Event, EventKind, MotorName, Reason};
+use parking_lot::Mutex;
 use serde::Deserialize;
 use tokio::sync::{Mutex as AsyncMutex, Notify, OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
@@ -97,12 +98,12 @@ impl Page {
 
     /// The next beat, which is sent now.
     pub fn beat(&self) -> Text {
-        Text::Beat(self.control().man.beat(self.clock.now(), wall()))
+        Text::Beat(self.control.lock().man.beat(self.clock.now(), wall()))
     }
 
     /// The session that sees; `None`: the share is lost.
     pub fn set_view(&self, view: Option<Program>) {
-        *self.view.lock().unwrap_or_else(PoisonError::into_inner) = view;
+        *self.view.lock() = view;
     }
 
     /// Stops the motors of the page when it gives no sign of life. Runs until it is dropped.
@@ -110,7 +111,7 @@ impl Page {
         loop {
             let now = self.clock.now();
             let due = {
-                let mut control = self.control();
+                let mut control = self.control.lock();
                 if let Some(lapse) = control.man.poll(now) {
                     self.lapse(&mut control, lapse);
                 }
@@ -130,7 +131,7 @@ impl Page {
 
     /// The motors that this page turned stop.
     pub fn end(&self, lapse: Lapse) {
-        let mut control = self.control();
+        let mut control = self.control.lock();
         if let Some(lapse) = control.man.end(lapse) {
             self.lapse(&mut control, lapse);
         }
@@ -156,7 +157,7 @@ impl Page {
         match read(text) {
             Ok(FromPage::Alive(sign)) => {
                 let now = self.clock.now();
-                let mut control = self.control();
+                let mut control = self.control.lock();
                 if let Some(lapse) = control.man.hear(&sign, now) {
                     self.lapse(&mut control, lapse);
                 }
@@ -196,7 +197,7 @@ impl Page {
             | Ask::Rates { .. }
             | Ask::Ports
             | Ask::Frames { .. } => {}
-            Ask::Stop { motor } => self.control().man.stop(motor.as_ref()),
+            Ask::Stop { motor } => self.control.lock().man.stop(motor.as_ref()),
             Ask::Latch => {
                 self.check_operator()?;
                 self.link.latching();
@@ -229,7 +230,7 @@ impl Page {
                 self.answer(id, Ok(Answer::LetGo)).await;
             }
             Ask::StopAll => {
-                self.control().man.stop(None);
+                self.control.lock().man.stop(None);
                 self.link.latching();
                 let view = self.view();
                 tasks.spawn(async move {
@@ -264,7 +265,7 @@ impl Page {
                     Ok(ready) => ready,
                     Err(refusal) => return self.refuse(id, refusal).await,
                 };
-                let ticket = self.control().man.ticket(ask.motor().cloned());
+                let ticket = self.control.lock().man.ticket(ask.motor().cloned());
                 let line = ask.line().map(str::to_owned);
                 tasks.spawn(async move {
                     let motion = CommandPermit { page: Arc::clone(&page), ticket };
@@ -294,7 +295,7 @@ impl Page {
             && event.event == EventKind::Stopping
             && event.by.as_ref() != Some(&self.name)
         {
-            let mut control = self.control();
+            let mut control = self.control.lock();
             if counts(&control, &event) {
                 let motor = event.line.zip(event.motor);
                 let motor = motor.map(|(line, motor)| MotorName { line, motor });
@@ -369,17 +370,13 @@ impl Page {
     }
 
     fn view(&self) -> Result<Program, Refusal> {
-        let view = self.view.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let view = self.view.lock().clone();
         view.ok_or_else(|| lost("the server connects again"))
-    }
-
-    fn control(&self) -> MutexGuard<'_, Control> {
-        self.control.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The session that turns motors, if there is one. Motion depends on the page from now on.
     fn permit(&self, ticket: &Ticket, hold: bool) -> Result<Option<Program>, Refusal> {
-        let mut control = self.control();
+        let mut control = self.control.lock();
         control.man.permit(ticket, hold, self.clock.now())?;
         self.changed.notify_one();
         Ok(control.drive.clone())
@@ -397,7 +394,7 @@ impl Page {
         // The page may have lapsed meanwhile.
         self.permit(ticket, hold)?;
         {
-            let mut control = self.control();
+            let mut control = self.control.lock();
             (control.drive, control.opened) = (Some(drive.clone()), wall());
         }
         tokio::spawn(follow(Arc::clone(self), drive.clone(), listener));
@@ -410,7 +407,7 @@ async fn follow(page: Arc<Page>, drive: Program, mut listener: Listener) {
     while let Ok(frame) = listener.next().await {
         page.notice_stop(&frame, |_, _| true);
     }
-    let mut control = page.control();
+    let mut control = page.control.lock();
     if control.drive.as_ref().is_some_and(|current| current.is(&drive))
         && let Some(lapse) = control.man.end(Lapse::Share)
     {

@@ -6,13 +6,14 @@ use std::fmt;
 use std::io::{self, Read, Write};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
+use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink_proto::time::Micros;
+use parking_lot::Mutex;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
@@ -134,7 +135,7 @@ impl Remote {
                 Vec::new()
             }
             Execution::Here(engine) => {
-                let engine = lock(engine).take();
+                let engine = engine.lock().take();
                 engine.map_or_else(Vec::new, Engine::stop)
             }
         }
@@ -145,7 +146,7 @@ impl Remote {
     pub fn advance(&self) -> Option<Duration> {
         match &self.place {
             Execution::Thread { .. } => None,
-            Execution::Here(engine) => lock(engine).as_mut().and_then(Engine::advance),
+            Execution::Here(engine) => engine.lock().as_mut().and_then(Engine::advance),
         }
     }
 
@@ -335,7 +336,7 @@ impl Remote {
     fn send(&self, task: impl FnOnce(&mut Engine) + Send + 'static) -> Result<(), Ended> {
         let (tasks, wake) = match &self.place {
             Execution::Thread { tasks, wake } => (tasks, wake),
-            Execution::Here(engine) => return lock(engine).as_mut().map(task).ok_or(Ended),
+            Execution::Here(engine) => return engine.lock().as_mut().map(task).ok_or(Ended),
         };
         tasks.send(Box::new(task)).map_err(|_| Ended)?;
         match (&**wake).write(&[0]) {
@@ -345,10 +346,6 @@ impl Remote {
             Err(_) => Err(Ended),
         }
     }
-}
-
-fn lock(engine: &Mutex<Option<Engine>>) -> MutexGuard<'_, Option<Engine>> {
-    engine.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn tell(waiting: &mut HashMap<CommandId, Ending>, id: CommandId, result: CommandResult) {

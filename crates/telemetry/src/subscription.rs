@@ -1,11 +1,12 @@
 //! What a consumer wants, and the bounded queue from which it takes what came.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use litemap::LiteMap as Map;
 use motorlink_proto::time::Instant;
+use parking_lot::{Condvar, Mutex};
 
 use crate::event::Event;
 use crate::plan::Wants;
@@ -66,39 +67,36 @@ impl Subscription {
 
     /// The next record, if one waits.
     pub fn take(&self) -> Option<Record> {
-        self.lock().records.pop_front()
+        self.0.queue.lock().records.pop_front()
     }
 
     /// The next record, which is waited for; `None` after this time, or when no more can come.
     pub fn wait(&self, timeout: Duration) -> Option<Record> {
         let is_empty = |queue: &mut Queue| queue.records.is_empty() && !queue.is_closed;
-        let waited = self.0.came.wait_timeout_while(self.lock(), timeout, is_empty);
-        waited.unwrap_or_else(PoisonError::into_inner).0.records.pop_front()
+        let mut queue = self.0.queue.lock();
+        self.0.came.wait_while_for(&mut queue, is_empty, timeout);
+        queue.records.pop_front()
     }
 
     /// The records that were lost in all, because the consumer was too slow.
     pub fn lost(&self) -> u64 {
-        self.lock().lost_in_all
+        self.0.queue.lock().lost_in_all
     }
 
     /// Whether no more records can come.
     pub fn is_closed(&self) -> bool {
-        self.lock().is_closed
+        self.0.queue.lock().is_closed
     }
 
     /// Ends the subscription: no more records come.
     pub fn close(&self) {
-        self.lock().is_closed = true;
+        self.0.queue.lock().is_closed = true;
         self.0.came.notify_all();
     }
 
     pub(crate) fn push(&self, record: Record) {
-        self.lock().push(record);
+        self.0.queue.lock().push(record);
         self.0.came.notify_all();
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        self.0.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

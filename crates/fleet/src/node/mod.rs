@@ -11,11 +11,12 @@ mod session_router;
 mod sessions;
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, OnceLock, RwLock};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use motorlink_telemetry::share::address::Local;
+use parking_lot::{Mutex, RwLock};
 use tokio::runtime::Runtime;
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;

@@ -1,11 +1,12 @@
 //! What the tasks of a node share, and how they answer queries.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
+use std::sync::{Arc, OnceLock};
 
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::client::Program;
 use motorlink_telemetry::share::message::{Group, Line};
+use parking_lot::{Mutex, RwLock};
 use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::key_expr::keyexpr;
@@ -53,7 +54,7 @@ pub(super) struct State {
 
 impl Common {
     pub(super) fn lines(&self) -> Arc<Lines> {
-        Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner).lines)
+        Arc::clone(&self.state.read().lines)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The other nodes of the network. Each node remembers those that went away without an end, so that a
 //! program that comes later knows whom it does not reach.
 
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use zenoh::Wait;
@@ -10,7 +10,6 @@ use zenoh::sample::{Sample, SampleKind};
 
 use super::node_state::Common;
 use crate::key::{self, Name};
-use crate::membership::Membership;
 
 /// How long the network may take to take the last words.
 const LAST: Duration = Duration::from_secs(1);
@@ -20,7 +19,7 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
     let (zenoh, follower) = (&common.zenoh, Arc::clone(common));
     let ended = move |sample: Sample| {
         if let Some(run) = key::run_of(sample.key_expr().as_str()) {
-            follower.members().ended(run);
+            follower.members.lock().ended(run);
         }
     };
     let any = key::ended(&Name::any(), &Name::any());
@@ -30,8 +29,8 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
         let run = key::run_of(sample.key_expr().as_str());
         let Some(run) = run.filter(|(_, boot)| *boot != follower.boot) else { return };
         match sample.kind() {
-            SampleKind::Put => follower.members().came(run),
-            SampleKind::Delete => follower.members().went(run, follower.clock.now()),
+            SampleKind::Put => follower.members.lock().came(run),
+            SampleKind::Delete => follower.members.lock().went(run, follower.clock.now()),
         }
     };
     let alive = zenoh.liveliness().declare_subscriber(key::all_alive());
@@ -50,11 +49,5 @@ pub(super) fn say_end(common: &Common) {
         // The answer comes behind it.
         let own = common.zenoh.liveliness().get(key::alive_of(&common.name)).timeout(LAST).wait();
         let _ = own.map(|answers| answers.recv());
-    }
-}
-
-impl Common {
-    pub(super) fn members(&self) -> MutexGuard<'_, Membership> {
-        self.members.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

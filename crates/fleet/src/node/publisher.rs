@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::{Arc, PoisonError, RwLockWriteGuard};
+use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_telemetry::overview::Overview;
@@ -24,7 +24,7 @@ use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
-use super::node_state::{Common, State, covers, reply};
+use super::node_state::{Common, covers, reply};
 use crate::key;
 use crate::message::Info;
 use crate::request_permission::Lines;
@@ -51,7 +51,7 @@ pub(super) async fn start(common: &Arc<Common>, period: Duration) -> io::Result<
         .map_err(|_| io::Error::from(io::ErrorKind::TimedOut))??;
     // Before anybody can ask.
     let names = common.known_lines().into_iter().map(|line| line.line);
-    common.state_mut().searching.extend(names);
+    common.state.write().searching.extend(names);
     let columns = Arc::clone(common);
     let handle = Handle::current();
     let asked = move |query: Query| {
@@ -85,7 +85,7 @@ impl Common {
                         self.columns_of(group);
                     }
                     // It may be the event that a port is back.
-                    Ok(Text::Missed { .. }) => self.state_mut().lost.clear(),
+                    Ok(Text::Missed { .. }) => self.state.write().lost.clear(),
                     _ => {}
                 },
                 FrameKind::Data => {
@@ -107,7 +107,7 @@ impl Common {
     async fn learn(&self, program: &Program) -> io::Result<()> {
         match program.ask(Ask::Lines).await {
             Ok(Answer::Lines { lines, latched_by }) => {
-                let mut state = self.state_mut();
+                let mut state = self.state.write();
                 let known = Lines::of(&lines);
                 if *state.lines != known {
                     state.lines = Arc::new(known);
@@ -155,7 +155,7 @@ impl Common {
         let Some(speaks) = DriveProtocol::of(line) else { return };
         let motors: Vec<_> = (1..=u8::MAX).map_while(|number| speaks.motor(number)).collect();
         let (program, name) = (program.clone(), line.line.clone());
-        self.state_mut().searching.insert(name.clone());
+        self.state.write().searching.insert(name.clone());
         tokio::spawn(async move {
             loop {
                 let Ok(heard) = self.heard(&program, &name).await else { return };
@@ -164,7 +164,7 @@ impl Common {
                     // Those that are there answer.
                     let _ = Exchanges::new(&program, &target).within(SEARCH).touch().await;
                 }
-                self.state_mut().searching.remove(&name);
+                self.state.write().searching.remove(&name);
                 match self.heard(&program, &name).await {
                     // The first question is that for motor 1.
                     Ok(now) if heard.is_empty() && !now.contains(&1) => sleep(SEARCH_AGAIN).await,
@@ -181,17 +181,13 @@ impl Common {
         Ok(of.into_iter().flat_map(|line| line.heard).collect())
     }
 
-    fn state_mut(&self) -> RwLockWriteGuard<'_, State> {
-        self.state.write().unwrap_or_else(PoisonError::into_inner)
-    }
-
     pub(super) fn known_lines(&self) -> Vec<Line> {
-        self.state.read().unwrap_or_else(PoisonError::into_inner).known.clone()
+        self.state.read().known.clone()
     }
 
     /// What the node says of itself.
     pub(super) fn info(&self) -> Info {
-        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        let state = self.state.read();
         Info {
             node: self.name.to_string(),
             protocol: crate::VERSION,
@@ -202,13 +198,13 @@ impl Common {
             lines: state.known.clone(),
             searching: state.searching.iter().cloned().collect(),
             latched_by: state.latched_by.clone(),
-            away: self.members().away(),
+            away: self.members.lock().away(),
         }
     }
 
     /// Learns the state of the share as it is now. Without an answer the last one is kept.
     pub(super) async fn refresh(&self) {
-        let age = self.clock.now() - self.state.read().unwrap_or_else(PoisonError::into_inner).t;
+        let age = self.clock.now() - self.state.read().t;
         if age > FRESH
             && let Some(own) = self.own.get()
         {
@@ -226,25 +222,25 @@ impl Common {
     fn follow_port(&self, event: &Event) {
         let Event { line: Some(line), event, message, .. } = event else { return };
         match event {
-            EventKind::Lost => self.state_mut().lost.insert(line.clone(), message.clone()),
-            EventKind::Back | EventKind::Closed => self.state_mut().lost.remove(line),
+            EventKind::Lost => self.state.write().lost.insert(line.clone(), message.clone()),
+            EventKind::Back | EventKind::Closed => self.state.write().lost.remove(line),
             _ => None,
         };
     }
 
     /// What the share says of a line whose port is lost.
     pub(super) fn lost(&self, line: &str) -> Option<String> {
-        self.state.read().unwrap_or_else(PoisonError::into_inner).lost.get(line).cloned()
+        self.state.read().lost.get(line).cloned()
     }
 
     fn columns_of(&self, group: Group) {
-        let mut state = self.state_mut();
+        let mut state = self.state.write();
         let key = key::of_motor(&self.name, &group.line, group.motor, key::COLUMNS);
         state.columns.insert(key, group);
     }
 
     fn say_columns(&self, query: &Query) {
-        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        let state = self.state.read();
         let meant = state.columns.iter().filter(|(key, _)| covers(query.key_expr(), key));
         let meant: Vec<_> = meant.map(|(key, group)| (key.clone(), group.clone())).collect();
         drop(state);

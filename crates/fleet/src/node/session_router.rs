@@ -1,7 +1,7 @@
 //! Queries of programs, and the sessions that they belong to.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use motorlink_telemetry::share::client::{Program, UNAWAITED};
 use motorlink_telemetry::share::message::{Ask as ShareAsk, Request};
@@ -17,7 +17,7 @@ use super::node_state::{Common, answer};
 use super::request_order::RequestOrder;
 use super::send_buffer::SendBuffer;
 use super::session::Session;
-use super::sessions::{Asked, Asking, Open, Sessions};
+use super::sessions::{Asked, Asking, Open};
 use crate::VERSION;
 use crate::key::{self, Asker, Name, Scope};
 use crate::message::{
@@ -64,10 +64,6 @@ pub(super) fn open(common: &Arc<Common>, runtime: &Runtime) -> zenoh::Result<Liv
 }
 
 impl Common {
-    fn sessions(&self) -> MutexGuard<'_, Sessions> {
-        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn asked(self: &Arc<Self>, query: Query, handle: &Handle) {
         let t = self.clock.now();
         let refuse = |why: String| answer(&query, t, AnswerKind::Refused { why });
@@ -83,7 +79,7 @@ impl Common {
             Err(error) => return refuse(format!("the request cannot be read: {error}")),
         };
         let Asker { scope, who, session } = asker;
-        let mut sessions = self.sessions();
+        let mut sessions = self.sessions.lock();
         sessions.heard(&session, t);
         if matches!(ask, Ask::Join { .. }) && sessions.open.len() >= session_limit(scope) {
             sessions.forget_silent(t);
@@ -130,7 +126,7 @@ impl Common {
 
     /// A program or its network has gone. What it sees is kept for a moment; its motors stop now.
     fn gone(self: &Arc<Self>, who: &Name, session: &Name, handle: &Handle) {
-        let sessions = self.sessions();
+        let sessions = self.sessions.lock();
         let open = sessions.open.get(session).filter(|open| open.who == *who);
         let asked = open.map(|open| open.asked.clone());
         drop(sessions);
@@ -172,7 +168,7 @@ impl Common {
                 served.serve(asked).await
             }
         };
-        let mut sessions = self.sessions();
+        let mut sessions = self.sessions.lock();
         sessions.open.remove(&session);
         if sessions.over.len() >= REASONS {
             sessions.over.pop_front();

@@ -10,10 +10,11 @@ mod tunnel;
 use std::collections::BTreeMap;
 use std::io;
 use std::os::unix::net::UnixStream;
-use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
+use std::sync::{Arc, LazyLock, Weak};
 use std::time::{Duration, Instant};
 
 use motorlink_telemetry::share::address::{Address, Unreachable};
+use parking_lot::Mutex;
 use tokio::runtime::Runtime;
 use zenoh::Session as Zenoh;
 
@@ -185,7 +186,7 @@ pub(crate) fn runtime() -> Result<&'static Runtime, Unreachable> {
 /// One session for each network of this process.
 pub(crate) fn zenoh_of(network: &Network) -> Result<Arc<Zenoh>, NetworkError> {
     static OPEN: Mutex<BTreeMap<Network, Weak<Zenoh>>> = Mutex::new(BTreeMap::new());
-    let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut open = OPEN.lock();
     if let Some(zenoh) = open.get(network).and_then(Weak::upgrade).filter(|it| !it.is_closed()) {
         return Ok(zenoh);
     }

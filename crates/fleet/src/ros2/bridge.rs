@@ -1,7 +1,7 @@
 //! The tasks of a node for ROS 2, and what they share.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_recording::schema::{Message, Time};
@@ -14,6 +14,7 @@ use motorlink_telemetry::share::message::{
 };
 use motorlink_telemetry::share::motor_exchange::Target;
 use motorlink_telemetry::signal::Signal;
+use parking_lot::Mutex;
 use tokio::runtime::Handle;
 use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
@@ -88,7 +89,7 @@ impl Shared {
 
     /// Does something with the machine, and what follows from it. Gives what that gives.
     pub fn with<T>(self: &Arc<Self>, act: impl FnOnce(&mut Machine, f64) -> T) -> T {
-        let mut machine = self.machine.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut machine = self.machine.lock();
         let result = act(&mut machine, self.clock.now());
         while let Some(output) = machine.commands.next() {
             match output {
@@ -123,7 +124,7 @@ impl Shared {
     /// Stops the motors for which no command comes.
     pub async fn stop_in_time(self: Arc<Self>) {
         loop {
-            let wake = self.machine.lock().unwrap_or_else(PoisonError::into_inner).commands.wake();
+            let wake = self.machine.lock().commands.wake();
             let left = wake.map_or(IDLE.as_secs_f64(), |at| at - self.clock.now());
             match Duration::try_from_secs_f64(left) {
                 Ok(left) if !left.is_zero() => tokio::select! {

@@ -3,11 +3,12 @@
 mod snapshot;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_telemetry::share::data::Data;
 use motorlink_telemetry::share::message::Group;
+use parking_lot::Mutex;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session as Zenoh, Wait};
@@ -71,10 +72,10 @@ impl View {
         let now = Boot.now();
         let mut silent = Vec::new();
         let nodes = directory::nodes(network)?.nodes;
-        nodes.keys().for_each(|run| shared.picture().came(run.clone()));
+        nodes.keys().for_each(|run| shared.picture.lock().came(run.clone()));
         for (run, info) in nodes {
             match info {
-                Some(info) => shared.picture().state(run.0, info, now),
+                Some(info) => shared.picture.lock().state(run.0, info, now),
                 None => silent.push(run),
             }
         }
@@ -84,12 +85,12 @@ impl View {
 
     /// The nodes that have said something.
     pub fn nodes(&self) -> BTreeMap<Name, Node> {
-        self.shared.picture().nodes()
+        self.shared.picture.lock().nodes()
     }
 
     /// The nodes that are there, and have said nothing yet.
     pub fn silent(&self) -> Vec<&Name> {
-        let picture = self.shared.picture();
+        let picture = self.shared.picture.lock();
         let is_silent = |run: &&Run| picture.runs().all(|it| it != *run);
         self.silent.iter().filter(is_silent).map(|(node, _)| node).collect()
     }
@@ -97,18 +98,18 @@ impl View {
     /// The nodes that went away without an end and that were not seen here, and for how long, in seconds.
     pub fn away(&self) -> BTreeMap<Run, f64> {
         let nodes = self.nodes();
-        let runs: BTreeSet<Run> = self.shared.picture().runs().cloned().collect();
+        let runs: BTreeSet<Run> = self.shared.picture.lock().runs().cloned().collect();
         directory::away(nodes.values().map(|node| &node.info), |run| runs.contains(run))
     }
 
     /// A name that several nodes have. The values of their motors are not known.
     pub fn twins(&self) -> Option<Name> {
-        self.shared.picture().twins()
+        self.shared.picture.lock().twins()
     }
 
     /// The motors that have answered.
     pub fn drives(&self) -> Vec<Drive> {
-        self.shared.picture().drives()
+        self.shared.picture.lock().drives()
     }
 
     /// The clock of [`Drive::at`] and [`Node::at`].
@@ -118,14 +119,10 @@ impl View {
 }
 
 impl Shared {
-    fn picture(&self) -> MutexGuard<'_, Snapshot> {
-        self.picture.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn state(self: &Arc<Self>, sample: &Sample) {
         let info = serde_json::from_slice(&sample.payload().to_bytes()).ok();
         if let (Some(node), Some(info)) = (key::node_of(sample.key_expr().as_str()), info) {
-            self.picture().state(node, info, Boot.now());
+            self.picture.lock().state(node, info, Boot.now());
         }
     }
 
@@ -133,29 +130,29 @@ impl Shared {
     fn saw(&self, sample: &Sample) {
         let Some(run) = key::run_of(sample.key_expr().as_str()) else { return };
         match sample.kind() {
-            SampleKind::Put => self.picture().came(run),
-            SampleKind::Delete => self.picture().went(&run),
+            SampleKind::Put => self.picture.lock().came(run),
+            SampleKind::Delete => self.picture.lock().went(&run),
         }
     }
 
     fn columns(self: &Arc<Self>, sample: &Sample) {
         let group: Option<Group> = serde_json::from_slice(&sample.payload().to_bytes()).ok();
         if let (Some(node), Some(group)) = (key::node_of(sample.key_expr().as_str()), group) {
-            self.picture().columns(node, group);
+            self.picture.lock().columns(node, group);
         }
     }
 
     fn samples(self: &Arc<Self>, sample: &Sample) {
         let Some((node, line, motor)) = key::motor_of(sample.key_expr().as_str()) else { return };
         let Ok(data) = Data::decode(&sample.payload().to_bytes()) else { return };
-        if !self.picture().samples(node, line, motor, &data, Boot.now()) {
+        if !self.picture.lock().samples(node, line, motor, &data, Boot.now()) {
             self.ask_columns();
         }
     }
 
     /// Asks all nodes for the columns of their samples, unless that was done just before.
     fn ask_columns(self: &Arc<Self>) {
-        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut asked = self.asked.lock();
         let now = Boot.now();
         if now < *asked + AGAIN {
             return;

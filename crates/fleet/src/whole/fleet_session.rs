@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::os::unix::net::UnixStream as StdStream;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Unreachable;
 use motorlink_telemetry::share::frame::{self, Frame, Reader};
 use motorlink_telemetry::share::message::{Line, Request, decode, encode};
+use parking_lot::Mutex;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
@@ -273,7 +274,7 @@ impl FleetSession {
         if away.is_empty() {
             return;
         }
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.known.lock();
         for run in away.into_keys().filter(|(node, _)| (self.is_meant)(node)) {
             let lines = Vec::new();
             known.entry(self.name_of(&run)).or_insert(Absent { run, lines });
@@ -284,7 +285,7 @@ impl FleetSession {
 
     /// Nodes that were there before keep their lines.
     fn remember(&mut self) {
-        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let known = self.known.lock().clone();
         for (name, Absent { run: (node, boot), lines }) in known {
             if !self.links.contains_key(&name) {
                 let next = Some(Instant::now() + AGAIN);
@@ -347,7 +348,7 @@ impl FleetSession {
         let lines = self.aggregate.lines_of(&node).filter(|lines| !lines.is_empty());
         let run = self.links.get(&node).and_then(|it| Some((it.node.clone(), it.boot.clone()?)));
         if let Some((lines, run)) = lines.zip(run) {
-            let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut known = self.known.lock();
             known.insert(node, Absent { run, lines: lines.to_vec() });
         }
     }

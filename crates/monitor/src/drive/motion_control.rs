@@ -1,12 +1,13 @@
 //! Who may move a motor, and how far.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use motorlink_telemetry::line::Request;
 use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::{MotorName, Reason};
 use motorlink_telemetry::share::motor_exchange::{ATTEMPTS, Exchanges, Target};
+use parking_lot::Mutex;
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 
@@ -98,7 +99,7 @@ impl Control {
 
     /// The motors that pages have commanded or limited.
     pub(super) fn motors(&self) -> Vec<MotorName> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect()
+        self.0.lock().keys().cloned().collect()
     }
 
     /// Waits until no other page commands the motor.
@@ -109,12 +110,12 @@ impl Control {
 
     /// Ramps that drives acknowledged so far may be lost.
     pub(super) fn forget(&self) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.0.lock();
         all.values_mut().for_each(|known| known.limited.forget());
     }
 
     fn known<T>(&self, target: &Target, with: impl FnOnce(&mut Known) -> T) -> T {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.0.lock();
         with(all.entry(target.name.clone()).or_default())
     }
 }

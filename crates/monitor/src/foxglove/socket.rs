@@ -45,15 +45,15 @@ async fn read(
         match message {
             Some(Ok(Message::Text(text))) => {
                 let channels = viewers.channels();
-                viewer.session().receive(&text, channels);
+                viewer.session.lock().receive(&text, channels);
             }
-            Some(Ok(Message::Binary(_))) => viewer.session().receive_binary(),
+            Some(Ok(Message::Binary(_))) => viewer.session.lock().receive_binary(),
             Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
             Some(Ok(Message::Close(_))) | None => return Ok(()),
             Some(Err(error)) => return Err(error.to_string()),
         }
         viewer.news.notify_one();
-        if viewer.session().is_flooded() {
+        if viewer.session.lock().is_flooded() {
             return Err("this viewer does not read what it is told".to_owned());
         }
     }
@@ -62,7 +62,7 @@ async fn read(
 /// Sends to a viewer, until it has gone or does not read.
 async fn write(viewer: &Viewer, sink: &mut Sink) {
     loop {
-        let out = viewer.session().take(Instant::now());
+        let out = viewer.session.lock().take(Instant::now());
         let is_idle = out.is_none();
         let sent = async {
             match out {

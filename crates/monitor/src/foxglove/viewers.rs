@@ -1,11 +1,12 @@
 //! All viewers, and what they see: the messages of a recording of the share, made while a viewer is there.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 
 use motorlink_proto::time::Micros;
 use motorlink_recording::record::live::{Config, Item, Live};
 use motorlink_recording::write::{Entry, Topic};
+use parking_lot::Mutex;
 use tokio::sync::{Notify, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::sleep;
@@ -46,19 +47,15 @@ struct Present {
 /// A viewer that is connected.
 #[derive(Default)]
 pub struct Viewer {
-    session: Mutex<Session>,
+    /// What waits for it.
+    pub(super) session: Mutex<Session>,
     /// There is something to send.
     pub(super) news: Notify,
 }
 
 impl Viewer {
-    /// What waits for it.
-    pub(super) fn session(&self) -> MutexGuard<'_, Session> {
-        self.session.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn tell(&self, text: String) {
-        self.session().tell(text);
+        self.session.lock().tell(text);
         self.news.notify_one();
     }
 }
@@ -73,7 +70,7 @@ pub struct Joined {
 
 impl Drop for Joined {
     fn drop(&mut self) {
-        let mut present = self.viewers.present();
+        let mut present = self.viewers.present.lock();
         present.viewers.remove(&self.number);
         if present.viewers.is_empty()
             && let Some(feed) = present.feed.take()
@@ -94,7 +91,7 @@ impl Viewers {
     /// A viewer comes. It gets the list of channels.
     pub(super) fn join(self: &Arc<Self>) -> Joined {
         let viewer = Arc::new(Viewer::default());
-        let mut present = self.present();
+        let mut present = self.present.lock();
         viewer.tell(encode(&Text::ServerInfo {
             name: &self.program,
             capabilities: [],
@@ -117,23 +114,19 @@ impl Viewers {
 
     /// How many channels there are.
     pub(super) fn channels(&self) -> usize {
-        self.present().channels.len()
-    }
-
-    fn present(&self) -> MutexGuard<'_, Present> {
-        self.present.lock().unwrap_or_else(PoisonError::into_inner)
+        self.present.lock().channels.len()
     }
 
     /// Passes on what a feed gives. `numbers` has the channels of its topics.
     fn take(&self, item: Item, numbers: &mut Vec<u32>) {
-        let mut present = self.present();
+        let mut present = self.present.lock();
         match item {
             Item::Entry(Entry::Topic(topic)) => numbers.push(present.channel(topic)),
             Item::Entry(Entry::Message { topic, time, data }) => {
                 let Some(channel) = numbers.get(topic) else { return };
                 let data = data.into();
                 for viewer in present.viewers.values() {
-                    viewer.session().offer(*channel, time, &data);
+                    viewer.session.lock().offer(*channel, time, &data);
                     viewer.news.notify_one();
                 }
             }
@@ -178,7 +171,7 @@ async fn feed(link: Arc<ShareLink>, viewers: Weak<Viewers>) {
         link.other_lines(&drives).await;
         drop(live);
         if let Some(viewers) = viewers.upgrade() {
-            viewers.present().troubles.clear();
+            viewers.present.lock().troubles.clear();
         }
     }
 }
@@ -197,7 +190,7 @@ fn follow(link: &ShareLink, viewers: &Weak<Viewers>, drives: &Drives) -> Option<
         Err(error) => {
             if let Some(viewers) = viewers.upgrade() {
                 let why = format!("the system gives no thread: {error}");
-                viewers.present().trouble(String::new(), why);
+                viewers.present.lock().trouble(String::new(), why);
             }
             None
         }

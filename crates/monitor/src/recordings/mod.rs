@@ -12,13 +12,14 @@ use std::fs::File;
 use std::io;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Micros;
 use motorlink_telemetry::share::address::Address;
 use motorlink_telemetry::share::client::{Program, Refusal};
 use motorlink_telemetry::share::message::{self as share, Reason};
+use parking_lot::Mutex;
 use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio::task::spawn_blocking;
 
@@ -108,7 +109,7 @@ impl Recordings {
     ) -> Result<String, Refusal> {
         let (begun, begins) = oneshot::channel();
         {
-            let mut making = self.making();
+            let mut making = self.making.lock();
             let told = self.told.borrow().clone();
             if let Some(told) = told.filter(Recorded::is_active) {
                 let message = format!("{} records already, for {}", told.name, told.by);
@@ -129,7 +130,7 @@ impl Recordings {
         if !told.borrow().as_ref().is_some_and(Recorded::is_active) {
             return Err(nothing());
         }
-        self.making().as_ref().ok_or_else(nothing)?.end();
+        self.making.lock().as_ref().ok_or_else(nothing)?.end();
         let is_over = |told: &Option<Recorded>| !told.as_ref().is_some_and(Recorded::is_active);
         let ended = told.wait_for(is_over).await.map_err(|_| nothing())?;
         ended.clone().ok_or_else(nothing)
@@ -137,7 +138,7 @@ impl Recordings {
 
     /// Ends the recording, and waits a while for that: the server ends.
     pub fn close(&self) {
-        let Some(making) = self.making().take() else { return };
+        let Some(making) = self.making.lock().take() else { return };
         making.end();
         let began = Instant::now();
         // A disk that does not answer must not keep the server.
@@ -206,9 +207,5 @@ impl Recordings {
         let mut folder = Arc::clone(&self.folder).lock_owned().await;
         let read = spawn_blocking(move || read(&mut folder)).await;
         read.map_err(|_| Refusal::usage("the recording cannot be read: the server has a fault"))
-    }
-
-    fn making(&self) -> MutexGuard<'_, Option<Making>> {
-        self.making.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

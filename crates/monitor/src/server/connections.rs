@@ -6,13 +6,14 @@
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use parking_lot::Mutex;
 use rustix::net::listen;
 use rustix::net::sockopt::set_socket_send_buffer_size;
 use socket2::SockRef;
@@ -54,21 +55,17 @@ impl Deadline {
 
     /// The connection goes on: its time begins again.
     pub fn extend(&self) {
-        *self.time() = Instant::now() + EXCHANGE;
+        *self.0.lock() = Instant::now() + EXCHANGE;
     }
 
     async fn pass(&self) {
         loop {
-            let time = *self.time();
+            let time = *self.0.lock();
             if time <= Instant::now() {
                 return;
             }
             sleep_until(time).await;
         }
-    }
-
-    fn time(&self) -> MutexGuard<'_, Instant> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -77,12 +74,6 @@ struct Places {
     /// Those that arrive, by their order: where they come from, and what ends them.
     arriving: Mutex<BTreeMap<u64, (IpAddr, AbortHandle)>>,
     requests: Arc<Semaphore>,
-}
-
-impl Places {
-    fn arriving(&self) -> MutexGuard<'_, BTreeMap<u64, (IpAddr, AbortHandle)>> {
-        self.arriving.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// The oldest connection of the address that has the most.
@@ -106,20 +97,20 @@ impl Arrival {
     /// Its request may come in: it gives way to no other. Gives whether there is a place for it. A request
     /// that stops motors needs none.
     pub fn come_in(&self, stops: bool) -> bool {
-        self.places.arriving().remove(&self.number);
+        self.places.arriving.lock().remove(&self.number);
         if stops {
             return true;
         }
         let place = Arc::clone(&self.places.requests).try_acquire_owned().ok();
         let has_place = place.is_some();
-        *self.place.lock().unwrap_or_else(PoisonError::into_inner) = place;
+        *self.place.lock() = place;
         has_place
     }
 }
 
 impl Drop for Arrival {
     fn drop(&mut self) {
-        self.places.arriving().remove(&self.number);
+        self.places.arriving.lock().remove(&self.number);
     }
 }
 
@@ -137,7 +128,7 @@ pub async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, router: Rout
         };
         // A request that is there already comes in before the next connection can take its place.
         yield_now().await;
-        let mut arriving = places.arriving();
+        let mut arriving = places.arriving.lock();
         if arriving.len() >= ARRIVALS
             && let Some((_, oldest)) = oldest_of_most(&arriving).and_then(|it| arriving.remove(&it))
         {

@@ -206,7 +206,7 @@ async fn let_go(
     Query(Leaving { run, page }): Query<Leaving>,
 ) -> StatusCode {
     if role == Role::Operator && run == state.run {
-        let page = state.pages().get(&page).cloned();
+        let page = state.pages.lock().get(&page).cloned();
         if let Some(page) = page {
             page.end(Lapse::LetGo);
         }

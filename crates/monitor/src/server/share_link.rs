@@ -1,8 +1,8 @@
 //! The connection of the server itself to the share: it stops all motors when no page can.
 
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use motorlink_telemetry::share::address::Address;
@@ -11,6 +11,7 @@ use motorlink_telemetry::share::frame::FrameKind;
 use motorlink_telemetry::share::message::{
     Answer, Ask, EventKind, Line, Reason, Request, StoppedMotor, Text, decode,
 };
+use parking_lot::Mutex;
 use tokio::sync::{Mutex as AsyncMutex, watch};
 use tokio::time::{Instant, sleep, timeout};
 
@@ -114,7 +115,7 @@ impl ShareLink {
     /// while the share was lost.
     async fn send_pending(&self) -> io::Result<()> {
         let _sending = self.sending.lock().await;
-        let wanted = *self.pending();
+        let wanted = *self.pending.lock();
         let stop = wanted.stop.filter(|asked| asked.elapsed() < self.stop_waits);
         if stop.is_none() && !wanted.latch {
             return Ok(());
@@ -124,14 +125,10 @@ impl ShareLink {
         program.pass(&Request::new(2, Ask::Stop { motor: None })).await?;
         // The share takes the requests of a program in their order: it has them when it answers.
         lines(&program, &mut listener).await?;
-        let mut pending = self.pending();
+        let mut pending = self.pending.lock();
         pending.stop.take_if(|latest| wanted.stop == Some(*latest));
         pending.latch = false;
         Ok(())
-    }
-
-    fn pending(&self) -> MutexGuard<'_, Pending> {
-        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Connects again and again.
@@ -160,7 +157,7 @@ impl ShareLink {
                         }
                     };
                     known = Some(drives);
-                    self.pending().latch |= self.is_latched.load(Ordering::SeqCst);
+                    self.pending.lock().latch |= self.is_latched.load(Ordering::SeqCst);
                     lost
                 }
                 Err(error) => error,
@@ -245,17 +242,17 @@ impl ShareLink {
     /// # Errors
     /// It is lost.
     pub async fn stop_all(&self) -> Result<Vec<StoppedMotor>, Refusal> {
-        self.stops.lock().unwrap_or_else(PoisonError::into_inner).count(None);
+        self.stops.lock().count(None);
         self.latching();
         let asked = Instant::now();
         // Before the look at the connection: one that is made at this moment sends it.
-        self.pending().stop = Some(asked);
+        self.pending.lock().stop = Some(asked);
         let program = self.get().await.map_err(until_back)?.program;
-        self.pending().stop.take_if(|latest| *latest == asked);
+        self.pending.lock().stop.take_if(|latest| *latest == asked);
         match stop_all(&program).await {
             Err(refusal) if refusal.reason == Reason::Line => {
                 // A frozen share may have had it for long.
-                self.pending().stop = Some(Instant::now());
+                self.pending.lock().stop = Some(Instant::now());
                 Err(until_back(lost("the connection has ended")))
             }
             stopped => stopped,

@@ -41,7 +41,7 @@ impl Drop for Present<'_> {
     fn drop(&mut self) {
         self.page.end(Lapse::LetGo);
         self.tasks.iter().for_each(AbortHandle::abort);
-        self.state.pages().remove(&self.name);
+        self.state.pages.lock().remove(&self.name);
     }
 }
 
@@ -63,7 +63,7 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
     let (link, recordings) = (Arc::clone(&state.link), Arc::clone(&state.recordings));
     let page =
         Arc::new(Page::new(name.clone(), may, Micros::from(*deadline), link, recordings, out));
-    state.pages().insert(name.clone(), Arc::clone(&page));
+    state.pages.lock().insert(name.clone(), Arc::clone(&page));
     let watched = Arc::clone(&page);
     let watch = tokio::spawn(async move { watched.watch().await }).abort_handle();
     let _present =

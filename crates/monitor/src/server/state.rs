@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use parking_lot::Mutex;
 use tokio::sync::Semaphore;
 
 use super::auth::{Auth, random_word};
@@ -38,7 +39,8 @@ pub struct State {
     pub run: String,
     /// Programs that show the same data.
     pub viewers: Arc<Viewers>,
-    pages: Mutex<BTreeMap<String, Arc<Page>>>,
+    /// Those that are connected, by name.
+    pub pages: Mutex<BTreeMap<String, Arc<Page>>>,
     last_page: AtomicU64,
     pub places: Semaphore,
 }
@@ -72,10 +74,5 @@ impl State {
     /// The number of the next page.
     pub fn next_page(&self) -> u64 {
         self.last_page.fetch_add(1, Ordering::Relaxed) + 1
-    }
-
-    /// The pages, by name.
-    pub fn pages(&self) -> MutexGuard<'_, BTreeMap<String, Arc<Page>>> {
-        self.pages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

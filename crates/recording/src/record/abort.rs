@@ -1,8 +1,9 @@
 //! The end of a recording that has not begun yet.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use motorlink_telemetry::runner::Remote;
+use parking_lot::Mutex;
 
 use crate::error::RecordError;
 
@@ -20,14 +21,14 @@ impl Abort {
     /// The start fails at once with [`RecordError::Aborted`], and leaves no file. Nothing happens if the
     /// recording has begun.
     pub fn abort(&self) {
-        let mut state = self.lock();
+        let mut state = self.0.lock();
         state.is_aborted = true;
         state.engines.drain(..).for_each(|engine| engine.end());
     }
 
     /// An engine that is waited for.
     pub(super) fn engine(&self, engine: &Remote) {
-        let mut state = self.lock();
+        let mut state = self.0.lock();
         match state.is_aborted {
             true => engine.end(),
             false => state.engines.push(engine.clone()),
@@ -35,16 +36,12 @@ impl Abort {
     }
 
     pub(super) fn check(&self) -> Result<(), RecordError> {
-        if self.lock().is_aborted { Err(RecordError::Aborted) } else { Ok(()) }
+        if self.0.lock().is_aborted { Err(RecordError::Aborted) } else { Ok(()) }
     }
 
     /// The recording has begun.
     pub(super) fn begun(&self) -> Result<(), RecordError> {
-        self.lock().engines.clear();
+        self.0.lock().engines.clear();
         self.check()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,12 +1,13 @@
 //! Frames on the wire: what a tap sees, and serial bytes split into frames.
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, Direction, EventBytes, EventCan, Tap};
 use motorlink_capture::st::{self, Piece};
 use motorlink_proto::st::HEADER_NACK;
+use parking_lot::Mutex;
 
 use super::wall::{Anchor, moment, wall_at, wall_now};
 use crate::schema::{Frame, FrameResult, Time};
@@ -129,26 +130,22 @@ impl Outlet {
 
     /// Puts taps in. They see what comes from now on.
     pub(super) fn plug(&self, taps: &Taps) -> Plug {
-        let mut plugged = self.plugged();
+        let mut plugged = self.0.lock();
         let number = plugged.last().map_or(0, |last| last.number + 1);
         plugged.push(Plugged { number, seen: taps.seen.clone() });
         Plug { outlet: self.clone(), number }
     }
 
     fn see(&self, seen: impl Fn() -> Seen) {
-        for one in &*self.plugged() {
+        for one in &*self.0.lock() {
             one.seen.push(seen());
         }
-    }
-
-    fn plugged(&self) -> MutexGuard<'_, Vec<Plugged>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Plug {
     fn drop(&mut self) {
-        self.outlet.plugged().retain(|one| one.number != self.number);
+        self.outlet.0.lock().retain(|one| one.number != self.number);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Records lines in threads: an engine each, one that makes messages, one that writes them.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -10,6 +10,7 @@ use motorlink_proto::time::{Instant as Moment, Micros};
 use motorlink_telemetry::acquisition::Rate;
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::signal::Motor;
+use parking_lot::Mutex;
 
 use super::abort::Abort;
 use super::choice::{self, Group};
@@ -175,7 +176,7 @@ impl Recorder {
             writer.queue().push(entry);
         }
         let shared = Arc::new(Shared::default());
-        shared.progress().written = writer.progress().written;
+        shared.progress.lock().written = writer.progress().written;
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new().name("motorlink-record".to_owned());
         let thread = thread.spawn(move || {
@@ -193,7 +194,7 @@ impl Recorder {
 
     /// How far it is.
     pub fn progress(&self) -> Progress {
-        self.shared.progress().clone()
+        self.shared.progress.lock().clone()
     }
 
     /// Ends the recording and the file. Motors are not affected.
@@ -219,12 +220,6 @@ impl Drop for Recorder {
     }
 }
 
-impl Shared {
-    fn progress(&self) -> MutexGuard<'_, Progress> {
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 fn run(
     mut recorded: Vec<Recorded>,
     writer: Writer,
@@ -233,7 +228,7 @@ fn run(
     let began = Instant::now();
     let mut asked = began;
     let mut losses = Losses::default();
-    while !shared.ends.load(Ordering::SeqCst) && !shared.progress().is_over {
+    while !shared.ends.load(Ordering::SeqCst) && !shared.progress.lock().is_over {
         std::thread::park_timeout(TURN);
         // The engine counts the values of the last second.
         if asked.elapsed() >= RATES {
@@ -244,7 +239,7 @@ fn run(
         tell(&recorded, &writer, &losses, began, shared);
     }
     await_confirmation(&mut recorded, &writer, &mut losses);
-    let gaps = take_means(&recorded, &mut shared.progress());
+    let gaps = take_means(&recorded, &mut shared.progress.lock());
     let mut counts = Counts::default();
     for it in recorded {
         let ended = it.end(&mut |entry| {
@@ -253,7 +248,7 @@ fn run(
         counts = counts.plus(ended);
     }
     counts.lost += writer.queue().lost();
-    shared.progress().counts = counts;
+    shared.progress.lock().counts = counts;
     if !gaps.is_empty() {
         writer.queue().push(Entry::Metadata(schema::gaps::NAME.to_owned(), gaps));
     }
@@ -283,7 +278,7 @@ fn turn(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
 
 fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant, shared: &Shared) {
     let of_writer = writer.progress();
-    let mut progress = shared.progress();
+    let mut progress = shared.progress.lock();
     progress.elapsed = began.elapsed();
     progress.written = of_writer.written;
     progress.is_over = of_writer.is_complete || of_writer.failed.is_some();
@@ -373,7 +368,7 @@ impl Recorded {
     fn take(&mut self, now: Time, put: &mut dyn FnMut(Entry)) {
         match self {
             Recorded::Engine { track, rates, .. } => {
-                if let Some(rates) = lock(rates).take() {
+                if let Some(rates) = rates.lock().take() {
                     track.take_rates(&rates);
                 }
                 track.take(now, put);
@@ -416,16 +411,12 @@ impl Recorded {
                 let rates = Arc::clone(rates);
                 // An engine that has ended has no rates.
                 let _ = runner.remote().post(move |engine| {
-                    *lock(&rates) = Some(engine.rates().collect());
+                    *rates.lock() = Some(engine.rates().collect());
                 });
             }
             Recorded::Share(followed) => followed.ask_rates(wall_now()),
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What is known of the recording.

@@ -1,10 +1,11 @@
 //! The time of the day, monotonic after one look at the clock.
 
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::LazyLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use motorlink::Clock;
 use motorlink_proto::time::Instant;
+use parking_lot::Mutex;
 
 use crate::schema::Time;
 
@@ -56,7 +57,7 @@ impl DayInUse {
     /// Reads the clock of the machine, if no other recording is in progress: somebody may have set it
     /// since the last one.
     pub fn new() -> Self {
-        let mut day = day();
+        let mut day = DAY.lock();
         if day.users == 0 {
             day.zero = None;
         }
@@ -73,7 +74,7 @@ impl Default for DayInUse {
 
 impl Drop for DayInUse {
     fn drop(&mut self) {
-        day().users -= 1;
+        DAY.lock().users -= 1;
     }
 }
 
@@ -90,16 +91,12 @@ pub(super) fn moment() -> Instant {
 
 /// The time of the day at a [`moment`].
 pub(super) fn wall_at(moment: Instant) -> Time {
-    let zero = *day().zero.get_or_insert_with(|| {
+    let zero = *DAY.lock().zero.get_or_insert_with(|| {
         let now = CLOCK.now();
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         u64::try_from(since.as_nanos()).unwrap_or(u64::MAX).saturating_sub(now.0 * 1000)
     });
     Time(zero.saturating_add(moment.0 * 1000))
-}
-
-fn day() -> MutexGuard<'static, Day> {
-    DAY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -15,12 +15,13 @@ mod script;
 mod station;
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, MotorId, MotorSet, TORQUE4_ID};
 use motorlink_proto::st::{Parse, Profile};
 use motorlink_proto::time::Instant;
+use parking_lot::Mutex;
 
 use crate::schema::{Direction, Frame, FrameResult};
 use script::{LINE, Script};
@@ -144,48 +145,44 @@ impl Tally {
     /// The number of different requests that are named in [`unknown`](Self::unknown).
     const MOST_NAMES: usize = 100;
 
-    fn counts(&self) -> MutexGuard<'_, Counts> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The number of requests that got the next recorded reply.
     pub fn recorded(&self) -> u64 {
-        self.counts().recorded
+        self.0.lock().recorded
     }
 
     /// The number of requests whose last recorded reply was repeated.
     pub fn repeated(&self) -> u64 {
-        self.counts().repeated
+        self.0.lock().repeated
     }
 
     /// The number of times that the program sent bytes that are no frame.
     pub fn damaged(&self) -> u64 {
-        self.counts().damaged
+        self.0.lock().damaged
     }
 
     /// The number of requests that were not recorded, each with its bytes in hexadecimal. The empty
     /// name stands for more different requests than can be kept.
     pub fn unknown(&self) -> Vec<(String, u64)> {
-        let counts = self.counts();
+        let counts = self.0.lock();
         let named = counts.unknown.iter().map(|(name, count)| (name.clone(), *count));
         let more = (counts.more_unknown > 0).then(|| (String::new(), counts.more_unknown));
         named.chain(more).collect()
     }
 
     fn add_recorded(&self) {
-        self.counts().recorded += 1;
+        self.0.lock().recorded += 1;
     }
 
     fn add_repeated(&self) {
-        self.counts().repeated += 1;
+        self.0.lock().repeated += 1;
     }
 
     fn add_damaged(&self) {
-        self.counts().damaged += 1;
+        self.0.lock().damaged += 1;
     }
 
     fn add_unknown(&self, request: String) {
-        let mut counts = self.counts();
+        let mut counts = self.0.lock();
         let has_room = counts.unknown.len() < Self::MOST_NAMES;
         match counts.unknown.get_mut(&request) {
             Some(count) => *count += 1,

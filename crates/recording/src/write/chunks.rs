@@ -1,11 +1,12 @@
 //! MCAP in memory: entries become chunks.
 
 use std::io::{self, Write};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use parking_lot::Mutex;
 
 use super::entry::{Attached, Entry, Topic};
 use crate::schema;
@@ -98,12 +99,12 @@ impl Mcap {
 
     /// How many bytes wait.
     pub(super) fn waiting(&self) -> usize {
-        self.waiting.lock().len()
+        self.waiting.0.lock().len()
     }
 
     /// The bytes that wait.
     pub(super) fn take(&mut self) -> Vec<u8> {
-        std::mem::take(&mut *self.waiting.lock())
+        std::mem::take(&mut *self.waiting.0.lock())
     }
 }
 
@@ -114,15 +115,9 @@ fn failed(error: McapError) -> io::Error {
     }
 }
 
-impl Waiting {
-    fn lock(&self) -> MutexGuard<'_, Vec<u8>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 impl Write for Waiting {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.lock().extend(bytes);
+        self.0.lock().extend(bytes);
         Ok(bytes.len())
     }
 

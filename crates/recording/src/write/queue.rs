@@ -1,8 +1,10 @@
 //! What waits for the disk, in bounded memory. Adding to it never waits.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
+
+use parking_lot::{Condvar, Mutex};
 
 /// What takes memory.
 pub trait Weighed {
@@ -54,7 +56,7 @@ impl<T: Weighed> Queue<T> {
 
     /// Adds an item; `false`: it is dropped. If the queue is full, it is counted as lost.
     pub fn push(&self, item: T) -> bool {
-        let mut held = self.lock();
+        let mut held = self.0.held.lock();
         let bytes = held.bytes + item.bytes();
         if held.is_closed {
             return false;
@@ -70,35 +72,31 @@ impl<T: Weighed> Queue<T> {
 
     /// Whether at least half of the memory is free.
     pub fn has_room(&self) -> bool {
-        self.lock().bytes <= self.0.most_bytes / 2
+        self.0.held.lock().bytes <= self.0.most_bytes / 2
     }
 
     /// Items that were dropped in all because the queue was full.
     pub fn lost(&self) -> u64 {
-        self.lock().lost
+        self.0.held.lock().lost
     }
 
     /// Nothing more comes.
     pub fn close(&self) {
-        self.lock().is_closed = true;
+        self.0.held.lock().is_closed = true;
         self.0.came.notify_all();
     }
 
     /// What is there.
     pub fn take(&self) -> Taken<T> {
-        let mut held = self.lock();
+        let mut held = self.0.held.lock();
         held.bytes = 0;
         Taken { items: std::mem::take(&mut held.items), is_last: held.is_closed }
     }
 
     /// Waits for this time, or until nothing more comes.
     pub fn wait(&self, time: Duration) {
-        let waited = self.0.came.wait_timeout_while(self.lock(), time, |held| !held.is_closed);
-        drop(waited);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Held<T>> {
-        self.0.held.lock().unwrap_or_else(PoisonError::into_inner)
+        let mut held = self.0.held.lock();
+        self.0.came.wait_while_for(&mut held, |held| !held.is_closed, time);
     }
 }
 

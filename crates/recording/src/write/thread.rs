@@ -1,9 +1,11 @@
 //! The thread that writes. Only it waits for the disk.
 
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
 
 use super::entry::Entry;
 use super::queue::{Queue, Taken};
@@ -58,7 +60,7 @@ impl Writer {
 
     /// How far it is.
     pub fn progress(&self) -> Progress {
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.progress.lock().clone()
     }
 
     /// Writes the rest and ends the file.
@@ -95,7 +97,7 @@ fn write(
         due = Instant::now() + FLUSH;
         let Taken { items, is_last } = queue.take();
         let written = write_all(&mut series, items, &mut synced);
-        let mut told = progress.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut told = progress.lock();
         told.written = series.written();
         told.is_complete = series.is_complete();
         if let Err(error) = written {

@@ -1,12 +1,11 @@
 //! Carries out the exchanges of relayed lines, for the owners of their clients.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use litemap::LiteMap as Map;
 use motorlink::rmd::{Asked, Client, Error, MotorId};
 use motorlink::{Clock, st};
 use motorlink_proto::st::Request;
 use motorlink_proto::time::{Instant, Micros};
+use parking_lot::Mutex;
 
 use super::driver::StStep;
 use super::relay::{RmdOver, RmdRelay, StOver};
@@ -86,7 +85,7 @@ impl RmdOwner {
 
     /// The pending exchanges that can be carried out now.
     pub fn ready(&self) -> impl Iterator<Item = (MotorId, Asked)> {
-        let (now, resting) = (self.clock.now(), self.resting().clone());
+        let (now, resting) = (self.clock.now(), self.resting.lock().clone());
         let is_ready =
             move |id: &MotorId| resting.get(id).is_none_or(|rest: &Rest| rest.until <= now);
         self.relay.pending().into_iter().filter(move |(id, _)| is_ready(id))
@@ -120,7 +119,7 @@ impl RmdOwner {
         if matches!(result, Err(Error::Quarantined { .. })) && self.rest(id) {
             return None;
         }
-        self.resting().remove(&id);
+        self.resting.lock().remove(&id);
         let error = result.as_ref().err().filter(|error| error.is_line_failure());
         let error = error.or(confirmed.as_ref().err()).cloned();
         self.relay.ended(id, RmdOver { result, losses: Some(losses), sent });
@@ -138,13 +137,9 @@ impl RmdOwner {
     /// Lets a motor in quarantine rest; false if it was waited for too long.
     fn rest(&self, id: MotorId) -> bool {
         let now = self.clock.now();
-        let mut resting = self.resting();
+        let mut resting = self.resting.lock();
         let rest = resting.entry(id).or_insert(Rest { since: now, until: now });
         rest.until = now + RETRY;
         now.since(rest.since) < PATIENCE
-    }
-
-    fn resting(&self) -> MutexGuard<'_, Map<MotorId, Rest>> {
-        self.resting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -4,7 +4,7 @@
 //! exchanges of the engine, so the owner passes on what its client counts.
 
 use std::os::fd::BorrowedFd;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use litemap::LiteMap as Map;
@@ -12,6 +12,7 @@ use motorlink::st::{Counters, Exchanged, Profile, Progress};
 use motorlink::{Clock, LinkState, rmd, st};
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
+use parking_lot::{Condvar, Mutex};
 
 use super::driver::{RmdDriver, RmdEnded, StDriver, StStep};
 use super::{Driver, LineError, Stopped};
@@ -79,12 +80,12 @@ impl<K, S, E> Default for Relay<K, S, E> {
 impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
     /// The exchanges that wait to be carried out.
     pub fn pending(&self) -> Vec<(K, S)> {
-        self.lock().pending.iter().map(|(key, step)| (*key, step.clone())).collect()
+        self.0.exchanges.lock().pending.iter().map(|(key, step)| (*key, step.clone())).collect()
     }
 
     /// An exchange is over. One that was given up meanwhile is ignored.
     pub fn ended(&self, key: K, over: E) {
-        let mut exchanges = self.lock();
+        let mut exchanges = self.0.exchanges.lock();
         if exchanges.pending.remove(&key).is_some() {
             exchanges.over.insert(key, over);
         }
@@ -93,35 +94,31 @@ impl<K: Ord + Copy, S: Clone, E> Relay<K, S, E> {
     /// Waits for this time, or until an exchange is pending.
     pub fn wait(&self, time: Duration) {
         let is_idle = |exchanges: &mut Exchanges<K, S, E>| exchanges.pending.is_empty();
-        drop(self.0.begun.wait_timeout_while(self.lock(), time, is_idle));
+        self.0.begun.wait_while_for(&mut self.0.exchanges.lock(), is_idle, time);
     }
 
     /// The owner has closed its client. The line is lost for good.
     pub fn close(&self) {
-        self.lock().is_closed = true;
+        self.0.exchanges.lock().is_closed = true;
     }
 
     fn is_closed(&self) -> bool {
-        self.lock().is_closed
+        self.0.exchanges.lock().is_closed
     }
 
     fn begin(&self, key: K, step: S) {
-        self.lock().pending.insert(key, step);
+        self.0.exchanges.lock().pending.insert(key, step);
         self.0.begun.notify_all();
     }
 
     fn cancel(&self, key: K) {
-        let mut exchanges = self.lock();
+        let mut exchanges = self.0.exchanges.lock();
         exchanges.pending.remove(&key);
         exchanges.over.remove(&key);
     }
 
     fn take_over(&self) -> Map<K, E> {
-        std::mem::take(&mut self.lock().over)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Exchanges<K, S, E>> {
-        self.0.exchanges.lock().unwrap_or_else(PoisonError::into_inner)
+        std::mem::take(&mut self.0.exchanges.lock().over)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use litemap::LiteMap as Map;
+use parking_lot::Mutex;
 use rustix::net::{Shutdown, shutdown};
 use serde::Deserialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -128,7 +129,7 @@ impl Program {
     pub async fn ask(&self, ask: Ask) -> Result<Answer, Refusal> {
         let (sender, answer) = oneshot::channel();
         let id = {
-            let mut pending = self.shared.pending();
+            let mut pending = self.shared.pending.lock();
             if let Some(ended) = &pending.ended {
                 return Err(ended.clone());
             }
@@ -199,7 +200,7 @@ impl Program {
     /// answers of a program: those of two sequences must not mix.
     pub async fn lane(&self, lane: Lane) -> OwnedMutexGuard<()> {
         let lock = {
-            let mut lanes = self.shared.lanes.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut lanes = self.shared.lanes.lock();
             Arc::clone(lanes.entry(lane).or_default())
         };
         lock.lock_owned().await
@@ -207,7 +208,7 @@ impl Program {
 
     /// Whether the share or the [`Listener`] has ended.
     pub fn has_ended(&self) -> bool {
-        self.shared.pending().ended.is_some()
+        self.shared.pending.lock().ended.is_some()
     }
 
     /// Sends a request. The [`Listener`] gives its end if its id is below [`OWN_IDS`].
@@ -262,10 +263,6 @@ impl Drop for Listener {
 }
 
 impl Shared {
-    fn pending(&self) -> std::sync::MutexGuard<'_, Pending> {
-        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn close(&self, why: Refusal) {
         // It has ended already.
         let _ = shutdown(&self.socket, Shutdown::Both);
@@ -274,14 +271,14 @@ impl Shared {
 
     /// No request gets an answer any more.
     fn end(&self, why: Refusal) {
-        let mut pending = self.pending();
+        let mut pending = self.pending.lock();
         pending.ended.get_or_insert(why);
         pending.answers.clear();
     }
 
     /// Why there is no answer.
     fn ended(&self) -> Refusal {
-        self.pending().ended.clone().unwrap_or_else(ended)
+        self.pending.lock().ended.clone().unwrap_or_else(ended)
     }
 
     /// Gives a frame back, unless it is an answer to a request of this side.
@@ -295,7 +292,7 @@ impl Shared {
             .and_then(|it| it.id)
             .filter(|id| *id >= OWN_IDS);
         let Some(id) = id else { return Some(frame) };
-        let sender = self.pending().answers.remove(&id)?;
+        let sender = self.pending.lock().answers.remove(&id)?;
         let result = match message::decode(&frame.payload) {
             Ok(Text::Answer { answer, .. }) => Ok(answer),
             Ok(Text::Refusal { refusal, .. }) => Err(refusal),

@@ -8,13 +8,14 @@ mod record;
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::can::CanFrame;
 use motorlink::port::{self, Direction, EventBytes, EventCan};
 use motorlink_proto::time::{Instant, Micros};
+use parking_lot::Mutex;
 
 use frame_ring::Memory;
 use record::What;
@@ -57,10 +58,6 @@ impl Tap {
     }
 
     fn keep(&self, at: Duration, direction: Direction, what: What<'_>) {
-        self.memory().keep(Instant(0) + Micros::from(at), direction, what);
-    }
-
-    fn memory(&self) -> MutexGuard<'_, Memory> {
-        self.0.memory.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.memory.lock().keep(Instant(0) + Micros::from(at), direction, what);
     }
 }

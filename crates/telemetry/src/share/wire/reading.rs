@@ -129,7 +129,7 @@ pub(in crate::share) fn read(
     now: Instant,
     part: Part,
 ) -> Answer {
-    let blocks = tap.memory().blocks();
+    let blocks = tap.0.memory.lock().blocks();
     let kept_since = blocks.first().and_then(|block| Some(block.span?.0));
     let first = blocks.first().map_or(0, |block| block.first);
     let missed = part.after.is_some_and(|after| (after >> PLACE) + 1 < first);
