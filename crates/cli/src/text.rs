@@ -1,41 +1,28 @@
 //! Text of a given width.
 
+use console::{Alignment, measure_text_width, pad_str};
+
 /// Heights of a bar.
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// Text of exactly this width. If it is cut, it ends with `…`.
 pub fn fit(text: &str, width: usize) -> String {
-    let length = text.chars().count();
-    if length <= width {
-        return format!("{text:<width$}");
-    }
-    let kept: String = text.chars().take(width.saturating_sub(1)).collect();
-    if width == 0 { kept } else { kept + "…" }
+    aligned(text, width, Alignment::Left)
 }
 
 /// As [`fit`], right-aligned.
 pub fn right(text: &str, width: usize) -> String {
-    match text.chars().count() <= width {
-        true => format!("{text:>width$}"),
-        false => fit(text, width),
-    }
+    aligned(text, width, Alignment::Right)
+}
+
+fn aligned(text: &str, width: usize, alignment: Alignment) -> String {
+    let mark = if width == 0 { "" } else { "…" };
+    pad_str(text, width, alignment, Some(mark)).into_owned()
 }
 
 /// Text in lines of at most this width. Lines after the first are indented.
 pub fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    let mut line = String::new();
-    for word in text.split_whitespace() {
-        let used = line.chars().count();
-        if used > 0 && used + 1 + word.chars().count() > width {
-            lines.push(std::mem::replace(&mut line, "  ".to_owned()));
-        } else if !line.trim().is_empty() {
-            line.push(' ');
-        }
-        line += word;
-    }
-    lines.push(line);
-    lines
+    flow(text.split_whitespace(), " ", "  ", width)
 }
 
 /// `1 message`, `2 messages`.
@@ -44,16 +31,25 @@ pub fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{plural}")
 }
 
-/// Words in lines of at most this width, with `gap` between two words.
-pub fn flow(words: &[String], gap: &str, width: usize) -> Vec<String> {
+/// Words in lines of at most this width, with `gap` between two words. Lines after the first begin with
+/// `indent`.
+pub fn flow<W: AsRef<str>>(
+    words: impl IntoIterator<Item = W>,
+    gap: &str,
+    indent: &str,
+    width: usize,
+) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words {
+        let word = word.as_ref();
+        let added = gap.len() + measure_text_width(word);
         match lines.last_mut() {
-            Some(line) if line.chars().count() + gap.len() + word.chars().count() <= width => {
+            None => lines.push(word.to_owned()),
+            Some(line) if measure_text_width(line) + added <= width => {
                 *line += gap;
                 *line += word;
             }
-            _ => lines.push(word.clone()),
+            Some(_) => lines.push(format!("{indent}{word}")),
         }
     }
     lines
@@ -90,8 +86,7 @@ mod tests {
         assert_eq!(fit("x", 0), "");
         assert_eq!(wrapped("one two three", 7), ["one two", "  three"]);
         assert_eq!(wrapped("unbreakable", 4), ["unbreakable"]);
-        let words = ["a 1", "b 2", "c 3"].map(str::to_owned);
-        assert_eq!(flow(&words, "  ", 8), ["a 1  b 2", "c 3"]);
+        assert_eq!(flow(["a 1", "b 2", "c 3"], "  ", "", 8), ["a 1  b 2", "c 3"]);
     }
 
     #[test]

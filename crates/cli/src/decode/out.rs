@@ -8,6 +8,7 @@ use super::entry::Entry;
 use super::{csv, object, text};
 use crate::failure::Failure;
 use crate::terminal::safe;
+use crate::text::flow;
 
 /// The form of the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,18 +81,7 @@ impl Out {
         if measure_text_width(&self.line) <= columns {
             return;
         }
-        let mut folded = String::new();
-        let mut used = 0;
-        for word in self.line.split_inclusive(' ') {
-            let width = measure_text_width(word.trim_end());
-            if used > 0 && used + width > columns {
-                folded.truncate(folded.trim_end().len());
-                folded += "\n    ";
-                used = 4;
-            }
-            folded += word;
-            used += measure_text_width(word);
-        }
-        self.line = folded;
+        self.line = flow(self.line.trim_end().split(' '), " ", "    ", columns).join("\n");
+        self.line.push('\n');
     }
 }

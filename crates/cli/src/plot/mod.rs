@@ -15,6 +15,7 @@ use motorlink_testbench::scenario::short;
 use plotters::prelude::*;
 
 use crate::palette::Meaning;
+use crate::text::flow;
 pub use figure::{Figure, Panel, Samples, Signal, States, Times};
 use labels::Label;
 use points::{thin, whole_range};
@@ -122,7 +123,8 @@ impl<'a> Picture<'a> {
             Part { panel, heading: Heading::new(panel, figure), strips }
         };
         let panels = figure.panels.iter().map(part).collect();
-        Picture { figure, title: title_lines(&figure.title), labels, events, panels }
+        let title = flow(figure.title.split_whitespace(), " ", "", TITLE_LINE);
+        Picture { figure, title, labels, events, panels }
     }
 
     /// Height of the title and of the labels.
@@ -132,7 +134,7 @@ impl<'a> Picture<'a> {
     }
 
     fn labels_top(&self) -> i32 {
-        MARGIN + self.title.len() as i32 * (TITLE_FONT + 5) + 6
+        MARGIN + self.title.len().max(1) as i32 * (TITLE_FONT + 5) + 6
     }
 
     fn height(&self) -> i32 {
@@ -327,20 +329,4 @@ fn chart<'a, 'b>(area: &'a Area<'b>, top: i32, axis: i32) -> ChartBuilder<'a, 'b
     let mut builder = ChartBuilder::on(area);
     builder.margin_top(top * FINE).margin_right(RIGHT * FINE).x_label_area_size(axis * FINE);
     builder
-}
-
-/// A title broken between words.
-fn title_lines(title: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in title.split_whitespace() {
-        let line = lines.last_mut().expect("there is a first line");
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > TITLE_LINE {
-            lines.push(word.to_owned());
-        } else {
-            let space = if line.is_empty() { "" } else { " " };
-            *line += space;
-            *line += word;
-        }
-    }
-    lines
 }

@@ -211,21 +211,19 @@ impl Contents {
             let messages = counted(topic.messages, "message");
             let text = format!("{:<width$}  {messages}{rate}", topic.name);
             row(if n == 0 { "topics" } else { "" }, text);
-            let signals: Vec<String> = topic.fields.iter().map(in_words).collect();
-            for line in flow(&signals, "  ", SIGNALS) {
+            for line in flow(topic.fields.iter().map(in_words), "  ", "", SIGNALS) {
                 row("", format!("  {line}"));
             }
         }
         let kinds: Vec<String> =
             self.kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
         row("events", if kinds.is_empty() { "none".to_owned() } else { kinds.join(", ") });
-        let attached: Vec<String> = recording.attachments().map(str::to_owned).collect();
-        for (n, line) in flow(&attached, "  ", SIGNALS).into_iter().enumerate() {
+        let attached = flow(recording.attachments(), "  ", "", SIGNALS);
+        for (n, line) in attached.into_iter().enumerate() {
             row(if n == 0 { "attached" } else { "" }, line);
         }
-        let gaps: Vec<String> =
-            gaps(recording).map(|(motor, seconds)| format!("{motor} for {seconds} s")).collect();
-        for (n, line) in flow(&gaps, ", ", SIGNALS).into_iter().enumerate() {
+        let gaps = gaps(recording).map(|(motor, seconds)| format!("{motor} for {seconds} s"));
+        for (n, line) in flow(gaps, ", ", "", SIGNALS).into_iter().enumerate() {
             row(if n == 0 { "no values" } else { "" }, line);
         }
         let lost = lost(recording.losses()).into_iter();

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::failure::Failure;
 use crate::hint;
 use crate::output::{Printer, print_line};
+use crate::text::flow;
 
 /// Which registers.
 #[derive(clap::Args)]
@@ -110,21 +111,9 @@ pub fn list(output: Printer, filter: &Filter) -> Result<(), Failure> {
 /// A line of the table; the meaning is wrapped in its own column on a terminal.
 fn row([id, name, ty, access, unit]: [&str; 5], meaning: &str) -> String {
     let columns = Term::stdout().size_checked().map_or(usize::MAX, |(_, columns)| columns.into());
-    let front = format!("{id:<4}  {name:<21}  {ty:<4}  {access:<6}  {unit:<10}  ");
-    let mut line = front;
-    let mut used = MEANING;
-    for (n, word) in meaning.split(' ').enumerate() {
-        if n > 0 && used + 1 + word.chars().count() > columns {
-            line += &format!("\n{:MEANING$}", "");
-            used = MEANING;
-        } else if n > 0 {
-            line.push(' ');
-            used += 1;
-        }
-        line += word;
-        used += word.chars().count();
-    }
-    line
+    let room = columns.saturating_sub(MEANING);
+    let meaning = flow(meaning.split(' '), " ", "", room).join(&format!("\n{:MEANING$}", ""));
+    format!("{id:<4}  {name:<21}  {ty:<4}  {access:<6}  {unit:<10}  {meaning}")
 }
 
 fn legend(has_profile: bool) -> Result<(), Failure> {

@@ -145,5 +145,5 @@ fn keys(place: &Selection, width: usize) -> Vec<String> {
             vec!["SPACE STOP ALL".into(), "Enter done".into(), "Esc cancel".into()]
         }
     };
-    text::flow(&words, "  ", width)
+    text::flow(words, "  ", "", width)
 }
