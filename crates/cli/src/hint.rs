@@ -50,9 +50,10 @@ pub fn gain() -> Hinted<Text> {
 }
 
 /// An ID of an RMD motor.
-pub fn id() -> Hinted<impl TypedValueParser<Value = u8>> {
+pub fn id() -> Hinted<impl TypedValueParser<Value = MotorId>> {
     let words = || (1..=32).map(|id: u8| id.to_string()).collect();
-    Hinted { parser: clap::value_parser!(u8).range(1..=32), words }
+    let parser = clap::value_parser!(u8).range(1..=32);
+    Hinted { parser: parser.try_map(|id| MotorId::new(id).ok_or("IDs are 1 to 32")), words }
 }
 
 /// IDs of RMD motors: `3`, `1,3`, `1-4`.
@@ -61,8 +62,14 @@ pub fn ids() -> Hinted<impl TypedValueParser<Value = MotorSet>> {
     Hinted { parser: parse_ids, words }
 }
 
+/// The RMD motors that are given, or else motor 1.
+pub fn ids_or_first(given: &[MotorSet]) -> MotorSet {
+    let first = if given.is_empty() { MotorId::new(1) } else { None };
+    given.iter().copied().flatten().chain(first).collect()
+}
+
 /// A number of an ST motor.
-pub fn motor() -> Hinted<impl TypedValueParser<Value = u8>> {
+pub fn motor() -> Hinted<impl TypedValueParser<Value = MotorNumber>> {
     let words = || (1..=7).map(|number: u8| number.to_string()).collect();
     Hinted { parser: parse_motor, words }
 }
@@ -116,16 +123,15 @@ pub fn direction() -> Hinted<impl TypedValueParser<Value = SpinDirection>> {
 }
 
 /// Reads the number of an ST motor. In frames, 0 is the motor of the previous request.
-fn parse_motor(text: &str) -> Result<u8, String> {
-    match text.parse::<u8>() {
-        Ok(0) => {
-            Err("motor numbers are 1 to 7: the first motor is 1. In a frame, 0 means the motor of \
-                      the previous request; write 1 for a drive with one motor"
-                .to_owned())
+fn parse_motor(text: &str) -> Result<MotorNumber, &'static str> {
+    let number = text.parse::<u8>().ok();
+    number.and_then(MotorNumber::new).ok_or(match number {
+        Some(0) => {
+            "motor numbers are 1 to 7: the first motor is 1. In a frame, 0 means the motor of the \
+             previous request; write 1 for a drive with one motor"
         }
-        Ok(number) if MotorNumber::new(number).is_some() => Ok(number),
-        _ => Err("motor numbers are 1 to 7".to_owned()),
-    }
+        _ => "motor numbers are 1 to 7",
+    })
 }
 
 /// Reads the motors that `--id` means: `3`, `1,3`, `1-4`, or `1..4`, which is the same.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Subcommand, ValueEnum};
-use motorlink::rmd::{Direction, MotorId, MotorSet};
+use motorlink::rmd::{Direction, MotorSet};
 use motorlink_spec::dbc::dbc;
 use motorlink_spec::json::json;
 use motorlink_spec::markdown::markdown;
@@ -86,7 +86,7 @@ impl From<Sender> for Direction {
 pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::Dbc { id, all, direction, file } => {
-            let motors = if all { MotorSet::ALL } else { ids(&id) };
+            let motors = if all { MotorSet::ALL } else { hint::ids_or_first(&id) };
             let sender = direction.unwrap_or(Sender::Reply);
             file.write(&dbc(motors, sender.into()))?;
             if direction.is_none() {
@@ -100,14 +100,6 @@ pub fn run(args: Args) -> Result<(), Failure> {
         Command::Json(file) => file.write(&format!("{:#}\n", json())),
         Command::Markdown(file) => file.write(&markdown()),
         Command::Wireshark(file) => file.write(&wireshark()),
-    }
-}
-
-/// The motors that are meant.
-fn ids(given: &[MotorSet]) -> MotorSet {
-    match given {
-        [] => MotorId::new(1).into_iter().collect(),
-        _ => given.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more)),
     }
 }
 

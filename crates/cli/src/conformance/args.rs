@@ -48,7 +48,8 @@ pub enum Command {
         #[command(flatten)]
         run: Run,
         /// The motor, 1 to 7
-        #[arg(short, long, default_value = "1", value_parser = parse_motor)]
+        #[arg(short, long, default_value = "1", value_parser = hint::motor(),
+              hide_possible_values = true)]
         motor: MotorNumber,
         /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
         #[arg(long, default_value = "spec", value_parser = hint::profile())]
@@ -68,10 +69,12 @@ pub enum Command {
         #[arg(long)]
         write_rom: bool,
         /// The motor's ID, 1 to 32
-        #[arg(short, long, default_value = "1", value_parser = parse_id)]
+        #[arg(short, long, default_value = "1", value_parser = hint::id(),
+              hide_possible_values = true)]
         id: MotorId,
         /// Bits of its encoder, 12 to 18
-        #[arg(long, default_value = "14", value_parser = parse_encoder)]
+        #[arg(long, default_value = "14", value_parser = hint::encoder_bits(),
+              hide_possible_values = true)]
         encoder: EncoderBits,
     },
     /// Check your own program: serve drives with faults, and check how the program handles them
@@ -186,19 +189,4 @@ pub struct Host {
     /// Your program and its arguments
     #[arg(last = true, required = true)]
     pub command: Vec<String>,
-}
-
-fn parse_motor(text: &str) -> Result<MotorNumber, String> {
-    let motor = text.parse().ok().and_then(MotorNumber::new);
-    motor.ok_or_else(|| "motor numbers are 1 to 7".to_owned())
-}
-
-fn parse_id(text: &str) -> Result<MotorId, String> {
-    let id = text.parse().ok().and_then(MotorId::new);
-    id.ok_or_else(|| "motor IDs are 1 to 32".to_owned())
-}
-
-fn parse_encoder(text: &str) -> Result<EncoderBits, String> {
-    let bits = text.parse().ok().and_then(EncoderBits::new);
-    bits.ok_or_else(|| "encoders have 12 to 18 bits".to_owned())
 }

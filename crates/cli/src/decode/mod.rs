@@ -58,8 +58,8 @@ enum Protocol {
         #[command(flatten)]
         common: Common,
         /// The motor's ID, 1 to 32, of hexadecimal data bytes without an identifier
-        #[arg(short, long, value_parser = clap::value_parser!(u8).range(1..=32), hide_possible_values = true)]
-        id: Option<u8>,
+        #[arg(short, long, value_parser = hint::id(), hide_possible_values = true)]
+        id: Option<MotorId>,
         /// Take every frame of a motor as a request, or as a reply
         #[arg(long, value_enum)]
         direction: Option<Direction>,
@@ -102,13 +102,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
             (common, Plain::Serial, Decoder::St(st_capture::Decoder::new(profile)))
         }
         Protocol::Rmd { common, id, direction } => {
-            let id = id.and_then(MotorId::new).map(MotorId::can_id);
             let decoder = match direction {
                 None => rmd_capture::Decoder::new(),
                 Some(Direction::Request) => rmd_capture::Decoder::of(rmd::Direction::HostToDrive),
                 Some(Direction::Reply) => rmd_capture::Decoder::of(rmd::Direction::DriveToHost),
             };
-            (common, Plain::Can(id), Decoder::Rmd(Box::new(decoder)))
+            (common, Plain::Can(id.map(MotorId::can_id)), Decoder::Rmd(Box::new(decoder)))
         }
     };
     let out = match (common.json, common.csv) {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use motorlink::rmd::MotorSet;
-use motorlink::st::{FullScale, Profile};
+use motorlink::st::{FullScale, MotorNumber, Profile};
 
 use crate::hint;
 use crate::span::{parse_rate, parse_span, span_up_to};
@@ -36,7 +36,7 @@ pub struct What {
     /// Motors of ST drives, such as 1,2 [default: those that the drive has]
     #[arg(short, long, value_name = "NUMBER", value_delimiter = ',', value_parser = hint::motor(),
           hide_possible_values = true)]
-    pub motor: Vec<u8>,
+    pub motor: Vec<MotorNumber>,
     /// IDs of RMD motors, such as 1,3 or 1-4 [default: those that answer]
     #[arg(short, long, value_name = "ID", value_parser = hint::ids(), hide_possible_values = true)]
     pub id: Vec<MotorSet>,

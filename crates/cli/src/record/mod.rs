@@ -104,14 +104,12 @@ fn config(ports: &[RecordedPort], args: &What) -> Result<Config, Failure> {
         return Err(Failure::usage(format!("a recording is an MCAP file, not .{ending}"))
             .trying("-o run.mcap, and then `motorlink convert` or `motorlink plot`"));
     }
-    let numbers = args.motor.iter().copied().filter_map(MotorNumber::new);
-    let motors: Vec<MotorNumber> = numbers.collect();
-    let ids = args.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
-    let is_given = !motors.is_empty() || !ids.is_empty();
+    let ids: MotorSet = args.id.iter().copied().flatten().collect();
+    let is_given = !args.motor.is_empty() || !ids.is_empty();
     let port = |place: &RecordedPort| -> Result<Port, Failure> {
         let name = place.port.parse()?;
         let (motors, ids) = match is_given {
-            true => (motors.clone(), ids),
+            true => (args.motor.clone(), ids),
             false => (place.motors.clone(), place.ids),
         };
         let (profile, timeout, full_scale) = (args.profile, args.timeout, args.full_scale);

@@ -97,7 +97,7 @@ pub enum Read {
     Scan {
         /// IDs to try instead of 1 to 32
         #[arg(value_name = "ID", value_parser = hint::id(), hide_possible_values = true)]
-        ids: Vec<u8>,
+        ids: Vec<MotorId>,
     },
     /// Show temperature, voltage, errors, speed, currents and angles
     Status {
@@ -277,10 +277,7 @@ pub struct Wait {
 impl MotorArgs {
     /// The motors that are meant.
     pub fn ids(&self) -> MotorSet {
-        if self.id.is_empty() {
-            return MotorId::new(1).into_iter().collect();
-        }
-        self.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more))
+        hint::ids_or_first(&self.id)
     }
 
     /// The motors, for messages: `motor 1`, `motors 1, 3`.

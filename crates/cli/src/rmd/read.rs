@@ -10,8 +10,8 @@ use crate::output::progress;
 /// The version of the protocol.
 const DRIVEN: &str = "V1.62";
 
-pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
-    let wanted: MotorSet = ids.iter().copied().filter_map(MotorId::new).collect();
+pub fn scan(session: &Session, ids: Vec<MotorId>) -> Result<(), Failure> {
+    let wanted: MotorSet = ids.into_iter().collect();
     let wanted = if wanted.is_empty() { MotorSet::ALL } else { wanted };
     let bar = progress(wanted.len());
     let mut found = Vec::new();

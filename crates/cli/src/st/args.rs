@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::st::{FullScale, Profile};
+use motorlink::st::{FullScale, MotorNumber, Profile};
 
 use super::registers::Filter;
 use crate::angle::{parse_angle, parse_tolerance};
@@ -29,9 +29,9 @@ pub struct Args {
 #[command(next_help_heading = help::GLOBAL)]
 pub struct DriveArgs {
     /// The motor, 1 to 7
-    #[arg(short, long, default_value_t = 1, global = true, value_parser = hint::motor(),
+    #[arg(short, long, default_value = "1", global = true, value_parser = hint::motor(),
           hide_possible_values = true)]
-    pub motor: u8,
+    pub motor: MotorNumber,
     /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
     #[arg(long, env = "MOTORLINK_PROFILE", default_value = "spec", global = true,
           value_parser = hint::profile())]
@@ -88,7 +88,7 @@ impl DriveArgs {
             of_motor,
             number: "--motor",
             default_motor: 1,
-            motor: Some(self.motor),
+            motor: Some(self.motor.number()),
         });
     }
 }

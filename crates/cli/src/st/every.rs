@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use motorlink::port::PortName;
-use motorlink::st::{Error, EventClient, MotorNumber, Profile, RegisterId};
+use motorlink::st::{Error, EventClient, Profile, RegisterId};
 use motorlink_telemetry::line::{LineError, StLine};
 use motorlink_telemetry::rows::Absent;
 use motorlink_telemetry::sample::Sample;
@@ -35,7 +35,6 @@ impl Drive<'_> {
     ) -> Result<(), Failure> {
         let Drive { connection, drive, port } = *self;
         let view = View::new(connection, drive, port)?;
-        let number = MotorNumber::new(drive.motor).ok_or(Error::NoSuchMotor(drive.motor))?;
         if segment.is_some() {
             view.wants(Profile::Spec, SEGMENTS)?;
         }
@@ -46,7 +45,7 @@ impl Drive<'_> {
             None => line,
         };
         let signal =
-            |&register| Signal { motor: Motor::St(number), source: Source::Register(register) };
+            |&register| Signal { motor: Motor::St(drive.motor), source: Source::Register(register) };
         let watch = Watch {
             line: Box::new(line),
             signals: registers.iter().map(signal).collect(),

@@ -34,12 +34,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
         return registers::list(connection.output(), filter);
     }
     if matches!(command, Command::Act(Act::Stop)) {
-        interrupt::complete_stop(format!("motor {}", drive.motor));
+        interrupt::complete_stop(drive.motor.to_string());
     }
     let port = connection.port()?;
     drive.repeat_in_hints(connection.port_text());
     let done = run_at(&connection, &drive, &port, command);
-    done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
+    done.map_err(|failure| failure.about(&port.to_string(), drive.motor.number()))
 }
 
 fn run_at(
@@ -54,7 +54,7 @@ fn run_at(
         Command::Act(act) => {
             keep_error();
             let of_stop = |failure: Failure| match act {
-                Act::Stop => failure.of_stop(format!("motor {}", drive.motor)),
+                Act::Stop => failure.of_stop(drive.motor),
                 _ => failure,
             };
             let session = connect().map_err(of_stop)?;

@@ -129,7 +129,7 @@ impl View {
             .trying("leave one out"));
         }
         Ok(View {
-            motor: drive.motor,
+            motor: drive.motor.number(),
             output: connection.output(),
             port: port.to_string(),
             units: StUnits {

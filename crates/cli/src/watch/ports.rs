@@ -1,5 +1,6 @@
 //! The engines of the ports, and the search for motors.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use motorlink::port::{Carries, PortName};
@@ -33,15 +34,15 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
         let mut options = motorlink::st::Options { profile: args.profile, ..Default::default() };
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = StLine::open(&port, options).map_err(Failure::from)?;
-        let numbers = (1..=u8::MAX).map_while(MotorNumber::new);
-        let given = numbers.filter(|it| args.motor.contains(&it.number())).map(Motor::St).collect();
+        let numbers: BTreeSet<MotorNumber> = args.motor.iter().copied().collect();
+        let given = numbers.into_iter().map(Motor::St).collect();
         opened.push(Opened::new(text, Box::new(line), Protocol::St, given, by)?);
     }
     if port.carries(Carries::Frames) {
         let mut options = motorlink::rmd::Options::default();
         options.timeout = args.timeout.unwrap_or(options.timeout);
         let line = RmdLine::open(&port, options).map_err(Failure::from)?;
-        let ids = args.id.iter().fold(MotorSet::EMPTY, |ids, more| ids.union(*more));
+        let ids: MotorSet = args.id.iter().copied().flatten().collect();
         let given = ids.map(Motor::Rmd).collect();
         opened.push(Opened::new(text, Box::new(line), Protocol::Rmd, given, by)?);
     }
