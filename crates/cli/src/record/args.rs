@@ -14,7 +14,7 @@ pub struct Args {
     /// A port; repeat it for each port. A serial line has an ST drive, a CAN bus has RMD motors
     #[arg(short, long, env = "MOTORLINK_PORT", value_name = "PORT",
           value_hint = clap::ValueHint::AnyPath)]
-    pub ports: Vec<String>,
+    pub port: Vec<String>,
     #[command(flatten)]
     pub what: What,
 }

@@ -37,7 +37,7 @@ const OTHERS: [&str; 6] = ["csv", "log", "asc", "pcapng", "svg", "png"];
 pub fn run(args: &Args) -> Result<(), Failure> {
     let of = |port: &String| RecordedPort { port: port.clone(), ..RecordedPort::default() };
     let ports: Vec<RecordedPort> =
-        args.ports.iter().filter(|port| !port.is_empty()).map(of).collect();
+        args.port.iter().filter(|port| !port.is_empty()).map(of).collect();
     run_on(&ports, &args.what)
 }
 
