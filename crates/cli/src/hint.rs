@@ -1,11 +1,14 @@
-//! Words that shells complete for an argument, which is not restricted to them.
+//! Words that shells complete for an argument. Most arguments are not restricted to them.
 
 use std::ffi::OsStr;
 
-use clap::builder::{PossibleValue, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Command, Error};
-use motorlink::rmd::{EncoderBits, GearRatio, MotorId, MotorSet, Payload, Pid, SpinDirection};
+use motorlink::rmd::{
+    Direction, EncoderBits, GearRatio, MotorId, MotorSet, Payload, Pid, SpinDirection,
+};
 use motorlink::st::{FullScale, MotorNumber, Profile, RegisterId};
+use motorlink_telemetry::share::message::Protocol;
 
 /// A parser with words for completions. The argument needs `hide_possible_values`, so that its help does
 /// not list them.
@@ -34,6 +37,23 @@ impl<P: TypedValueParser> TypedValueParser for Hinted<P> {
         Some(Box::new((self.words)().into_iter().map(PossibleValue::new)))
     }
 }
+
+/// One of these words.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    words: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).map(move |given| {
+        words.iter().find(|(word, _)| *word == given).expect("the parser takes no other word").1
+    })
+}
+
+/// The protocols of drives.
+pub const PROTOCOLS: [(&str, Protocol); 2] =
+    [(Protocol::St.word(), Protocol::St), (Protocol::Rmd.word(), Protocol::Rmd)];
+
+/// Whose frames of RMD motors are meant.
+pub const SENDERS: [(&str, Direction); 2] =
+    [("request", Direction::HostToDrive), ("reply", Direction::DriveToHost)];
 
 fn text(words: fn() -> Vec<String>) -> Hinted<Text> {
     Hinted { parser: |text| Ok(text.to_owned()), words }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Subcommand, ValueEnum};
+use clap::Subcommand;
 use motorlink::rmd::{Direction, MotorSet};
 use motorlink_spec::dbc::dbc;
 use motorlink_spec::json::json;
@@ -36,8 +36,8 @@ enum Command {
         all: bool,
         /// Whose frames the file describes: request for those of the host, reply for those of motors
         /// (default)
-        #[arg(long, value_name = "DIRECTION")]
-        direction: Option<Sender>,
+        #[arg(long, value_name = "DIRECTION", value_parser = hint::one_of(&hint::SENDERS))]
+        direction: Option<Direction>,
         #[command(flatten)]
         file: File,
     },
@@ -67,28 +67,12 @@ struct File {
     force: bool,
 }
 
-/// [`Direction`] on the command line.
-#[derive(Clone, Copy, ValueEnum)]
-enum Sender {
-    Request,
-    Reply,
-}
-
-impl From<Sender> for Direction {
-    fn from(sender: Sender) -> Self {
-        match sender {
-            Sender::Request => Direction::HostToDrive,
-            Sender::Reply => Direction::DriveToHost,
-        }
-    }
-}
-
 pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::Dbc { id, all, direction, file } => {
             let motors = if all { MotorSet::ALL } else { hint::ids_or_first(&id) };
-            let sender = direction.unwrap_or(Sender::Reply);
-            file.write(&dbc(motors, sender.into()))?;
+            let sender = direction.unwrap_or(Direction::DriveToHost);
+            file.write(&dbc(motors, sender))?;
             if direction.is_none() {
                 note(
                     "the file describes replies; requests have the same identifiers: write a second \

@@ -7,6 +7,7 @@ use clap::Subcommand;
 use motorlink::rmd::{EncoderBits, MotorId};
 use motorlink::st::{MotorNumber, Profile};
 use motorlink_link::serve::ServeName;
+use motorlink_telemetry::share::message::Protocol;
 
 use crate::connection::Port;
 use crate::hint;
@@ -83,26 +84,15 @@ pub enum Command {
     /// Print the scenarios of `conformance host`, as a Markdown table
     Scenarios {
         /// The protocol
-        which: Which,
+        #[arg(value_parser = hint::one_of(&hint::PROTOCOLS))]
+        which: Protocol,
     },
     /// Print every clause and its tests, as a Markdown table
     Clauses {
         /// The document
-        which: Which,
+        #[arg(value_parser = hint::one_of(&hint::PROTOCOLS))]
+        which: Protocol,
     },
-}
-
-#[derive(clap::ValueEnum, Clone, Copy)]
-pub enum Which {
-    St,
-    Rmd,
-}
-
-/// How differences from readings are taken.
-#[derive(clap::ValueEnum, Clone, Copy, PartialEq, Eq)]
-pub enum Readings {
-    Apart,
-    Strict,
 }
 
 /// Behind `motorlink conformance st --help` and `rmd --help`.
@@ -130,8 +120,10 @@ pub struct Run {
     ///
     /// apart: the case passes, and the difference is listed with its row of docs/SPEC-NOTES.md. strict: the
     /// case fails.
-    #[arg(long, value_name = "HOW", default_value = "apart")]
-    pub readings: Readings,
+    #[arg(long = "readings", value_name = "HOW", default_value = "apart",
+          action = clap::ArgAction::Set,
+          value_parser = hint::one_of(&[("apart", false), ("strict", true)]))]
+    pub is_strict: bool,
     #[command(flatten)]
     pub results: Results,
 }
@@ -157,7 +149,8 @@ pub struct Results {
 #[derive(clap::Args)]
 pub struct Host {
     /// The protocol of your program
-    pub which: Which,
+    #[arg(value_parser = hint::one_of(&hint::PROTOCOLS))]
+    pub which: Protocol,
     /// Serve the drive at this port: pty:PATH or tcp-listen:ADDR:PORT for ST, slcan-pty:PATH or
     /// tcp-listen:ADDR:PORT for RMD
     #[arg(long, value_name = "PORT")]

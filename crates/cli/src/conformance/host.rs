@@ -11,9 +11,10 @@ use motorlink_conformance::host::{HostOutput, Journal, Reading, Scenario, Task, 
 use motorlink_conformance::{Outcome, Report, Verdict};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
+use motorlink_telemetry::share::message::Protocol;
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::args::{Host, Which};
+use super::args::Host;
 use super::results::{refused, verdict};
 use crate::failure::Failure;
 use crate::interrupt;
@@ -35,7 +36,7 @@ const QUOTED: usize = 50;
 pub fn run(args: &Host) -> Result<(), Failure> {
     interrupt::take_over();
     match args.which {
-        Which::St => {
+        Protocol::St => {
             let timeout = args.timeout.map_or(st::TIMEOUT, Into::into);
             conduct(
                 args,
@@ -50,7 +51,7 @@ pub fn run(args: &Host) -> Result<(), Failure> {
                 },
             )
         }
-        Which::Rmd => {
+        Protocol::Rmd => {
             let timeout = args.timeout.map_or(rmd::TIMEOUT, Into::into);
             conduct(
                 args,
@@ -203,10 +204,10 @@ fn watch(
 fn spawn(args: &Host, words: &[String], served: &Served) -> Result<Child, Failure> {
     let path = &served.path;
     let port = match (args.which, &args.serve) {
-        (Which::St, ServeName::TcpListen { .. }) => format!("tcp:{path}"),
-        (Which::St, _) => path.clone(),
-        (Which::Rmd, ServeName::TcpListen { .. }) => format!("slcan:tcp:{path}"),
-        (Which::Rmd, _) => format!("slcan:{path}"),
+        (Protocol::St, ServeName::TcpListen { .. }) => format!("tcp:{path}"),
+        (Protocol::St, _) => path.clone(),
+        (Protocol::Rmd, ServeName::TcpListen { .. }) => format!("slcan:tcp:{path}"),
+        (Protocol::Rmd, _) => format!("slcan:{path}"),
     };
     let mut words = words.iter().map(|word| word.replace("{port}", &port).replace("{path}", path));
     let program = words.next().unwrap_or_default();

@@ -12,9 +12,10 @@ use motorlink::time::Micros;
 use motorlink_conformance::{
     Case, Need, Report, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
 };
+use motorlink_telemetry::share::message::Protocol;
 
 pub use args::Args;
-use args::{Command, Readings, Run, Which};
+use args::{Command, Run};
 use results::verdict;
 use world::Commands;
 
@@ -50,14 +51,14 @@ pub fn run(args: Args) -> Result<(), Failure> {
             conduct("rmd", &run, rmd::suite(), bench, |_| None)
         }
         Command::Host(args) => host::run(&args),
-        Command::Scenarios { which: Which::St } => {
+        Command::Scenarios { which: Protocol::St } => {
             output::print_line(&scenario_table(&hosts::st::scenarios()).trim_end())
         }
-        Command::Scenarios { which: Which::Rmd } => {
+        Command::Scenarios { which: Protocol::Rmd } => {
             output::print_line(&scenario_table(&hosts::rmd::scenarios()).trim_end())
         }
-        Command::Clauses { which: Which::St } => output::print_line(&st::table().trim_end()),
-        Command::Clauses { which: Which::Rmd } => output::print_line(&rmd::table().trim_end()),
+        Command::Clauses { which: Protocol::St } => output::print_line(&st::table().trim_end()),
+        Command::Clauses { which: Protocol::Rmd } => output::print_line(&rmd::table().trim_end()),
     }
 }
 
@@ -88,7 +89,7 @@ fn conduct<B: Subject>(
     suite.retain(|case| results.wants(&case.name, case.clauses));
     let mut screen = results.screen(suite.len())?;
     let mut report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
-    if run.readings == Readings::Strict {
+    if run.is_strict {
         report = report.strict();
     }
     screen.summary(&report)?;

@@ -12,8 +12,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use clap::{Subcommand, ValueEnum};
-use motorlink::rmd::{self, MotorId};
+use clap::Subcommand;
+use motorlink::rmd::{Direction, MotorId};
 use motorlink::st::Profile;
 use motorlink_capture::{
     Captured, Damage, Format, Plain, Reader, Wire, rmd as rmd_capture, st as st_capture,
@@ -60,8 +60,8 @@ enum Protocol {
         /// The motor's ID, 1 to 32, of hexadecimal data bytes without an identifier
         #[arg(short, long, value_parser = hint::id(), hide_possible_values = true)]
         id: Option<MotorId>,
-        /// Take every frame of a motor as a request, or as a reply
-        #[arg(long, value_enum)]
+        /// Take every frame of a motor as a request (from the host), or as a reply
+        #[arg(long, value_parser = hint::one_of(&hint::SENDERS))]
         direction: Option<Direction>,
     },
 }
@@ -82,14 +82,6 @@ struct Common {
     csv: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Direction {
-    /// From the host to a motor
-    Request,
-    /// From a motor to the host
-    Reply,
-}
-
 fn formats() -> impl clap::builder::TypedValueParser<Value = Format> {
     use clap::builder::TypedValueParser;
     let names = Format::ALL.map(Format::name);
@@ -102,11 +94,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
             (common, Plain::Serial, Decoder::St(st_capture::Decoder::new(profile)))
         }
         Protocol::Rmd { common, id, direction } => {
-            let decoder = match direction {
-                None => rmd_capture::Decoder::new(),
-                Some(Direction::Request) => rmd_capture::Decoder::of(rmd::Direction::HostToDrive),
-                Some(Direction::Reply) => rmd_capture::Decoder::of(rmd::Direction::DriveToHost),
-            };
+            let decoder =
+                direction.map_or_else(rmd_capture::Decoder::new, rmd_capture::Decoder::of);
             (common, Plain::Can(id.map(MotorId::can_id)), Decoder::Rmd(Box::new(decoder)))
         }
     };

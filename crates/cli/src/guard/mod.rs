@@ -12,10 +12,12 @@ use motorlink::relay::{Event, Relay, RelayOptions};
 use motorlink::rmd::StopAction;
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::Served;
+use motorlink_telemetry::share::message::Protocol;
 use serde_json::json;
 
 use crate::connection::Port;
 use crate::failure::Failure;
+use crate::hint;
 use crate::interrupt::{self, interrupted};
 use crate::output::{self, note};
 use crate::span::parse_span;
@@ -100,20 +102,15 @@ struct RmdArgs {
     serve: Vec<String>,
     /// How motors are stopped when the program ends: stop (0x81) holds them; off (0x80) lets them turn
     /// freely, so a load may fall
-    #[arg(long, value_name = "ACTION", default_value = "stop")]
-    on_loss: OnLoss,
+    #[arg(long, value_name = "ACTION", default_value = "stop",
+          value_parser = hint::one_of(&[("off", StopAction::Off), ("stop", StopAction::Stop)]))]
+    on_loss: StopAction,
     /// The motor for --prove
     #[arg(long, value_name = "ID", default_value_t = 1, requires = "prove",
         value_parser = clap::value_parser!(u8).range(1..=32))]
     id: u8,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum OnLoss {
-    Off,
-    Stop,
 }
 
 #[derive(clap::Args)]
@@ -154,22 +151,24 @@ fn guard_st(args: &StArgs, program: &[OsString]) -> Result<(), Failure> {
     hold();
     let relay = Relay::st(&port, args.common.options())?;
     match args.common.spin {
-        Some(speed) => Proof::st(port, args.motor, speed).show(program, relay, args.common.json),
-        None => serve(relay, "st", &port, &args.serve, args.common.json),
+        Some(speed) => {
+            let (protocol, motor) = (Protocol::St, args.motor);
+            Proof { protocol, port, motor, speed }.show(program, relay, args.common.json)
+        }
+        None => serve(relay, Protocol::St, &port, &args.serve, args.common.json),
     }
 }
 
 fn guard_rmd(args: &RmdArgs, program: &[OsString]) -> Result<(), Failure> {
     let port = args.port.name()?;
-    let on_loss = match args.on_loss {
-        OnLoss::Off => StopAction::Off,
-        OnLoss::Stop => StopAction::Stop,
-    };
     hold();
-    let relay = Relay::rmd(&port, on_loss, args.common.options())?;
+    let relay = Relay::rmd(&port, args.on_loss, args.common.options())?;
     match args.common.spin {
-        Some(speed) => Proof::rmd(port, args.id, speed).show(program, relay, args.common.json),
-        None => serve(relay, "rmd", &port, &args.serve, args.common.json),
+        Some(speed) => {
+            let (protocol, motor) = (Protocol::Rmd, args.id);
+            Proof { protocol, port, motor, speed }.show(program, relay, args.common.json)
+        }
+        None => serve(relay, Protocol::Rmd, &port, &args.serve, args.common.json),
     }
 }
 
@@ -188,7 +187,7 @@ impl Common {
 /// Guards until a signal comes.
 fn serve(
     mut relay: Relay,
-    protocol: &str,
+    protocol: Protocol,
     port: &PortName,
     names: &[String],
     json: bool,

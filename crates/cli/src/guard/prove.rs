@@ -14,9 +14,11 @@ use motorlink::rmd::{self, CentiDps, Dps};
 use motorlink::st::register::{self, Unit};
 use motorlink::st::{self, Ramp, Request};
 use motorlink_link::serve::ServeName;
+use motorlink_telemetry::share::message::Protocol;
 
 use super::words;
 use crate::failure::Failure;
+use crate::hint;
 use crate::interrupt::interrupted;
 use crate::json::{Line, Row};
 use crate::output::{Printer, note, print_line};
@@ -35,6 +37,7 @@ const RESTS: f64 = 0.01;
 /// The program that is killed: it turns a motor and keeps reading its speed.
 #[derive(clap::Args)]
 pub struct Spin {
+    #[arg(value_parser = hint::one_of(&hint::PROTOCOLS))]
     protocol: Protocol,
     port: String,
     motor: u8,
@@ -42,19 +45,11 @@ pub struct Spin {
     speed: i32,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Protocol {
-    St,
-    Rmd,
-}
-
-impl Protocol {
-    /// Of speeds.
-    fn unit(self) -> &'static str {
-        match self {
-            Protocol::St => Unit::Rpm.symbol(),
-            Protocol::Rmd => Dps::SYMBOL,
-        }
+/// The unit of speeds.
+fn unit(protocol: Protocol) -> &'static str {
+    match protocol {
+        Protocol::St => Unit::Rpm.symbol(),
+        Protocol::Rmd => Dps::SYMBOL,
     }
 }
 
@@ -75,7 +70,7 @@ impl Spin {
                 return Err(Failure::refused(format!(
                     "the motor turns at {speed} {unit} instead of {told} {unit}: does it have \
                      power, and is it free to turn?",
-                    unit = self.protocol.unit(),
+                    unit = unit(self.protocol),
                     told = self.speed,
                 )));
             }
@@ -130,21 +125,13 @@ impl SpunMotor {
 
 /// What is to be proved.
 pub struct Proof {
-    protocol: Protocol,
-    port: PortName,
-    motor: u8,
-    speed: i32,
+    pub protocol: Protocol,
+    pub port: PortName,
+    pub motor: u8,
+    pub speed: i32,
 }
 
 impl Proof {
-    pub fn st(port: PortName, motor: u8, speed: i32) -> Self {
-        Proof { protocol: Protocol::St, port, motor, speed }
-    }
-
-    pub fn rmd(port: PortName, id: u8, speed: i32) -> Self {
-        Proof { protocol: Protocol::Rmd, port, motor: id, speed }
-    }
-
     pub fn show(&self, program: &[OsString], mut relay: Relay, json: bool) -> Result<(), Failure> {
         if self.speed == 0 {
             return Err(Failure::usage("--spin 0 does not turn the motor: give a speed"));
@@ -154,7 +141,7 @@ impl Proof {
         relay.serve(&format!("unix-listen:{}", path.display()).parse::<ServeName>()?)?;
         let mut program = Program::start(program, self, &path)?;
         let reached = program.turning(&mut relay)?;
-        let unit = self.protocol.unit();
+        let unit = unit(self.protocol);
         note(format!(
             "a program turns motor {} at {reached} {unit}; it is killed now (SIGKILL)",
             self.motor
@@ -191,7 +178,7 @@ impl Proof {
                     "motor {} still turns at {speed} {} although it acknowledged its stop: does \
                      something drive it?",
                     self.motor,
-                    self.protocol.unit(),
+                    unit(self.protocol),
                 )));
             }
             std::thread::sleep(LOOK);
@@ -221,13 +208,13 @@ struct Program {
 
 impl Program {
     fn start(program: &[OsString], proof: &Proof, path: &Path) -> Result<Self, Failure> {
-        let (protocol, port) = match proof.protocol {
-            Protocol::St => ("st", format!("unix:{}", path.display())),
-            Protocol::Rmd => ("rmd", format!("slcan:unix:{}", path.display())),
+        let port = match proof.protocol {
+            Protocol::St => format!("unix:{}", path.display()),
+            Protocol::Rmd => format!("slcan:unix:{}", path.display()),
         };
         let (name, words) = program.split_first().expect("a program has a name");
         let mut command = Command::new(name);
-        command.args(words).args(["guard", "spin", protocol, &port]);
+        command.args(words).args(["guard", "spin", proof.protocol.word(), &port]);
         command.args([proof.motor.to_string(), proof.speed.to_string()]);
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
         let (say, said) = channel();

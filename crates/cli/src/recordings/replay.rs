@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::input::Input;
 use crate::failure::Failure;
+use crate::hint;
 use crate::interrupt::{self, interrupted};
 use crate::output::{self, note};
 
@@ -38,18 +39,12 @@ pub struct Args {
     #[arg(long, value_name = "[LABEL=]PORT", required = true)]
     serve: Vec<String>,
     /// How fast replies come: 1 is with the recorded delays, max is at once
-    #[arg(long, default_value = "1")]
-    speed: SpeedName,
+    #[arg(long, default_value = "1",
+          value_parser = hint::one_of(&[("1", Speed::Recorded), ("max", Speed::Max)]))]
+    speed: Speed,
     /// Exit code 1 if a program asked something that was not recorded
     #[arg(long)]
     strict: bool,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum SpeedName {
-    #[value(name = "1")]
-    Recorded,
-    Max,
 }
 
 /// The frames of a recorded line.
@@ -159,13 +154,9 @@ fn serve(
     label: &str,
     port: &ServeName,
     line: Line,
-    speed: SpeedName,
+    speed: Speed,
     tally: &Tally,
 ) -> Result<Value, Failure> {
-    let speed = match speed {
-        SpeedName::Recorded => Speed::Recorded,
-        SpeedName::Max => Speed::Max,
-    };
     let (requests, protocol, served) = match line {
         Line::St(line) => {
             let requests = line.requests();

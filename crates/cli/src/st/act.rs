@@ -9,7 +9,7 @@ use motorlink::st::{
 };
 use motorlink::time;
 
-use super::args::{Act, Pfc, Wait};
+use super::args::{Act, Wait};
 use super::read::explain;
 use super::session::Session;
 use super::{files, mode, set};
@@ -58,9 +58,7 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
         Act::FaultAck => acknowledge(session),
         Act::EncoderAlign => execute(session, Execute::EncoderAlign),
         Act::IqdrefClear => execute(session, Execute::IqdrefClear),
-        Act::Pfc { action: Pfc::Enable } => execute(session, Execute::PfcEnable),
-        Act::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
-        Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
+        Act::Pfc { action } => execute(session, action),
         Act::Ramp { rpm, ms } => {
             let held = mode::set_ramp(session, Ramp { speed_rpm: rpm, duration_ms: ms })?;
             let fault = mode::fault(session)?;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::st::{FullScale, MotorNumber, Profile};
+use motorlink::st::{self, FullScale, MotorNumber, Profile};
 
 use super::registers::Filter;
 use crate::angle::{parse_angle, parse_tolerance};
@@ -249,8 +249,8 @@ pub enum Act {
     /// Switch the power factor correction on or off, or acknowledge its faults
     Pfc {
         /// Action
-        #[arg(value_enum)]
-        action: Pfc,
+        #[arg(value_parser = hint::one_of(&PFC))]
+        action: st::Command,
     },
     /// Write the settings of a file that differ from those of the motor
     ///
@@ -301,9 +301,9 @@ pub struct Wait {
     pub wait_timeout: Option<Duration>,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy)]
-pub enum Pfc {
-    Enable,
-    Disable,
-    FaultAck,
-}
+/// What `pfc` does.
+const PFC: [(&str, st::Command); 3] = [
+    ("enable", st::Command::PfcEnable),
+    ("disable", st::Command::PfcDisable),
+    ("fault-ack", st::Command::PfcFaultAck),
+];
