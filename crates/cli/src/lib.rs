@@ -21,7 +21,6 @@ mod demo;
 mod failure;
 #[cfg(feature = "fleet")]
 mod fleet;
-#[cfg(any(feature = "monitor", feature = "fleet"))]
 mod folder;
 mod guard;
 mod help;

@@ -3,15 +3,16 @@
 use std::io::{BufRead, BufReader, Write};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
 use std::slice::from_ref;
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 
 use motorlink_testbench::{BenchConfig, SimServer};
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 use crate::failure::Failure;
+use crate::folder;
 use crate::nonblocking_writer::NonblockingWriter;
 use crate::output::missed;
 use crate::sim;
@@ -23,7 +24,8 @@ pub struct Drives {
     pub rmd: String,
     served: [String; 2],
     control: Mutex<Control>,
-    folder: PathBuf,
+    /// Removed at the end, after the links.
+    _folder: TempDir,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -35,9 +37,8 @@ struct Control {
 impl Drives {
     /// Starts the drives. Their ports can be opened when this returns.
     pub fn start() -> Result<Self, Failure> {
-        let folder = std::env::temp_dir().join(format!("motorlink-demo-{}", std::process::id()));
-        std::fs::create_dir_all(&folder)?;
-        let (st, can) = (folder.join("st0"), folder.join("can0"));
+        let folder = folder::new()?;
+        let (st, can) = (folder.path().join("st0"), folder.path().join("can0"));
         let served = [format!("pty:{}", st.display()), format!("slcan-pty:{}", can.display())];
         let (commands, theirs) = UnixStream::pair()?;
         let ports = served.clone();
@@ -57,7 +58,7 @@ impl Drives {
             rmd: format!("slcan:{}", can.display()),
             served,
             control: Mutex::new(control),
-            folder,
+            _folder: folder,
             thread: Some(thread),
         })
     }
@@ -104,7 +105,6 @@ impl Drop for Drives {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
-        let _ = std::fs::remove_dir(&self.folder);
     }
 }
 

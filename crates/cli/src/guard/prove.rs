@@ -2,8 +2,7 @@
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader};
-use std::os::unix::fs::DirBuilderExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
@@ -18,6 +17,7 @@ use motorlink_telemetry::share::message::Protocol;
 
 use super::words;
 use crate::failure::Failure;
+use crate::folder;
 use crate::hint;
 use crate::interrupt::interrupted;
 use crate::json::{Line, Row};
@@ -136,8 +136,8 @@ impl Proof {
         if self.speed == 0 {
             return Err(Failure::usage("--spin 0 does not turn the motor: give a speed"));
         }
-        let folder = Folder::new()?;
-        let path = folder.0.join("line");
+        let folder = folder::new()?;
+        let path = folder.path().join("line");
         relay.serve(&format!("unix-listen:{}", path.display()).parse::<ServeName>()?)?;
         let mut program = Program::start(program, self, &path)?;
         let reached = program.turning(&mut relay)?;
@@ -255,22 +255,5 @@ impl Program {
 impl Drop for Program {
     fn drop(&mut self) {
         self.kill();
-    }
-}
-
-/// A folder of this user's own, gone at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Result<Self, Failure> {
-        let path = std::env::temp_dir().join(format!("motorlink-prove-{}", std::process::id()));
-        std::fs::DirBuilder::new().mode(0o700).create(&path)?;
-        Ok(Folder(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }

@@ -18,7 +18,6 @@ use motorlink_telemetry::share::server::Server;
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::folder::Folder;
 use crate::interrupt;
 use crate::output;
 use crate::share::{self, Connection, Lines, PROGRAM};
@@ -138,14 +137,7 @@ fn hold(args: &mut Args, web: Web) -> Result<(), Failure> {
         args.lines.ports = vec![SIMULATED.to_owned()];
         args.lines.timeout.get_or_insert(SIMULATED_TIMEOUT);
     }
-    let folder;
-    let path = match &args.at {
-        Some(at) => share::path(at)?,
-        None => {
-            folder = Folder::new()?;
-            folder.socket()
-        }
-    };
+    let (path, _folder) = share::socket(args.at.as_deref())?;
     let server = Server::open(&path, PROGRAM, args.lines.open(Limits::default())?)?;
     let at = format!("unix:{}", path.display());
     let monitor = start(args, Arc::new(Local(path)), false, web)?;

@@ -18,7 +18,6 @@ use motorlink_telemetry::share::server::Server;
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::folder::Folder;
 use crate::interrupt::{self, interrupted};
 use crate::network::NetworkArgs;
 use crate::output;
@@ -92,14 +91,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
     let network = args.network.given().unwrap_or_else(Network::of_nodes);
     let name = name(args.name.as_ref(), &network)?;
-    let folder;
-    let path = match &args.at {
-        Some(at) => share::path(at)?,
-        None => {
-            folder = Folder::new()?;
-            folder.socket()
-        }
-    };
+    let (path, _folder) = share::socket(args.at.as_deref())?;
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     interrupt::hold();
     let limits = config.limits()?;

@@ -16,11 +16,12 @@ use motorlink_telemetry::share::port_config::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
 use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 use crate::span::utc;
-use crate::{advice, output};
+use crate::{advice, folder, output};
 
 pub use asking::Connection;
 pub use lines::Lines;
@@ -163,6 +164,16 @@ pub fn tell_stops(
     // Where nothing answers, silence does not show that no motor is there.
     let is_silent = !motors.is_empty() && motors.iter().all(|one| one.absent);
     Ok(!is_silent && !motors.iter().any(may_turn))
+}
+
+/// The socket of a share: that of `--at`, or one in a folder of its own, which is removed when it is
+/// dropped.
+pub fn socket(at: Option<&str>) -> Result<(PathBuf, Option<TempDir>), Failure> {
+    if let Some(at) = at {
+        return Ok((path(at)?, None));
+    }
+    let folder = folder::new()?;
+    Ok((folder.path().join("share"), Some(folder)))
 }
 
 /// The path in unix:PATH.
