@@ -304,7 +304,6 @@ pictures: web $(VENV)/ready ## draws scenarios (docs/pictures) and screens of th
 	$(PROGRAM)
 	MOTORLINK_BIN=$(DEBUG)/motorlink $(VENV)/bin/python tests/e2e/pictures.py docs
 	cd web && MOTORLINK_BIN=$(DEBUG)/motorlink npm run --silent measure tests/pictures
-	$(DEBUG)/motorlink demo --picture docs/demo.svg
 	@for scenario in scenarios/*.toml; do \
 		$(DEBUG)/motorlink sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \
 	done

@@ -2,6 +2,7 @@
 runs. test_pictures.py compares them with the program."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -14,9 +15,12 @@ from program import Running, Sim, environment, eventually
 from terminal import Terminal
 
 COLUMNS = 80
-#: Measures in pixels, and colours, as in the picture of the demo (crates/cli/src/demo/picture.rs).
+#: Measures in pixels.
 FONT, COLUMN, LINE, MARGIN = 14, 8.43, 19, 18
-TEXT, BACKGROUND, BORDER, FAULT = "#24292f", "#ffffff", "#e4e7eb", "#c43e00"
+#: Colours, as crates/cli/src/palette.rs has them.
+TEXT, BACKGROUND, BORDER, RUNNING, FAULT = "#24292f", "#ffffff", "#e4e7eb", "#13803f", "#c43e00"
+#: Those of a terminal; any other marks a fault.
+INKS = {"default": TEXT, "green": RUNNING}
 FONTS = "ui-monospace, SFMono-Regular, Menlo, Consolas, 'DejaVu Sans Mono', monospace"
 
 
@@ -33,7 +37,7 @@ def draw(screen, title):
     for number in range(last + 1):
         for column, text, (is_bold, is_reverse, colour) in runs(screen.buffer[number]):
             x, y, length = MARGIN + column * COLUMN, MARGIN + LINE * number, len(text) * COLUMN
-            ink = TEXT if colour == "default" else FAULT
+            ink = INKS.get(colour, FAULT)
             if is_reverse:
                 svg.append(f'<rect x="{x:.1f}" y="{y}" width="{length:.1f}" height="{LINE}" fill="{ink}"/>')
                 ink = BACKGROUND
@@ -88,6 +92,20 @@ def output(folder, motorlink, command):
         cwd=folder, env=environment(path), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60,
     )
     return done.stdout
+
+
+def demo(folder, motorlink, _):
+    """The demo's screen during the fault."""
+    terminal = Terminal([motorlink, "demo"], COLUMNS, 40, folder, NO_COLOR=None, TMPDIR="/tmp")
+    try:
+        assert terminal.wait(120) == 0
+        drawn = terminal.raw.decode()
+    finally:
+        terminal.end()
+    during = re.search(r".*waits for standstill.*?RMD 4[^\n]*", drawn, re.DOTALL)
+    screen, stream = paper()
+    stream.feed(prompt("motorlink demo") + during[0])
+    return screen
 
 
 def watch(folder, motorlink, drives):
@@ -196,6 +214,7 @@ def plot(folder, motorlink, _):
 
 #: Each picture: how its screen comes about, and its title, for screen readers.
 PICTURES = {
+    "demo": (demo, "motorlink demo: a table of two ST and four RMD motors; ST motor 1 has a fault, over-current"),
     "watch": (watch, "motorlink watch: a row for each of six motors with state, speed, current, temperature, supply and rate; one motor is too hot"),
     "share": (share, "motorlink share holds two ports; motorlink st and motorlink rmd use its lines; its log lists their requests"),
     "record": (record, "motorlink record writes a starting motor into run.mcap; motorlink info lists drives, topics, signals and rates"),

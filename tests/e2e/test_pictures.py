@@ -18,7 +18,9 @@ def words(svg):
         lines.setdefault(int(text.get("y")), []).append((float(text.get("x")), text.text))
     joined = [" ".join(text for _, text in sorted(parts)) for _, parts in sorted(lines.items())]
     # A rate is called `only` if it is low, and one message has none. A start is seen in one of its states.
-    bars, numbers = re.compile("[▁▂▃▄▅▆▇█]+|, [0-9.]+ Hz$|only (?=[0-9])|(?<=starts: )[A-Z_]+"), re.compile(r"-?\d[\d.]*")
+    # A folder of the demo has a name of its own.
+    bars = re.compile("[▁▂▃▄▅▆▇█]+|, [0-9.]+ Hz$|only (?=[0-9])|(?<=starts: )[A-Z_]+|(?<=/tmp/motorlink-)[^/]+")
+    numbers = re.compile(r"-?\d[\d.]*")
     return [" ".join(numbers.sub("0", bars.sub("", line)).split()) for line in joined]
 
 

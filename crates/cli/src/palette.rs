@@ -19,12 +19,6 @@ macro_rules! meanings {
                 let rgb: u32 = match self { $( Meaning::$name => $colour, )+ };
                 ((rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8)
             }
-
-            /// The colour as SVG and CSS write it.
-            pub fn css(self) -> String {
-                let (red, green, blue) = self.colour();
-                format!("#{red:02x}{green:02x}{blue:02x}")
-            }
         }
     };
 }

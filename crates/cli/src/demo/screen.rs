@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use console::{Style, Term};
+use console::{StyledObject, Term, style, truncate_str};
 
-use super::line::{Ink, Line, wrap};
 use super::table::{self, Row};
+use crate::text::flow;
 
 /// How often a plain line is printed for a motor that is being watched.
 const PLAIN_EVERY: Duration = Duration::from_millis(500);
@@ -23,8 +23,6 @@ pub struct Screen {
     drawn: usize,
     began: Instant,
     printed: Option<Instant>,
-    /// All lines above the table, for a picture.
-    said: Vec<Line>,
 }
 
 impl Screen {
@@ -35,24 +33,25 @@ impl Screen {
         if is_live {
             let _ = term.hide_cursor();
         }
-        let (drawn, printed, said) = (0, None, Vec::new());
-        Screen { term, is_live, drawn, began: Instant::now(), printed, said }
+        Screen { term, is_live, drawn: 0, began: Instant::now(), printed: None }
     }
 
     pub fn title(&mut self, lines: &[&str]) {
         for line in lines {
-            self.add(0, Line::plain(line));
+            flow(line.split(' '), " ", "", self.width()).iter().for_each(|part| self.write(part));
         }
-        self.add(0, Line::plain(""));
+        self.write("");
     }
 
     /// Prints what happens next, above the table.
     pub fn say(&mut self, text: &str) {
         self.erase();
         let at = self.began.elapsed().as_secs_f64();
-        let mut line = Line::new(Ink::Dim, format!("{at:5.1} s  "));
-        line.push(Ink::Bold, text);
-        self.add(INDENT, line);
+        let room = self.width().saturating_sub(INDENT);
+        for (n, part) in flow(text.split(' '), " ", "", room).into_iter().enumerate() {
+            let time = if n == 0 { format!("{at:5.1} s  ") } else { " ".repeat(INDENT) };
+            self.write(&format!("{}{}", self.styled(time).dim(), self.styled(part).bold()));
+        }
         self.printed = None;
     }
 
@@ -60,28 +59,17 @@ impl Screen {
     pub fn show(&mut self, rows: &[Row]) {
         if self.is_live {
             self.erase();
-            let lines = self.table(rows);
+            let lines = table::lines(rows, self.width());
+            self.write("");
             lines.iter().for_each(|line| self.write(line));
-            self.drawn = lines.len();
+            self.drawn = 1 + lines.len();
         } else if self.printed.is_none_or(|at| at.elapsed() >= PLAIN_EVERY) {
             self.printed = Some(Instant::now());
             let moving = |row: &&Row| row.is_fault || !row.speed.starts_with("0 ");
             for row in rows.iter().filter(moving) {
-                self.write(&table::line(row, WIDTH));
+                self.write(&table::line(row, WIDTH, false));
             }
         }
-    }
-
-    /// The screen as it is now, at 80 columns.
-    pub fn picture(&self, rows: &[Row]) -> Vec<Line> {
-        let command = Line::plain("$ motorlink demo");
-        std::iter::once(command).chain(self.said.iter().cloned()).chain(self.table(rows)).collect()
-    }
-
-    /// The table, apart from the lines above.
-    fn table(&self, rows: &[Row]) -> Vec<Line> {
-        let table = table::lines(rows, self.width());
-        std::iter::once(Line::default()).chain(table).collect()
     }
 
     /// Leaves what is on the screen.
@@ -100,21 +88,14 @@ impl Screen {
         if self.is_live { usize::from(self.term.size().1) } else { WIDTH }
     }
 
-    /// Prints a line that stays, broken at the terminal's width.
-    fn add(&mut self, indent: usize, line: Line) {
-        for part in wrap(&line, self.width(), indent) {
-            self.write(&part);
-            self.said.push(part);
-        }
+    /// Text that has a style where a table is drawn.
+    fn styled(&self, text: String) -> StyledObject<String> {
+        style(text).force_styling(self.is_live)
     }
 
     /// A closed stdout is reported when the summary is printed.
-    fn write(&self, line: &Line) {
-        let text = line.parts().map(|(ink, text)| match self.is_live {
-            true => style(ink).apply_to(text).to_string(),
-            false => text.to_owned(),
-        });
-        let _ = self.term.write_line(&text.collect::<String>());
+    fn write(&self, line: &str) {
+        let _ = self.term.write_line(&truncate_str(line, self.width(), ""));
     }
 }
 
@@ -130,14 +111,4 @@ fn can_draw(term: &Term) -> bool {
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let is_high = term.size_checked().is_none_or(|(lines, _)| lines >= LEAST_LINES);
     term.features().is_attended() && !is_dumb && !no_colour && is_high
-}
-
-fn style(ink: Ink) -> Style {
-    match ink {
-        Ink::Plain => Style::new(),
-        Ink::Dim => Style::new().dim(),
-        Ink::Bold => Style::new().bold(),
-        Ink::Running => Style::new().green(),
-        Ink::Fault => Style::new().red().bold(),
-    }
 }

@@ -10,7 +10,6 @@ use motorlink::rmd::{
 use motorlink::st::{self, Flags, Ramp, Status, register};
 
 use super::bench::Drives;
-use super::line::Line;
 use super::screen::Screen;
 use super::table::Row;
 use crate::failure::Failure;
@@ -32,8 +31,6 @@ pub struct Story<'a> {
     exchanges: u64,
     exchanging: Duration,
     done: Vec<String>,
-    /// The screen during the fault.
-    picture: Option<Vec<Line>>,
 }
 
 /// Summary at the end of the demo.
@@ -58,13 +55,7 @@ impl<'a> Story<'a> {
             exchanges: 0,
             exchanging: Duration::ZERO,
             done: Vec::new(),
-            picture: None,
         }
-    }
-
-    /// The screen during the fault, if the demo got there.
-    pub fn into_picture(self) -> Option<Vec<Line>> {
-        self.picture
     }
 
     pub fn tell(&mut self) -> Result<(), Failure> {
@@ -195,7 +186,6 @@ impl<'a> Story<'a> {
         self.watch(Duration::from_millis(500))?;
         self.screen.say("The program waits for standstill, sends FAULT_ACK and restarts it.");
         self.tick()?;
-        self.picture = Some(self.screen.picture(&self.rows));
         self.until("ST motor 1 stands still", |_| Ok(motor.get(register::SPEED_MEAS)?.abs() < 30))?;
         motor.fault_ack()?;
         self.until("ST motor 1 is idle", |_| Ok(motor.status()? == Status::Idle))?;

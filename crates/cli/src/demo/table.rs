@@ -1,6 +1,6 @@
 //! The table of motors: columns that fit a terminal.
 
-use super::line::{Ink, Line};
+use console::{style, truncate_str};
 
 /// One motor as the table shows it.
 #[derive(Debug, Clone, Default)]
@@ -28,28 +28,28 @@ const COLUMNS: [Column; 4] = [
     ("voltage", 10, |row| &row.voltage),
 ];
 
-/// The table with its header; no line is wider than `width`.
-pub fn lines(rows: &[Row], width: usize) -> Vec<Line> {
+/// The table with its header, in colour; no line is wider than `width`.
+pub fn lines(rows: &[Row], width: usize) -> Vec<String> {
     let mut header = format!("{:<MOTOR$}{:<STATE$}", "  motor", "state");
     for (title, size, _) in columns(width) {
         header += &format!("{title:>size$}");
     }
-    let header = Line::new(Ink::Dim, header).cut(width);
-    std::iter::once(header).chain(rows.iter().map(|row| line(row, width))).collect()
+    let header = style(truncate_str(&header, width, "")).dim().force_styling(true).to_string();
+    std::iter::once(header).chain(rows.iter().map(|row| line(row, width, true))).collect()
 }
 
 /// A row of the table.
-pub fn line(row: &Row, width: usize) -> Line {
-    let mut line = Line::plain(&format!("  {:<1$}", row.motor, MOTOR - 2));
-    let ink = match (row.is_fault, row.is_turning) {
-        (true, _) => Ink::Fault,
-        (false, true) => Ink::Running,
-        (false, false) => Ink::Plain,
+pub fn line(row: &Row, width: usize, is_coloured: bool) -> String {
+    let motor = format!("  {:<1$}", row.motor, MOTOR - 2);
+    let state = style(format!("{:<STATE$}", row.state)).force_styling(is_coloured);
+    let state = match (row.is_fault, row.is_turning) {
+        (true, _) => state.red().bold(),
+        (false, true) => state.green(),
+        (false, false) => state,
     };
-    line.push(ink, &format!("{:<STATE$}", row.state));
     let values = columns(width).map(|(_, size, value)| format!("{:>size$}", value(row)));
-    line.push(Ink::Plain, &values.collect::<String>());
-    line.cut(width)
+    let line = format!("{motor}{state}{}", values.collect::<String>());
+    truncate_str(&line, width, "").into_owned()
 }
 
 /// The columns that fit.
@@ -62,6 +62,8 @@ fn columns(width: usize) -> impl Iterator<Item = Column> {
 
 #[cfg(test)]
 mod tests {
+    use console::measure_text_width;
+
     use super::*;
 
     #[test]
@@ -75,17 +77,16 @@ mod tests {
             voltage: "325.0 V".to_owned(),
             ..Row::default()
         };
-        let text = |line: &Line| line.parts().map(|(_, text)| text).collect::<String>();
         let whole = lines(std::slice::from_ref(&row), 80);
         for value in ["-12000 °/s", " -32768 s16A", " 100 °C", " 325.0 V"] {
-            assert!(text(&whole[1]).contains(value), "{value}");
+            assert!(whole[1].contains(value), "{value}");
         }
         for width in 0..=200 {
             for line in lines(std::slice::from_ref(&row), width) {
-                assert!(line.width() <= width.min(80), "{width}: {}", text(&line));
+                assert!(measure_text_width(&line) <= width.min(80), "{width}: {line}");
             }
         }
         let narrow = lines(&[row], 50);
-        assert!(text(&narrow[0]).contains("speed") && !text(&narrow[0]).contains("current"));
+        assert!(narrow[0].contains("speed") && !narrow[0].contains("current"));
     }
 }
