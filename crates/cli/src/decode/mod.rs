@@ -5,12 +5,12 @@ mod entry;
 mod input;
 mod object;
 mod out;
-mod source;
 mod text;
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use clap::Subcommand;
 use motorlink::rmd::{Direction, MotorId};
@@ -27,7 +27,6 @@ use crate::output::note;
 use crate::{hint, recordings};
 use entry::{Entry, Meaning};
 use out::Out;
-use source::{Recorded, Source};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -111,10 +110,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
         return decode_recording(&recordings::Input::of(path), decoder, out);
     }
     let input = input::open(&common.input, common.format, plain)?;
-    let (is_file, is_hex, name) = (input.is_file, input.is_hex, input.name.clone());
+    let (is_file, is_hex, name) = (input.is_file, input.is_hex, input.name);
     let failed = |error: io::Error| Failure::usage(format!("cannot read {name}: {error}"));
     let mut reader = Reader::new(input.content, input.format, plain).map_err(&failed)?;
-    let counts = decode(&mut reader, decoder, out, (is_file, is_hex), failed)?;
+    let counts = decode(decoder, out, is_hex, |out| {
+        // Before it waits for more input, all output is written.
+        if !is_file && reader.may_wait() {
+            out.flush()?;
+        }
+        reader.next().map_err(&failed)
+    })?;
     counts.report(!is_hex)
 }
 
@@ -143,10 +148,16 @@ fn decode_recording(input: &recordings::Input, decoder: Decoder, out: Out) -> Re
         }
         Decoder::Rmd(decoder) => Decoder::Rmd(decoder),
     };
-    let mut source = Recorded::new(recording.frames(), is_wanted);
-    let failed = |error: io::Error| input.failed(&error);
-    let counts = decode(&mut source, decoder, out, (true, false), failed)?;
-    let malformed = source.malformed();
+    let (mut frames, mut place) = (recording.frames(), 0);
+    let counts = decode(decoder, out, false, |_| {
+        let is_next =
+            |it: &io::Result<(Arc<Line>, _)>| it.as_ref().map_or(true, |(line, _)| is_wanted(line));
+        let Some(frame) = frames.find(is_next) else { return Ok(None) };
+        let (line, frame) = frame.map_err(|error| input.failed(&error))?;
+        place += 1;
+        Ok(Some(frame.captured(place, &line)))
+    })?;
+    let malformed = frames.malformed();
     input.note_frames(&recording, malformed);
     counts.report(true)
 }
@@ -161,21 +172,16 @@ fn is_recording(path: &Path) -> bool {
     read.is_ok() && magic == MAGIC
 }
 
-/// Decodes everything. Before it waits for more input, all output is written.
+/// Decodes everything. `next` gives the next entry; `None` at the end.
 fn decode(
-    source: &mut dyn Source,
     mut decoder: Decoder,
     mut out: Out,
-    (is_file, is_hex): (bool, bool),
-    failed: impl Fn(io::Error) -> Failure,
+    is_hex: bool,
+    mut next: impl FnMut(&mut Out) -> Result<Option<Captured>, Failure>,
 ) -> Result<Counts, Failure> {
     let mut counts = Counts::default();
     out.begin()?;
-    loop {
-        if !is_file && source.may_wait() {
-            out.flush()?;
-        }
-        let Some(captured) = source.next().map_err(&failed)? else { break };
+    while let Some(captured) = next(&mut out)? {
         if let (Wire::Damage(damage @ Damage::Line { .. }), true) = (&captured.wire, is_hex) {
             return Err(Failure::usage(damage.to_string()));
         }
