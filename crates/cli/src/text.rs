@@ -1,5 +1,7 @@
 //! Text of a given width.
 
+use std::borrow::Cow;
+
 use console::{Alignment, measure_text_width, pad_str};
 
 /// Heights of a bar.
@@ -29,6 +31,14 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 pub fn counted(count: u64, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{plural}")
+}
+
+/// A text as a cell of a CSV file: in quotation marks where it needs them.
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")).into(),
+        false => text.into(),
+    }
 }
 
 /// Words in lines of at most this width, with `gap` between two words. Lines after the first begin with

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::entry::{Entry, Frame, Meaning};
 use super::{object, text};
+use crate::text::csv_cell;
 
 /// The first row.
 pub const HEAD: &str =
@@ -28,19 +29,20 @@ pub fn push(out: &mut String, entry: &Entry<'_>) {
             continue;
         }
         if unit.is_empty() {
-            quoted(out, &value.text);
+            out.push_str(&csv_cell(&value.text));
         }
         out.push('\n');
     }
     if values.is_empty() {
         head(out, entry);
         out.push_str(",,,,,");
-        match &entry.meaning {
-            Meaning::Damage(why) => quoted(out, why),
-            Meaning::Other(what) => quoted(out, what),
-            Meaning::Rmd(described) => quoted(out, &described.to_string()),
-            Meaning::St(message) => quoted(out, &message.to_string()),
-        }
+        let text = match &entry.meaning {
+            Meaning::Damage(why) => why.clone(),
+            Meaning::Other(what) => (*what).to_owned(),
+            Meaning::Rmd(described) => described.to_string(),
+            Meaning::St(message) => message.to_string(),
+        };
+        out.push_str(&csv_cell(&text));
         out.push('\n');
     }
 }
@@ -52,7 +54,7 @@ fn head(out: &mut String, entry: &Entry<'_>) {
         let _ = write!(out, "{time}");
     }
     out.push(',');
-    quoted(out, entry.at.channel.as_deref().unwrap_or_default());
+    out.push_str(&csv_cell(entry.at.channel.as_deref().unwrap_or_default()));
     out.push_str(match entry.is_request {
         Some(true) => ",request,",
         Some(false) => ",reply,",
@@ -75,19 +77,5 @@ fn head(out: &mut String, entry: &Entry<'_>) {
         let _ = write!(out, "{motor}");
     }
     out.push(',');
-    out.push_str(match &entry.meaning {
-        Meaning::Damage(_) => "damage",
-        _ if entry.is_other() => "other",
-        Meaning::Rmd(described) => object::rmd_name(described.subject()),
-        Meaning::St(message) => message.name(),
-        Meaning::Other(_) => "other",
-    });
-}
-
-/// Appends a text, in quotation marks where it needs them.
-fn quoted(out: &mut String, text: &str) {
-    match text.contains([',', '"', '\n']) {
-        true => drop(write!(out, "\"{}\"", text.replace('"', "\"\""))),
-        false => out.push_str(text),
-    }
+    out.push_str(object::message_of(entry));
 }

@@ -53,17 +53,11 @@ pub fn of(entry: &Entry<'_>) -> Value {
         Meaning::Damage(why) => add("damage", why.as_str().into()),
         Meaning::Other(what) => add("other", (*what).into()),
         Meaning::Rmd(described) if entry.is_other() => add("other", described.to_string().into()),
-        Meaning::Rmd(described) => {
-            if let Some(motor) = motor(described.subject()) {
-                add("motor", motor.number().into());
-            }
-            add("message", rmd_name(described.subject()).into());
-        }
-        Meaning::St(message) => {
-            if let Some(motor) = message.motor() {
+        Meaning::Rmd(_) | Meaning::St(_) => {
+            if let Some(motor) = motor_of(entry) {
                 add("motor", motor.into());
             }
-            add("message", message.name().into());
+            add("message", message_of(entry).into());
         }
     }
     let values: Map<String, Value> =
@@ -74,12 +68,17 @@ pub fn of(entry: &Entry<'_>) -> Value {
     Value::Object(members)
 }
 
-/// The name of a message of RMD: the one of the functions of all languages.
-pub fn rmd_name(subject: Subject) -> &'static str {
-    match subject {
-        Subject::Torque4 => SetTorque4::STEM,
-        Subject::Motor(_, code) => code.info().map_or("unknown", |row| row.stem),
-        _ => "",
+/// The name of the message of an entry. One of RMD has that of the functions of all languages.
+pub fn message_of(entry: &Entry<'_>) -> &'static str {
+    match &entry.meaning {
+        Meaning::Damage(_) => "damage",
+        Meaning::Other(_) => "other",
+        Meaning::St(message) => message.name(),
+        Meaning::Rmd(described) => match described.subject() {
+            Subject::Torque4 => SetTorque4::STEM,
+            Subject::Motor(_, code) => code.info().map_or("unknown", |row| row.stem),
+            _ => "other",
+        },
     }
 }
 

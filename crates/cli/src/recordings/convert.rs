@@ -14,7 +14,7 @@ use super::pick::Pick;
 use crate::failure::Failure;
 use crate::output::{Printer, note};
 use crate::outputs::Output;
-use crate::text::counted;
+use crate::text::{counted, csv_cell};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -171,7 +171,8 @@ impl<'a> Csv<'a> {
                     true => String::new(),
                     false => format!(" [{}]", field.unit),
                 };
-                write!(out, ",{}", quoted(&format!("{motor}{}{unit}", field.signal)))?;
+                let name = printable(&format!("{motor}{}{unit}", field.signal));
+                write!(out, ",{}", csv_cell(&name))?;
             }
         }
         writeln!(out, ",event")?;
@@ -185,8 +186,8 @@ impl<'a> Csv<'a> {
             let is_event = |event: &&Log| row.is_none_or(|(time, _)| event.stamp.0 <= time);
             if let Some(event) = events.next_if(is_event) {
                 self.write_time(out, event.stamp.0)?;
-                let text = format!("{} {}", event.kind, event.name);
-                writeln!(out, "{},{}", ",".repeat(columns), quoted(&text))?;
+                let text = printable(&format!("{} {}", event.kind, event.name));
+                writeln!(out, "{},{}", ",".repeat(columns), csv_cell(&text))?;
                 continue;
             }
             let Some((time, n)) = row else { return Ok(rows) };
@@ -215,14 +216,5 @@ impl<'a> Csv<'a> {
         let sign = if time < self.zero { "-" } else { "" };
         let micros = time.abs_diff(self.zero) / 1000;
         write!(out, "{sign}{}.{:06}", micros / 1_000_000, micros % 1_000_000)
-    }
-}
-
-/// A text as a cell. Control characters are escaped.
-fn quoted(text: &str) -> String {
-    let text = printable(text);
-    match text.contains([',', '"']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text,
     }
 }
