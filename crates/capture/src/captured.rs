@@ -51,13 +51,31 @@ impl Stamp {
 impl fmt::Display for Stamp {
     /// Seconds with six decimals, as candump writes them. Nanoseconds are shown if they are not 0.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ns = self.ns();
-        let (sign, ns) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
-        let (seconds, below) = (ns / 1_000_000_000, ns % 1_000_000_000);
-        match below % 1_000 {
-            0 => write!(f, "{sign}{seconds}.{:06}", below / 1_000),
-            _ => write!(f, "{sign}{seconds}.{below:09}"),
+        // One write: it is a quarter of the time of a decoded line otherwise.
+        let mut text = [b'0'; 32];
+        let mut at = text.len();
+        let mut rest = self.ns().unsigned_abs();
+        let decimals = if rest.is_multiple_of(1_000) { 6 } else { 9 };
+        if decimals == 6 {
+            rest /= 1_000;
         }
+        for place in 0.. {
+            if place == decimals {
+                at -= 1;
+                text[at] = b'.';
+            }
+            at -= 1;
+            text[at] = b'0' + (rest % 10) as u8;
+            rest /= 10;
+            if rest == 0 && place >= decimals {
+                break;
+            }
+        }
+        if self.ns() < 0 {
+            at -= 1;
+            text[at] = b'-';
+        }
+        f.write_str(std::str::from_utf8(&text[at..]).unwrap_or(""))
     }
 }
 
@@ -168,7 +186,9 @@ mod tests {
     #[test]
     fn times_are_shown_with_all_their_digits() {
         assert_eq!(Stamp::Wall(1_436_509_053_249_713_000).to_string(), "1436509053.249713");
+        assert_eq!(Stamp::Relative(0).to_string(), "0.000000");
         assert_eq!(Stamp::Relative(1).to_string(), "0.000000001");
+        assert_eq!(Stamp::Wall(1_000).to_string(), "0.000001");
         assert_eq!(Stamp::Relative(-1_500_000_000).to_string(), "-1.500000");
         assert_eq!(Stamp::Relative(i64::MIN).to_string(), "-9223372036.854775808");
     }

@@ -33,5 +33,6 @@ pub use captured::{Captured, Damage, Direction, FdFrame, Stamp, Wire, error_fram
 pub use format::{Format, NoSuchFormat};
 pub use plain::Plain;
 pub use reader::Reader;
+pub use text::push_hex;
 pub use write_error::{Unwritable, WriteError};
 pub use writer::Writer;

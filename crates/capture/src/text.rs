@@ -63,10 +63,13 @@ pub(crate) fn nanoseconds(word: &[u8]) -> Option<i64> {
     total.checked_mul(10i64.checked_pow(9 - decimals.unwrap_or(0))?)?.checked_mul(sign)
 }
 
-/// Appends bytes as hexadecimal digits without spaces.
-pub(crate) fn push_hex(out: &mut String, bytes: &[u8]) {
+/// Appends bytes as hexadecimal digits, with `between` between two bytes.
+pub fn push_hex(out: &mut String, bytes: &[u8], between: &str) {
     const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
-    for byte in bytes {
+    for (n, byte) in bytes.iter().enumerate() {
+        if n > 0 {
+            out.push_str(between);
+        }
         out.push(char::from(DIGITS[usize::from(byte >> 4)]));
         out.push(char::from(DIGITS[usize::from(byte & 0x0F)]));
     }

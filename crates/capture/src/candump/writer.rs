@@ -42,17 +42,17 @@ impl<W: Write> Writer<W> {
                 match (frame.is_remote(), frame.len()) {
                     (true, 0) => line.push('R'),
                     (true, len) => drop(write!(line, "R{len}")),
-                    (false, _) => push_hex(line, frame.data()),
+                    (false, _) => push_hex(line, frame.data(), ""),
                 }
             }
             Wire::Fd(frame) => {
                 id(line, frame.id, frame.extended);
                 let _ = write!(line, "#{:X}", frame.flags & 0x0F);
-                push_hex(line, &frame.data);
+                push_hex(line, &frame.data, "");
             }
             Wire::Error { class, data } => {
                 id(line, class | ERROR, true);
-                push_hex(line, data);
+                push_hex(line, data, "");
             }
             Wire::Serial(_) => return Err(Unwritable::Serial.into()),
             Wire::Damage(_) => return Err(Unwritable::Damage.into()),

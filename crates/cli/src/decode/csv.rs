@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use motorlink_capture::push_hex;
 use serde_json::Value;
 
 use super::entry::{Entry, Frame, Meaning};
-use super::{object, text};
+use super::object;
 use crate::text::csv_cell;
 
 /// The first row.
@@ -71,7 +72,7 @@ fn head(out: &mut String, entry: &Entry<'_>) {
         Frame::Fd(_, _, data) | Frame::Bytes(data) => data,
         Frame::None => &[],
     };
-    text::push_hex(out, data, "");
+    push_hex(out, data, "");
     out.push(',');
     if let Some(motor) = object::motor_of(entry) {
         let _ = write!(out, "{motor}");
