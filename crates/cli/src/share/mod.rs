@@ -9,12 +9,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
-use motorlink_telemetry::line::Stopped;
 use motorlink_telemetry::share::address::Local;
 use motorlink_telemetry::share::message::{self, ANY_MOTOR, Ask, Event, StoppedMotor};
 use motorlink_telemetry::share::port_config::Limits;
 use motorlink_telemetry::share::server::{Server, ServerError};
-use motorlink_telemetry::signal::Motor;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -101,7 +99,9 @@ pub fn serve(
         Err(_) => "the share has failed".to_owned(),
     };
     let stopped = server.end(&why);
-    stopped.iter().try_for_each(|(line, one)| tell_stopped(line, one, json))?;
+    for (line, one) in &stopped {
+        tell_stop(None, (line, one.motor.number()), one.result.as_ref().copied(), json)?;
+    }
     if stopped.iter().any(|(_, one)| one.result.is_err()) {
         return Err(Failure::link(UNCONFIRMED));
     }
@@ -218,19 +218,6 @@ fn tell(event: &Event, json: bool) -> Result<(), Failure> {
             output::print_line(&format!("{} {}", utc(at), event.message))
         }
     }
-}
-
-/// Says how a motor took the last stop.
-fn tell_stopped(
-    line: &str,
-    Stopped { motor, result }: &Stopped,
-    json: bool,
-) -> Result<(), Failure> {
-    let motor = match motor {
-        Motor::St(motor) => motor.number(),
-        Motor::Rmd(id) => id.number(),
-    };
-    tell_stop(None, (line, motor), result.as_ref().copied(), json)
 }
 
 fn may_turn(one: &StoppedMotor) -> bool {

@@ -411,11 +411,7 @@ impl Watch {
 
 /// The row of a motor, without values yet.
 fn row(port: usize, motor: Motor, label: &str, period: Duration) -> Row {
-    let number = match motor {
-        Motor::St(number) => number.number(),
-        Motor::Rmd(id) => id.number(),
-    };
-    Row::new(port, motor, format!("{label}:{number}"), period)
+    Row::new(port, motor, format!("{label}:{}", motor.number()), period)
 }
 
 /// Begins a stop in the model.

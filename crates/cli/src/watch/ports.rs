@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use motorlink::port::{Carries, PortName};
-use motorlink::rmd::{MotorSet, Stop};
-use motorlink::st::{Command, MotorNumber, Request as StRequest};
+use motorlink::rmd::MotorSet;
+use motorlink::st::MotorNumber;
 use motorlink_telemetry::acquisition::Acquisition;
 use motorlink_telemetry::label::{distinct, last_part};
-use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::search::motors;
 use motorlink_telemetry::share::message::Protocol;
+use motorlink_telemetry::share::port_config::{Limits, PortConfig, protocols_of};
 use motorlink_telemetry::signal::Motor;
 
 use super::args::Args;
@@ -28,39 +27,36 @@ pub struct Opened {
 
 /// Opens a port and finds its motors. A port of both kinds gives a serial line and a CAN bus.
 pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failure> {
-    let port: PortName = text.parse()?;
-    let mut opened = Vec::new();
-    if port.carries(Carries::Bytes) {
-        let mut options = motorlink::st::Options { profile: args.profile, ..Default::default() };
-        options.timeout = args.timeout.unwrap_or(options.timeout);
-        let line = StLine::open(&port, options).map_err(Failure::from)?;
-        let numbers: BTreeSet<MotorNumber> = args.motor.iter().copied().collect();
-        let given = numbers.into_iter().map(Motor::St).collect();
-        opened.push(Opened::new(text, Box::new(line), Protocol::St, given, by)?);
-    }
-    if port.carries(Carries::Frames) {
-        let mut options = motorlink::rmd::Options::default();
-        options.timeout = args.timeout.unwrap_or(options.timeout);
-        let line = RmdLine::open(&port, options).map_err(Failure::from)?;
-        let ids: MotorSet = args.id.iter().copied().flatten().collect();
-        let given = ids.map(Motor::Rmd).collect();
-        opened.push(Opened::new(text, Box::new(line), Protocol::Rmd, given, by)?);
-    }
-    Ok(opened)
+    let (profile, timeout, limits) = (args.profile, args.timeout, Limits::default());
+    let config = PortConfig { port: text.parse()?, profile, timeout, limits };
+    let open = |protocol| {
+        let given = match protocol {
+            Protocol::St => {
+                let numbers: BTreeSet<MotorNumber> = args.motor.iter().copied().collect();
+                numbers.into_iter().map(Motor::St).collect()
+            }
+            Protocol::Rmd => {
+                let ids: MotorSet = args.id.iter().copied().flatten().collect();
+                ids.map(Motor::Rmd).collect()
+            }
+        };
+        Opened::new(text, config.open(protocol)?.engine, protocol, given, by)
+    };
+    protocols_of(&config.port).map(open).collect()
 }
 
 impl Opened {
     /// With the given motors; if there are none, with those that reply.
     fn new(
         name: &str,
-        line: Box<dyn Line>,
+        engine: Acquisition,
         protocol: Protocol,
         given: Vec<Motor>,
         by: &Arc<str>,
     ) -> Result<Self, Failure> {
         // The name of a thread must not contain a zero byte.
         let thread: String = name.chars().filter(|c| c.is_ascii_graphic()).collect();
-        let runner = Runner::start(&thread, Acquisition::new(line))?;
+        let runner = Runner::start(&thread, engine)?;
         let motors = match given.is_empty() {
             true => motors(runner.remote(), by, protocol).map_err(|why| {
                 let option = match protocol {
@@ -73,16 +69,6 @@ impl Opened {
             false => given,
         };
         Ok(Opened { runner, name: name.to_owned(), protocol, motors })
-    }
-}
-
-/// The request that stops a motor.
-pub fn stop_of(motor: Motor) -> Request {
-    match motor {
-        Motor::St(number) => {
-            Request::st(number.number(), StRequest::ExecuteCommand(Command::StopMotor))
-        }
-        Motor::Rmd(id) => Request::rmd(id, &Stop),
     }
 }
 

@@ -4,11 +4,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
-use motorlink::st::{Error, ErrorCode};
 use motorlink::time::Micros;
 use motorlink_telemetry::acquisition::{ConsumerId, Rate};
-use motorlink_telemetry::event::CommandError;
-use motorlink_telemetry::line::LineError;
+use motorlink_telemetry::line::Request;
 use motorlink_telemetry::overview::Overview;
 use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::Remote;
@@ -18,7 +16,6 @@ use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::{Full, Subscription};
 
 use super::model::Latch;
-use super::ports::stop_of;
 use super::settings::{Access, Item};
 use super::values::details;
 
@@ -183,12 +180,8 @@ impl Work {
 }
 
 fn stop(remote: &Remote, by: &Arc<str>, it: Stopping, sender: &SyncSender<Done>) {
-    let result = remote.stop(by, stop_of(it.motor));
-    let done = match result {
-        Err(CommandError::Line(LineError::St(Error::Refused {
-            code: ErrorCode::BadMotorSelected,
-            ..
-        }))) => Done::NoMotor(it),
+    let done = match remote.stop(by, Request::stop(it.motor)) {
+        Err(why) if why.is_of_no_motor() => Done::NoMotor(it),
         result => Done::Stopped(it, result.map(drop).map_err(|why| why.to_string())),
     };
     let _ = sender.send(done);

@@ -6,7 +6,7 @@ use motorlink_fleet::key::Name;
 use motorlink_fleet::view::{Drive, Node, View};
 use motorlink_telemetry::overview::{self, Overview};
 use motorlink_telemetry::sample::Sample;
-use motorlink_telemetry::signal::{Motor, Source};
+use motorlink_telemetry::signal::Source;
 use serde_json::{Value, json};
 
 use crate::text::{counted, fit, right};
@@ -131,10 +131,7 @@ impl Row {
         Row {
             node: drive.node.clone(),
             line: drive.line.clone(),
-            motor: match drive.motor {
-                Motor::St(motor) => motor.number(),
-                Motor::Rmd(id) => id.number(),
-            },
+            motor: drive.motor.number(),
             state: overview::state(&main, sample),
             speed: quantity(main.speed),
             current: quantity(main.current),
@@ -386,6 +383,7 @@ pub fn summary(sums: &[Sum]) -> String {
 #[cfg(test)]
 mod tests {
     use motorlink::rmd::MotorId;
+    use motorlink_telemetry::signal::Motor;
 
     use super::*;
 
