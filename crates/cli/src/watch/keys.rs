@@ -1,6 +1,6 @@
 //! The keys and their actions.
 
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::settings::Item;
 
@@ -131,9 +131,6 @@ impl Selection {
         list: impl FnOnce(usize) -> Vec<Item>,
         unwritable: impl FnOnce(Item) -> Option<String>,
     ) -> Option<Ask> {
-        if key.kind == KeyEventKind::Release {
-            return None;
-        }
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
         // These work on every page, also while typing: no name and no value has a space or an `!`.
         match key.code {

@@ -23,7 +23,7 @@ use motorlink_telemetry::acquisition::ConsumerId;
 use motorlink_telemetry::runner::Runner;
 use motorlink_telemetry::signal::Motor;
 use motorlink_telemetry::subscription::Subscription;
-use ratatui::crossterm::event::{self, Event, KeyEvent};
+use ratatui::crossterm::event::KeyEvent;
 
 use crate::advice::STOP_AGAIN;
 use crate::failure::Failure;
@@ -35,7 +35,7 @@ pub use args::Args;
 use keys::{Ask, Selection, View};
 use model::{Model, Port};
 use row::Row;
-use screen::{Screen, Wait};
+use screen::Screen;
 use settings::{Access, Item};
 use share::Share;
 use values::Units;
@@ -152,29 +152,13 @@ impl Watch {
                 screen.terminal.draw(|frame| view::draw(frame, &shown, &theme))?;
                 (drawn, self.has_changed) = (Instant::now(), false);
             }
-            let waited = screen.wait(TICK)?;
-            if let Wait::Gone = waited {
-                return Ok(());
-            }
-            let mut came = false;
-            // A resize is an event without input on stdin.
-            while event::poll(Duration::ZERO)? {
-                came = true;
-                match event::read()? {
-                    Event::Key(key) => match self.press(key) {
-                        Some(Ask::Quit) => return Ok(()),
-                        Some(Ask::Suspend) => screen.suspend()?,
-                        _ => {}
-                    },
-                    // Needed even if the size is as before: the terminal may have lost text meanwhile.
-                    Event::Resize(..) => screen.clear()?,
-                    _ => continue,
-                }
-                self.has_changed = true;
-            }
-            if let (Wait::Keys, false) = (waited, came) {
-                screen.announce_again()?;
-            }
+            let input = screen.input(TICK, |screen, key| match self.press(key) {
+                Some(Ask::Quit) => Ok(false),
+                Some(Ask::Suspend) => screen.suspend().map(|()| true),
+                _ => Ok(true),
+            })?;
+            let Some(is_new) = input else { return Ok(()) };
+            self.has_changed |= is_new;
             self.receive()?;
             self.repeat_stops();
             self.read_registers();

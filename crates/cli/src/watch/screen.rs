@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ratatui::backend::CrosstermBackend;
+use ratatui::crossterm::event::{self, Event, KeyEvent, KeyEventKind};
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, enable_raw_mode};
 use ratatui::{DefaultTerminal, Terminal};
@@ -82,32 +83,64 @@ impl Screen {
     }
 
     /// Clears the terminal. The next drawing is complete.
-    pub fn clear(&mut self) -> Result<(), Failure> {
+    fn clear(&mut self) -> Result<(), Failure> {
         execute!(stdout(), Clear(ClearType::All))?;
         // `Terminal::clear` would ask for the position of the cursor. Some terminals do not reply.
         self.terminal = Terminal::new(CrosstermBackend::new(stdout()))?;
         Ok(())
     }
 
-    /// Waits for a key, at most this time. Also detects the end of the terminal.
-    pub fn wait(&self, time: Duration) -> Result<Wait, Failure> {
+    /// Waits for input, at most this time. Gives each key to `press`, which returns whether the view goes
+    /// on. Returns whether there is something new to draw; `None` at the end of the view or of the
+    /// terminal.
+    pub fn input(
+        &mut self,
+        time: Duration,
+        mut press: impl FnMut(&mut Self, KeyEvent) -> Result<bool, Failure>,
+    ) -> Result<Option<bool>, Failure> {
+        let Some(is_readable) = self.wait(time)? else { return Ok(None) };
+        let (mut came, mut is_new) = (false, false);
+        // A resize is an event without input on stdin.
+        while event::poll(Duration::ZERO)? {
+            came = true;
+            match event::read()? {
+                Event::Key(key) if key.kind != KeyEventKind::Release => {
+                    if !press(self, key)? {
+                        return Ok(None);
+                    }
+                }
+                // Needed even if the size is as before: the terminal may have lost text meanwhile.
+                Event::Resize(..) => self.clear()?,
+                _ => continue,
+            }
+            is_new = true;
+        }
+        if is_readable && !came {
+            self.announce_again()?;
+        }
+        Ok(Some(is_new))
+    }
+
+    /// Waits at most this time. Returns whether there is input; `None` if the terminal was closed, for
+    /// example its window.
+    fn wait(&self, time: Duration) -> Result<Option<bool>, Failure> {
         let stdin = stdin();
         let mut fds = [PollFd::new(&stdin, PollFlags::IN)];
         let timeout = Timespec::try_from(time).ok();
         match poll(&mut fds, timeout.as_ref()) {
-            Ok(0) | Err(Errno::INTR) => return Ok(Wait::Nothing),
+            Ok(0) | Err(Errno::INTR) => return Ok(Some(false)),
             Ok(_) => {}
             Err(error) => return Err(std::io::Error::from(error).into()),
         }
         // At the end of a terminal crossterm would read without end.
         let is_gone =
             fds[0].revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL);
-        Ok(if is_gone { Wait::Gone } else { Wait::Keys })
+        Ok((!is_gone).then_some(true))
     }
 
     /// Makes crossterm read keys that it has left. It leaves keys behind a resize, and those behind 1024
     /// bytes, until the next key comes. Setting the mode of the terminal anew counts as a key.
-    pub fn announce_again(&self) -> Result<(), Failure> {
+    fn announce_again(&self) -> Result<(), Failure> {
         let stdin = stdin();
         let mode = tcgetattr(&stdin).map_err(std::io::Error::from)?;
         tcsetattr(&stdin, OptionalActions::Now, &mode).map_err(std::io::Error::from)?;
@@ -124,14 +157,6 @@ fn end_without_terminal() {
     while poll(&mut fds, None) == Err(Errno::INTR) {}
     std::thread::sleep(END);
     std::process::exit(128 + SIGHUP);
-}
-
-/// How a wait for keys ended.
-pub enum Wait {
-    Nothing,
-    Keys,
-    /// The terminal was closed, for example its window.
-    Gone,
 }
 
 impl Drop for Screen {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use motorlink_fleet::view::View;
 use ratatui::Frame;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
@@ -12,7 +12,7 @@ use super::table::{self, Only, Row, Shown, Sort, Sum};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::text::fit;
-use crate::watch::screen::{self, Screen, Wait};
+use crate::watch::screen::{self, Screen};
 use crate::watch::view::Theme;
 
 /// The longest wait for a key.
@@ -53,26 +53,10 @@ pub fn show(view: &View, mut place: Choice) -> Result<(), Failure> {
             screen.terminal.draw(|frame| draw(frame, &shown, &mut place, &theme))?;
             drawn = Some(Instant::now());
         }
-        let waited = screen.wait(TICK)?;
-        if let Wait::Gone = waited {
-            return Ok(());
-        }
-        let mut came = false;
-        while event::poll(Duration::ZERO)? {
-            came = true;
-            match event::read()? {
-                Event::Key(key) if key.kind == KeyEventKind::Press => {
-                    if !place.press(key) {
-                        return Ok(());
-                    }
-                }
-                Event::Resize(..) => screen.clear()?,
-                _ => continue,
-            }
-            drawn = None;
-        }
-        if let (Wait::Keys, false) = (waited, came) {
-            screen.announce_again()?;
+        match screen.input(TICK, |_, key| Ok(place.press(key)))? {
+            None => return Ok(()),
+            Some(true) => drawn = None,
+            Some(false) => {}
         }
     }
     Ok(())
