@@ -82,8 +82,8 @@ impl Choice {
         match key.code {
             KeyCode::Char('q') | KeyCode::Esc => return false,
             KeyCode::Char('c') if is_control => return false,
-            KeyCode::Char('s') => self.sort = self.sort.next(),
-            KeyCode::Char('f') => self.only = self.only.next(),
+            KeyCode::Char('s') => self.sort = table::next(self.sort),
+            KeyCode::Char('f') => self.only = table::next(self.only),
             KeyCode::Char('n') => self.by_node = !self.by_node,
             KeyCode::Char('/') => {
                 self.types = true;
@@ -133,8 +133,8 @@ fn draw(frame: &mut Frame<'_>, shown: &Shown, place: &mut Choice, theme: &Theme)
         "{} to {last} of {}, sorted by {}, {}{name}",
         (place.first + 1).min(last),
         rows.len(),
-        place.sort.word(),
-        place.only.word()
+        table::word(&place.sort),
+        table::word(&place.only)
     );
     lines.push(Line::raw(fit(&at, columns)));
     lines.push(Line::styled(fit(KEYS, columns), theme.dim()));

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use clap::ValueEnum;
 use motorlink_fleet::key::Name;
 use motorlink_fleet::view::{Drive, Node, View};
 use motorlink_telemetry::overview::{self, Overview};
@@ -19,7 +20,7 @@ const AWAY: f64 = 3.0;
 const TURNING: [&str; 2] = ["RUN", "turning"];
 
 /// What the rows are sorted by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Sort {
     /// Node, line, motor
     #[default]
@@ -36,32 +37,19 @@ pub enum Sort {
     Faults,
 }
 
-impl Sort {
-    pub fn next(self) -> Self {
-        match self {
-            Sort::Name => Sort::Speed,
-            Sort::Speed => Sort::Current,
-            Sort::Current => Sort::Temperature,
-            Sort::Temperature => Sort::Age,
-            Sort::Age => Sort::Faults,
-            Sort::Faults => Sort::Name,
-        }
-    }
+/// The word of a choice on the command line.
+pub fn word(choice: &impl ValueEnum) -> String {
+    choice.to_possible_value().map_or_else(String::new, |it| it.get_name().to_owned())
+}
 
-    pub fn word(self) -> &'static str {
-        match self {
-            Sort::Name => "name",
-            Sort::Speed => "speed",
-            Sort::Current => "current",
-            Sort::Temperature => "temperature",
-            Sort::Age => "age",
-            Sort::Faults => "faults",
-        }
-    }
+/// The choice behind this one; behind the last one, the first.
+pub fn next<T: ValueEnum + Copy + PartialEq>(choice: T) -> T {
+    let mut all = T::value_variants().iter().copied().cycle().skip_while(|it| *it != choice);
+    all.nth(1).unwrap_or(choice)
 }
 
 /// Which drives are shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Only {
     /// All of them
     #[default]
@@ -75,24 +63,6 @@ pub enum Only {
 }
 
 impl Only {
-    pub fn next(self) -> Self {
-        match self {
-            Only::All => Only::Turning,
-            Only::Turning => Only::Faulty,
-            Only::Faulty => Only::Old,
-            Only::Old => Only::All,
-        }
-    }
-
-    pub fn word(self) -> &'static str {
-        match self {
-            Only::All => "all",
-            Only::Turning => "turning",
-            Only::Faulty => "faulty",
-            Only::Old => "old",
-        }
-    }
-
     fn has(self, row: &Row) -> bool {
         match self {
             Only::All => true,
