@@ -2,17 +2,12 @@
 
 use std::sync::Arc;
 
-use motorlink::port::{
-    ByteLink, CanLink, EventBytes, EventCan, FaultBytes, FaultCan, PortName, Tap,
-};
-use motorlink::rmd::IDENTIFIERS;
-use motorlink::st::Profile;
+use motorlink::port::PortName;
 use motorlink_link::fault::{FaultError, Faults};
 
 use crate::failure::Failure;
 use crate::help;
 use crate::output::{Printer, note};
-use crate::trace;
 
 #[derive(clap::Args)]
 #[command(next_help_heading = help::GLOBAL)]
@@ -53,58 +48,37 @@ impl Connection {
         self.port.port.as_deref().unwrap_or_default()
     }
 
-    /// Wraps a serial line each time it is opened, for --trace and --fault. Each opening has other damage.
-    pub fn around_line(
+    /// What is put around a port each time it is opened, for --trace and --fault. Each opening has other
+    /// damage. `check` refuses faults that the port cannot have.
+    pub fn around<L>(
         &self,
-        profile: Profile,
-    ) -> Result<impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static, Failure> {
-        let mut wrap = Wrap::new(self, Faults::on_serial)?;
-        Ok(move |link| {
-            let faulty = |link: Box<dyn ByteLink>, faults: &Faults| -> Box<dyn ByteLink> {
-                Box::new(FaultBytes::new(link, faults))
-            };
-            wrap.around(link, faulty, |link| Box::new(Tap::bytes(link, trace::bytes(profile))))
-        })
-    }
-
-    /// As [`around_line`](Self::around_line), for an event loop.
-    pub fn around_event_line(
-        &self,
-        profile: Profile,
-    ) -> Result<impl FnMut(Box<dyn EventBytes>) -> Box<dyn EventBytes> + Send + 'static, Failure>
-    {
-        let mut wrap = Wrap::new(self, Faults::on_serial)?;
-        Ok(move |link| {
-            let faulty = |link: Box<dyn EventBytes>, faults: &Faults| -> Box<dyn EventBytes> {
-                Box::new(FaultBytes::new(link, faults))
-            };
-            wrap.around(link, faulty, |link| Box::new(Tap::bytes(link, trace::bytes(profile))))
-        })
-    }
-
-    /// As [`around_line`](Self::around_line), for a CAN bus.
-    pub fn around_bus(
-        &self,
-    ) -> Result<impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static, Failure> {
-        let mut wrap = Wrap::new(self, Faults::on_can)?;
-        Ok(move |link| {
-            let faulty = |link: Box<dyn CanLink>, faults: &Faults| -> Box<dyn CanLink> {
-                Box::new(FaultCan::new(link, faults, IDENTIFIERS))
-            };
-            wrap.around(link, faulty, |link| Box::new(Tap::frames(link, trace::frames())))
-        })
-    }
-
-    /// As [`around_bus`](Self::around_bus), for an event loop.
-    pub fn around_event_bus(
-        &self,
-    ) -> Result<impl FnMut(Box<dyn EventCan>) -> Box<dyn EventCan> + Send + 'static, Failure> {
-        let mut wrap = Wrap::new(self, Faults::on_can)?;
-        Ok(move |link| {
-            let faulty = |link: Box<dyn EventCan>, faults: &Faults| -> Box<dyn EventCan> {
-                Box::new(FaultCan::new(link, faults, IDENTIFIERS))
-            };
-            wrap.around(link, faulty, |link| Box::new(Tap::frames(link, trace::frames())))
+        check: fn(Faults) -> Result<Faults, FaultError>,
+        faulty: impl Fn(L, &Faults) -> L + Send + 'static,
+        tapped: impl Fn(L) -> L + Send + 'static,
+    ) -> Result<impl FnMut(L) -> L + Send + 'static, Failure> {
+        let mut faults = self.fault.map(check).transpose()?;
+        let trace = self.trace;
+        if self.port()?.is_held() {
+            if faults.is_some() {
+                let refused =
+                    "--fault damages frames, and a port of a share or node carries requests";
+                return Err(
+                    Failure::usage(refused).trying("use it on the port of the drive itself")
+                );
+            }
+            if trace {
+                note(
+                    "--trace shows no frames here: a share or node has the line. `motorlink monitor` shows \
+                     the frames on its wire",
+                );
+            }
+        }
+        Ok(move |mut link| {
+            if let Some(faults) = &mut faults {
+                link = faulty(link, faults);
+                faults.seed = faults.seed.wrapping_add(1);
+            }
+            if trace { tapped(link) } else { link }
         })
     }
 
@@ -130,50 +104,6 @@ pub fn missing_port() -> Failure {
         "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
          `-p sim:` needs no hardware",
     )
-}
-
-/// What is put around a port.
-struct Wrap {
-    trace: bool,
-    faults: Option<Faults>,
-}
-
-impl Wrap {
-    fn new(
-        connection: &Connection,
-        check: impl FnOnce(Faults) -> Result<Faults, FaultError>,
-    ) -> Result<Self, Failure> {
-        let faults = connection.fault.map(check).transpose()?;
-        if connection.port()?.is_held() {
-            if faults.is_some() {
-                let refused =
-                    "--fault damages frames, and a port of a share or node carries requests";
-                return Err(
-                    Failure::usage(refused).trying("use it on the port of the drive itself")
-                );
-            }
-            if connection.trace {
-                note(
-                    "--trace shows no frames here: a share or node has the line. `motorlink monitor` shows \
-                     the frames on its wire",
-                );
-            }
-        }
-        Ok(Wrap { trace: connection.trace, faults })
-    }
-
-    fn around<L>(
-        &mut self,
-        mut link: L,
-        faulty: impl FnOnce(L, &Faults) -> L,
-        tapped: impl FnOnce(L) -> L,
-    ) -> L {
-        if let Some(faults) = &mut self.faults {
-            link = faulty(link, faults);
-            faults.seed = faults.seed.wrapping_add(1);
-        }
-        if self.trace { tapped(link) } else { link }
-    }
 }
 
 /// Says, after a command that changes the motion of motors, that the holder of the port stops them now.

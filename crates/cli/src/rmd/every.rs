@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use motorlink::port::PortName;
-use motorlink::rmd::{Code, Error, EventClient, MotorId};
+use motorlink::port::{EventCan, FaultCan, PortName, TapCan};
+use motorlink::rmd::{Code, Error, EventClient, IDENTIFIERS, MotorId};
+use motorlink_link::fault::Faults;
 use motorlink_telemetry::line::RmdLine;
 use motorlink_telemetry::rows::Absent;
 use motorlink_telemetry::sample::Sample;
@@ -15,6 +16,7 @@ use crate::connection::{Connection, name_in_messages};
 use crate::failure::Failure;
 use crate::json::{Cell, Line, RmdUnits, Row};
 use crate::repeat::{Repeat, Watch};
+use crate::trace;
 
 /// The reads whose values `status` shows, in its order.
 pub const STATUS: [Code; 5] = [
@@ -27,38 +29,34 @@ pub const STATUS: [Code; 5] = [
 /// The reads whose values `angle` shows.
 pub const ANGLE: [Code; 2] = [Code::ReadMultiTurnAngle, Code::ReadSingleTurnAngle];
 
-/// The bus whose motor is read.
-pub struct Bus<'a> {
-    pub connection: &'a Connection,
-    pub motor: &'a MotorArgs,
-    pub port: &'a PortName,
-}
-
-impl Bus<'_> {
-    /// Reads the values of these reads again and again.
-    pub fn watch(
-        &self,
-        id: MotorId,
-        reads: &[Code],
-        (every, repeat): (Duration, &Repeat),
-    ) -> Result<(), Failure> {
-        let Bus { connection, motor, port } = *self;
-        let units = units(connection, motor)?;
-        let around = connection.around_event_bus()?;
-        let client = EventClient::open_wrapped(port, around, options(motor, &units)?)?;
-        let sources = sources(reads, units.raw);
-        let signal = |&source| Signal { motor: Motor::Rmd(id), source };
-        let port = port.to_string();
-        let watch = Watch {
-            line: Box::new(RmdLine::new(client)),
-            signals: sources.iter().map(signal).collect(),
-            output: connection.output(),
-            object: Line::about(&port, Some(id.number())),
-            shown: |values: &[Result<Sample, Absent>]| cells(&units, &sources, values),
-            doubt: || Error::Unconfirmed { port: name_in_messages(&port), motor: id }.into(),
-        };
-        watch.run(every, repeat)
-    }
+/// Reads the values of these reads of a motor again and again.
+pub fn watch(
+    connection: &Connection,
+    motor: &MotorArgs,
+    port: &PortName,
+    id: MotorId,
+    reads: &[Code],
+    (every, repeat): (Duration, &Repeat),
+) -> Result<(), Failure> {
+    let units = units(connection, motor)?;
+    let around = connection.around::<Box<dyn EventCan>>(
+        Faults::on_can,
+        |link, faults| Box::new(FaultCan::new(link, faults, IDENTIFIERS)),
+        |link| Box::new(TapCan::new(link, trace::frames())),
+    )?;
+    let client = EventClient::open_wrapped(port, around, options(motor, &units)?)?;
+    let sources = sources(reads, units.raw);
+    let signal = |&source| Signal { motor: Motor::Rmd(id), source };
+    let port = port.to_string();
+    let watch = Watch {
+        line: Box::new(RmdLine::new(client)),
+        signals: sources.iter().map(signal).collect(),
+        output: connection.output(),
+        object: Line::about(&port, Some(id.number())),
+        shown: |values: &[Result<Sample, Absent>]| cells(&units, &sources, values),
+        doubt: || Error::Unconfirmed { port: name_in_messages(&port), motor: id }.into(),
+    };
+    watch.run(every, repeat)
 }
 
 /// The quantities of these reads, and what is computed from them. The latter has no digits on the wire.

@@ -61,8 +61,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
                 quoted(connection.port_text())
             )));
         };
-        let bus = every::Bus { connection: &connection, motor: &motor, port: &port };
-        let done = bus.watch(id, reads, (every, repeat));
+        let done = every::watch(&connection, &motor, &port, id, reads, (every, repeat));
         return done.map_err(|failure| failure.about(&port.to_string(), first));
     }
     let session = connect(&connection, &motor, &port)

@@ -1,7 +1,10 @@
 //! An open bus, for all commands.
 
-use motorlink::port::PortName;
-use motorlink::rmd::{Client, Limits, MotionStatus, Motor, MotorId, Options, Payload, Quantity};
+use motorlink::port::{CanLink, FaultCan, PortName, TapCan};
+use motorlink::rmd::{
+    Client, IDENTIFIERS, Limits, MotionStatus, Motor, MotorId, Options, Payload, Quantity,
+};
+use motorlink_link::fault::Faults;
 
 use super::args::MotorArgs;
 use crate::advice;
@@ -9,6 +12,7 @@ use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::json::{Line, RmdUnits, Row};
 use crate::output::Printer;
+use crate::trace;
 
 /// An open bus, the selected motor, and how its values are shown.
 pub struct Session {
@@ -26,7 +30,12 @@ pub fn connect(
     port: &PortName,
 ) -> Result<Session, Failure> {
     let units = units(connection, motor)?;
-    let bus = Client::open_wrapped(port, connection.around_bus()?, options(motor, &units)?)?;
+    let around = connection.around::<Box<dyn CanLink>>(
+        Faults::on_can,
+        |link, faults| Box::new(FaultCan::new(link, faults, IDENTIFIERS)),
+        |link| Box::new(TapCan::new(link, trace::frames())),
+    )?;
+    let bus = Client::open_wrapped(port, around, options(motor, &units)?)?;
     let output = connection.output();
     let id = motor.ids().map(MotorId::number).next().unwrap_or(1);
     let (write_rom, port) = (motor.write_rom, port.to_string());

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use motorlink::port::PortName;
+use motorlink::port::{EventBytes, FaultBytes, PortName, TapBytes};
 use motorlink::st::{Error, EventClient, Profile, RegisterId};
+use motorlink_link::fault::Faults;
 use motorlink_telemetry::line::{LineError, StLine};
 use motorlink_telemetry::rows::Absent;
 use motorlink_telemetry::sample::Sample;
@@ -17,47 +18,45 @@ use crate::connection::{Connection, name_in_messages};
 use crate::failure::Failure;
 use crate::json::Cell;
 use crate::repeat::{Repeat, Watch};
+use crate::trace;
 
-/// The drive whose registers are read.
-pub struct Drive<'a> {
-    pub connection: &'a Connection,
-    pub drive: &'a DriveArgs,
-    pub port: &'a PortName,
-}
-
-impl Drive<'_> {
-    /// Reads registers again and again, with `segment` in this data segment.
-    pub fn watch(
-        &self,
-        registers: &[RegisterId],
-        segment: Option<u8>,
-        (every, repeat): (Duration, &Repeat),
-    ) -> Result<(), Failure> {
-        let Drive { connection, drive, port } = *self;
-        let view = View::new(connection, drive, port)?;
-        if segment.is_some() {
-            view.wants(Profile::Spec, SEGMENTS)?;
-        }
-        let around = connection.around_event_line(drive.profile)?;
-        let line = StLine::new(EventClient::open_wrapped(port, around, options(drive))?);
-        let line = match segment {
-            Some(segment) => line.using_segments(&[segment]),
-            None => line,
-        };
-        let signal =
-            |&register| Signal { motor: Motor::St(drive.motor), source: Source::Register(register) };
-        let watch = Watch {
-            line: Box::new(line),
-            signals: registers.iter().map(signal).collect(),
-            output: view.output,
-            object: view.line(),
-            shown: |values: &[Result<Sample, Absent>]| {
-                registers.iter().zip(values).map(|(it, value)| cell(&view, *it, value)).collect()
-            },
-            doubt: || Error::Unconfirmed { port: name_in_messages(&view.port), why: None }.into(),
-        };
-        watch.run(every, repeat)
+/// Reads registers of a drive again and again, with `segment` in this data segment.
+pub fn watch(
+    connection: &Connection,
+    drive: &DriveArgs,
+    port: &PortName,
+    registers: &[RegisterId],
+    segment: Option<u8>,
+    (every, repeat): (Duration, &Repeat),
+) -> Result<(), Failure> {
+    let view = View::new(connection, drive, port)?;
+    if segment.is_some() {
+        view.wants(Profile::Spec, SEGMENTS)?;
     }
+    let profile = drive.profile;
+    let around = connection.around::<Box<dyn EventBytes>>(
+        Faults::on_serial,
+        |link, faults| Box::new(FaultBytes::new(link, faults)),
+        move |link| Box::new(TapBytes::new(link, trace::bytes(profile))),
+    )?;
+    let line = StLine::new(EventClient::open_wrapped(port, around, options(drive))?);
+    let line = match segment {
+        Some(segment) => line.using_segments(&[segment]),
+        None => line,
+    };
+    let motor = Motor::St(drive.motor);
+    let signal = |&register| Signal { motor, source: Source::Register(register) };
+    let watch = Watch {
+        line: Box::new(line),
+        signals: registers.iter().map(signal).collect(),
+        output: view.output,
+        object: view.line(),
+        shown: |values: &[Result<Sample, Absent>]| {
+            registers.iter().zip(values).map(|(it, value)| cell(&view, *it, value)).collect()
+        },
+        doubt: || Error::Unconfirmed { port: name_in_messages(&view.port), why: None }.into(),
+    };
+    watch.run(every, repeat)
 }
 
 fn cell(

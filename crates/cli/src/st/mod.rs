@@ -49,7 +49,9 @@ fn run_at(
     command: Command,
 ) -> Result<(), Failure> {
     let connect = || connect(connection, drive, port);
-    let watched = every::Drive { connection, drive, port };
+    let watch = |registers: &[String], segment, times| {
+        every::watch(connection, drive, port, &read::find_all(registers)?, segment, times)
+    };
     match command {
         Command::Act(act) => {
             keep_error();
@@ -70,20 +72,20 @@ fn run_at(
                 scan::run(connection, port, drive.timeout.unwrap_or(SCAN_TIMEOUT), &rates)
             }
             Read::Get { registers, repeat } => match repeat.every {
-                Some(every) => watched.watch(&read::find_all(&registers)?, None, (every, &repeat)),
+                Some(every) => watch(&registers, None, (every, &repeat)),
                 None => read::get(&connect()?, &registers),
             },
             Read::Segment { segment, registers, repeat } => match repeat.every {
-                Some(every) => {
-                    watched.watch(&read::find_all(&registers)?, Some(segment), (every, &repeat))
-                }
+                Some(every) => watch(&registers, Some(segment), (every, &repeat)),
                 None => read::segment(&connect()?, segment, &registers),
             },
             Read::Dump(args) => files::run(&connect()?, Task::Dump(&args)),
             Read::Diff(args) => files::run(&connect()?, Task::Diff(&args)),
             Read::Info => read::info(&connect()?),
             Read::Status { repeat } => match repeat.every {
-                Some(every) => watched.watch(&read::STATUS, None, (every, &repeat)),
+                Some(every) => {
+                    every::watch(connection, drive, port, &read::STATUS, None, (every, &repeat))
+                }
                 None => read::status(&connect()?),
             },
         },

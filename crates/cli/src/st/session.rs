@@ -2,10 +2,11 @@
 
 use std::ops::Deref;
 
-use motorlink::port::PortName;
+use motorlink::port::{ByteLink, FaultBytes, PortName, TapBytes};
 use motorlink::st::{
     Client, Error, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId, Target,
 };
+use motorlink_link::fault::Faults;
 
 use super::args::DriveArgs;
 use super::units::StUnits;
@@ -13,6 +14,7 @@ use crate::connection::{Connection, name_in_messages};
 use crate::failure::Failure;
 use crate::json::{self, Cell, Line, Row};
 use crate::output::Printer;
+use crate::trace;
 
 /// An open drive, and how its values are shown.
 pub struct Session {
@@ -51,7 +53,12 @@ pub fn connect(
     port: &PortName,
 ) -> Result<Session, Failure> {
     let view = View::new(connection, drive, port)?;
-    let around = connection.around_line(drive.profile)?;
+    let profile = drive.profile;
+    let around = connection.around::<Box<dyn ByteLink>>(
+        Faults::on_serial,
+        |link, faults| Box::new(FaultBytes::new(link, faults)),
+        move |link| Box::new(TapBytes::new(link, trace::bytes(profile))),
+    )?;
     let client = Client::open_wrapped(port, around, options(drive))?;
     Ok(Session { client, has_speed_limit: drive.speed_limit.is_some(), view })
 }
