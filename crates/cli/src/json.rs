@@ -219,6 +219,14 @@ impl RmdUnits {
         }
     }
 
+    /// A value in the physical unit at the shown shaft, or with --raw in digits. A value that no frame can
+    /// carry is refused, never cut.
+    pub fn wanted<Q: Quantity>(&self, value: f64) -> Result<Q, Failure> {
+        let scale = if self.raw { Q::UNIT.raw() } else { self.scale(Q::UNIT) };
+        let digits = scale.wanted(value).map(Q::from_digits);
+        digits.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
+    }
+
     /// A field of a message, as the command table has it.
     pub fn field(&self, field: &Field, digits: i64) -> Row {
         if self.raw {

@@ -58,23 +58,23 @@ fn carry_out(session: &Session, act: Act) -> Result<(), Failure> {
             session.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
         Act::Torque { amps } => {
-            let current = session.wanted::<IqCommand>(amps)?;
+            let current = session.units.wanted::<IqCommand>(amps)?;
             let status = motor.set_torque(current)?;
-            session.commanded(format!("turns with {}", session.shown(current)), &status)
+            session.commanded(format!("turns with {}", session.units.shown(current)), &status)
         }
         Act::Speed { dps } => {
-            let speed = session.wanted::<CentiDps>(dps)?;
+            let speed = session.units.wanted::<CentiDps>(dps)?;
             let status = motor.set_speed(speed)?;
-            session.commanded(format!("turns at {}", session.shown(speed)), &status)
+            session.commanded(format!("turns at {}", session.units.shown(speed)), &status)
         }
         Act::Position { degrees, most, wait } => {
-            let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
+            let (angle, max_speed) = (session.units.wanted(degrees)?, max_speed(session, &most)?);
             let command = || Ok(motor.set_position(angle, max_speed)?);
             move_to(session, command, Target::MultiTurn(angle), max_speed, &wait)
         }
         Act::SingleTurnPosition { degrees, direction, most, full_turn, wait } => {
             session.wants_no_gear()?;
-            let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
+            let (angle, max_speed) = (session.units.wanted(degrees)?, max_speed(session, &most)?);
             let command = || turn(session, angle, max_speed, direction, &full_turn);
             let target = Target::SingleTurn { angle, direction };
             move_to(session, command, target, max_speed, &wait)
@@ -123,15 +123,15 @@ fn move_to(
 ) -> Result<(), Failure> {
     if !wait.wait {
         let place = match target {
-            Target::MultiTurn(angle) => session.shown(angle),
+            Target::MultiTurn(angle) => session.units.shown(angle),
             Target::SingleTurn { angle, direction } => {
-                format!("{} {direction}", session.shown(angle))
+                format!("{} {direction}", session.units.shown(angle))
             }
         };
         return session.commanded(format!("turns to {place}"), &command()?);
     }
     let motor = session.motor()?;
-    let tolerance = wait.wait_tolerance.map(|degrees| session.wanted(degrees)).transpose()?;
+    let tolerance = wait.wait_tolerance.map(|degrees| session.units.wanted(degrees)).transpose()?;
     let options = ArrivalOptions { tolerance, timeout: wait.wait_timeout };
     let arrived = arrival::move_and_wait(
         motor,
@@ -151,7 +151,7 @@ fn move_to(
 }
 
 fn max_speed(session: &Session, most: &MaxSpeed) -> Result<Option<SpeedLimit>, Failure> {
-    most.max_speed.map(|speed| session.wanted(speed)).transpose()
+    most.max_speed.map(|speed| session.units.wanted(speed)).transpose()
 }
 
 fn turn(
@@ -165,7 +165,7 @@ fn turn(
         args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
         args::FullTurn { tolerance: None, .. } => FullTurn::default(),
         args::FullTurn { tolerance: Some(degrees), .. } => {
-            FullTurn::Refused { tolerance: session.wanted(degrees)? }
+            FullTurn::Refused { tolerance: session.units.wanted(degrees)? }
         }
     };
     let moved = session.motor()?.set_single_turn_position(angle, direction, max_speed, full_turn);
@@ -184,7 +184,7 @@ fn turn(
 fn set_torque4(session: &Session, amps: &[f64], expect: MotorSet) -> Result<(), Failure> {
     let mut torques = [IqCommand(0); 4];
     for (slot, &amps) in torques.iter_mut().zip(amps) {
-        *slot = session.wanted(amps)?;
+        *slot = session.units.wanted(amps)?;
     }
     let replies = session.bus.set_torque4(SetTorque4(torques), expect)?;
     let mut failures = Vec::new();

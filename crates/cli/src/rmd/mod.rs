@@ -12,7 +12,6 @@ mod several;
 pub use args::Args;
 use args::{Act, Command, Read};
 use session::connect;
-pub use session::wanted;
 pub use settings::{GainChange, gain_alone, range};
 
 use motorlink::rmd::MotorId;

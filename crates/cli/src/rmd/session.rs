@@ -77,15 +77,7 @@ fn limits(motor: &MotorArgs, units: &RmdUnits) -> Result<Limits, Failure> {
 }
 
 fn limit<Q: Quantity>(value: f64, units: &RmdUnits, option: &str) -> Result<Q, Failure> {
-    wanted(value, units).map_err(|failure| failure.with_fact(option))
-}
-
-/// A value in the physical unit at the shown shaft, or with --raw in digits. A value that no frame can
-/// carry is refused, never cut.
-pub fn wanted<Q: Quantity>(value: f64, units: &RmdUnits) -> Result<Q, Failure> {
-    let scale = if units.raw { Q::UNIT.raw() } else { units.scale(Q::UNIT) };
-    let digits = scale.wanted(value);
-    digits.map(Q::from_digits).map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
+    units.wanted(value).map_err(|failure| failure.with_fact(option))
 }
 
 impl Session {
@@ -120,10 +112,10 @@ impl Session {
         if status.errors.is_empty() {
             return Ok(());
         }
-        let (errors, volts) = (status.errors, self.shown(status.voltage));
+        let (errors, volts) = (status.errors, self.units.shown(status.voltage));
         Err(Failure::refused(format!(
             "motor {id} answered and does not turn: it reports {errors} (supply {volts}, {})",
-            self.shown(status.temperature)
+            self.units.shown(status.temperature)
         ))
         .trying(advice::CLEAR_AND_REPEAT))
     }
@@ -137,11 +129,6 @@ impl Session {
             self.output.result(text, self.line(self.id))?;
         }
         self.replied(status)
-    }
-
-    /// A value that was commanded, as people read it.
-    pub fn shown<Q: Quantity>(&self, value: Q) -> String {
-        self.units.shown(value)
     }
 
     /// A failure of a motion command, if the command was sent.
@@ -169,11 +156,6 @@ impl Session {
             rows.extend(self.units.encoder_angle(field, field.raw(&data))?);
         }
         Ok(rows)
-    }
-
-    /// A value in the physical unit at the shown shaft, or with --raw in digits.
-    pub fn wanted<Q: Quantity>(&self, value: f64) -> Result<Q, Failure> {
-        wanted(value, &self.units)
     }
 
     /// Refuses an angle within the turn of the motor shaft: the output shaft has it several times.

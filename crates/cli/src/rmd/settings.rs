@@ -34,7 +34,7 @@ pub fn acceleration(session: &Session, limit: Option<f64>) -> Result<(), Failure
     let Some(limit) = limit else {
         return session.show(&Acceleration { acceleration: motor.acceleration()? });
     };
-    let limit: DpsPerSecond = session.wanted(limit)?;
+    let limit: DpsPerSecond = session.units.wanted(limit)?;
     let before = motor.acceleration().map_err(|error| unwritten(error, "the limit was"))?;
     motor.write_acceleration_ram(limit)?;
     let after = motor.acceleration().map_err(|error| unread(error, "the limit"))?;

@@ -21,7 +21,7 @@ use motorlink_telemetry::signal::Motor;
 
 use super::values::Units;
 use crate::failure::Failure;
-use crate::rmd::{GainChange, gain_alone, range, wanted};
+use crate::rmd::{GainChange, gain_alone, range};
 use crate::st::reason_of_read;
 
 /// A command that is not sent in this time is refused.
@@ -181,7 +181,7 @@ impl Access {
     fn write_acceleration(&self, text: &str) -> Result<(), String> {
         let not_a_number = |_| format!("`{text}` is not a number; nothing was sent");
         let number: f64 = text.parse().map_err(not_a_number)?;
-        let limit: Result<DpsPerSecond, Failure> = wanted(number, &self.units.rmd);
+        let limit: Result<DpsPerSecond, Failure> = self.units.rmd.wanted(number);
         let wanted = Acceleration { acceleration: limit.map_err(|failure| failure.text())? };
         self.ask(&WriteAccelerationRam(wanted))?;
         match Acceleration::decode(&self.ask(&ReadAcceleration)?) {
