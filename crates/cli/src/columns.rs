@@ -139,7 +139,7 @@ impl Columns {
 
 impl Column {
     fn of(cell: &Cell) -> Self {
-        let name = in_words(cell.name());
+        let name = in_words(&cell.name);
         let (unit, text) = cell.row().map_or(("", NO_VALUE), |row| (row.unit(), row.short()));
         let is_number = text == NO_VALUE || text.parse::<f64>().is_ok();
         let least = if is_number { NARROWEST } else { 0 };
@@ -156,11 +156,11 @@ mod tests {
     use crate::json::Row;
 
     fn cells(speed: f64) -> Vec<Cell> {
-        let refused = Cell::Refused("I_A".to_owned(), Failure::refused("it says no"));
+        let refused = Err(Failure::refused("it says no"));
         vec![
-            Cell::Read(Row::quantity("SPEED_MEAS", speed, 0, "rpm")),
-            refused,
-            Cell::Read(Row::quantity("phase_a", 0.5, 3, "A")),
+            Row::quantity("SPEED_MEAS", speed, 0, "rpm").into(),
+            Cell { name: "I_A".to_owned(), read: refused },
+            Row::quantity("phase_a", 0.5, 3, "A").into(),
         ]
     }
 

@@ -57,7 +57,7 @@ impl CsvFile {
                     let shaft = row.shaft().map(|shaft| format!(" {shaft} shaft"));
                     format!("{} [{}{}]", row.name, row.unit(), shaft.unwrap_or_default())
                 }
-                _ => cell.name().to_owned(),
+                _ => cell.name.clone(),
             });
             let names: Vec<String> = names.collect();
             self.write(&format!("t [s],{},{EVENT}", names.join(",")))?;

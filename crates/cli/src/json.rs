@@ -23,42 +23,27 @@ pub struct Row {
 }
 
 /// The result of reading one value.
-pub enum Cell {
-    Read(Row),
-    /// The drive refused to give the value of this name.
-    Refused(String, Failure),
+pub struct Cell {
+    pub name: String,
+    /// The value, or why the drive refused to give it.
+    pub read: Result<Row, Failure>,
 }
 
 impl Cell {
-    pub fn name(&self) -> &str {
-        match self {
-            Cell::Read(row) => &row.name,
-            Cell::Refused(name, _) => name,
-        }
-    }
-
     /// The value, if it could be read.
     pub fn row(&self) -> Option<&Row> {
-        match self {
-            Cell::Read(row) => Some(row),
-            Cell::Refused(..) => None,
-        }
+        self.read.as_ref().ok()
     }
 
     /// Why it could not be read.
     pub fn refusal(&self) -> Option<&Failure> {
-        match self {
-            Cell::Read(_) => None,
-            Cell::Refused(_, failure) => Some(failure),
-        }
+        self.read.as_ref().err()
     }
+}
 
-    /// As [`refusal`](Self::refusal), without the cell.
-    pub fn into_refusal(self) -> Option<Failure> {
-        match self {
-            Cell::Read(_) => None,
-            Cell::Refused(_, failure) => Some(failure),
-        }
+impl From<Row> for Cell {
+    fn from(row: Row) -> Self {
+        Cell { name: row.name.clone(), read: Ok(row) }
     }
 }
 
@@ -148,11 +133,9 @@ impl Line {
         self
     }
 
-    /// Begins with the seconds since the first sample, if it is one of several.
-    pub fn at(mut self, seconds: Option<f64>) -> Self {
-        if let Some(seconds) = seconds {
-            self.0.shift_insert(0, "t".to_owned(), number(seconds, 6));
-        }
+    /// Begins with the seconds since the first sample.
+    pub fn at(mut self, seconds: f64) -> Self {
+        self.0.shift_insert(0, "t".to_owned(), number(seconds, 6));
         self
     }
 
@@ -177,7 +160,7 @@ impl Line {
         let line = self.with_values("values", cells.iter().filter_map(Cell::row));
         let errors = cells
             .iter()
-            .filter_map(|cell| Some((cell.name().to_owned(), cell.refusal()?.object())))
+            .filter_map(|cell| Some((cell.name.clone(), cell.refusal()?.object())))
             .collect::<Map<String, Value>>();
         if errors.is_empty() { line } else { line.with("errors", errors) }
     }

@@ -65,7 +65,7 @@ impl Printer {
             let rows = cells.iter().filter_map(Cell::row);
             self.texts(rows.map(|row| (&*row.name, &*row.text)))?;
         }
-        self.report_all(cells.into_iter().filter_map(Cell::into_refusal).collect())
+        self.report_all(cells.into_iter().filter_map(|cell| cell.read.err()).collect())
     }
 
     /// Reports the failures of several values or motors. One of them is left to be returned. In JSON

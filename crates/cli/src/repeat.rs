@@ -295,23 +295,22 @@ impl<'a> Sink<'a> {
 
     fn sample(&mut self, elapsed: Duration, cells: Vec<Cell>) -> Result<(), Failure> {
         let seconds = elapsed.as_secs_f64();
-        for (name, failure) in cells.iter().filter_map(|cell| Some((cell.name(), cell.refusal()?)))
-        {
+        for (name, failure) in cells.iter().filter_map(|cell| Some((&cell.name, cell.refusal()?))) {
             if !self.output.json && !self.noted.iter().any(|noted| noted == name) {
                 note(failure.text());
-                self.noted.push(name.to_owned());
+                self.noted.push(name.clone());
             }
         }
         if let Some(recording) = &mut self.recording {
             recording.sample(seconds, &cells)?;
         }
         if self.output.json {
-            print_line(&Value::from(self.object.clone().at(Some(seconds)).cells(&cells)))?;
+            print_line(&Value::from(self.object.clone().at(seconds).cells(&cells)))?;
         } else if self.prints {
             self.columns.print(seconds, &cells)?;
         }
         let refusal = self.refusal.take();
-        self.refusal = refusal.or_else(|| cells.into_iter().find_map(Cell::into_refusal));
+        self.refusal = refusal.or_else(|| cells.into_iter().find_map(|cell| cell.read.err()));
         Ok(())
     }
 
@@ -361,6 +360,6 @@ impl<'a> Sink<'a> {
     }
 
     fn event(&self, elapsed: Duration, name: &str) -> Line {
-        self.object.clone().at(Some(elapsed.as_secs_f64())).with("event", name)
+        self.object.clone().at(elapsed.as_secs_f64()).with("event", name)
     }
 }

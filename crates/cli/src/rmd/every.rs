@@ -87,11 +87,11 @@ fn cells(
             Source::Quantity(quantity) => {
                 let ((_, field), name) = (quantity.read(), quantity.short_name());
                 let row = units.field(field, sample.digits);
-                cells.push(Cell::Read(Row { name, ..row }));
-                cells.extend(units.encoder_angle(field, sample.digits)?.map(Cell::Read));
+                cells.push(Row { name, ..row }.into());
+                cells.extend(units.encoder_angle(field, sample.digits)?.map(Cell::from));
             }
             Source::Derived(derived) => {
-                cells.push(Cell::Read(Row::derived(*derived, sample.value)));
+                cells.push(Row::derived(*derived, sample.value).into());
             }
             Source::Register(_) => {}
         }

@@ -71,7 +71,7 @@ fn cell(
         Err(Absent::Refused(why)) => match &**why {
             LineError::St(error) if refusal::is_about_register(error) => {
                 let failure = refusal::of_read(error.clone(), register, view.profile);
-                Ok(Cell::Refused(register.to_string(), view.about(failure)))
+                Ok(Cell { name: register.to_string(), read: Err(view.about(failure)) })
             }
             other => Err(other.into()),
         },

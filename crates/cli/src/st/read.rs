@@ -65,7 +65,7 @@ pub const STATUS: [RegisterId; 10] = [
 pub fn status(session: &Session) -> Result<(), Failure> {
     let mut cells = read_all(session, &STATUS)?;
     for (register, cell) in STATUS.into_iter().zip(&mut cells) {
-        let Cell::Read(row) = cell else { continue };
+        let Ok(row) = &mut cell.read else { continue };
         let Some(bits) = row.value["value"].as_i64() else { continue };
         match register {
             RegisterId::STATUS => {
@@ -129,7 +129,8 @@ fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Fa
                 Ok(bits) => Ok(session.cell(register, bits)),
                 Err(error) if refusal::is_about_register(&error) => {
                     let failure = refusal::of_read(error, register, session.client.profile());
-                    Ok(Cell::Refused(register.to_string(), session.about(failure)))
+                    let read = Err(session.about(failure));
+                    Ok(Cell { name: register.to_string(), read })
                 }
                 Err(error) => Err(error.into()),
             }

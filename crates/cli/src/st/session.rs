@@ -192,9 +192,8 @@ impl View {
 
     /// A register with its value as people read it, or why its value is not plausible.
     pub fn cell(&self, register: RegisterId, bits: i32) -> Cell {
-        match self.plausible(register, bits) {
-            Ok(reading) => Cell::Read(self.row(&reading)),
-            Err(failure) => Cell::Refused(register.to_string(), self.about(failure)),
-        }
+        let read = self.plausible(register, bits).map(|reading| self.row(&reading));
+        let name = register.to_string();
+        Cell { name, read: read.map_err(|failure| self.about(failure)) }
     }
 }
