@@ -2,7 +2,7 @@
 //! unclear.
 
 /// A row of docs/SPEC-NOTES.md. A drive that differs from it may still fulfil its document.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Reading {
     /// The row's id.
     pub row: &'static str,

@@ -1,7 +1,10 @@
 //! What a person sees of a run: a bar while it runs, a row for what did not pass, a table by
 //! paragraph.
 
+use std::collections::BTreeMap;
+
 use console::style;
+use indexmap::IndexMap;
 use indicatif::ProgressBar;
 use motorlink_conformance::{Finding, Outcome, Reading, Report, Verdict, rmd, st};
 
@@ -80,14 +83,11 @@ fn found(Finding { sent, expected, received, reading }: &Finding) -> Result<(), 
 
 /// Differences from readings by their row, each with what a first case found.
 fn readings(report: &Report) -> Result<(), Failure> {
-    let mut rows: Vec<(Reading, &Outcome, &Finding, usize)> = Vec::new();
+    let mut rows: IndexMap<Reading, (&Outcome, &Finding, usize)> = IndexMap::new();
     for outcome in &report.outcomes {
         for finding in &outcome.differences {
             let Some(reading) = finding.reading else { continue };
-            match rows.iter_mut().find(|(known, ..)| *known == reading) {
-                Some((.., count)) => *count += 1,
-                None => rows.push((reading, outcome, finding, 1)),
-            }
+            rows.entry(reading).or_insert((outcome, finding, 0)).2 += 1;
         }
     }
     if rows.is_empty() {
@@ -96,7 +96,7 @@ fn readings(report: &Report) -> Result<(), Failure> {
     output::print_line(
         &"Differences from our readings of what the document leaves open, which are no failures:",
     )?;
-    for (Reading { row, text }, outcome, finding, count) in rows {
+    for (Reading { row, text }, (outcome, finding, count)) in rows {
         output::print_line(&format!("{:<8} {text}", style(row).yellow()))?;
         let others = if count > 1 { format!(", and {} others", count - 1) } else { String::new() };
         output::print_line(&format!("           case     {}{others}", outcome.name))?;
@@ -118,7 +118,7 @@ fn demands(clauses: &[&str]) -> Result<(), Failure> {
 
 /// A line a paragraph, in the order of the document.
 fn paragraphs(report: &Report) -> Result<(), Failure> {
-    let mut table: Vec<(&str, [usize; 5])> = Vec::new();
+    let mut table: BTreeMap<(Option<Vec<u32>>, &str), [usize; 5]> = BTreeMap::new();
     for outcome in &report.outcomes {
         let clause = outcome.clauses.first().copied().unwrap_or("");
         let paragraph = clause.rsplit_once('-').map_or(clause, |(paragraph, _)| paragraph);
@@ -129,22 +129,14 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
             Verdict::Skipped(_) => 3,
             Verdict::NotRun(_) => 4,
         };
-        match table.iter_mut().find(|(known, _)| *known == paragraph) {
-            Some((_, counts)) => counts[column] += 1,
-            None => {
-                let mut counts = [0; 5];
-                counts[column] = 1;
-                table.push((paragraph, counts));
-            }
-        }
+        table.entry((place(paragraph), paragraph)).or_default()[column] += 1;
     }
-    table.sort_by_key(|(paragraph, _)| place(paragraph));
     output::print_line(&format!(
         "{:<10} {:>7} {:>7} {:>8} {:>8} {:>8}",
         "paragraph", "passed", "failed", "reading", "skipped", "not run"
     ))?;
     let mut total = [0; 5];
-    for (paragraph, counts) in table {
+    for ((_, paragraph), counts) in table {
         counted(paragraph, counts)?;
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
@@ -173,13 +165,10 @@ fn counted(
 
 /// Why cases were skipped, each reason once.
 fn reasons(report: &Report) -> Result<(), Failure> {
-    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    let mut reasons = IndexMap::new();
     for outcome in &report.outcomes {
         if let Verdict::Skipped(why) = &outcome.verdict {
-            match reasons.iter_mut().find(|(known, _)| known == why) {
-                Some((_, count)) => *count += 1,
-                None => reasons.push((why, 1)),
-            }
+            *reasons.entry(why).or_insert(0) += 1;
         }
     }
     for (why, count) in reasons {

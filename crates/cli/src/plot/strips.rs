@@ -1,6 +1,7 @@
 //! A panel of signals whose values have names: a strip for each, and a legend for what is too narrow
 //! for its name.
 
+use indexmap::IndexMap;
 use motorlink_testbench::scenario::short;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -49,7 +50,7 @@ impl Strip {
         let samples = &signal.samples;
         let place = |n: usize| LEFT + samples.place(n, f64::from(PLOT)) as i32;
         let mut spans = Vec::new();
-        let mut narrow: Vec<(String, Meaning, Vec<String>)> = Vec::new();
+        let mut narrow: IndexMap<String, (Meaning, Vec<String>)> = IndexMap::new();
         for segment in samples.segments() {
             let mut first = segment.start;
             for same in samples.values[segment.clone()].chunk_by(|a, b| a == b) {
@@ -59,20 +60,18 @@ impl Strip {
                 let middle = room(from, to, width(&name), events);
                 if middle.is_none() {
                     let moment = short(samples.place(first, samples.end));
-                    match narrow.iter_mut().find(|(known, ..)| *known == name) {
-                        Some((_, _, moments)) => moments.push(moment),
-                        None => narrow.push((name.clone(), meaning, vec![moment])),
-                    }
+                    let (_, moments) = narrow.entry(name.clone()).or_insert((meaning, Vec::new()));
+                    moments.push(moment);
                 }
                 spans.push(Span { name, meaning, from, to, middle });
                 first += same.len();
             }
         }
         // The look of a state is explained where its name has room once.
-        narrow.retain(|(name, ..)| {
+        narrow.retain(|name, _| {
             !spans.iter().any(|span: &Span| span.middle.is_some() && span.name == *name)
         });
-        let legend = flow(narrow.into_iter().map(|(name, meaning, moments)| Entry {
+        let legend = flow(narrow.into_iter().map(|(name, (meaning, moments))| Entry {
             text: format!("{name} at {} s", listed(&moments)),
             meaning,
         }));

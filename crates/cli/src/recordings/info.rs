@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 
+use indexmap::IndexMap;
 use motorlink_link::{printable, printable_lines};
 use motorlink_recording::read::{Content, Drive, Metadata, Recording, lost};
 use motorlink_recording::schema::{self, Log, Loss, SETTINGS_TYPE, SignalField, Time, drive};
@@ -91,7 +92,7 @@ fn settings(
 struct Contents {
     topics: Vec<Topic>,
     /// Kinds of events with their numbers, in the order of their first appearance.
-    kinds: Vec<(String, u64)>,
+    kinds: IndexMap<String, u64>,
     events: Vec<Log>,
 }
 
@@ -138,12 +139,9 @@ impl Contents {
                 events.push(event);
             }
         }
-        let mut kinds: Vec<(String, u64)> = Vec::new();
+        let mut kinds = IndexMap::new();
         for event in &events {
-            match kinds.iter_mut().find(|(kind, _)| *kind == event.kind) {
-                Some((_, count)) => *count += 1,
-                None => kinds.push((event.kind.clone(), 1)),
-            }
+            *kinds.entry(event.kind.clone()).or_insert(0) += 1;
         }
         let mut topics: Vec<Topic> = topics.into_values().collect();
         topics.sort_by(|a, b| a.name.cmp(&b.name));
