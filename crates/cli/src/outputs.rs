@@ -78,13 +78,27 @@ pub fn resolve(
     Ok(found)
 }
 
-/// Where the only output of a command goes, given with `option`.
+/// Where the only output of a command goes, given with `option`. `inputs` are the files that were read;
+/// `replace` is the option that allows to replace a file, and whether it was given.
 ///
 /// # Errors
-/// The folder does not exist.
-pub fn one(option: &str, path: &Path) -> Result<Output, Failure> {
-    let found = resolve(&[(option, Some(path))], &[])?;
-    Ok(found.into_iter().flatten().next().expect("an output was given"))
+/// The folder does not exist, or the file exists, or it is an input.
+pub fn one(
+    option: &str,
+    path: &Path,
+    inputs: &[&Path],
+    replace: (&str, bool),
+) -> Result<Output, Failure> {
+    let found = resolve(&[(option, Some(path))], inputs)?;
+    let output = found.into_iter().flatten().next().expect("an output was given");
+    match (&output, replace) {
+        (Output::File(place), (option, false)) if place.real.exists() => {
+            let name = printable(&place.named.display().to_string());
+            Err(Failure::usage(format!("`{name}` exists; nothing was written"))
+                .trying(format!("add {option} to replace it")))
+        }
+        _ => Ok(output),
+    }
 }
 
 /// Two names with the same identity are one file.
@@ -145,21 +159,6 @@ impl OutputPath {
 }
 
 impl Output {
-    /// Checks that no regular file would be replaced. `option` allows to replace it.
-    ///
-    /// # Errors
-    /// The file exists.
-    pub fn check_free(&self, option: &str) -> Result<(), Failure> {
-        match self {
-            Output::File(place) if place.real.exists() => {
-                let name = printable(&place.named.display().to_string());
-                Err(Failure::usage(format!("`{name}` exists; nothing was written"))
-                    .trying(format!("add {option} to replace it")))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Writes a content. A regular file is replaced when the content is complete, and is not changed
     /// before.
     pub fn write(

@@ -89,10 +89,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 impl File {
     fn write(&self, text: &str) -> Result<(), Failure> {
-        let output = outputs::one("--output", &self.output)?;
-        if !self.force {
-            output.check_free("--force")?;
-        }
+        let output = outputs::one("--output", &self.output, &[], ("--force", self.force))?;
         output.write(|out| out.write_all(text.as_bytes()))
     }
 }

@@ -11,9 +11,11 @@ mod style;
 
 use std::path::Path;
 
+use motorlink_link::printable;
 use motorlink_testbench::scenario::short;
 use plotters::prelude::*;
 
+use crate::failure::Failure;
 use crate::palette::Meaning;
 use crate::text::flow;
 pub use figure::{Figure, Panel, Samples, Signal, States, Times};
@@ -36,17 +38,25 @@ const TIME_AXIS: i32 = 44;
 /// Length of a line in the legend.
 const SAMPLE: i32 = 26;
 
-/// What to try after [`other_format`].
-pub const SVG_ADVICE: &str =
-    "give a name that ends in .svg or .png; Inkscape and rsvg-convert convert SVG to other formats";
-
-/// The extension of a file name that promises another format than SVG and PNG. Names without an extension and
-/// devices may have any content.
-pub fn other_format(plot: &Path) -> Option<String> {
-    let extension = plot.extension()?.to_str()?.to_ascii_lowercase();
-    let is_other = ["jpg", "jpeg", "gif", "bmp", "webp", "tif", "tiff", "pdf", "eps", "ps"]
-        .contains(&&*extension);
-    is_other.then(|| extension.to_uppercase())
+/// Refuses the name of a file that promises another format than SVG and PNG. Names without an extension and
+/// devices may have any content. `who` writes it.
+///
+/// # Errors
+/// The extension is that of another format.
+pub fn check_format(who: &str, plot: &Path) -> Result<(), Failure> {
+    let extension = plot.extension().and_then(|extension| extension.to_str());
+    let extension = extension.unwrap_or_default().to_ascii_uppercase();
+    match &*extension {
+        "JPG" | "JPEG" | "GIF" | "BMP" | "WEBP" | "TIF" | "TIFF" | "PDF" | "EPS" | "PS" => {
+            let name = printable(&plot.display().to_string());
+            let why = format!("{who} writes SVG and PNG, not {extension}: `{name}`");
+            Err(Failure::usage(why).trying(
+                "give a name that ends in .svg or .png; Inkscape and rsvg-convert convert SVG to other \
+                 formats",
+            ))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Draws a figure: as PNG if the name of the file ends so, otherwise as SVG.

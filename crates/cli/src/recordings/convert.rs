@@ -7,7 +7,6 @@ use motorlink_capture::{Format, WriteError, Writer};
 use motorlink_link::printable;
 use motorlink_recording::read::{Table, Tables};
 use motorlink_recording::schema::Log;
-use serde_json::json;
 
 use super::input::Input;
 use super::pick::Pick;
@@ -37,6 +36,12 @@ pub struct Args {
     json: bool,
 }
 
+impl Args {
+    fn written(&self, to: &Output, what: &str, count: (&str, u64)) -> Result<(), Failure> {
+        self.input.written(Printer { json: self.json }, (to, &self.output), what, count)
+    }
+}
+
 /// What the new file has.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -49,10 +54,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if kind != Kind::Signals && (args.pick.is_some() || args.unix) {
         return Err(Failure::usage("--signals and --unix are for .csv: other formats have frames"));
     }
-    let output = args.input.output("OUT", &args.output, args.force)?;
-    if output == Output::Stdout && args.json {
-        return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
-    }
+    let output = args.input.output("OUT", &args.output, args.force, args.json)?;
     match kind {
         Kind::Signals => signals(args, &output),
         Kind::Frames(format) => frames(args, format, &output),
@@ -86,7 +88,7 @@ fn signals(args: &Args, output: &Output) -> Result<(), Failure> {
     })?;
     let columns = csv.columns() as u64;
     let what = format!("{} of {}", counted(rows, "row"), counted(columns, "signal"));
-    done(args, output, &what, ("rows", rows))
+    args.written(output, &what, ("rows", rows))
 }
 
 fn frames(args: &Args, format: Format, output: &Output) -> Result<(), Failure> {
@@ -114,22 +116,7 @@ fn frames(args: &Args, format: Format, output: &Output) -> Result<(), Failure> {
         let left = format!("{serial} frames of serial lines are left out: only .pcapng has them");
         note(left);
     }
-    done(args, output, &counted(count, "frame"), ("frames", count))
-}
-
-/// Says what was written.
-fn done(
-    args: &Args,
-    output: &Output,
-    what: &str,
-    (name, count): (&str, u64),
-) -> Result<(), Failure> {
-    if *output == Output::Stdout {
-        return Ok(());
-    }
-    let file = printable(&args.output.display().to_string());
-    let object = json!({ "ok": true, "recording": args.input.name(), "file": file, name: count });
-    Printer { json: args.json }.result(format!("{file} has {what}"), object)
+    args.written(output, &counted(count, "frame"), ("frames", count))
 }
 
 /// Whether it is a device or a FIFO, whose names have no ending.

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use motorlink_link::printable;
 use motorlink_recording::read::{Loss, ReadError, Recording, Tables, lost};
+use serde_json::json;
 
 use super::pick::Pick;
 use crate::failure::Failure;
-use crate::output::note;
+use crate::output::{Printer, note};
 use crate::outputs::{self, Output};
 
 /// A recording to read.
@@ -81,13 +82,35 @@ impl Input {
         Ok(read)
     }
 
-    /// Where a result is written to. A file that exists is replaced with `force` only.
-    pub fn output(&self, name: &str, path: &Path, force: bool) -> Result<Output, Failure> {
-        let outputs = outputs::resolve(&[(name, Some(path))], &[&self.file])?;
-        let output = outputs.into_iter().flatten().next().expect("the output was resolved");
-        if !force {
-            output.check_free("--force")?;
+    /// Where a result is written to. A file that exists is replaced with `force` only. With `json` it
+    /// cannot be stdout.
+    pub fn output(
+        &self,
+        name: &str,
+        path: &Path,
+        force: bool,
+        json: bool,
+    ) -> Result<Output, Failure> {
+        let output = outputs::one(name, path, &[&self.file], ("--force", force))?;
+        match output == Output::Stdout && json {
+            true => Err(Failure::usage("`-` and --json both need stdout: write to a file")),
+            false => Ok(output),
         }
-        Ok(output)
+    }
+
+    /// Says what was written, and how much of it, unless it went to stdout.
+    pub fn written(
+        &self,
+        printer: Printer,
+        (output, path): (&Output, &Path),
+        what: &str,
+        (name, count): (&str, u64),
+    ) -> Result<(), Failure> {
+        if *output == Output::Stdout {
+            return Ok(());
+        }
+        let file = printable(&path.display().to_string());
+        let object = json!({ "ok": true, "recording": self.name(), "file": file, name: count });
+        printer.result(format!("{file} has {what}"), object)
     }
 }

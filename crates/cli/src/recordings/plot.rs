@@ -1,20 +1,18 @@
 //! `motorlink plot`: signals of a recording as a picture.
 
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use motorlink_link::printable;
 use motorlink_recording::read::{Table, Tables};
 use motorlink_recording::schema::Time;
 use motorlink_testbench::scenario::Mark;
-use serde_json::json;
 
 use super::input::Input;
 use super::look::{meaning, quantity, states};
 use super::pick::Pick;
 use crate::failure::Failure;
 use crate::output::{Printer, note};
-use crate::outputs::Output;
 use crate::palette::Meaning;
 use crate::plot::{self, Figure, Panel, Samples, Signal, Times};
 use crate::text::counted;
@@ -59,32 +57,16 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    if let Some(other) = plot::other_format(&args.output) {
-        let name = printable(&args.output.display().to_string());
-        return Err(Failure::usage(format!("plot writes SVG and PNG, not {other}: `{name}`"))
-            .trying(plot::SVG_ADVICE));
-    }
-    let output = args.input.output("--output", &args.output, args.force)?;
-    if output == Output::Stdout && args.json {
-        return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
-    }
+    plot::check_format("plot", &args.output)?;
+    let output = args.input.output("--output", &args.output, args.force, args.json)?;
     let read = args.input.tables(&args.pick)?;
     let view = View::new(&read, args)?;
     let figure = view.figure(&read, args);
     let picture = plot::draw(&figure, &args.output).map_err(Failure::link)?;
     output.write(|file| file.write_all(&picture))?;
-    if output == Output::Stdout {
-        return Ok(());
-    }
-    let (signals, file) = (figure.signals.len(), shown(&args.output));
-    let recording = args.input.name();
-    let object = json!({ "ok": true, "recording": recording, "file": file, "signals": signals });
-    let what = counted(signals as u64, "signal");
-    Printer { json: args.json }.result(format!("{file} has {what}"), object)
-}
-
-fn shown(path: &Path) -> String {
-    printable(&path.display().to_string())
+    let signals = figure.signals.len() as u64;
+    let (printer, to) = (Printer { json: args.json }, (&output, args.output.as_path()));
+    args.input.written(printer, to, &counted(signals, "signal"), ("signals", signals))
 }
 
 /// The part of a recording that is drawn. Time 0 is the first sample of the recording.

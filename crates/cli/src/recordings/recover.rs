@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .clone()
         .or_else(|| (!is_whole).then(|| input.file.with_extension("recovered.mcap")));
     if let Some(path) = &path {
-        let output = input.output("--output", path, args.force)?;
+        let output = input.output("--output", path, args.force, false)?;
         output.write(|out| recording.write_to(out).map(drop))?;
     }
     let losses = recording.losses().to_vec();

@@ -87,10 +87,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
 
     /// `dump`: writes the settings as text.
     fn dump(self, args: &DumpArgs) -> Result<(), Failure> {
-        let file = outputs::one("FILE", &args.file)?;
-        if !args.overwrite {
-            file.check_free("--overwrite")?;
-        }
+        let file = outputs::one("FILE", &args.file, &[], ("--overwrite", args.overwrite))?;
         let dump = Dump::reading(self.motor.tuning()).run(&self.motor).map_err(Into::into)?;
         let rows: Vec<Row> = dump.values().map(|(setting, digits)| row(setting, digits)).collect();
         if file == Output::Stdout {

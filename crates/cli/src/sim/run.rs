@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use motorlink::st::register::Unit;
-use motorlink_link::printable;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
@@ -44,14 +43,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let why = "the scenario has no panels to plot: add a [[panel]] with signals";
         return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
     }
-    if let Some(plot) = &args.plot
-        && let Some(other) = plot::other_format(plot)
-    {
-        let why = format!(
-            "--plot writes SVG and PNG, not {other}: `{}`",
-            printable(&plot.display().to_string())
-        );
-        return Err(Failure::usage(why).trying(plot::SVG_ADVICE));
+    if let Some(plot) = &args.plot {
+        plot::check_format("--plot", plot)?;
     }
     let inputs: Vec<&Path> =
         std::iter::once(&args.scenario).chain(&scenario.files).map(|path| &**path).collect();
