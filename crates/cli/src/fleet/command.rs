@@ -16,7 +16,7 @@ use serde_json::Value;
 use super::args::Motors;
 use super::found::found;
 use crate::failure::Failure;
-use crate::output::{note, print_line};
+use crate::output::{Printer, note};
 
 /// Commands that read, stop or acknowledge, and end by themselves.
 const ST: [&str; 9] =
@@ -167,10 +167,7 @@ fn carry_out(jobs: Vec<Job>, json: bool) -> Result<(), Failure> {
         let Ok((Job { name, .. }, Some(output))) = slot.into_inner() else { continue };
         let output = output?;
         for line in String::from_utf8_lossy(&output.stdout).lines() {
-            match json {
-                true => print_line(&named(&name, line))?,
-                false => print_line(&format!("{name}: {line}"))?,
-            }
+            Printer { json }.result(format!("{name}: {line}"), named(&name, line))?;
         }
         for line in String::from_utf8_lossy(&output.stderr).lines() {
             note(format!("{name}: {line}"));

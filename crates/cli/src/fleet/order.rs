@@ -13,7 +13,7 @@ use super::args::OrderArgs;
 use crate::advice;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::{keep_error, kept_error, print_line};
+use crate::output::{Printer, keep_error, kept_error};
 use crate::share::{self, Connection};
 
 /// What all nodes are told.
@@ -67,18 +67,16 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
             Err(format!("another node of this name went away {seconds:.0} s ago without an end")),
         )
     });
+    let printer = Printer { json: args.at.json };
     let (mut is_done, mut away) = (true, Vec::new());
     for (name, told) in told.chain(others) {
         match told {
-            Ok(motors) => is_done &= say(args, order, &name, motors)?,
+            Ok(motors) => is_done &= say(printer, order, &name, motors)?,
             Err(why) => {
                 let message = format!("node {name}: {why}");
-                match args.at.json {
-                    true => print_line(
-                        &json!({"event": "failed", "node": name.as_str(), "message": message}),
-                    )?,
-                    false => print_line(&message)?,
-                }
+                let object =
+                    json!({"event": "failed", "node": name.as_str(), "message": message});
+                printer.result(message, object)?;
                 away.push(name.to_string());
             }
         }
@@ -118,7 +116,7 @@ fn tell(
 
 /// Says what a node has done. Gives whether nothing is left to do.
 fn say(
-    args: &OrderArgs,
+    printer: Printer,
     order: Order,
     node: &Name,
     motors: Vec<StoppedMotor>,
@@ -128,14 +126,10 @@ fn say(
         Order::Release => ("released", "motion is possible"),
     };
     let message = format!("{node}: {words}");
-    match args.at.json {
-        true => {
-            print_line(&json!({"event": event, "node": node.as_str(), "message": message}))?;
-        }
-        false => print_line(&message)?,
-    }
+    let object = json!({"event": event, "node": node.as_str(), "message": message});
+    printer.result(message, object)?;
     match order {
-        Order::StopAll => share::tell_stops(&motors, Some(node.as_str()), args.at.json),
+        Order::StopAll => share::tell_stops(&motors, Some(node.as_str()), printer),
         Order::Latch | Order::Release => Ok(true),
     }
 }

@@ -18,6 +18,7 @@ use tempfile::TempDir;
 
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
+use crate::output::Printer;
 use crate::span::utc;
 use crate::{advice, folder, output};
 
@@ -88,11 +89,12 @@ pub fn serve(
     json: bool,
     mut outcome: Result<(), Failure>,
 ) -> Result<(), Failure> {
+    let printer = Printer { json };
     while !interrupted() && outcome.is_ok() {
         outcome = server
             .turn()
             .map_err(Failure::from)
-            .and_then(|events| events.iter().try_for_each(|event| tell(event, json)));
+            .and_then(|events| events.iter().try_for_each(|event| tell(event, printer)));
     }
     let why = match &outcome {
         Ok(()) => "the share was ended".to_owned(),
@@ -100,7 +102,7 @@ pub fn serve(
     };
     let stopped = server.end(&why);
     for (line, one) in &stopped {
-        tell_stop(None, (line, one.motor.number()), one.result.as_ref().copied(), json)?;
+        tell_stop(None, (line, one.motor.number()), one.result.as_ref().copied(), printer)?;
     }
     if stopped.iter().any(|(_, one)| one.result.is_err()) {
         return Err(Failure::link(UNCONFIRMED));
@@ -127,14 +129,14 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
     }
     let name = format!("motorlink {}", std::process::id());
     let mut share = Connection::open(&Local(path.to_owned()), &name).map_err(failed)?;
-    let done = |event: &str, message: &str| match args.json {
-        true => output::print_line(&json!({ "event": event, "message": message })),
-        false => output::print_line(&message),
+    let printer = Printer { json: args.json };
+    let done = |event: &str, message: &str| {
+        printer.result(message, json!({ "event": event, "message": message }))
     };
     match request {
         AskFor::Stop => {
             let motors = share.stop(false).map_err(failed)?;
-            match tell_stops(&motors, None, args.json)? {
+            match tell_stops(&motors, None, printer)? {
                 true => Ok(()),
                 false => Err(Failure::link(UNCONFIRMED).trying(advice::STOP_AGAIN)),
             }
@@ -154,13 +156,13 @@ fn ask(request: AskFor, path: &Path, args: &Args) -> Result<(), Failure> {
 pub fn tell_stops(
     motors: &[StoppedMotor],
     node: Option<&str>,
-    json: bool,
+    printer: Printer,
 ) -> Result<bool, Failure> {
     for one in motors.iter().filter(|one| !one.absent) {
         let result = one.failure.as_ref().map_or(Ok(()), Err);
-        tell_stop(node, (&one.motor.line, one.motor.motor), result, json)?;
+        tell_stop(node, (&one.motor.line, one.motor.motor), result, printer)?;
     }
-    tell_absent(motors, node, json)?;
+    tell_absent(motors, node, printer)?;
     // Where nothing answers, silence does not show that no motor is there.
     let is_silent = !motors.is_empty() && motors.iter().all(|one| one.absent);
     Ok(!is_silent && !motors.iter().any(may_turn))
@@ -190,11 +192,9 @@ pub const UNCONFIRMED: &str = "motors may still turn: not all confirmed that the
 
 fn ready(server: &Server, args: &Args) -> Result<(), Failure> {
     let lines = server.hub.lines();
-    if args.json {
-        let lines = lines_in_json(&lines);
-        return output::print_line(&json!({"event": "ready", "at": args.at, "lines": lines}));
-    }
-    output::print_line(&lines_in_words(&format!("share at {}", args.at), &lines))
+    let object = json!({"event": "ready", "at": args.at, "lines": lines_in_json(&lines)});
+    let text = lines_in_words(&format!("share at {}", args.at), &lines);
+    Printer { json: args.json }.result(text, object)
 }
 
 /// The lines of a share, for programs.
@@ -210,14 +210,9 @@ pub fn lines_in_words(what: &str, lines: &[message::Line]) -> String {
     format!("{what}: {}", lines.join(", "))
 }
 
-fn tell(event: &Event, json: bool) -> Result<(), Failure> {
-    match json {
-        true => output::print_line(&json!(event)),
-        false => {
-            let at = UNIX_EPOCH + Duration::try_from_secs_f64(event.wall).unwrap_or_default();
-            output::print_line(&format!("{} {}", utc(at), event.message))
-        }
-    }
+fn tell(event: &Event, printer: Printer) -> Result<(), Failure> {
+    let at = UNIX_EPOCH + Duration::try_from_secs_f64(event.wall).unwrap_or_default();
+    printer.result(format!("{} {}", utc(at), event.message), json!(event))
 }
 
 fn may_turn(one: &StoppedMotor) -> bool {
@@ -225,14 +220,18 @@ fn may_turn(one: &StoppedMotor) -> bool {
 }
 
 /// Says where no motor was found.
-fn tell_absent(motors: &[StoppedMotor], node: Option<&str>, json: bool) -> Result<(), Failure> {
+fn tell_absent(
+    motors: &[StoppedMotor],
+    node: Option<&str>,
+    printer: Printer,
+) -> Result<(), Failure> {
     let mut lines: BTreeMap<&str, Vec<u8>> = BTreeMap::new();
     for one in motors.iter().filter(|one| one.absent) {
         lines.entry(&one.motor.line).or_default().push(one.motor.motor);
     }
     for (line, numbers) in lines {
         let words = format!("no motor was found at {}", ranges(&numbers));
-        tell_of("no-motor", (node, line, None), &words, json)?;
+        tell_of("no-motor", (node, line, None), &words, printer)?;
     }
     Ok(())
 }
@@ -252,7 +251,7 @@ fn tell_stop(
     node: Option<&str>,
     (line, motor): (&str, u8),
     result: Result<(), impl Display>,
-    json: bool,
+    printer: Printer,
 ) -> Result<(), Failure> {
     let motor = Some(motor).filter(|motor| *motor != ANY_MOTOR);
     let (event, words) = match (result, motor) {
@@ -260,7 +259,7 @@ fn tell_stop(
         (Err(error), Some(_)) => ("stop-failed", format!("it may still be turning: {error}")),
         (Err(error), None) => ("stop-failed", format!("motors may still be turning: {error}")),
     };
-    tell_of(event, (node, line, motor), &words, json)
+    tell_of(event, (node, line, motor), &words, printer)
 }
 
 /// Says something of a line or a motor.
@@ -268,14 +267,11 @@ fn tell_of(
     event: &str,
     (node, line, motor): (Option<&str>, &str, Option<u8>),
     words: &str,
-    json: bool,
+    printer: Printer,
 ) -> Result<(), Failure> {
     let node_slash = node.map(|node| format!("{node}/")).unwrap_or_default();
     let comma_motor = motor.map(|motor| format!(", motor {motor}")).unwrap_or_default();
     let message = format!("{node_slash}{line}{comma_motor}: {words}");
-    if !json {
-        return output::print_line(&message);
-    }
     let mut object = json!({ "event": event });
     if let Some(node) = node {
         object["node"] = json!(node);
@@ -285,7 +281,7 @@ fn tell_of(
         object["motor"] = json!(motor);
     }
     object["message"] = json!(message);
-    output::print_line(&object)
+    printer.result(message, object)
 }
 
 impl From<ServerError> for Failure {
