@@ -33,6 +33,20 @@ pub fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{plural}")
 }
 
+/// Whether a text is like a pattern in which `*` is any text and `?` is any letter of one byte.
+pub fn is_like(pattern: &str, text: &str) -> bool {
+    fn is_like(pattern: &[u8], text: &[u8]) -> bool {
+        match (pattern, text) {
+            ([], []) => true,
+            ([b'*', rest @ ..], _) => (0..=text.len()).any(|taken| is_like(rest, &text[taken..])),
+            ([b'?', rest @ ..], [_, after @ ..]) => is_like(rest, after),
+            ([letter, rest @ ..], [first, after @ ..]) => letter == first && is_like(rest, after),
+            _ => false,
+        }
+    }
+    is_like(pattern.as_bytes(), text.as_bytes())
+}
+
 /// A text as a cell of a CSV file: in quotation marks where it needs them.
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
     match text.contains([',', '"', '\n']) {

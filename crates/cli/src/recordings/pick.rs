@@ -6,6 +6,7 @@ use motorlink_recording::read::Recording;
 use motorlink_recording::schema::SignalField;
 
 use crate::failure::Failure;
+use crate::text::is_like;
 
 /// Signals by their names.
 #[derive(clap::Args)]
@@ -56,19 +57,6 @@ fn is_meant(wanted: &str, topic: &str, field: &SignalField) -> bool {
     let full = format!("{motor}/{}", field.signal);
     let matches = |name: &str| is_like(&wanted.to_lowercase(), &name.to_lowercase());
     matches(&field.signal) || matches(&full)
-}
-
-/// Whether a text is like a pattern in which `*` is any text.
-fn is_like(pattern: &str, text: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == text,
-        Some((start, rest)) => text.strip_prefix(start).is_some_and(|text| {
-            text.char_indices()
-                .map(|(at, _)| at)
-                .chain([text.len()])
-                .any(|at| is_like(rest, &text[at..]))
-        }),
-    }
 }
 
 #[cfg(test)]

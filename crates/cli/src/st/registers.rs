@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::failure::Failure;
 use crate::hint;
 use crate::output::{Printer, print_line};
-use crate::text::flow;
+use crate::text::{flow, is_like};
 
 /// Which registers.
 #[derive(clap::Args)]
@@ -49,17 +49,8 @@ impl Filter {
 
 /// Whether a name matches a pattern with `*` and `?`, or has it in it where it has neither.
 fn matches(pattern: &str, name: &str) -> bool {
-    fn whole(pattern: &[u8], name: &[u8]) -> bool {
-        match (pattern, name) {
-            ([], []) => true,
-            ([b'*', rest @ ..], _) => (0..=name.len()).any(|taken| whole(rest, &name[taken..])),
-            ([b'?', rest @ ..], [_, after @ ..]) => whole(rest, after),
-            ([letter, rest @ ..], [first, after @ ..]) => letter == first && whole(rest, after),
-            _ => false,
-        }
-    }
     match pattern.contains(['*', '?']) {
-        true => whole(pattern.as_bytes(), name.as_bytes()),
+        true => is_like(pattern, name),
         false => name.contains(pattern),
     }
 }
