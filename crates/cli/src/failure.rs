@@ -38,7 +38,8 @@ pub struct Problem {
 }
 
 /// What kind of problem it is, which gives the exit code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// The drive refused, or did not do it.
     Refused,
@@ -65,19 +66,6 @@ impl Kind {
             Kind::Usage => 2,
             Kind::Link | Kind::Silent | Kind::Output => 3,
             Kind::Lost => 4,
-        }
-    }
-
-    fn word(self) -> &'static str {
-        match self {
-            Kind::Refused => "refused",
-            Kind::Differs => "differs",
-            Kind::Damaged => "damaged",
-            Kind::Usage => "usage",
-            Kind::Link => "link",
-            Kind::Silent => "silent",
-            Kind::Output => "output",
-            Kind::Lost => "lost",
         }
     }
 }
@@ -318,8 +306,7 @@ impl Problem {
 
     /// For programs: docs/JSON.md.
     pub fn object(&self) -> Value {
-        let mut object =
-            json!({ "kind": self.kind.word(), "message": self.pasteable(&self.message) });
+        let mut object = json!({ "kind": self.kind, "message": self.pasteable(&self.message) });
         let members = object.as_object_mut().expect("an object was made");
         let advice = self.advice.as_deref().map(|advice| self.pasteable(advice));
         members.extend(advice.map(|advice| ("try".to_owned(), json!(advice))));

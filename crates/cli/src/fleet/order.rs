@@ -74,8 +74,7 @@ pub fn run(args: &OrderArgs, order: Order) -> Result<(), Failure> {
             Ok(motors) => is_done &= say(printer, order, &name, motors)?,
             Err(why) => {
                 let message = format!("node {name}: {why}");
-                let object =
-                    json!({"event": "failed", "node": name.as_str(), "message": message});
+                let object = json!({"event": "failed", "node": name.as_str(), "message": message});
                 printer.result(message, object)?;
                 away.push(name.to_string());
             }

@@ -1,6 +1,5 @@
 //! Where browsers connect.
 
-use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::PathBuf;
 
@@ -104,28 +103,14 @@ impl Listen {
 }
 
 fn bind_usual() -> Result<TcpListener, Failure> {
-    let mut address = USUAL;
-    loop {
-        match TcpListener::bind(address) {
-            Ok(listener) => {
-                if address != USUAL {
-                    note(format!(
-                        "port {} is taken; this is port {}",
-                        USUAL.port(),
-                        address.port()
-                    ));
-                }
-                return Ok(listener);
-            }
-            Err(error) if error.kind() == ErrorKind::AddrInUse => {
-                if address.port() >= USUAL.port() + TRIED {
-                    return Err(refused(USUAL, &error));
-                }
-                address.set_port(address.port() + 1);
-            }
-            Err(error) => return Err(refused(address, &error)),
-        }
+    let ports = USUAL.port()..=USUAL.port() + TRIED;
+    let all: Vec<SocketAddr> = ports.map(|port| SocketAddr::new(USUAL.ip(), port)).collect();
+    let listener = TcpListener::bind(&all[..]).map_err(|error| refused(USUAL, &error))?;
+    let port = listener.local_addr()?.port();
+    if port != USUAL.port() {
+        note(format!("port {} is taken; this is port {port}", USUAL.port()));
     }
+    Ok(listener)
 }
 
 fn refused(address: SocketAddr, error: &std::io::Error) -> Failure {

@@ -18,6 +18,7 @@ use crate::json::{Line, Row};
 use crate::output::{Printer, note};
 use crate::outputs::{self, Output};
 use crate::pasteable::{self, quoted};
+use crate::text::counted;
 
 use interruption::{Ended, Interruptible};
 
@@ -109,7 +110,7 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
                 let (motor, file) = (self.name(), shown(&args.file));
                 Err(Failure::differs(format!(
                     "{motor} differs from {file} in {}",
-                    settings_of(count)
+                    counted(count as u64, "setting")
                 )))
             }
         }
@@ -146,7 +147,10 @@ impl<M: Tunable<Error: Into<Failure> + Clone + std::fmt::Display>> Tuned<'_, M> 
         }
         let mut done = Vec::new();
         if !differences.is_empty() {
-            done.push(format!("{} written and read back", settings_of(differences.len())));
+            done.push(format!(
+                "{} written and read back",
+                counted(differences.len() as u64, "setting")
+            ));
         }
         let permanent = comparison.permanent(permissions);
         if !permanent.is_empty() {
@@ -331,10 +335,6 @@ fn row(setting: &Setting, digits: i64) -> Row {
             Row::quantity(&setting.name, scale.value(digits), scale.decimals, unit)
         }
     }
-}
-
-fn settings_of(count: usize) -> String {
-    format!("{count} {}", if count == 1 { "setting" } else { "settings" })
 }
 
 fn shown(path: &Path) -> String {

@@ -12,7 +12,7 @@ use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
 use super::keys::{Field, HELP, Selection, View};
-use crate::text::{self, wrapped};
+use crate::text::{self, counted, wrapped};
 use parts::MARK;
 pub use parts::{Shown, Theme};
 
@@ -60,8 +60,8 @@ fn top(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Lin
     let model = shown.model;
     let mut lines = Vec::new();
     if height >= TITLED {
-        let ports = count(model.ports.len(), "port");
-        let motors = count(model.rows.len(), "motor");
+        let ports = counted(model.ports.len() as u64, "port");
+        let motors = counted(model.rows.len() as u64, "motor");
         let hertz = 1.0 / model.period.as_secs_f64();
         let text = format!("motorlink watch: {motors} on {ports}, {hertz:.1} Hz asked for");
         lines.push(Line::styled(text::fit(&text, width), theme.bold()));
@@ -95,13 +95,6 @@ fn top(shown: &Shown<'_>, theme: &Theme, width: usize, height: usize) -> Vec<Lin
 const TITLED: usize = 6;
 /// The part of the height for the names of motors whose stop is not confirmed: one line in so many.
 const LOUD: usize = 8;
-
-fn count(count: usize, one: &str) -> String {
-    match count {
-        1 => format!("1 {one}"),
-        _ => format!("{count} {one}s"),
-    }
-}
 
 /// The typed text, or the question that needs a y.
 fn field(shown: &Shown<'_>, theme: &Theme, width: usize) -> Vec<Line<'static>> {
