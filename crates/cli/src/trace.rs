@@ -1,5 +1,6 @@
 //! `--trace`: prints every frame on stderr, as bytes and with its meaning.
 
+use std::fmt::Arguments;
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
@@ -17,12 +18,7 @@ pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send 
         let sent = direction == Direction::Sent;
         let time = i64::try_from(at.as_nanos()).ok().map(Stamp::Relative);
         let meaning = transcript.note(time, sent, bytes);
-        print_message(&format!(
-            "{:>10.6} {} {:<24} {meaning}",
-            at.as_secs_f64(),
-            arrow(direction),
-            hex(bytes)
-        ));
+        print(direction, at, format_args!("{:<24} {meaning}", hex(bytes)));
     }
 }
 
@@ -35,17 +31,14 @@ pub fn frames() -> impl FnMut(Direction, Duration, &CanFrame) + Send {
         };
         let (id, data) = (frame.id(), hex(frame.data()));
         let meaning = rmd::describe(*frame, way);
-        print_message(&format!(
-            "{:>10.6} {} {id:03x}#{data:<24} {meaning}",
-            at.as_secs_f64(),
-            arrow(direction)
-        ));
+        print(direction, at, format_args!("{id:03x}#{data:<24} {meaning}"));
     }
 }
 
-fn arrow(direction: Direction) -> &'static str {
-    match direction {
+fn print(direction: Direction, at: Duration, what: Arguments<'_>) {
+    let arrow = match direction {
         Direction::Sent => "->",
         Direction::Received => "<-",
-    }
+    };
+    print_message(&format!("{:>10.6} {arrow} {what}", at.as_secs_f64()));
 }

@@ -102,7 +102,7 @@ were not run because the line or the drive failed, 130 Ctrl-C. A difference from
 reading is a failure only with --readings strict.";
 
 /// What may be done to the drive, and where the results go.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct Run {
     /// Allow cases that turn the motor
     #[arg(long)]
@@ -129,7 +129,7 @@ pub struct Run {
 }
 
 /// What is run and shown, and where the results go.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct Results {
     /// Run only cases with this text in their name or in a clause, such as ST-4.5
     #[arg(long, value_name = "TEXT")]

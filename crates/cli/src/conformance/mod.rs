@@ -35,7 +35,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let link = name.open_bytes()?;
             let byte_time = byte_time(&name);
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
-            let world = Box::new(Commands::new(&run));
+            let world = Box::new(Commands(run.clone()));
             let bench = st::Harness::new(link, world, options);
             interrupt::hold();
             conduct("st", &run, st::suite(profile), bench, |report| other_profile(profile, report))
@@ -45,7 +45,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let mut allowed = run.allowed();
             allowed.extend(write_rom.then_some(Need::Rom));
             let options = rmd::Options { id, encoder, allowed };
-            let world = Box::new(Commands::new(&run));
+            let world = Box::new(Commands(run.clone()));
             let bench = rmd::Harness::new(link, world, options);
             interrupt::hold();
             conduct("rmd", &run, rmd::suite(), bench, |_| None)

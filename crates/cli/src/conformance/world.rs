@@ -8,29 +8,17 @@ use super::args::Run;
 use crate::interrupt::interrupted;
 
 /// Runs what the user gave.
-pub struct Commands {
-    power_cycle: Option<String>,
-    fault_on: Option<String>,
-    fault_off: Option<String>,
-}
-
-impl Commands {
-    pub fn new(run: &Run) -> Self {
-        let Run { power_cycle, fault_on, fault_off, .. } = run;
-        let (power_cycle, fault_on) = (power_cycle.clone(), fault_on.clone());
-        Commands { power_cycle, fault_on, fault_off: fault_off.clone() }
-    }
-}
+pub struct Commands(pub Run);
 
 impl World for Commands {
     fn power_cycle(&mut self) -> Result<(), Unavailable> {
-        shell(self.power_cycle.as_deref(), "--power-cycle")
+        shell(self.0.power_cycle.as_deref(), "--power-cycle")
     }
 
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
         let (command, option) = match present {
-            true => (&self.fault_on, "--fault-on"),
-            false => (&self.fault_off, "--fault-off"),
+            true => (&self.0.fault_on, "--fault-on"),
+            false => (&self.0.fault_off, "--fault-off"),
         };
         shell(command.as_deref(), option)
     }

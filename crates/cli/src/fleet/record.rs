@@ -9,7 +9,7 @@ use motorlink_telemetry::share::message::Protocol;
 use super::args::{Nodes, Via};
 use super::found::found;
 use crate::failure::Failure;
-use crate::record::{RecordedPort, What, run_on};
+use crate::record::{What, run_on};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -30,16 +30,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             if line.heard.is_empty() {
                 continue;
             }
-            let mut place =
-                RecordedPort { port: remote.port(&line.line), ..RecordedPort::default() };
+            let mut port = args.what.port(&remote.port(&line.line))?;
             let numbers = line.heard.iter();
             match line.protocol {
+                _ if !port.motors.is_empty() || !port.ids.is_empty() => {}
                 Protocol::St => {
-                    place.motors = numbers.filter_map(|it| MotorNumber::new(*it)).collect()
+                    port.motors = numbers.filter_map(|it| MotorNumber::new(*it)).collect()
                 }
-                Protocol::Rmd => place.ids = numbers.filter_map(|it| MotorId::new(*it)).collect(),
+                Protocol::Rmd => port.ids = numbers.filter_map(|it| MotorId::new(*it)).collect(),
             }
-            ports.push(place);
+            ports.push(port);
         }
     }
     if ports.is_empty() {
@@ -47,5 +47,5 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "no motor of a node has answered, so there is nothing to record",
         ));
     }
-    run_on(&ports, &args.what)
+    run_on(ports, &args.what)
 }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use clap::Command;
+use clap::builder::Resettable;
 use clap_mangen::Man;
 use clap_mangen::roff::{Roff, roman};
 
@@ -23,28 +24,18 @@ fn write_pages(command: &Command, folder: &Path) -> Result<(), Failure> {
     for command in command.get_subcommands().filter(|command| !command.is_hide_set()) {
         write_pages(command, folder)?;
     }
-    let man = Man::new(command.clone());
+    let man = Man::new(command.clone().after_help(Resettable::Reset));
     let path = folder.join(man.get_filename());
     let page = page(command, &man).map_err(|error| Failure::file(&path, &error))?;
     std::fs::write(&path, page).map_err(|error| Failure::file(&path, &error))
 }
 
-/// As [`Man::render`], which would fill the lines of tables and examples.
+/// The page of a command. [`Man::render`] would fill the lines of tables and examples behind the options.
 fn page(command: &Command, man: &Man) -> io::Result<Vec<u8>> {
     let mut page = Vec::new();
-    man.render_title(&mut page)?;
-    man.render_name_section(&mut page)?;
-    man.render_synopsis_section(&mut page)?;
-    man.render_description_section(&mut page)?;
-    man.render_options_section(&mut page)?;
-    if command.get_subcommands().any(|command| !command.is_hide_set()) {
-        man.render_subcommands_section(&mut page)?;
-    }
+    man.render(&mut page)?;
     if let Some(help) = command.get_after_help() {
         notes(&help.to_string()).to_writer(&mut page)?;
-    }
-    if command.get_version().is_some() {
-        man.render_version_section(&mut page)?;
     }
     Ok(page)
 }

@@ -5,7 +5,11 @@ use std::time::Duration;
 
 use motorlink::rmd::MotorSet;
 use motorlink::st::{FullScale, MotorNumber, Profile};
+use motorlink_recording::record::Port;
+pub use motorlink_recording::write::Rotate;
+use motorlink_recording::write::{LEAST_ROTATION, LEAST_SIZE};
 
+use crate::failure::Failure;
 use crate::hint;
 use crate::span::{parse_rate, parse_span, span_up_to};
 
@@ -73,9 +77,19 @@ pub struct What {
     pub json: bool,
 }
 
-use motorlink_recording::write::{LEAST_ROTATION, LEAST_SIZE};
-
-pub use motorlink_recording::write::Rotate;
+impl What {
+    /// A port to record, with the motors that are named.
+    pub fn port(&self, name: &str) -> Result<Port, Failure> {
+        Ok(Port {
+            name: name.parse()?,
+            profile: self.profile,
+            timeout: self.timeout,
+            motors: self.motor.clone(),
+            ids: self.id.iter().copied().flatten().collect(),
+            full_scale: self.full_scale,
+        })
+    }
+}
 
 /// The units of sizes, and their bytes.
 const UNITS: [(&str, f64); 6] = [

@@ -8,8 +8,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use motorlink::rmd::MotorSet;
-use motorlink::st::MotorNumber;
 use motorlink_link::printable;
 use motorlink_recording::record::{Abort, Config, Line, Port, Progress, Recorder};
 use motorlink_recording::write::Output;
@@ -35,22 +33,13 @@ const ENOUGH: f64 = 0.99;
 const OTHERS: [&str; 6] = ["csv", "log", "asc", "pcapng", "svg", "png"];
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let of = |port: &String| RecordedPort { port: port.clone(), ..RecordedPort::default() };
-    let ports: Vec<RecordedPort> =
-        args.port.iter().filter(|port| !port.is_empty()).map(of).collect();
-    run_on(&ports, &args.what)
-}
-
-/// A port, and the motors that it is known to have.
-#[derive(Default)]
-pub struct RecordedPort {
-    pub port: String,
-    pub motors: Vec<MotorNumber>,
-    pub ids: MotorSet,
+    let ports = args.port.iter().filter(|port| !port.is_empty());
+    let ports = ports.map(|port| args.what.port(port)).collect::<Result<_, _>>()?;
+    run_on(ports, &args.what)
 }
 
 /// Records these ports.
-pub fn run_on(ports: &[RecordedPort], args: &What) -> Result<(), Failure> {
+pub fn run_on(ports: Vec<Port>, args: &What) -> Result<(), Failure> {
     // A reader of the output that stops reading must not stop the recording.
     output::never_wait(if args.json { output::missed } else { output::missed_text });
     let config = config(ports, args)?;
@@ -91,7 +80,7 @@ fn start(config: &Config) -> Result<Recorder, Failure> {
     started
 }
 
-fn config(ports: &[RecordedPort], args: &What) -> Result<Config, Failure> {
+fn config(ports: Vec<Port>, args: &What) -> Result<Config, Failure> {
     if ports.is_empty() {
         return Err(missing_port());
     }
@@ -104,21 +93,10 @@ fn config(ports: &[RecordedPort], args: &What) -> Result<Config, Failure> {
         return Err(Failure::usage(format!("a recording is an MCAP file, not .{ending}"))
             .trying("-o run.mcap, and then `motorlink convert` or `motorlink plot`"));
     }
-    let ids: MotorSet = args.id.iter().copied().flatten().collect();
-    let is_given = !args.motor.is_empty() || !ids.is_empty();
-    let port = |place: &RecordedPort| -> Result<Port, Failure> {
-        let name = place.port.parse()?;
-        let (motors, ids) = match is_given {
-            true => (args.motor.clone(), ids),
-            false => (place.motors.clone(), place.ids),
-        };
-        let (profile, timeout, full_scale) = (args.profile, args.timeout, args.full_scale);
-        Ok(Port { name, profile, timeout, motors, ids, full_scale })
-    };
     let words: Vec<String> =
         std::env::args().map(|word| pasteable::quoted(&word).to_string()).collect();
     Ok(Config {
-        ports: ports.iter().map(port).collect::<Result<_, _>>()?,
+        ports,
         clients: Vec::new(),
         signals: args.signals.clone(),
         period: args.rate.into(),

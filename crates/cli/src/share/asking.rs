@@ -74,23 +74,18 @@ impl Connection {
             if let Some(result) = self.ended.remove(&id) {
                 return result.map_err(|refusal| io::Error::other(refusal.message));
             }
-            while let Some(heard) = self.codec.hear().map_err(io::Error::other)? {
-                match heard {
-                    Heard::Ended(Ended { id, result }) => drop(self.ended.insert(id, result)),
-                    Heard::Text(Text::Closing { message }) => self.closing = Some(message),
-                    Heard::Text(_) | Heard::Data(_) => {}
-                }
-            }
-            if self.ended.contains_key(&id) {
-                continue;
-            }
-            match self.socket.read(&mut bytes)? {
-                0 => {
-                    let why = self.closing.take();
-                    let why = why.unwrap_or_else(|| "the share closed the connection".to_owned());
-                    return Err(io::Error::other(why));
-                }
-                count => self.codec.push(&bytes[..count]),
+            match self.codec.hear().map_err(io::Error::other)? {
+                Some(Heard::Ended(Ended { id, result })) => drop(self.ended.insert(id, result)),
+                Some(Heard::Text(Text::Closing { message })) => self.closing = Some(message),
+                Some(Heard::Text(_) | Heard::Data(_)) => {}
+                None => match self.socket.read(&mut bytes)? {
+                    0 => {
+                        let why = self.closing.take();
+                        let why = why.unwrap_or_else(|| "the share closed the connection".into());
+                        return Err(io::Error::other(why));
+                    }
+                    count => self.codec.push(&bytes[..count]),
+                },
             }
         }
     }
