@@ -131,7 +131,7 @@ def test_the_help_has_all_keys_and_those_that_are_sequences_do_what_it_says(benc
     terminal.press("esc")
     terminal.shows_no("any key closes this help")
     names = ("st0:1", "st0:2", "can0:1", "can0:2", "can0:3", "can0:4")
-    for key, row in (("down", 1), ("up", 0), ("end", 5), ("home", 0), ("page-down", 5), ("page-up", 0)):
+    for key, row in (("down", 1), ("up", 0), ("j", 1), ("k", 0), ("end", 5), ("home", 0), ("page-down", 5), ("page-up", 0)):
         terminal.press(key)
         terminal.shows(f">{names[row]}")
     terminal.press("end", "enter")

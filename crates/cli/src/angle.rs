@@ -44,14 +44,6 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_without_a_unit_is_refused_with_both_spellings() {
-        for number in ["90", "0", "-1.5"] {
-            let refused = parse_angle(number).unwrap_err();
-            assert_eq!(refused, format!("the unit is missing: write {number}deg or {number}rad"));
-        }
-    }
-
-    #[test]
     fn a_tolerance_is_not_negative() {
         assert_eq!(parse_tolerance("0rad"), Ok(0.0));
         assert!(parse_tolerance("-1rad").is_err());

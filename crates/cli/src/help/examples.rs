@@ -206,11 +206,4 @@ mod tests {
             );
         }
     }
-
-    #[test]
-    fn examples_fit_80_columns_in_help_and_in_a_manual_page() {
-        for line in EXAMPLES.iter().flat_map(|(_, example)| example.lines()) {
-            assert!(PROGRAM.len() + line.chars().count() <= 74, "{line}");
-        }
-    }
 }

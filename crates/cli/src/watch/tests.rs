@@ -485,21 +485,3 @@ fn keys_that_work_in_every_view_do_so() {
         assert_eq!(place.view, View::Motors);
     }
 }
-
-#[test]
-fn the_selection_stays_in_the_list() {
-    let mut place = Selection::new(2);
-    for (code, row) in [
-        (KeyCode::Up, 0),
-        (KeyCode::Char('j'), 1),
-        (KeyCode::Down, 1),
-        (KeyCode::Char('k'), 0),
-        (KeyCode::End, 1),
-        (KeyCode::Home, 0),
-        (KeyCode::PageDown, 1),
-        (KeyCode::PageUp, 0),
-    ] {
-        press(&mut place, code);
-        assert_eq!(place.row, row, "{code:?}");
-    }
-}
