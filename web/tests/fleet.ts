@@ -13,7 +13,6 @@ const SIGNALS = {
   st: ['STATUS', 'FLAGS', CLOCK, 'SPEED_MEAS', 'TORQUE_REF', 'TORQUE_MEAS', 'BUS_VOLTAGE', 'HEATS_TEMP'],
   rmd: [
     'temperature_celsius', 'iq_amps', 'speed_dps', 'encoder', 'multi_turn_angle_degrees', 'voltage_volts', 'errors',
-    'voltage_times_iq_va',
   ],
 };
 

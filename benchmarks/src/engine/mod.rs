@@ -111,9 +111,8 @@ fn polling(ports: &[Port], seconds: u32) -> Result<(Section, Vec<Goal>)> {
 - {BUSES} buses of {MOTORS_OF_BUS} RMD motors behind slcan adapters, and {ST_LINES} lines to ST
   drives with {MOTORS_OF_LINE} motors each. All ports are TCP on this machine. The drives are in another
   process.
-- An RMD motor is asked 0x9C and 0x9A at each instant. The product of its voltage and Iq is computed
-  from both. A motor of an ST drive is asked for one data segment of {registers} registers. Replies
-  are confirmed each 100 ms.
+- An RMD motor is asked 0x9C and 0x9A at each instant. A motor of an ST drive is asked for one data
+  segment of {registers} registers. Replies are confirmed each 100 ms.
 - {seconds} s. *Hz*: the least rate of a signal. *missing*: instants without a reply, of all exchanges.
   *lost*: records that a consumer lost.
 - An instant is missing if the machine gives the engine or the drives no core for 10 ms. Measure on

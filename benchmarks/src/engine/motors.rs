@@ -6,16 +6,9 @@ pub(super) const MOTORS_OF_BUS: u8 = 16;
 /// Lines to ST drives.
 pub(super) const ST_LINES: usize = 2;
 pub(super) const MOTORS_OF_LINE: u8 = 2;
-/// What is read of an RMD motor, and what is computed from it. The temperature is in both replies.
-pub(super) const QUANTITIES: [&str; 7] = [
-    "temperature_celsius",
-    "iq_amps",
-    "speed_dps",
-    "encoder",
-    "voltage_volts",
-    "errors",
-    "voltage_times_iq_va",
-];
+/// What is read of an RMD motor. The temperature is in both replies.
+pub(super) const QUANTITIES: [&str; 6] =
+    ["temperature_celsius", "iq_amps", "speed_dps", "encoder", "voltage_volts", "errors"];
 /// What is read of a motor of an ST drive.
 pub(super) const REGISTERS: [&str; 8] = [
     "STATUS",

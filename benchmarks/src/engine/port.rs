@@ -13,7 +13,7 @@ use motorlink_proto::st::{Command, Frame, MotorNumber, Parse, Profile, Request a
 use motorlink_telemetry::acquisition::{Acquisition, ConsumerId};
 use motorlink_telemetry::event::What;
 use motorlink_telemetry::line::{Line, Request, RmdLine, StLine};
-use motorlink_telemetry::plan::{Read, Wants};
+use motorlink_telemetry::plan::Wants;
 use motorlink_telemetry::runner::{Remote, Runner};
 use motorlink_telemetry::signal::{Motor, Signal};
 use motorlink_telemetry::subscription::{Full, Record, Subscription};
@@ -213,7 +213,7 @@ pub(super) fn count(
                     if since >= span.0 {
                         break;
                     }
-                    counted.replies += u64::from(!matches!(values.poll.read, Read::Derived(_)));
+                    counted.replies += 1;
                     for (signal, sample) in values.poll.signals.iter().zip(&values.samples) {
                         *counted.values.entry(*signal).or_default() += u64::from(sample.is_ok());
                     }

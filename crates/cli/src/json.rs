@@ -3,7 +3,6 @@
 use motorlink::rmd::{EncoderBits, Field, GearRatio, Meaning, Quantity, Scale};
 use motorlink::st::register::Unit;
 use motorlink::st::{Flags, FullScale, Reading, RegisterId};
-use motorlink_telemetry::signal::Derived;
 use serde_json::{Map, Value, json};
 
 use crate::failure::Failure;
@@ -63,11 +62,6 @@ impl Row {
     pub fn quantity(name: &str, value: f64, decimals: u8, unit: &str) -> Self {
         let text = format!("{value:.*} {unit}", usize::from(decimals));
         Row { name: name.to_owned(), text, value: quantity(value, decimals, unit) }
-    }
-
-    /// What is computed from two values of an RMD motor.
-    pub fn derived(derived: Derived, value: f64) -> Self {
-        Row::quantity(derived.short_name(), value, derived.decimals(), derived.unit())
     }
 
     /// An ST current: digits, and with the full scale also A.

@@ -1,7 +1,6 @@
 //! The engine of one line: signals for its consumers, commands in between, stops before all.
 
 mod completions;
-mod derivation;
 mod polling;
 mod rates;
 mod tally;
@@ -25,7 +24,6 @@ use crate::schedule::{
 };
 use crate::signal::{Motor, Signal};
 use crate::subscription::{Consumer, Subscription};
-use derivation::Derivation;
 
 pub use rates::Rate;
 pub use tally::{Counts, Tally};
@@ -59,7 +57,6 @@ pub struct Acquisition {
     clock: Clock,
     schedule: Schedule<Arc<Command>>,
     polls: Map<PollId, Arc<Poll>>,
-    derivations: Vec<Derivation>,
     last_poll: u32,
     consumers: Map<ConsumerId, Consumer>,
     /// Events that are told once the stops that they are about have gone out.
@@ -144,7 +141,6 @@ impl Acquisition {
             schedule: Schedule::new(line.rules()),
             line: StopsAtEnd(Some(line)),
             polls: Map::new(),
-            derivations: Vec::new(),
             last_poll: 0,
             consumers: Map::new(),
             untold: Vec::new(),
@@ -198,12 +194,10 @@ impl Acquisition {
 
     /// Sends these signals, and all events, to a subscription. What the drive refuses is said again.
     pub fn subscribe(&mut self, subscription: Subscription, wants: Wants) -> ConsumerId {
-        let sources = wants.keys().filter_map(|signal| signal.derived_from()).flatten();
-        let asked: BTreeSet<Signal> = wants.keys().copied().chain(sources).collect();
-        self.unfit.retain(|signal| !asked.contains(signal));
+        self.unfit.retain(|signal| !wants.contains_key(signal));
         self.refused.retain(|id, _| {
             let poll = self.polls.get(id);
-            poll.is_some_and(|poll| !poll.signals.iter().any(|it| asked.contains(it)))
+            poll.is_some_and(|poll| !poll.signals.iter().any(|it| wants.contains_key(it)))
         });
         self.last_consumer += 1;
         let id = ConsumerId(self.last_consumer);

@@ -8,7 +8,7 @@ use motorlink_proto::st::register::Access;
 use motorlink_proto::st::{MAX_PAYLOAD, MotorNumber, Profile, RegisterId, SEGMENT_REGISTERS};
 use motorlink_proto::time::Micros;
 
-use crate::signal::{Derived, Motor, Quantity, Signal, Source};
+use crate::signal::{Motor, Quantity, Signal, Source};
 
 /// The shortest period that anybody wants of each signal.
 pub type Wants = BTreeMap<Signal, Micros>;
@@ -37,8 +37,6 @@ pub enum Read {
     Command(Code),
     /// Asks whether the replies so far belong to their requests.
     Confirm,
-    /// Nothing is sent: the value comes from the replies to other reads.
-    Derived(Derived),
 }
 
 /// The polls of an ST drive.
@@ -103,51 +101,24 @@ fn chunks(mut registers: &[RegisterId]) -> impl Iterator<Item = &[RegisterId]> {
 
 /// The polls of the motors on a CAN bus. A read gives all its values. A value that several reads have
 /// is taken from one that is needed anyway.
-///
-/// The sources of derived values are read, too. They are read with the same period, the shortest of
-/// all, so that they always come from the same instants.
 pub fn rmd_polls(wants: &Wants) -> Vec<Poll> {
-    let mut motors: Map<MotorId, Wanted> = Map::new();
+    let mut motors: Map<MotorId, Vec<(Quantity, Micros)>> = Map::new();
     for (signal, period) in wants {
-        let Motor::Rmd(id) = signal.motor else { continue };
-        match signal.source {
-            Source::Quantity(quantity) => motors.entry(id).or_default().add(quantity, *period),
-            Source::Derived(derived) => {
-                let wanted = motors.entry(id).or_default();
-                for source in derived.sources() {
-                    wanted.add(source, *period);
-                    wanted.together.insert(source);
-                }
-            }
-            Source::Register(_) => {}
+        if let (Motor::Rmd(id), Source::Quantity(quantity)) = (signal.motor, signal.source) {
+            motors.entry(id).or_default().push((quantity, *period));
         }
     }
-    motors.into_iter().flat_map(|(id, wanted)| motor_polls(id, &wanted)).collect()
+    motors.into_iter().flat_map(|(id, quantities)| motor_polls(id, &quantities)).collect()
 }
 
-/// What is wanted of a motor.
-#[derive(Default)]
-struct Wanted {
-    quantities: Map<Quantity, Micros>,
-    /// The sources of derived values.
-    together: BTreeSet<Quantity>,
-}
-
-impl Wanted {
-    fn add(&mut self, quantity: Quantity, period: Micros) {
-        let shortest = self.quantities.entry(quantity).or_insert(period);
-        *shortest = (*shortest).min(period);
-    }
-}
-
-fn motor_polls(id: MotorId, Wanted { quantities, together }: &Wanted) -> Vec<Poll> {
+fn motor_polls(id: MotorId, quantities: &[(Quantity, Micros)]) -> Vec<Poll> {
     let codes = |quantity: Quantity| quantity.reads().map(|(code, _)| code);
-    let only = quantities.keys().filter(|quantity| codes(**quantity).count() == 1);
-    let needed: Vec<Code> = only.flat_map(|quantity| codes(*quantity)).collect();
+    let only = quantities.iter().filter(|(quantity, _)| codes(*quantity).count() == 1);
+    let needed: Vec<Code> = only.flat_map(|(quantity, _)| codes(*quantity)).collect();
     let motor = Motor::Rmd(id);
     let signal = |quantity| Signal { motor, source: Source::Quantity(quantity) };
     let mut polls: Vec<Poll> = Vec::new();
-    for (&quantity, &period) in quantities {
+    for &(quantity, period) in quantities {
         // The first read is the one with the most values.
         let code = codes(quantity).find(|code| needed.contains(code)).or(codes(quantity).next());
         let Some(code) = code else { continue };
@@ -164,26 +135,7 @@ fn motor_polls(id: MotorId, Wanted { quantities, together }: &Wanted) -> Vec<Pol
             }),
         }
     }
-    let is_source = |it: &Signal| together.iter().any(|source| *it == signal(*source));
-    let mut tied: Vec<&mut Poll> =
-        polls.iter_mut().filter(|poll| poll.signals.iter().any(is_source)).collect();
-    if let Some(shortest) = tied.iter().map(|poll| poll.period).min() {
-        tied.iter_mut().for_each(|poll| poll.period = shortest);
-    }
     polls
-}
-
-/// The derived values that are wanted, each with the period of the polls that read its sources. They
-/// send nothing.
-pub fn derived_polls(wants: &Wants, polls: &[Poll]) -> Vec<Poll> {
-    let poll = |signal: &Signal| {
-        let [first, _] = signal.derived_from()?;
-        let read = polls.iter().find(|poll| poll.signals.contains(&first))?;
-        let Source::Derived(derived) = signal.source else { return None };
-        let (motor, period) = (signal.motor, read.period);
-        Some(Poll { motor, period, read: Read::Derived(derived), signals: vec![*signal] })
-    };
-    wants.keys().filter_map(poll).collect()
 }
 
 #[cfg(test)]
@@ -213,7 +165,6 @@ mod tests {
                 Read::Segment(segment, _) => format!("segment {segment}"),
                 Read::Command(code) => format!("{:#04x}", u8::from(*code)),
                 Read::Confirm => "confirm".to_owned(),
-                Read::Derived(_) => "derived".to_owned(),
             };
             format!("{read} {} ms: {}", poll.period.0 / 1000, names.join(" "))
         };
@@ -235,32 +186,6 @@ mod tests {
         assert_eq!(texts(&polls), ["0x9a 10 ms: temperature_celsius voltage_volts"]);
         let polls = rmd_polls(&wants(rmd(1), &names[..1]));
         assert_eq!(texts(&polls), ["0x9c 10 ms: temperature_celsius"]);
-    }
-
-    #[test]
-    fn the_sources_of_a_derived_value_are_read_once_and_together() {
-        let both = ["0x9c 10 ms: iq_amps", "0x9a 10 ms: voltage_volts"];
-        let wanted = wants(rmd(1), &[("voltage_times_iq_va", FAST)]);
-        let polls = rmd_polls(&wanted);
-        assert_eq!(texts(&polls), both);
-        assert_eq!(texts(&derived_polls(&wanted, &polls)), ["derived 10 ms: voltage_times_iq_va"]);
-        // A source that is wanted anyway costs nothing more.
-        let names = [("voltage_times_iq_va", FAST), ("iq_amps", FAST), ("voltage_volts", SLOW)];
-        assert_eq!(texts(&rmd_polls(&wants(rmd(1), &names))), both);
-        // Another period would give other instants.
-        let names = [("voltage_times_iq_va", SLOW), ("speed_dps", FAST), ("encoder", SLOW)];
-        let wanted = wants(rmd(1), &names);
-        let polls = rmd_polls(&wanted);
-        assert_eq!(
-            texts(&polls),
-            ["0x9c 10 ms: iq_amps speed_dps encoder", "0x9a 10 ms: voltage_volts"]
-        );
-        assert_eq!(texts(&derived_polls(&wanted, &polls)), ["derived 10 ms: voltage_times_iq_va"]);
-        // Another motor is not concerned.
-        let mut other = wants(rmd(1), &[("voltage_times_iq_va", FAST)]);
-        other.extend(wants(rmd(2), &[("voltage_volts", SLOW)]));
-        assert_eq!(rmd_polls(&other).last().map(|poll| poll.period), Some(SLOW));
-        assert!(derived_polls(&wanted, &[]).is_empty());
     }
 
     #[test]

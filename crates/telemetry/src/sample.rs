@@ -11,7 +11,7 @@ use crate::signal::Signal;
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The integer that was read; the bits of a float that was read or computed.
+    /// The integer that was read; the bits of a float that was read.
     pub digits: i64,
     /// The value in the unit of the signal.
     pub value: f64,
@@ -31,26 +31,21 @@ impl Sample {
     pub fn told(value: f64) -> Self {
         Sample { digits: value.round() as i64, value }
     }
-
-    /// A value that no drive sent.
-    pub(crate) fn computed(value: f64) -> Self {
-        Sample { digits: value.to_bits() as i64, value }
-    }
 }
 
 /// Values, each or why it is not plausible.
 pub type Samples = Vec<Result<Sample, Implausible>>;
 
-/// The values of one reply, or what is computed from the replies of one instant.
+/// The values of one reply.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     /// The exchange, with the signals in the order of [`samples`](Self::samples).
     pub poll: Arc<Poll>,
     /// The instant that the exchange was planned for.
     pub instant: Instant,
-    /// When the request was sent. Of computed values: the first request.
+    /// When the request was sent.
     pub requested: Instant,
-    /// When the reply was complete. Of computed values: the last reply.
+    /// When the reply was complete.
     pub replied: Instant,
     /// The values.
     pub samples: Samples,

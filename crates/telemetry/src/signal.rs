@@ -33,33 +33,18 @@ pub enum Source {
     Register(RegisterId),
     /// A value in the replies of an RMD motor.
     Quantity(Quantity),
-    /// A value that is computed from two quantities of an RMD motor.
-    Derived(Derived),
 }
 
 /// A value in the replies of RMD motors: the index in the list of all quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Quantity(u8);
 
-/// A value that is computed from two quantities of the same RMD motor: the index in the list of all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Derived(u8);
-
 /// No signal has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownSignal {
     /// Of an RMD motor.
-    #[error("unknown quantity `{0}`: the quantities are {names}", names = listed(Quantity::all().map(Source::Quantity)))]
+    #[error("unknown signal `{0}`: the signals are {names}", names = names())]
     Quantity(String),
-    /// Of an RMD motor, neither a quantity nor derived.
-    #[error("unknown signal `{0}`: the signals are {names}", names = listed(of_rmd()))]
-    Rmd(String),
-    /// An ST drive does not tell enough to compute it.
-    #[error(
-        "{0} is a signal of RMD motors; an ST drive does not report its currents in A: read {power}",
-        power = RegisterId::MOTOR_POWER
-    )]
-    NotOfSt(Derived),
     /// Of an ST drive.
     #[error(transparent)]
     Register(#[from] UnknownRegister),
@@ -79,17 +64,13 @@ impl Motor {
 }
 
 impl Signal {
-    /// The signal of a motor with this name: that of a register, of a quantity such as `speed_dps`, or of
-    /// a derived value.
+    /// The signal of a motor with this name: that of a register, or of a quantity such as `speed_dps`.
     ///
     /// # Errors
     /// The motor has no such signal.
     pub fn named(motor: Motor, name: &str) -> Result<Self, UnknownSignal> {
         let source = match motor {
             Motor::St(_) => {
-                if let Some(derived) = Derived::named(name) {
-                    return Err(UnknownSignal::NotOfSt(derived));
-                }
                 let register = find_register(name)?;
                 let access = register.shape().map(|shape| shape.access);
                 if access == Some(Access::WriteOnly) {
@@ -97,18 +78,9 @@ impl Signal {
                 }
                 Source::Register(register)
             }
-            Motor::Rmd(_) => of_rmd()
-                .find(|source| source.to_string() == name)
-                .ok_or_else(|| UnknownSignal::Rmd(name.to_owned()))?,
+            Motor::Rmd(_) => Source::Quantity(Quantity::named(name)?),
         };
         Ok(Signal { motor, source })
-    }
-
-    /// The signals that a derived one is computed from.
-    pub fn derived_from(self) -> Option<[Signal; 2]> {
-        let Source::Derived(derived) = self.source else { return None };
-        let signal = |quantity| Signal { source: Source::Quantity(quantity), ..self };
-        Some(derived.sources().map(signal))
     }
 }
 
@@ -120,7 +92,7 @@ impl Source {
         };
         match motor {
             Motor::St(_) => RegisterId::all().filter(is_readable).map(Source::Register).collect(),
-            Motor::Rmd(_) => of_rmd().collect(),
+            Motor::Rmd(_) => Quantity::all().map(Source::Quantity).collect(),
         }
     }
 
@@ -131,7 +103,6 @@ impl Source {
                 register.shape().map_or("", |shape| shape.unit.quantity())
             }
             Source::Quantity(quantity) => quantity.read().1.scale.symbol,
-            Source::Derived(derived) => derived.unit(),
         }
     }
 }
@@ -141,7 +112,6 @@ impl fmt::Display for Source {
         match self {
             Source::Register(register) => register.fmt(f),
             Source::Quantity(quantity) => f.write_str(&quantity.name()),
-            Source::Derived(derived) => derived.fmt(f),
         }
     }
 }
@@ -149,13 +119,6 @@ impl fmt::Display for Source {
 impl Serialize for Source {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
-    }
-}
-
-impl fmt::Display for Derived {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let row = self.row();
-        write!(f, "{}_{}", row.name, row.suffix)
     }
 }
 
@@ -216,71 +179,6 @@ impl Quantity {
     }
 }
 
-impl Derived {
-    /// All of them.
-    pub fn all() -> impl Iterator<Item = Derived> {
-        (0..).map(Derived).zip(&DERIVED).map(|(derived, _)| derived)
-    }
-
-    /// The name without its unit.
-    pub fn short_name(self) -> &'static str {
-        self.row().name
-    }
-
-    /// The symbol of the unit.
-    pub fn unit(self) -> &'static str {
-        self.row().unit
-    }
-
-    /// Decimal places that are worth showing.
-    pub fn decimals(self) -> u8 {
-        self.row().decimals
-    }
-
-    /// The quantities that it is computed from.
-    pub fn sources(self) -> [Quantity; 2] {
-        self.row().sources.map(|name| Quantity::named(name).expect("a test finds all of them"))
-    }
-
-    /// Its value from those of its sources.
-    pub fn of(self, [first, second]: [f64; 2]) -> f64 {
-        (self.row().of)(first, second)
-    }
-
-    fn named(name: &str) -> Option<Self> {
-        Self::all().find(|derived| derived.to_string() == name)
-    }
-
-    fn row(self) -> &'static DerivedRow {
-        &DERIVED[usize::from(self.0)]
-    }
-}
-
-/// A value that is computed from two quantities.
-struct DerivedRow {
-    name: &'static str,
-    /// The unit in the full name.
-    suffix: &'static str,
-    unit: &'static str,
-    decimals: u8,
-    sources: [&'static str; 2],
-    of: fn(f64, f64) -> f64,
-}
-
-/// Each derived value once. Registers of ST drives are in none: s16A and s16V have no scale that the
-/// drive tells (docs/SPEC-NOTES.md S41), and MOTOR_POWER is the power.
-static DERIVED: [DerivedRow; 1] = [
-    // Not the electrical power: the voltage is that of the supply, and the windings get a part of it.
-    DerivedRow {
-        name: "voltage_times_iq",
-        suffix: "va",
-        unit: "VA",
-        decimals: 1,
-        sources: ["voltage_volts", "iq_amps"],
-        of: |voltage, iq| voltage * iq,
-    },
-];
-
 /// The reads that are repeated. Those with the most values come first.
 static READS: LazyLock<Vec<&'static CommandInfo>> = LazyLock::new(|| {
     let mut reads: Vec<_> = COMMANDS.iter().filter(|row| row.sampled).collect();
@@ -312,13 +210,9 @@ fn name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
     }
 }
 
-/// All signals of an RMD motor.
-fn of_rmd() -> impl Iterator<Item = Source> {
-    Quantity::all().map(Source::Quantity).chain(Derived::all().map(Source::Derived))
-}
-
-fn listed(sources: impl Iterator<Item = Source>) -> String {
-    sources.map(|source| source.to_string()).collect::<Vec<_>>().join(", ")
+/// The names of all quantities.
+fn names() -> String {
+    Quantity::all().map(Quantity::name).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -365,21 +259,6 @@ mod tests {
     }
 
     #[test]
-    fn every_derived_value_has_its_sources_and_a_unit() {
-        for derived in Derived::all() {
-            let [first, second] = derived.sources();
-            assert_ne!(first, second);
-            assert!(!derived.unit().is_empty() && !derived.to_string().ends_with('_'));
-        }
-        let motor = Motor::Rmd(MotorId::new(1).unwrap());
-        let product = Signal::named(motor, "voltage_times_iq_va").unwrap();
-        let Source::Derived(derived) = product.source else { panic!("{product:?}") };
-        assert_eq!(derived.sources().map(Quantity::name), ["voltage_volts", "iq_amps"]);
-        assert_eq!((derived.of([24.0, -1.5]), derived.unit()), (-36.0, "VA"));
-        assert_eq!(derived.short_name(), "voltage_times_iq");
-    }
-
-    #[test]
     fn a_read_has_the_quantities_of_its_reply() {
         let names =
             |code| -> Vec<String> { Quantity::of_read(code).map(Quantity::short_name).collect() };
@@ -413,14 +292,8 @@ mod tests {
         let unknown = Signal::named(rmd, "speed").unwrap_err().to_string();
         assert!(
             unknown.starts_with("unknown signal `speed`: the signals are temp")
-                && unknown.ends_with(", voltage_times_iq_va"),
+                && unknown.ends_with(", single_turn_angle_degrees"),
             "{unknown}"
-        );
-        let not_of_st = Signal::named(st, "voltage_times_iq_va").unwrap_err().to_string();
-        assert_eq!(
-            not_of_st,
-            "voltage_times_iq_va is a signal of RMD motors; an ST drive does not report its currents \
-             in A: read MOTOR_POWER"
         );
         let refused = Signal::named(st, "IQ_SPEEDMODE").unwrap_err().to_string();
         assert_eq!(refused, "IQ_SPEEDMODE can only be written");

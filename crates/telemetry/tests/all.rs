@@ -1,7 +1,6 @@
 //! One program of the tests that need none of their own: each more has to be linked.
 
 mod acquisition;
-mod derived;
 mod drives;
 mod engine;
 mod got;

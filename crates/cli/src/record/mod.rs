@@ -152,7 +152,7 @@ fn unknown(error: &UnknownSignal) -> Failure {
     match error {
         UnknownSignal::Register(_) => failure
             .trying("`motorlink st registers` lists the registers; put spaces between signals"),
-        UnknownSignal::Rmd(_) => {
+        UnknownSignal::Quantity(_) => {
             failure.trying("`motorlink st registers` lists the signals of ST drives")
         }
         _ => failure,

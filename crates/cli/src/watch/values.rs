@@ -29,7 +29,6 @@ impl Units {
         match source {
             Source::Register(register) => self.st.text(&self.reading(register, sample)),
             Source::Quantity(quantity) => self.row(quantity, sample).text,
-            Source::Derived(derived) => Row::derived(derived, sample.value).text,
         }
     }
 

@@ -116,6 +116,6 @@ mod tests {
         let signals: Vec<_> = group.motors.iter().map(|(_, signals)| signals.len()).collect();
         assert_eq!(signals, [1, 1]);
         let wrong = check(&motors(), &["sped".to_owned()]).unwrap_err();
-        assert!(matches!(wrong, UnknownSignal::Rmd(name) if name == "sped"));
+        assert!(matches!(wrong, UnknownSignal::Quantity(name) if name == "sped"));
     }
 }

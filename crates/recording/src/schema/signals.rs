@@ -157,9 +157,6 @@ fn doc(source: Source) -> String {
             register.text().map_or_else(String::new, |text| text.doc.to_owned())
         }
         Source::Quantity(_) => String::new(),
-        Source::Derived(derived) => {
-            derived.sources().map(Quantity::short_name).join(" times ").replace('_', " ")
-        }
     }
 }
 

@@ -77,8 +77,6 @@ impl Acquisition {
     fn doubt(&mut self, lane: Lane) {
         let since = self.confirmed.get(&lane).copied().unwrap_or_default();
         self.tell_each(lane, |motor| What::Doubtful(motor, since));
-        let motors = self.motors(lane);
-        self.derivations.iter_mut().for_each(|it| it.forget(|motor| motors.contains(&motor)));
         self.distrust(lane);
     }
 
@@ -94,8 +92,6 @@ impl Acquisition {
         self.is_open = false;
         self.answering.clear();
         self.tally.lost();
-        // It may be another drive after that.
-        self.derivations.iter_mut().for_each(|it| it.forget(|_| true));
         for (_, verdict) in self.schedule.closed(now) {
             match verdict {
                 Verdict::Command(id) => ended(id, Err(CommandError::Closed)),

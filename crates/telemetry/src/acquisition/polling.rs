@@ -5,15 +5,13 @@ use std::sync::Arc;
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
 
-use super::derivation::Derivation;
-use super::{Acquisition, ConsumerId};
+use super::Acquisition;
 use crate::event::What;
 use crate::line::{LineError, Reply};
-use crate::plan::{Poll, Read, Wants, derived_polls};
+use crate::plan::{Poll, Read, Wants};
 use crate::sample::{Samples, Values};
 use crate::schedule::{Lane, PollId};
 use crate::signal::{Motor, Signal};
-use crate::subscription::Consumer;
 
 /// For this time after a doubt, the values of each instant are confirmed: one more takes
 /// only those of its instant.
@@ -62,13 +60,8 @@ impl Acquisition {
                     let instant = self.instants.get(&lane).copied().unwrap_or(requested);
                     let values = Arc::new(Values { poll, instant, requested, replied, samples });
                     let anchor = self.schedule.first_instant().unwrap_or(instant);
-                    // What is computed from them comes first: then they complete their row.
-                    for derivation in &mut self.derivations {
-                        if let Some(computed) = derivation.take(&values) {
-                            pass(&mut self.consumers, anchor, derivation.id, &computed);
-                        }
-                    }
-                    pass(&mut self.consumers, anchor, id, &values);
+                    let consumers = self.consumers.iter_mut();
+                    consumers.for_each(|(_, consumer)| consumer.values(anchor, id, &values));
                 }
                 None => {
                     self.refuse(id, poll.signals.clone(), LineError::Reply);
@@ -89,12 +82,9 @@ impl Acquisition {
         }
     }
 
-    /// Tells that there are no values of these signals, and of what is computed from them.
-    fn refuse(&mut self, id: PollId, mut signals: Vec<Signal>, why: LineError) {
+    /// Tells that there are no values of these signals.
+    fn refuse(&mut self, id: PollId, signals: Vec<Signal>, why: LineError) {
         if self.refused.insert(id, signals.clone()).is_none() {
-            let derived = self.derivations.iter().filter(|it| it.needs(&signals));
-            let derived: Vec<_> = derived.flat_map(|it| it.poll.signals.clone()).collect();
-            signals.extend(derived);
             self.tell(What::Refused(signals, Arc::new(why)));
         }
     }
@@ -127,7 +117,6 @@ impl Acquisition {
             *shortest = (*shortest).min(*period);
         }
         let mut polls = self.line.polls(&wants);
-        self.derive(&wants, &polls);
         polls.extend(self.confirmations(&polls));
         let is_known = |poll: &Poll| self.polls.values().any(|known| **known == *poll);
         if polls.len() == self.polls.len() && polls.iter().all(is_known) {
@@ -162,19 +151,6 @@ impl Acquisition {
         true
     }
 
-    /// Computes the derived values that are wanted, from these polls.
-    fn derive(&mut self, wants: &Wants, polls: &[Poll]) {
-        let mut old = std::mem::take(&mut self.derivations);
-        for poll in derived_polls(wants, polls) {
-            let same = old.iter().position(|derivation| *derivation.poll == poll);
-            let derivation = same.map(|at| old.swap_remove(at)).or_else(|| {
-                self.last_poll += 1;
-                Derivation::new(PollId(self.last_poll), poll)
-            });
-            self.derivations.extend(derivation);
-        }
-    }
-
     /// A confirmation for each lane, at the rate of its fastest poll, but not too often on a good line.
     fn confirmations(&self, polls: &[Poll]) -> Vec<Poll> {
         let mut lanes: Map<Lane, Poll> = Map::new();
@@ -194,16 +170,6 @@ impl Acquisition {
         }
         lanes.into_iter().map(|(_, value)| value).collect()
     }
-}
-
-/// Passes values to the consumers that want them.
-fn pass(
-    consumers: &mut Map<ConsumerId, Consumer>,
-    anchor: Instant,
-    id: PollId,
-    values: &Arc<Values>,
-) {
-    consumers.iter_mut().for_each(|(_, consumer)| consumer.values(anchor, id, values));
 }
 
 /// The signals whose values are not plausible, and the reason for the first one.

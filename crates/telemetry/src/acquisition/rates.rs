@@ -15,12 +15,12 @@ pub struct Rate {
     pub asked: Micros,
     /// The period that the line carries, from measured exchanges.
     pub predicted: Micros,
-    /// Values a second, in the last second. Of a derived signal: those of its slower source.
+    /// Values a second, in the last second.
     pub achieved: f64,
 }
 
 impl Acquisition {
-    /// The rates of all signals that are read or computed.
+    /// The rates of all signals that are read.
     pub fn rates(&self) -> impl Iterator<Item = Rate> {
         let rate = |signal, asked, achieved| {
             let predicted = self.schedule.predicted_period(asked);
@@ -30,20 +30,10 @@ impl Acquisition {
             let is_refused = self.refused.get(id).is_some_and(|refused| refused.contains(signal));
             if is_refused { 0.0 } else { self.schedule.load().rate(*id) }
         };
-        let read = self.polls.iter().flat_map(move |(id, poll)| {
+        self.polls.iter().flat_map(move |(id, poll)| {
             let signals = poll.signals.iter();
             signals.map(move |signal| rate(*signal, poll.period, achieved(id, signal)))
-        });
-        let computed = self.derivations.iter().flat_map(move |derivation| {
-            let sources = self.polls.iter().flat_map(|(id, poll)| {
-                let sources = poll.signals.iter().filter(|it| derivation.needs(&[**it]));
-                sources.map(move |source| achieved(id, source))
-            });
-            let slower = sources.fold(f64::INFINITY, f64::min);
-            let poll = &derivation.poll;
-            poll.signals.iter().map(move |&signal| rate(signal, poll.period, slower))
-        });
-        read.chain(computed)
+        })
     }
 
     /// Whether each poll was answered once, so that the rates are predicted.

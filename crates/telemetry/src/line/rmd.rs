@@ -157,7 +157,7 @@ impl Line for RmdLine {
                 let (_, field) = quantity.reads().find(|(code, _)| code == read)?;
                 Some(Ok(Sample { digits: field.raw(data), value: field.value(data) }))
             }
-            Source::Register(_) | Source::Derived(_) => None,
+            Source::Register(_) => None,
         };
         poll.signals.iter().map(sample).collect()
     }

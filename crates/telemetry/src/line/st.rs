@@ -305,7 +305,7 @@ impl Line for StLine {
                 let values = segment_values(registers, payload)?;
                 Some(registers.iter().zip(values).map(|(it, bits)| sample(*it, bits)).collect())
             }
-            Read::Command(_) | Read::Confirm | Read::Derived(_) => None,
+            Read::Command(_) | Read::Confirm => None,
         }
     }
 }

@@ -58,11 +58,7 @@ fn programs_see_lines_and_signals_and_each_other() {
     let Ok(Answer::Lines { lines, latched_by: None }) = first.ask(Ask::Lines) else { panic!() };
     let names: Vec<_> = lines.iter().map(|it| (it.line.as_str(), it.protocol)).collect();
     assert_eq!(names, [("st0", Protocol::St), ("rmd0", Protocol::Rmd)]);
-    let wanted = [
-        ("st0", "SPEED_MEAS", "rpm"),
-        ("rmd0", "speed_dps", "°/s"),
-        ("rmd0", "voltage_times_iq_va", "VA"),
-    ];
+    let wanted = [("st0", "SPEED_MEAS", "rpm"), ("rmd0", "speed_dps", "°/s")];
     for (line, wanted, unit) in wanted {
         let answer = first.ask(Ask::Signals { line: line.to_owned() });
         let Ok(Answer::Signals { signals }) = answer else { panic!("{answer:?}") };
@@ -169,29 +165,6 @@ fn rows_of_a_line_that_repeats_replies_have_no_wrong_value() {
     }
     let told = viewer.events.iter().any(|it| it.event == EventKind::Doubtful);
     assert!(told, "a reply came twice");
-}
-
-#[test]
-fn a_computed_signal_is_a_group_of_its_own() {
-    let share = VirtualShare::new();
-    let (mut viewer, mut tuner) = (share.join("viewer"), share.join("tuner"));
-    let computed = "voltage_times_iq_va";
-    let signals = [("rmd0", 2, "iq_amps"), ("rmd0", 2, computed)];
-    viewer.ask(subscribing(&signals, 1000, false)).unwrap();
-    tuner.ask(turn(2, 360)).unwrap();
-    loop {
-        let (group, data) = viewer.data();
-        if group.columns[0].name == computed {
-            assert_eq!((group.columns.len(), group.columns[0].unit.as_str()), (1, "VA"));
-            // The motor accelerates.
-            if data.columns[2].iter().any(|value| value.abs() > 1.0) {
-                break;
-            }
-        }
-    }
-    let refused = viewer.ask(subscribing(&[("st0", 1, computed)], 10, false)).unwrap_err();
-    assert_eq!(refused.reason, Reason::Usage);
-    assert!(refused.message.ends_with("read MOTOR_POWER"), "{}", refused.message);
 }
 
 #[test]
