@@ -376,7 +376,7 @@ fn history(seed: u64) -> Result<(), String> {
     let mut done: Vec<String> = Vec::new();
     for _ in 0..STEPS {
         let (p, m) = (draw(&mut random, PROGRAMS), draw(&mut random, 3));
-        let what = draw(&mut random, 16);
+        let what = draw(&mut random, 17);
         if world.programs[p].is_none() {
             world.join(p);
             model.ending[p] = [Ending::Stop, Ending::Off, Ending::Nothing][draw(&mut random, 3)];
@@ -521,6 +521,24 @@ fn step(world: &mut World, model: &mut Model, (p, m, what): (usize, usize, usize
                 false => world.programs[p].as_mut().unwrap().lives = true,
             }
             format!("p{p} is frozen")
+        }
+        // A stop whose reply is lost with the line. It is sent again when the motor answers again.
+        15 => {
+            let ask = match ((p + m) % 2 == 0, is_st) {
+                (true, _) => Ask::Stop { motor: Some(name(m)) },
+                (false, true) => command(MOTORS[m], &[3, 2], false),
+                (false, false) => command(MOTORS[m], &[0x81, 0, 0, 0, 0, 0, 0, 0], false),
+            };
+            *world.drives.is_cut.lock().unwrap() = [true; 2];
+            let asked = world.ask(p, ask.clone());
+            *world.drives.is_cut.lock().unwrap() = [false; 2];
+            let confirmed = world.ask(p, command(MOTORS[m], &read(m), false));
+            world.run(3.0);
+            model.stop(m);
+            format!(
+                "p{p} stops {:?} on a line that is cut: {asked:?}, then reads: {confirmed:?}",
+                MOTORS[m]
+            )
         }
         // The share is killed, and started again.
         _ => {
