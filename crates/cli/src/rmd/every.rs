@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::{EventCan, FaultCan, PortName, TapCan};
+use motorlink::port::{EventCan, FaultCan, PortName, Tap};
 use motorlink::rmd::{Code, Error, EventClient, IDENTIFIERS, MotorId};
 use motorlink_link::fault::Faults;
 use motorlink_telemetry::line::RmdLine;

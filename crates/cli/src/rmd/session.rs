@@ -1,6 +1,6 @@
 //! An open bus, for all commands.
 
-use motorlink::port::{CanLink, FaultCan, PortName, TapCan};
+use motorlink::port::{CanLink, FaultCan, PortName, Tap};
 use motorlink::rmd::{
     Client, IDENTIFIERS, Limits, MotionStatus, Motor, MotorId, Options, Payload, Quantity,
 };
@@ -33,7 +33,7 @@ pub fn connect(
     let around = connection.around::<Box<dyn CanLink>>(
         Faults::on_can,
         |link, faults| Box::new(FaultCan::new(link, faults, IDENTIFIERS)),
-        |link| Box::new(TapCan::new(link, trace::frames())),
+        |link| Box::new(Tap::frames(link, trace::frames())),
     )?;
     let bus = Client::open_wrapped(port, around, options(motor, &units)?)?;
     let output = connection.output();

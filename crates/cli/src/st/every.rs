@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::port::{EventBytes, FaultBytes, PortName, TapBytes};
+use motorlink::port::{EventBytes, FaultBytes, PortName, Tap};
 use motorlink::st::{Error, EventClient, Profile, RegisterId};
 use motorlink_link::fault::Faults;
 use motorlink_telemetry::line::{LineError, StLine};
@@ -37,7 +37,7 @@ pub fn watch(
     let around = connection.around::<Box<dyn EventBytes>>(
         Faults::on_serial,
         |link, faults| Box::new(FaultBytes::new(link, faults)),
-        move |link| Box::new(TapBytes::new(link, trace::bytes(profile))),
+        move |link| Box::new(Tap::bytes(link, trace::bytes(profile))),
     )?;
     let line = StLine::new(EventClient::open_wrapped(port, around, options(drive))?);
     let line = match segment {

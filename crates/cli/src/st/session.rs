@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use motorlink::port::{ByteLink, FaultBytes, PortName, TapBytes};
+use motorlink::port::{ByteLink, FaultBytes, PortName, Tap};
 use motorlink::st::{
     Client, Error, Limits, Motor, Options, Profile, Reading, Recovery, RegisterId, Target,
 };
@@ -57,7 +57,7 @@ pub fn connect(
     let around = connection.around::<Box<dyn ByteLink>>(
         Faults::on_serial,
         |link, faults| Box::new(FaultBytes::new(link, faults)),
-        move |link| Box::new(TapBytes::new(link, trace::bytes(profile))),
+        move |link| Box::new(Tap::bytes(link, trace::bytes(profile))),
     )?;
     let client = Client::open_wrapped(port, around, options(drive))?;
     Ok(Session { client, has_speed_limit: drive.speed_limit.is_some(), view })

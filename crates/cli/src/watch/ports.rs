@@ -40,7 +40,8 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
                 ids.map(Motor::Rmd).collect()
             }
         };
-        Opened::new(text, config.open(protocol)?.engine, protocol, given, by)
+        let opened = config.open(protocol).map_err(|why| Failure::from(&why))?;
+        Opened::new(text, opened.engine, protocol, given, by)
     };
     protocols_of(&config.port).map(open).collect()
 }
