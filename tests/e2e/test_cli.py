@@ -68,3 +68,21 @@ def test_ports_lists_what_is_connected(run):
 def test_a_reader_that_has_enough_ends_the_program_quietly(piped, command):
     done = piped(command, "| head -n 2 >/dev/null", within=20)
     assert (done.code, done.err) == (0, "")
+
+
+def test_the_log_says_what_is_sent_and_results_stay(run):
+    words = ("st", "-p", "sim:", "get", "SPEED_MEAS")
+    quiet, told = run(*words).ended(0), run("--log", "debug", *words).ended(0)
+    assert (told.out, quiet.err) == (quiet.out, "")
+    assert re.search(r"T\S+Z DEBUG \S+: sends port=sim motor=1 request=reading SPEED_MEAS", told.err)
+    warned = run(*words, MOTORLINK_LOG="warn").ended(0)
+    assert warned.err == ""
+
+
+def test_the_log_of_a_share_says_who_joins_and_what_stops(start, run, sim, tmp_path):
+    socket = tmp_path / "share"
+    share = start("share", "-p", sim().st, "--at", f"unix:{socket}", MOTORLINK_LOG="info")
+    share.line(0)
+    run("st", "-p", f"share:{socket}/st0", "start").ended(0)
+    share.says("st0, motor 1: it confirmed the stop")
+    assert any(" joined" in line for line in share.err)

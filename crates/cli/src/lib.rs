@@ -27,6 +27,8 @@ mod help;
 mod hint;
 mod interrupt;
 mod json;
+#[cfg(feature = "log")]
+mod log;
 #[cfg(feature = "monitor")]
 mod monitor;
 #[cfg(feature = "fleet")]
@@ -72,6 +74,10 @@ use crate::failure::Failure;
 #[derive(Parser)]
 #[command(name = "motorlink", version, max_term_width = 100, after_help = help::EXIT_CODES)]
 struct Cli {
+    /// Print on stderr what happens on each line, up to this level
+    #[cfg(feature = "log")]
+    #[arg(long, env = "MOTORLINK_LOG", value_name = "LEVEL", value_parser = hint::one_of(&log::LEVELS))]
+    log: Option<tracing_subscriber::filter::LevelFilter>,
     #[command(subcommand)]
     command: Command,
 }
@@ -178,6 +184,8 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
             return error.exit_code().try_into().unwrap_or(2);
         }
     };
+    #[cfg(feature = "log")]
+    cli.log.into_iter().for_each(log::start);
     let result = match cli.command {
         Command::Demo(args) => demo::run(args),
         Command::Sim(args) => sim::run(args),

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Instant as Moment;
+use tracing::{debug, info};
 
 use crate::clock::Clock;
 use crate::port::PortError;
@@ -91,6 +92,7 @@ impl<L> Reopening<L> {
     /// Opens the port. The first attempt must succeed.
     pub fn open(name: &str, mut open: Opener<L>, back_off: BackOff) -> Result<Self, PortError> {
         let link = open()?;
+        debug!(port = name.trim_end_matches(':'), "opened");
         Ok(Reopening { open: Some(open), back_off, ..Self::over(name, link) })
     }
 
@@ -149,6 +151,7 @@ impl<L> Reopening<L> {
     /// busy device server accepts each connection and closes it.
     pub fn close(&mut self) {
         if self.link.take().is_some() {
+            info!(port = %self.name, "closed: it failed, or the far end hung up");
             self.trouble = PortError::Closed(self.name.to_string()).to_string();
         }
         let now = Instant::now();
@@ -167,6 +170,7 @@ impl<L> Reopening<L> {
     fn postpone(&mut self, error: &PortError) {
         self.trouble = error.to_string();
         self.wait = (self.wait * 2).clamp(self.back_off.first, self.back_off.cap);
+        info!(port = %self.name, again_in = ?self.wait, %error, "not opened");
         self.closed_until(Instant::now() + self.wait);
     }
 
@@ -186,6 +190,7 @@ impl<L> Reopening<L> {
             }
             match open() {
                 Ok(link) => {
+                    info!(port = %self.name, "opened again");
                     self.link = Some(link);
                     self.reopened = Some(Instant::now());
                     self.sign.show(Shown::Open);

@@ -16,6 +16,7 @@ use motorlink_proto::time::Micros;
 use parking_lot::Mutex;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
+use tracing::info_span;
 
 use crate::acquisition::{Acquisition, ConsumerId, Rate};
 use crate::event::CommandError;
@@ -82,7 +83,8 @@ impl Runner {
         let (tasks, inbox) = mpsc::channel();
         let engine = Engine { acquisition, waiting: HashMap::new() };
         let thread = std::thread::Builder::new().name(name.to_owned());
-        let thread = thread.spawn(move || engine.run(&inbox, woken))?;
+        let line = info_span!("line", name);
+        let thread = thread.spawn(move || line.in_scope(|| engine.run(&inbox, woken)))?;
         let place = Execution::Thread { tasks, wake: Arc::new(wake) };
         Ok(Runner { remote: Remote { clock: Clock::running(), place }, thread: Some(thread) })
     }

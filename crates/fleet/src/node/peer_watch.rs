@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use tracing::info;
 use zenoh::Wait;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::{Sample, SampleKind};
@@ -28,6 +29,7 @@ pub(super) fn follow(common: &Arc<Common>) -> zenoh::Result<()> {
     let seen = move |sample: Sample| {
         let run = key::run_of(sample.key_expr().as_str());
         let Some(run) = run.filter(|(_, boot)| *boot != follower.boot) else { return };
+        info!(node = %run.0, is_here = sample.kind() == SampleKind::Put, "another node");
         match sample.kind() {
             SampleKind::Put => follower.members.lock().came(run),
             SampleKind::Delete => follower.members.lock().went(run, follower.clock.now()),

@@ -8,6 +8,7 @@ use motorlink_telemetry::share::message::{Ask as ShareAsk, Request};
 use tokio::runtime::{Handle, Runtime};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::mpsc::{Receiver, channel};
+use tracing::info;
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::query::Query;
@@ -144,6 +145,7 @@ impl Common {
         motion: Option<f64>,
         asked: Receiver<Asked>,
     ) {
+        info!(program = name, "session opened");
         let why = match Program::connect(&self.share, &name).await {
             Err(error) => format!("the share of the node: {error}"),
             Ok((program, listener, _)) => {
@@ -168,6 +170,7 @@ impl Common {
                 served.serve(asked).await
             }
         };
+        info!(program = name, why, "session over");
         let mut sessions = self.sessions.lock();
         sessions.open.remove(&session);
         if sessions.over.len() >= REASONS {

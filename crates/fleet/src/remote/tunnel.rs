@@ -17,6 +17,7 @@ use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{sleep, timeout};
+use tracing::info;
 use zenoh::Session as Zenoh;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::Priority;
@@ -412,6 +413,7 @@ impl Tunnel {
     }
 
     async fn end(mut self, why: Option<String>) {
+        info!(node = %self.link.node, why, "no longer used");
         if let Some(message) = why
             && let Some(mut writer) = self.writer.take()
         {

@@ -14,6 +14,7 @@ use motorlink_telemetry::share::message as share;
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+use tracing::info;
 
 use super::share_link::{AGAIN, ShareLink};
 use super::state::{Settings, State};
@@ -39,6 +40,7 @@ struct Present<'s> {
 
 impl Drop for Present<'_> {
     fn drop(&mut self) {
+        info!(page = self.name, "left");
         self.page.end(Lapse::LetGo);
         self.tasks.iter().for_each(AbortHandle::abort);
         self.state.pages.lock().remove(&self.name);
@@ -57,6 +59,7 @@ pub async fn serve(state: Arc<State>, socket: WebSocket, role: Role) {
         Ok((program, listener, name)) => (Some((program, listener)), name, None),
         Err(error) => (None, own_name.clone(), Some(error.to_string())),
     };
+    info!(page = name, ?role, "joined");
     let (out, outgoing) = mpsc::channel(WAITING);
     let Settings { separate_share, opens_addresses, deadline, program } = &state.settings;
     let may = Permissions { role, opens_addresses: *opens_addresses };

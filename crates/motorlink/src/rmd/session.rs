@@ -14,6 +14,7 @@ use motorlink_proto::rmd::{
     TORQUE4_ID,
 };
 use motorlink_proto::time::{Instant, Micros};
+use tracing::debug;
 
 use super::asked::Asked;
 use super::held::HeldExchanges;
@@ -201,6 +202,7 @@ impl Session {
             return self.begin_held(id, asked);
         }
         let request = asked.request().unwrap_or_else(|| self.host.confirmation(id));
+        debug!(port = %self.port, motor = %id, request = %motorlink_proto::Hex(&request), "sends");
         self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {

@@ -11,6 +11,7 @@ use motorlink_proto::st::{
     Master, MotorNumber, Output, Profile, Recovery, RegisterId, Request, RequestError, SyncState,
 };
 use motorlink_proto::time::Instant;
+use tracing::debug;
 
 use super::error::{Target, advice, hint};
 use super::held::HeldExchange;
@@ -223,6 +224,7 @@ impl Session {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
+        debug!(port = %self.port, motor, request = %what, "sends");
         self.pending = PendingRequest { motor, what };
         self.before = self.master.counters();
         Ok(())
@@ -254,7 +256,7 @@ impl Session {
         let PendingRequest { motor, what } = self.pending;
         self.last.finished(outcome.as_ref().ok().map(|(_, size)| *size));
         let (port, target) = (Arc::clone(&self.port), Target(motor));
-        match outcome {
+        let concluded = match outcome {
             Ok((Some(value), _)) => {
                 self.account.acknowledged();
                 Ok(value)
@@ -277,7 +279,8 @@ impl Session {
                 let (what, hint) = (what.to_string(), advice(failure));
                 Err(Error::Failed { port, motor: target, request: what, failure, hint })
             }
-        }
+        };
+        concluded.inspect_err(|error| debug!("{error}"))
     }
 
     /// Whether the answer shows that the replies since the last confirmation match their requests. A

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use tracing::debug;
+
 use super::Acquisition;
 use crate::event::{Event, What};
 use crate::schedule::Lane;
@@ -22,6 +24,7 @@ impl Acquisition {
     }
 
     fn tell_event(&self, event: &Arc<Event>) {
+        debug!(what = ?event.what, "event");
         for consumer in self.consumers.values() {
             consumer.subscription.push(Record::Event(Arc::clone(event)));
         }

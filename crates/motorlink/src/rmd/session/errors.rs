@@ -33,12 +33,14 @@ impl Session {
         let port = Arc::clone(&self.port);
         let [code, ..] = self.pending[id.index()].request;
         let code = Code::from(code);
-        match error {
+        let failed = match error {
             proto::Failure::Altered => Error::Altered { port, motor: id, request: code },
             proto::Failure::Echo => Error::Echo { port, motor: id },
             proto::Failure::Foreign(dialect) => Error::Foreign { port, motor: id, dialect },
             proto::Failure::Quarantined => Error::Quarantined { port, motor: id },
             _ => Error::Timeout { port, motor: id, request: code },
-        }
+        };
+        debug!("{failed}");
+        failed
     }
 }

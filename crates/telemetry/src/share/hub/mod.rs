@@ -28,6 +28,7 @@ use std::sync::mpsc::{self, Receiver, Sender};
 
 use litemap::LiteMap as Map;
 use motorlink_proto::time::{Instant, Micros};
+use tracing::info;
 
 use super::event_text;
 use super::frame::Frame;
@@ -304,6 +305,7 @@ impl Hub {
     }
 
     fn publish(&mut self, event: Event) {
+        info!("{}", event.message);
         self.sessions.iter_mut().for_each(|(_, session)| session.tell(&event));
         self.log.push_back(event);
     }

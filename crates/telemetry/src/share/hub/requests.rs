@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use motorlink_proto::time::{Instant, Micros};
 use serde::Deserialize;
+use tracing::debug;
 
 use super::Hub;
 use super::completion_types::{Sent, WorkResult};
@@ -65,6 +66,7 @@ impl Hub {
                 return;
             }
             session.pending += 1;
+            debug!(program = session.name.as_deref(), id, ?ask, "request");
         }
         let answered = match (self.name(session), ask) {
             (None, Ask::Hello { protocol, name }) => self.hello(session, protocol, &name),
