@@ -74,9 +74,12 @@ def test_the_log_says_what_is_sent_and_results_stay(run):
     words = ("st", "-p", "sim:", "get", "SPEED_MEAS")
     quiet, told = run(*words).ended(0), run("--log", "debug", *words).ended(0)
     assert (told.out, quiet.err) == (quiet.out, "")
-    assert re.search(r"T\S+Z DEBUG \S+: sends port=sim motor=1 request=reading SPEED_MEAS", told.err)
+    assert re.search(r"T\S+Z DEBUG \S+: begins port=sim motor=1 request=reading SPEED_MEAS", told.err)
     warned = run(*words, MOTORLINK_LOG="warn").ended(0)
     assert warned.err == ""
+    # A stop is sent, whatever the variable says.
+    wrong = run("st", "-p", "sim:", "stop", MOTORLINK_LOG="loud").ended(0)
+    assert "MOTORLINK_LOG is off, error, warn, info or debug" in wrong.err
 
 
 def test_the_log_of_a_share_says_who_joins_and_what_stops(start, run, sim, tmp_path):

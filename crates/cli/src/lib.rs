@@ -74,9 +74,9 @@ use crate::failure::Failure;
 #[derive(Parser)]
 #[command(name = "motorlink", version, max_term_width = 100, after_help = help::EXIT_CODES)]
 struct Cli {
-    /// Print on stderr what happens on each line, up to this level
+    /// Print on stderr what happens on each line, up to this level [env: MOTORLINK_LOG]
     #[cfg(feature = "log")]
-    #[arg(long, env = "MOTORLINK_LOG", value_name = "LEVEL", value_parser = hint::one_of(&log::LEVELS))]
+    #[arg(long, value_name = "LEVEL", value_parser = hint::one_of(&log::LEVELS))]
     log: Option<tracing_subscriber::filter::LevelFilter>,
     #[command(subcommand)]
     command: Command,
@@ -185,7 +185,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         }
     };
     #[cfg(feature = "log")]
-    cli.log.into_iter().for_each(log::start);
+    log::start(cli.log);
     let result = match cli.command {
         Command::Demo(args) => demo::run(args),
         Command::Sim(args) => sim::run(args),

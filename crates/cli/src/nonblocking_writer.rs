@@ -58,6 +58,14 @@ impl NonblockingWriter {
         }
     }
 
+    /// Prints a line that is worth less than others: it leaves half of the places to them.
+    pub fn say_beside(&self, text: impl Display) {
+        match self.state.waiting.load(Ordering::SeqCst) < WAITING / 2 {
+            true => self.say(text),
+            false => drop(self.state.dropped.fetch_add(1, Ordering::SeqCst)),
+        }
+    }
+
     /// Whether the next line would not be dropped.
     pub fn has_room(&self) -> bool {
         self.state.waiting.load(Ordering::SeqCst) < WAITING

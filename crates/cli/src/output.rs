@@ -1,6 +1,6 @@
 //! Output: aligned rows for people, or one JSON object per line for programs.
 
-use std::io::{Write, stderr, stdout};
+use std::io::{IsTerminal, Write, stderr, stdout};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -30,6 +30,9 @@ static KEPT_ERROR: Mutex<Option<Failure>> = Mutex::new(None);
 
 /// Whether stderr has JSON, too.
 static JSON: AtomicBool = AtomicBool::new(false);
+
+/// Whether a view has the terminal.
+static HAS_VIEW: AtomicBool = AtomicBool::new(false);
 
 /// Where results go.
 #[derive(Debug, Clone, Copy)]
@@ -178,6 +181,19 @@ pub fn print_message(text: &dyn std::fmt::Display) {
         Some(messages) => messages.say(text),
         None => drop(writeln!(stderr(), "{}", safe(&text.to_string()))),
     }
+}
+
+/// Prints a line of the log on stderr: it takes no place of a message, and none on a view of a terminal.
+pub fn log(text: &dyn std::fmt::Display) {
+    let is_on_view = HAS_VIEW.load(Ordering::Relaxed) && stderr().is_terminal();
+    if let Some(messages) = MESSAGES.get().filter(|_| !is_on_view) {
+        messages.say_beside(text);
+    }
+}
+
+/// Whether a view has the terminal.
+pub fn show_view(is_shown: bool) {
+    HAS_VIEW.store(is_shown, Ordering::Relaxed);
 }
 
 /// Prints a failure on stderr; returns the exit code.

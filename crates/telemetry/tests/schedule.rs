@@ -419,6 +419,18 @@ fn stops_go_ahead_of_precautions_on_every_lane() {
 }
 
 #[test]
+fn a_quiet_stop_withdraws_no_command() {
+    for quiet in [Quiet::Again, Quiet::Precaution] {
+        let mut line = Line::new(SERIAL, taking(1_000));
+        line.command(0, "start", SECOND);
+        let stop = line.schedule.stop(line.now, Lane(0), "x", is("x"), |_| false, Some(quiet));
+        assert_eq!(stop.1, []);
+        line.run(50 * MILLISECOND);
+        assert!(line.at(&Event::Command("start")).is_some());
+    }
+}
+
+#[test]
 fn quiet_stops_on_a_silent_line_give_way_to_others_and_have_their_turns() {
     const QUIET: [&str; 4] = ["a", "b", "c", "d"];
     for quiet in [Quiet::Again, Quiet::Precaution] {

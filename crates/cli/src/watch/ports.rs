@@ -40,8 +40,9 @@ pub fn open(args: &Args, text: &str, by: &Arc<str>) -> Result<Vec<Opened>, Failu
                 ids.map(Motor::Rmd).collect()
             }
         };
-        let opened = config.open(protocol).map_err(|why| Failure::from(&why))?;
-        Opened::new(text, opened.engine, protocol, given, by)
+        let opened = config.open_around(protocol, (|line| line, |bus| bus));
+        let (_, engine) = opened.map_err(|why| Failure::from(&why))?;
+        Opened::new(text, engine, protocol, given, by)
     };
     protocols_of(&config.port).map(open).collect()
 }

@@ -16,6 +16,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGTSTP};
 
 use crate::failure::Failure;
+use crate::output;
 
 /// Time to end the view and the stops in progress.
 const END: Duration = Duration::from_secs(10);
@@ -49,6 +50,7 @@ impl Screen {
         };
         let (suspend, go_on) = (flag(SIGTSTP)?, flag(SIGCONT)?);
         std::thread::Builder::new().name("terminal".to_owned()).spawn(end_without_terminal)?;
+        output::show_view(true);
         let terminal = ratatui::try_init().inspect_err(|_| restore())?;
         Ok(Screen { terminal, suspend, go_on })
     }
@@ -168,6 +170,7 @@ impl Drop for Screen {
 /// Errors are ignored: the terminal may be closed.
 fn restore() {
     let _ = ratatui::try_restore();
+    output::show_view(false);
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use motorlink_telemetry::share::message::{
 use parking_lot::Mutex;
 use tokio::sync::{Mutex as AsyncMutex, watch};
 use tokio::time::{Instant, sleep, timeout};
-use tracing::warn;
+use tracing::debug;
 
 use crate::dead_man::Stops;
 use crate::drive::Drives;
@@ -163,7 +163,7 @@ impl ShareLink {
                 }
                 Err(error) => error,
             };
-            warn!(%why, "no connection to the share");
+            debug!(%why, "no connection to the share");
             self.joined.send_replace(Some(Err(why.to_string())));
             sleep(AGAIN).await;
         }

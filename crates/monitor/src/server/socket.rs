@@ -1,6 +1,5 @@
 //! The WebSocket of a page: texts of the page, and what the share and the server send to it.
 
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,6 +13,7 @@ use motorlink_telemetry::share::message as share;
 use tokio::sync::{mpsc, watch};
 use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+use tokio_util::task::AbortOnDropHandle;
 use tracing::info;
 
 use super::share_link::{AGAIN, ShareLink};
@@ -40,10 +40,10 @@ struct Present<'s> {
 
 impl Drop for Present<'_> {
     fn drop(&mut self) {
-        info!(page = self.name, "left");
         self.page.end(Lapse::LetGo);
         self.tasks.iter().for_each(AbortHandle::abort);
         self.state.pages.lock().remove(&self.name);
+        info!(page = self.name, "left");
     }
 }
 
@@ -183,18 +183,19 @@ enum LinkState {
     Down(Reconnecting),
 }
 
-/// Connects again and again. It goes on where it was whenever somebody waits for it.
-type Reconnecting = Pin<Box<dyn Future<Output = (Program, Listener)> + Send>>;
+/// Connects again and again, until it is dropped. It is a task of its own: while a page does not read,
+/// nobody would poll a future, and it may hold what a stop waits for.
+type Reconnecting = AbortOnDropHandle<(Program, Listener)>;
 
 fn reconnecting(link: Arc<ShareLink>, name: String) -> Reconnecting {
-    Box::pin(async move {
+    AbortOnDropHandle::new(tokio::spawn(async move {
         loop {
             if let Ok((program, listener, _)) = link.connect(&name).await {
                 return (program, listener);
             }
             sleep(AGAIN).await;
         }
-    })
+    }))
 }
 
 impl View {
@@ -221,20 +222,21 @@ impl View {
         let lost = match &mut self.state {
             LinkState::Up(listener) => match listener.next().await {
                 Ok(frame) => return message(page, frame),
-                Err(error) => {
-                    page.set_view(None);
-                    let (link, name) = (Arc::clone(&self.link), self.name.clone());
-                    self.state = LinkState::Down(reconnecting(link, name));
-                    Some(error.to_string())
-                }
+                Err(error) => Some(error.to_string()),
             },
-            LinkState::Down(coming) => {
-                let (program, listener) = coming.as_mut().await;
-                page.set_view(Some(program));
-                self.state = LinkState::Up(listener);
-                None
-            }
+            LinkState::Down(coming) => match coming.await {
+                Ok((program, listener)) => {
+                    page.set_view(Some(program));
+                    self.state = LinkState::Up(listener);
+                    None
+                }
+                Err(error) => Some(error.to_string()),
+            },
         };
+        if lost.is_some() {
+            page.set_view(None);
+            self.state = LinkState::Down(reconnecting(Arc::clone(&self.link), self.name.clone()));
+        }
         Message::Text(encode(&Text::Share { lost }).into())
     }
 }

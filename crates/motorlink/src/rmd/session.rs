@@ -202,7 +202,6 @@ impl Session {
             return self.begin_held(id, asked);
         }
         let request = asked.request().unwrap_or_else(|| self.host.confirmation(id));
-        debug!(port = %self.port, motor = %id, request = %motorlink_proto::Hex(&request), "sends");
         self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
@@ -210,6 +209,7 @@ impl Session {
             Err(RequestError::Quarantined { .. }) if waits => self.waiting.insert(id),
             Err(refused) => return Err(self.refused(refused)),
         }
+        debug!(port = %self.port, motor = %id, request = %motorlink_proto::Hex(&request), "begins");
         self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
         if waits || self.host.is_unknown(id) {
             self.insisting.insert(id);

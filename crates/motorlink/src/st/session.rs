@@ -224,7 +224,7 @@ impl Session {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
-        debug!(port = %self.port, motor, request = %what, "sends");
+        debug!(port = %self.port, motor, request = %what, "begins");
         self.pending = PendingRequest { motor, what };
         self.before = self.master.counters();
         Ok(())

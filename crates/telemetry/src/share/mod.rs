@@ -5,7 +5,8 @@
 //! [`server`] connects programs to it through a Unix socket. [`client_codec`] is a program without a socket,
 //! [`stream`] one that follows the motors of a line, [`port`] a line of a share as a port, [`address`] the
 //! way to a share. With the feature `tokio` `client` is a program that does not block, `motor_exchange` its
-//! requests to a motor, and `drive_values` and `drive_settings` read drives with them. [`command_kind`] reads the bytes of a command. [`port_config`] opens the ports
+//! requests to a motor, and `drive_values` and `drive_settings` read drives with them.
+//! [`command_kind`] reads the bytes of a command. [`port_config`] opens the ports
 //! of lines, [`scan`] asks what answers on others. [`event_text`] makes sentences of the events of an
 //! engine. [`wire`] keeps the frames of a line.
 
