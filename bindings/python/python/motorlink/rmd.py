@@ -35,7 +35,8 @@ from motorlink._apis import Blocking
 from motorlink._client import BlockingClient, PortLike, opens
 from motorlink._core import CanPort, RecordedClient
 from motorlink._core import RmdClient as Core
-from motorlink._rmd import RmdClient, RmdMotor, ScanResult
+from motorlink._rmd import RmdClient, ScanResult
+from motorlink._rmd_motor import RmdMotor
 from motorlink._rmd_table import *
 from motorlink._sampling import Sampling
 from motorlink._settings import Settings

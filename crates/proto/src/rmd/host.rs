@@ -36,33 +36,19 @@
 //! to a status question contains a voltage. If the question itself is received, the exchange ends
 //! with [`Failure::Echo`].
 
-use super::command::{Code, Command, ReadMotionStatus, ReadStatus, SetTorque};
+use super::command::{Code, Command, ReadStatus, SetTorque};
 use super::limits::Limits;
 use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Failure, Output, RequestError};
-use super::reply_trust::{Admitted, ReplyTrust, answers};
+use super::reply_trust::{Admitted, ReplyTrust, answers, question_behind};
+use super::slot::{DEFAULT_TIMEOUT, NEVER, Slot};
 use crate::can::CanFrame;
 use crate::time::{Instant, Micros};
 
-/// Default timeout of a reply. Real motors answer in 0.3 to 2 ms, and a USB adapter may delay a
-/// frame by 16 ms.
-pub const DEFAULT_TIMEOUT: Micros = Micros::from_millis(50);
 /// Default quarantine time: how long the host waits for a late reply after a timeout, and how long
 /// such a motor must be silent.
 pub const DEFAULT_QUARANTINE: Micros = Micros::from_millis(100);
-
-#[derive(Debug, Clone, Copy)]
-struct Slot {
-    /// The request; after its arrival the reply.
-    data: [u8; 8],
-    timeout: Micros,
-    deadline: Instant,
-    /// The failure so far. A timeout means that nothing was received instead of the reply.
-    failure: Failure,
-    trust: ReplyTrust,
-    limits: Limits,
-}
 
 /// The host's side of one bus.
 #[derive(Debug, Clone)]
@@ -88,22 +74,12 @@ pub struct Host {
     counters: Counters,
 }
 
-const NEVER: Instant = Instant(u64::MAX);
-
 impl Host {
     /// A host with the default times and no limits. Former hosts may have sent requests on this
     /// bus. If they did not, call [`trust`](Self::trust).
     pub const fn new() -> Self {
-        const IDLE: Slot = Slot {
-            data: [0; 8],
-            timeout: DEFAULT_TIMEOUT,
-            deadline: NEVER,
-            failure: Failure::Timeout,
-            trust: ReplyTrust::UNKNOWN,
-            limits: Limits { current: None, speed: None, angle: None },
-        };
         Host {
-            slots: [IDLE; MotorId::COUNT],
+            slots: [Slot::UNKNOWN; MotorId::COUNT],
             queued: MotorSet::EMPTY,
             queued_torque4: MotorSet::EMPTY,
             in_flight: MotorSet::EMPTY,
@@ -497,14 +473,6 @@ impl Host {
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {
         &mut self.slots[id.index()]
-    }
-}
-
-/// A status question whose reply has another code than the reply to `request`.
-pub fn question_behind(request: u8) -> [u8; 8] {
-    match answers(request, Code::ReadStatus.into()) {
-        true => ReadMotionStatus.encode(),
-        false => ReadStatus.encode(),
     }
 }
 

@@ -52,6 +52,7 @@ mod outcome;
 mod payload;
 mod reply;
 mod reply_trust;
+mod slot;
 mod way;
 
 pub use arrival::{
@@ -63,11 +64,13 @@ pub use describe::{Described, Direction, Subject, describe};
 pub use drive::{Drive, DriveConfig, Ignored, Mode, MotorControl, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
 pub use gear::{GearRatio, InvalidGearRatio};
-pub use host::{DEFAULT_QUARANTINE, DEFAULT_TIMEOUT, Host, question_behind};
+pub use host::{DEFAULT_QUARANTINE, Host};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
 pub use motor::{Dialect, IDENTIFIERS, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
 pub use outcome::{Counters, Failure, Output, RequestError};
 pub use payload::{Field, Meaning, Payload};
 pub use reply::*;
+pub use reply_trust::question_behind;
+pub use slot::DEFAULT_TIMEOUT;
 pub use way::Target;

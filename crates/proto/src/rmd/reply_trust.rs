@@ -11,7 +11,7 @@
 //! A motor without any exchange so far may have pending replies to a former host. It has to answer
 //! two questions, and then be silent for the quarantine time.
 
-use super::command::Code;
+use super::command::{Code, Command, ReadMotionStatus, ReadStatus};
 use crate::time::{Instant, Micros};
 
 /// Which late replies a motor may still send.
@@ -157,4 +157,12 @@ impl ReplyTrust {
 /// Whether a reply with the code `reply` answers a request with the code `request`.
 pub(super) fn answers(request: u8, reply: u8) -> bool {
     Code::from(request).is_answered_by(Code::from(reply))
+}
+
+/// A status question whose reply has another code than the reply to `request`.
+pub fn question_behind(request: u8) -> [u8; 8] {
+    match answers(request, Code::ReadStatus.into()) {
+        true => ReadMotionStatus.encode(),
+        false => ReadStatus.encode(),
+    }
 }

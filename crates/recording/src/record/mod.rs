@@ -10,6 +10,7 @@ mod followed;
 pub mod frames;
 mod joint;
 pub mod live;
+mod losses;
 mod open;
 mod recorder;
 mod settings;

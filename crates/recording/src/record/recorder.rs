@@ -17,14 +17,15 @@ use super::choice::{self, Group};
 use super::client::{Client, Lent};
 use super::content::{Content, Counts, Line};
 use super::followed::{self, Followed};
+use super::losses::Losses;
 use super::open::{Opened, Port, open};
 use super::settings;
 use super::topics::Topics;
 use super::track::Track;
 use super::wall::{DayInUse, wall_now};
 use crate::error::{RecordError, WriteError};
-use crate::schema::{self, Log, Loss, Severity, Time, drive, name, recording};
-use crate::write::{Attached, Entry, Output, Pairs, Queue, Series, Writer, Written};
+use crate::schema::{self, Log, Severity, Time, drive, name, recording};
+use crate::write::{Attached, Entry, Output, Pairs, Series, Writer, Written};
 
 /// How often messages are made of what came.
 pub(super) const TURN: Duration = Duration::from_millis(20);
@@ -38,9 +39,6 @@ const OF_SHARE: Duration = Duration::from_millis(250);
 
 /// How long it waits for them besides. A share that says nothing is given up earlier.
 const LAST: Duration = Duration::from_secs(5);
-
-/// Whom losses of the recorder itself concern, in events.
-const RECORDER: &str = "recorder";
 
 /// What is recorded.
 #[derive(Debug, Clone)]
@@ -292,25 +290,6 @@ fn tell(recorded: &[Recorded], writer: &Writer, losses: &Losses, began: Instant,
     take_means(recorded, &mut progress);
 }
 
-/// Messages that did not fit into the queue of the writer.
-#[derive(Default)]
-struct Losses {
-    known: u64,
-    told: u64,
-}
-
-impl Losses {
-    /// Says how many were lost, as soon as there is room to say it.
-    fn tell(&mut self, now: Time, queue: &Queue<Entry>) {
-        self.known = queue.lost();
-        let new = self.known - self.told;
-        let said = || Entry::message(Topics::EVENTS, now, &Loss::Messages.log(now, RECORDER, new));
-        if new > 0 && queue.has_room() && queue.push(said()) {
-            self.told = self.known;
-        }
-    }
-}
-
 fn await_confirmation(recorded: &mut [Recorded], writer: &Writer, losses: &mut Losses) {
     let began = Instant::now();
     let ends: Vec<_> = recorded.iter().map(Recorded::now).collect();
@@ -480,33 +459,4 @@ fn drive(
         }
     }
     entries.push(Entry::Metadata(drive::NAME.to_owned(), pairs));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::schema::Message;
-
-    #[test]
-    fn losses_are_written_once_there_is_room_again() {
-        let queue = Queue::new(1_000);
-        let mut losses = Losses::default();
-        let message = || Entry::Message { topic: 0, time: 0, data: vec![0; 300] };
-        let taken = (0..10).filter(|_| queue.push(message())).count();
-        losses.tell(Time(7), &queue);
-        let items = queue.take().items;
-        assert_eq!((losses.known, losses.told), (10 - taken as u64, 0));
-        assert_eq!(items.len(), taken);
-        losses.tell(Time(8), &queue);
-        losses.tell(Time(9), &queue);
-        let [Entry::Message { time: 8, data, .. }] = &Vec::from(queue.take().items)[..] else {
-            panic!("one event");
-        };
-        let log = Log::decode(data).unwrap();
-        assert_eq!(
-            (&*log.kind, &*log.name, log.severity),
-            ("lost_records", RECORDER, Severity::Error)
-        );
-        assert!(log.message.starts_with(&format!("{} messages are lost here", 10 - taken)));
-    }
 }

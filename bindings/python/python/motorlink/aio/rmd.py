@@ -21,7 +21,8 @@ from typing import Any, Union
 
 from motorlink._apis import Awaited
 from motorlink._core import RMD_SCAN_WIDTH, CanPort, RmdEventClient, RmdRequest, RmdSampling
-from motorlink._rmd import RmdClient, RmdMotor, ScanResult
+from motorlink._rmd import RmdClient, ScanResult
+from motorlink._rmd_motor import RmdMotor
 from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._settings import Settings
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
