@@ -15,7 +15,7 @@ use super::drive_settings::Tuned;
 use super::message::Reason;
 use super::motor_exchange::{ATTEMPTS, Exchanges, Target, is_refused_by_motor, is_worth_repeating};
 use crate::line::Request;
-use crate::signal::{Motor, Quantity};
+use crate::signal::{Motor, Quantity, Source};
 
 /// The heading of values that RMD motors measure.
 const MEASURED: &str = "Measured values";
@@ -63,7 +63,7 @@ impl Value {
     /// A value of a register of an ST drive.
     pub fn of_register(reading: Reading) -> Self {
         let name = reading.register.to_string();
-        let unit = reading.register.shape().map_or("", |shape| shape.unit.quantity()).to_owned();
+        let unit = Source::Register(reading.register).unit().to_owned();
         match reading.plausible() {
             Err(why) => Value { name, value: None, text: why.to_string(), unit },
             Ok(reading) => {
